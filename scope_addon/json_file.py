@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reading JSON files that people have written or edited."""
+"""Reading JSON files that people have written or edited, and maps, which Scope writes as JSON files itself."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from typing import Any
 
 from ..solver.errors import InputError
 from ..solver.loaders.regular_file import check_regular
+from .atomic_write import atomic_path, reason
+from .errors import OutputError
 
 LARGEST_JSON_BYTES = 1_000_000
 _LARGEST_WHOLE_NUMBER = 1 << 53  # that every reader of JSON holds exactly; 10**400 fits no float (RFC 7493, 2.2)
@@ -23,17 +25,55 @@ def read_json_object(path: Path, error: type[InputError], what: str, advice: str
     :raises InputError: as `error`, when the file cannot be read or is something else.
     """
     check_regular(path, error, what, LARGEST_JSON_BYTES)
-    article = "an" if what.startswith(tuple("aeiou")) else "a"
     try:
         text = path.read_text("utf-8-sig")  # some editors write a byte order mark
         content = json.loads(text, parse_int=_parse_whole_number)
     except OSError as failure:
         raise error(f"{path}: the {what} cannot be read ({failure.strerror}); choose another file") from failure
     except (ValueError, RecursionError) as failure:
-        raise error(f"{path} is not {article} {what}: it is not JSON ({failure}); {advice}") from failure
+        raise error(f"{path} is not {_article(what)} {what}: it is not JSON ({failure}); {advice}") from failure
     if not isinstance(content, dict):
-        raise error(f"{path} is not {article} {what}: it does not hold a JSON object; {advice}")
+        raise error(f"{path} is not {_article(what)} {what}: it does not hold a JSON object; {advice}")
     return content
+
+
+def load_map(path: Path, what: str) -> dict[str, Any]:
+    """Read what `save_map` wrote.
+
+    :param what: the map's kind, e.g. ``bone map``.
+    :raises InputError: the file cannot be read or is something else.
+    """
+    content = read_json_object(path, InputError, what, "choose one that Scope saved")
+    if content.get("format") != f"scope {what}" or content.get("version") != 1:
+        raise InputError(f"{path}: this JSON file is not a Scope {what}, version 1; choose another file")
+    return content
+
+
+def save_map(path: Path, what: str, **content: Any) -> None:
+    """Write a map as JSON, atomically. Only a map of its kind is overwritten, whatever it holds, or an empty file.
+
+    :param what: the map's kind, e.g. ``bone map``.
+    :raises OutputError: the file cannot be written, or is something else.
+    """
+    if path.is_file() and not _is_map_or_empty(path, what):
+        raise OutputError(f"{path} is not {_article(what)} {what}, so it is not overwritten; choose another name")
+    text = json.dumps({"format": f"scope {what}", "version": 1, **content}, indent=2, ensure_ascii=False)
+    try:
+        with atomic_path(path) as temporary:
+            temporary.write_text(text + "\n", encoding="utf-8")
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {reason(error)}") from error
+
+
+def _is_map_or_empty(path: Path, what: str) -> bool:
+    try:
+        return path.stat().st_size == 0 or read_json_object(path, InputError, what, "")["format"] == f"scope {what}"
+    except (OSError, InputError, KeyError):
+        return False
+
+
+def _article(noun: str) -> str:
+    return "an" if noun.startswith(tuple("aeiou")) else "a"
 
 
 def _parse_whole_number(digits: str) -> int:

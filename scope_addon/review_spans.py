@@ -14,9 +14,9 @@ from .motion import Motion
 FAR_SHARE = 0.03  # reprojection error above which a frame should be reviewed, as a share of the image's longer side
 LOW_CONFIDENCE = 0.35  # mean over the joints that keypoints determine
 REASONS = {
-    "unseen": "not visible, the pose is filled in",
-    "far": "large reprojection error, should be checked",
-    "unsure": "low confidence, should be checked",
+    "unseen": "not visible: the pose is filled in",
+    "far": "the body is far from the footage: check these frames",
+    "unsure": "low confidence: check these frames",
     "floor": "a foot is under the floor",
 }
 

@@ -116,17 +116,7 @@ def _checked(values: Mapping[str, Any]) -> LiveOptions:
         choose_camera(1, 1, focal_mm=values["focal_mm"], fov_deg=values["fov_deg"], calibration=values["calibration"])
     elif values["calibration"]:
         read_calibration(values["calibration"])
-    return LiveOptions(
-        values["live_quality"],
-        values["live_people"],
-        tuple(values["heights_m"]),
-        values["focal_mm"],
-        values["fov_deg"],
-        values["calibration"],
-        values["threads"],
-        values["provider"],
-        values["reconnect_s"],
-    )
+    return LiveOptions.of(values)
 
 
 def _outputs(values: Mapping[str, Any], body: Body, stack: ExitStack) -> list[Output]:

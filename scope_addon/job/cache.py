@@ -46,7 +46,7 @@ class Cache:
         """Return the finished capture with this key; None if there is none."""
         import json
 
-        from .messages import is_result  # loads numba
+        from .messages import is_result
 
         folder = self.root / "captures" / key
         try:
@@ -133,7 +133,7 @@ class Cache:
                 shutil.rmtree(folder, ignore_errors=True)
 
     def _not_writable(self, error: OSError) -> Exception:
-        from ..errors import OutputError  # imported here because it loads numba, which the preferences do not need
+        from ..errors import OutputError
 
         reason = error.strerror or error
         return OutputError(

@@ -8,19 +8,18 @@ includes the first estimates of focal length, shape and floor.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-import cv2
-
 from ...solver import Body
 from ..capture.camera.intrinsics import assumed_camera, choose_camera
 from ..capture.fitting.live_body import LiveBody
+from ..capture.fitting.stature import require_stature
 from ..capture.media.frame import Frame
+from ..capture.media.opencv_threads import opencv_in_one_thread
 from ..capture.perception.execution import Execution
 from ..capture.tracking.tracker import PeopleTracker
 from .clock import Clock
@@ -46,6 +45,21 @@ class LiveOptions:
     threads: int = 0
     provider: str = "auto"
     reconnect_s: float = 2.0
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any]) -> LiveOptions:
+        """Return the options from their values by name, as the command line and a request have them."""
+        return cls(
+            quality=values["live_quality"],
+            people=values["live_people"],
+            heights_m=tuple(values["heights_m"]),
+            focal_mm=values["focal_mm"],
+            fov_deg=values["fov_deg"],
+            calibration=Path(values["calibration"]) if values["calibration"] else None,
+            threads=values["threads"],
+            provider=values["provider"],
+            reconnect_s=values["reconnect_s"],
+        )
 
 
 class Output(Protocol):
@@ -96,6 +110,8 @@ def run_live(
 
     :raises ScopeError: an option is invalid, the source cannot be read, or an output failed.
     """
+    for height_m in options.heights_m:
+        require_stature(body, height_m)
     clock = clock or Clock()
     execution = Execution(options.provider)
     cores = os.cpu_count() or 1
@@ -105,7 +121,7 @@ def run_live(
     statistics = Statistics()
     reader = NewestFrame(source, clock, options.reconnect_s, listeners.say, listeners.received)
     stopped = False
-    with ThreadPoolExecutor(1, "scope-live-calibration") as executor, _opencv_in_one_thread(), reader:
+    with ThreadPoolExecutor(1, "scope-live-calibration") as executor, opencv_in_one_thread(), reader:
         try:
             _loop(reader, _Poses(source, body, options, tracker, executor, listeners), outputs, statistics, listeners)
         except KeyboardInterrupt:
@@ -186,14 +202,3 @@ def _loop(
             rate, counts = statistics.recent_rate, (reader.dropped, reader.received)
             presence = min((pose.presence for pose in found), key=list(Presence).index)  # of whoever is seen best
             listeners.progress(LiveProgress(presence, rate, median_ms, p95_ms, *counts))
-
-
-@contextmanager
-def _opencv_in_one_thread() -> Iterator[None]:
-    """Leave the cores to the networks and the reader."""
-    before = cv2.getNumThreads()
-    cv2.setNumThreads(1)
-    try:
-        yield
-    finally:
-        cv2.setNumThreads(before)

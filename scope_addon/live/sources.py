@@ -180,7 +180,8 @@ class CameraSource:
         path = f"/dev/video{device}" if isinstance(device, int) else device
         if sys.platform.startswith("linux") and not os.path.exists(path):
             found = sorted(str(p) for p in Path("/dev").glob("video*"))
-            raise VideoError(f"{self.name} does not exist; there are {', '.join(found) or 'no cameras'}")
+            advice = f"choose one of {', '.join(found)}" if found else "connect a camera, or choose a stream or a file"
+            raise VideoError(f"{self.name} does not exist; {advice}")
 
     def pictures(self, clock: Clock) -> Iterator[Picture]:
         """See `Source`.

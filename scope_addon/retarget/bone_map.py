@@ -3,14 +3,11 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from ...solver.errors import InputError
-from ..atomic_write import atomic_path, reason
-from ..errors import OutputError
-from ..json_file import read_json_object
+from ..json_file import load_map, save_map
 
 SIDED_PARTS = ("hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist")
 SPINE = ("spine1", "spine2", "spine3")
@@ -21,7 +18,7 @@ PARTS = (
     *(f"{side}_{part}" for side in ("left", "right") for part in (*SIDED_PARTS, *PHALANGES)),
 )
 REQUIRED = ("pelvis", *(f"{side}_{part}" for side in ("left", "right") for part in ("hip", "knee")))
-_FORMAT = "scope bone map"
+_KIND = "bone map"
 
 
 @dataclass
@@ -57,17 +54,11 @@ class BoneMap:
 def save_bone_map(bone_map: BoneMap, path: str | Path) -> None:
     """Write the map as JSON, atomically. Only a bone map is overwritten, or an empty file.
 
+    :raises InputError: the map could not be loaded again, see `BoneMap.check`.
     :raises OutputError: when the file cannot be written, or is something else.
     """
-    path = Path(path)
-    if path.is_file() and not _is_bone_map_or_empty(path):
-        raise OutputError(f"{path} is not a bone map, so it is not overwritten; choose another name")
-    text = json.dumps({"format": _FORMAT, "version": 1, "bones": bone_map.parts}, indent=2, ensure_ascii=False)
-    try:
-        with atomic_path(path) as temporary:
-            temporary.write_text(text + "\n", encoding="utf-8")
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {reason(error)}") from error
+    bone_map.check()
+    save_map(Path(path), _KIND, bones=bone_map.parts)
 
 
 def load_bone_map(path: str | Path) -> BoneMap:
@@ -76,10 +67,7 @@ def load_bone_map(path: str | Path) -> BoneMap:
     :raises InputError: when the file cannot be read or is not a valid map.
     """
     path = Path(path)
-    content = read_json_object(path, InputError, "bone map", "choose one that Scope saved")
-    bones = content.get("bones")
-    if content.get("format") != _FORMAT or content.get("version") != 1:
-        raise InputError(f"{path}: this JSON file is not a Scope bone map, version 1; choose another file")
+    bones = load_map(path, _KIND).get("bones")
     if not isinstance(bones, dict) or not all(is_name(bone) and is_name(part) for bone, part in bones.items()):
         raise InputError(f"{path}: 'bones' must be an object that maps bone names to body parts; correct the file")
     out = BoneMap(dict(bones))
@@ -88,14 +76,6 @@ def load_bone_map(path: str | Path) -> BoneMap:
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
     return out
-
-
-def _is_bone_map_or_empty(path: Path) -> bool:
-    """Return whether a file has the format of a bone map, whatever its version and bones, or has no content."""
-    try:
-        return path.stat().st_size == 0 or read_json_object(path, InputError, "bone map", "")["format"] == _FORMAT
-    except (OSError, InputError, KeyError):
-        return False
 
 
 def is_name(text: object) -> bool:

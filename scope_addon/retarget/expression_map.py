@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -15,13 +14,11 @@ from numpy.typing import NDArray
 
 from ...solver.errors import InputError
 from ...solver.names import EXPRESSIONS
-from ..atomic_write import atomic_path, reason
-from ..errors import OutputError
-from ..json_file import read_json_object
+from ..json_file import load_map, save_map
 from .bone_map import is_name
 
 LARGEST_FACTOR = 10.0
-_FORMAT = "scope expression map"
+_KIND = "expression map"
 _LEAST_ARKIT = 5  # keys with ARKit's names from which others, such as visemes, are left alone
 _BOTH_BLINK = {"eyeBlinkLeft": 0.5, "eyeBlinkRight": 0.5}
 _SMILE = {"mouthSmileLeft": 0.5, "mouthSmileRight": 0.5}
@@ -126,17 +123,11 @@ def guess_expression_map(keys: Iterable[str]) -> ExpressionMap:
 def save_expression_map(expression_map: ExpressionMap, path: str | Path) -> None:
     """Write the map as JSON, atomically. Only an expression map is overwritten, or an empty file.
 
+    :raises InputError: the map could not be loaded again, see `ExpressionMap.check`.
     :raises OutputError: when the file cannot be written, or is something else.
     """
-    path = Path(path)
-    if path.is_file() and not _is_expression_map_or_empty(path):
-        raise OutputError(f"{path} is not an expression map, so it is not overwritten; choose another name")
-    content = {"format": _FORMAT, "version": 1, "shape_keys": expression_map.keys}
-    try:
-        with atomic_path(path) as temporary:
-            temporary.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {reason(error)}") from error
+    expression_map.check()
+    save_map(Path(path), _KIND, shape_keys=expression_map.keys)
 
 
 def load_expression_map(path: str | Path) -> ExpressionMap:
@@ -145,10 +136,7 @@ def load_expression_map(path: str | Path) -> ExpressionMap:
     :raises InputError: when the file cannot be read or is not a valid map.
     """
     path = Path(path)
-    content = read_json_object(path, InputError, "expression map", "choose one that Scope saved")
-    if content.get("format") != _FORMAT or content.get("version") != 1:
-        raise InputError(f"{path}: this JSON file is not a Scope expression map, version 1; choose another file")
-    keys = content.get("shape_keys")
+    keys = load_map(path, _KIND).get("shape_keys")
     if not isinstance(keys, dict) or not all(is_name(key) and _are_factors(f) for key, f in keys.items()):
         raise InputError(
             f"{path}: 'shape_keys' must be an object that maps each shape key to expressions and factors; "
@@ -169,13 +157,6 @@ def _plain(key: str) -> str:
     if side and (name[side.start()] == "_" or side[1].isupper()):
         name = name[: side.start()] + ("left" if side[1].lower() == "l" else "right")
     return re.sub(r"[^a-z0-9]", "", name.lower())
-
-
-def _is_expression_map_or_empty(path: Path) -> bool:
-    try:
-        return path.stat().st_size == 0 or read_json_object(path, InputError, "expression map", "")["format"] == _FORMAT
-    except (OSError, InputError, KeyError):
-        return False
 
 
 def _are_factors(factors: object) -> bool:

@@ -74,6 +74,7 @@ def unregister() -> None:
     """Stop a running capture, live or not, and unregister everything."""
     capture_operators.end_capture()
     live_operators.end_live()
+    pin_tool.detach()
     compiled_solver.detach()
     translations.unregister()
     warm_up.detach()

@@ -51,6 +51,7 @@ class SCOPE_OT_export(ReportingOperator):
         ),
         default="SHOWN",
         description="What to export",
+        options={"SKIP_SAVE"},  # or what was exported last would be written under the selected capture's name
     )
     shape: EnumProperty(
         name="Shape",

@@ -111,6 +111,7 @@ def _build(scene: bpy.types.Scene, path: Path, imported: Imported, options: Buil
     """Build one motion and store it and its result with the scene."""
     from ..scene.build import build_scene
     from ..scene.packed_motion import pack_motion
+    from .capture.capture_job import rate_warnings
     from .capture.result import show_result
 
     motion, footage = imported.motion, None
@@ -121,7 +122,8 @@ def _build(scene: bpy.types.Scene, path: Path, imported: Imported, options: Buil
     options = replace(options, name=path.stem, with_camera=options.with_camera and seen)
     result = build_scene([motion], imported.body, footage, options)
     pack_motion(result.people[0].armature, motion.to_bytes())
-    report = {"warnings": [*imported.notes, *result.warnings]}
+    warnings = [*imported.notes, *rate_warnings(motion, options, result, "motion"), *result.warnings]
+    report = {"warnings": warnings}
     show_result(result.collection.scope_result, str(footage or ""), report, result)
     scene.scope.capture = result.collection
 

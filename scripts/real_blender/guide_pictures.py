@@ -16,11 +16,21 @@ PICTURES = {
     "preferences": ("11_preferences", (830, 36, 1518, 572)),
 }
 _SCALE = 0.6  # of wide pictures
+_MOST_BYTES = 60_000
 ROOT = Path(__file__).resolve().parents[2]
 
+made = []
 for name, (screenshot, (left, top, right, bottom)) in PICTURES.items():
-    picture = cv2.imread(str(ROOT / "build" / "screenshots" / f"{screenshot}.png"))[top:bottom, left:right]
+    whole = cv2.imread(str(ROOT / "build" / "screenshots" / f"{screenshot}.png"))
+    if whole is None:  # the part of ./scripts/blender that takes it was not run
+        continue
+    picture = whole[top:bottom, left:right]
     if picture.shape[1] > 1000:
         picture = cv2.resize(picture, None, fx=_SCALE, fy=_SCALE, interpolation=cv2.INTER_AREA)
-    cv2.imwrite(str(ROOT / "assets" / "guide" / f"{name}.jpg"), picture, [cv2.IMWRITE_JPEG_QUALITY, 85])
-print("The guide's pictures in assets/guide are new; look at them.")
+    for quality in range(85, 20, -5):
+        jpeg = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
+        if len(jpeg) <= _MOST_BYTES:
+            break
+    (ROOT / "assets" / "guide" / f"{name}.jpg").write_bytes(jpeg)
+    made.append(name)
+print(f"New in assets/guide: {', '.join(made)}. Look at them.")

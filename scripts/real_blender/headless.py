@@ -47,6 +47,14 @@ def one_clip() -> None:
     assert not list(OUT.glob("broken*")) + list(OUT.glob("wall*"))
 
 
+def without_a_video() -> None:
+    """Capture the sample clip, whose results are not for the folder of the clip, and import a motion."""
+    command("capture", *FAST, status=0)
+    assert {path.name for path in Path().glob("sample.*")} - {"sample.mp4"} == {"sample.npz", "sample.glb"}
+    command("import", "sample.npz", "-o", "out/imported.glb", status=0)
+    assert (OUT / "imported.glb").stat().st_size > 1000
+
+
 def name_that_is_not_utf8() -> None:
     """Capture a file with a name in Latin-1, at which OpenCV's functions crash."""
     clip = OUT / os.fsdecode(b"caf\xe9.mp4")
@@ -133,6 +141,7 @@ if __name__ == "__main__":
     subprocess.run(["convert", "-size", "320x240", "xc:gray", "clips/wall.png"], check=True)
     os.environ.pop("DISPLAY", None)
     one_clip()
+    without_a_video()
     name_that_is_not_utf8()
     damaged_code()
     folder()

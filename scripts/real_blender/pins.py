@@ -33,13 +33,14 @@ def listed() -> list[dict]:
     return json.loads(rig().get("scope_corrections", "[]"))
 
 
-def on_screen(joint: str) -> tuple[float, float]:
-    """Return where a joint is on the screen, in pixels from the top left."""
+def on_screen(joint: str, area: bpy.types.Area | None = None) -> tuple[float, float]:
+    """Return where a joint is on the screen, in pixels from the top left, by default in the first viewport."""
     here, armature = viewport(), rig()
     here["window"].view_layer.update()
     place = armature.matrix_world @ armature.pose.bones[joint].head
-    region = here["region"]
-    x, y = location_3d_to_region_2d(region, here["area"].spaces.active.region_3d, place)
+    area = area or here["area"]
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    x, y = location_3d_to_region_2d(region, area.spaces.active.region_3d, place)
     return region.x + x, here["window"].height - (region.y + y)
 
 
@@ -66,9 +67,9 @@ def drag(joint: str, by: tuple[int, int], name: str = "") -> Iterator[float]:
     yield 2.5
 
 
-def off(joint: str, target: tuple[float, float]) -> float:
+def off(joint: str, target: tuple[float, float], area: bpy.types.Area | None = None) -> float:
     """Return how far a joint is from a place on the screen, pixels."""
-    x, y = on_screen(joint)
+    x, y = on_screen(joint, area)
     return round(((x - target[0]) ** 2 + (y - target[1]) ** 2) ** 0.5, 2)
 
 
@@ -91,15 +92,76 @@ def steps() -> Iterator[float]:
     invoke(bpy.ops.scope.pin_limb, "INVOKE_DEFAULT")
     yield 1.0
     picture("pins_1_handles")
+    yield from hidden_by_its_button()
 
     was = on_screen("left_wrist")
     shoulder = on_screen("left_shoulder")
     by = round(0.3 * (shoulder[0] - was[0])), round(0.3 * (shoulder[1] - was[1]))  # where a bent arm reaches
     yield from dragged(was, by)
     yield from corrected(first, frame)
+    yield from disabled()
     missed = {k: v for k, v in report.items() if k.endswith("_px") and v > 2.5}
     (OUT / "pins.json").write_text(json.dumps(report))
     assert not missed, missed
+
+
+def tools() -> int:
+    """Return how often the tool runs."""
+    return [each.bl_idname for each in viewport()["window"].modal_operators].count("SCOPE_OT_pin_limb")
+
+
+def disabled() -> Iterator[float]:
+    """Disable the extension while the handles are shown."""
+    invoke(bpy.ops.scope.pin_limb, "INVOKE_DEFAULT")
+    x, y = on_screen("head")
+    xdotool(*move(x - 60, y), *move(x - 64, y))
+    yield 1.5
+    assert drawn("left_hip")
+    name = next(a.module for a in bpy.context.preferences.addons if a.module.endswith(".scope"))
+    bpy.ops.preferences.addon_disable(module=name)
+    xdotool(*move(x - 60, y), *move(x - 64, y))
+    yield 1.5
+    assert not drawn("left_hip"), "the handles stay when the extension is disabled"
+
+
+def drawn(joint: str, area: bpy.types.Area | None = None) -> bool:
+    """Return whether a white handle is drawn on a joint; the suit under it is dark."""
+    x, y = on_screen(joint, area)
+    place = f"3x3+{round(x) - 1}+{round(y) - 1}"
+    command = ["import", "-window", "root", "-crop", place, "-depth", "8", "rgb:-"]
+    return min(subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout) > 180
+
+
+def hidden_by_its_button() -> Iterator[float]:
+    """Press the tool's button again, which hides the handles, and once more, which shows them."""
+    for expected in (0, 1):
+        invoke(bpy.ops.scope.pin_limb, "INVOKE_DEFAULT")
+        x, y = on_screen("head")
+        xdotool(*move(x - 60, y), *move(x - 64, y))  # a tool ends at its next event
+        yield 1.5
+        assert tools() == expected, tools()
+        assert drawn("left_hip") == bool(expected)
+
+
+def dragged_in_side_view(joint: str, by: tuple[int, int]) -> Iterator[float]:
+    """Drag a handle in the view from the side, which pins the joint in space."""
+    use(bpy.ops.scope.side_view)
+    yield 2.0
+    area = next(a for a in viewport()["window"].screen.areas if a.type == "VIEW_3D" and a.spaces.active.lock_object)
+    assert drawn("left_hip")
+    assert drawn("left_hip", area)
+    before, (x, y) = len(listed()), on_screen(joint, area)
+    xdotool(*move(x - 3, y), *move(x, y), "mousedown", 1, "sleep", "0.3", *move(x + by[0] / 2, y + by[1] / 2))
+    yield 2.0
+    picture("pins_6_side_view")
+    xdotool(*move(x + by[0], y + by[1]), "mouseup", 1)
+    yield 3.0
+    assert [e["joint"] for e in listed()[before:]] == [joint], listed()
+    report["dragged_in_side_view_px"] = off(joint, (x + by[0], y + by[1]), area)
+    invoke(bpy.ops.ed.undo)
+    yield 1.0
+    use(bpy.ops.scope.side_view)
+    yield 1.0
 
 
 def dragged(was: tuple[float, float], by: tuple[int, int]) -> Iterator[float]:
@@ -134,6 +196,7 @@ def dragged(was: tuple[float, float], by: tuple[int, int]) -> Iterator[float]:
         yield 0.5
         report[f"smoothed_{strength}_px"] = off("left_wrist", target)
     yield from dragged_while_busy("left_ankle", (24, -20))
+    yield from dragged_in_side_view("right_wrist", (-20, -15))
     key("Escape")
     yield 1.0
 

@@ -20,6 +20,7 @@ from ..made_motion import made_motion
 from ..solver.compiled.small_package import make_package
 from .system_calls import FULL, KILL, NO_MEMORY
 
+ACTIONS = (KILL, FULL, NO_MEMORY)
 SAMPLE = Path(__file__).resolve().parents[2] / "assets" / "sample" / "sample.mp4"
 SCOPE, PROGRAM = "scope.scope_addon", "scope.tests.fuzz.programs"
 SIZES = 0.05  # by which a format may differ that states times
@@ -54,7 +55,7 @@ class Command(NamedTuple):
     outputs: tuple[str, ...]
     needs: tuple[str, ...]
     is_whole: IsWhole
-    actions: tuple[str, ...] = (KILL, FULL, NO_MEMORY)
+    actions: tuple[str, ...] = ACTIONS
     replaces: bool = True
     continues: bool = False
     tells: bool = True

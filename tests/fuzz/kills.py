@@ -15,12 +15,11 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 
-from .commands import CACHE, COMMANDS, INPUTS, Command
-from .system_calls import FULL, KILL, NO_MEMORY, Traced, traced
+from .commands import ACTIONS, CACHE, COMMANDS, INPUTS, Command
+from .system_calls import KILL, Traced, traced
 
 ROOT = Path(__file__).resolve().parents[2]
 OLD = b"an earlier result"
-ACTIONS = (KILL, FULL, NO_MEMORY)
 REMOVALS = ("unlink", "rmdir")  # what could not be removed, the next run removes
 FOLDERS = ("in", "out", "tmp", "clips", "home")
 SEEN = ("out", "tmp", "home")  # folders in which nothing may be left

@@ -60,7 +60,7 @@ def test_what_is_no_source_is_said(text, message):
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="devices of Linux")
 def test_a_camera_that_does_not_exist_is_said():
-    with pytest.raises(VideoError, match="camera 987 does not exist; there are"):
+    with pytest.raises(VideoError, match="camera 987 does not exist; (choose one of /dev|connect a camera)"):
         open_source("987")
 
 

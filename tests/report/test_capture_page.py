@@ -140,7 +140,7 @@ def test_warnings_are_marked_at_their_times(body):
 
 def test_frames_without_the_person_are_listed_and_marked(body):
     text = capture_page(clip(body, Path("a.mp4")), np.arange(FRAMES), [])
-    assert "not visible, the pose is filled in" in text
+    assert "not visible: the pose is filled in" in text
     mark = re.search(r'<rect class="span unseen" x="([\d.]+)"', text)
     assert mark is not None
     assert float(mark[1]) == pytest.approx(500)  # the fifth of nine frames

@@ -29,6 +29,7 @@ def test_a_motion_of_another_tool_is_built_and_listed(amass):
     result = scene.scope.result
     assert (result.collection.name, result.people, result.frames) == ("walk_poses", 1, len(MOTION))
     assert "Scope's own body" in result.warnings[0].text
+    assert "keeps its 24 frames/s, the motion has 120" in result.warnings[1].text
     armature = captured_armature(bpy.context)
     assert scene.render.fps == 24
     assert armature.animation_data.action.frame_range[1] == pytest.approx(1 + 24 * (len(MOTION) - 1) / 120, abs=0.01)
@@ -42,13 +43,14 @@ def test_a_motion_of_another_tool_is_built_and_listed(amass):
 def test_the_scenes_frame_rate_is_set_on_request(amass):
     bpy.ops.scope.import_motion(filepath=str(amass), set_rate=True)
     assert bpy.context.scene.render.fps == 120
+    assert not any("frames/s" in warning.text for warning in bpy.context.scene.scope.result.warnings)
 
 
 def test_our_own_file_has_its_camera_and_footage(footage):
     own = motion_of(walk(1.0))
     own.source = footage.name
     own.save(footage.with_name("own.npz"))
-    bpy.ops.scope.import_motion(filepath=str(footage.with_name("own.npz")))
+    bpy.ops.scope.import_motion(filepath=str(footage.with_name("own.npz")), set_rate=True)
     camera = next(obj for obj in bpy.data.objects if obj.type == "CAMERA")
     assert len(camera.data.background_images) == 1
     assert bpy.context.scene.scope.result.footage == str(footage)

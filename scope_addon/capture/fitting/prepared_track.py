@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver import Body, Floor, Measurements, Priors, Weights, default_priors
+from ....solver.loaders.body_file import CHILD_BELOW_M
 from ...kinematics.contact_points import CONTACT_POINTS, with_contact_points
 from ..camera.intrinsics import Camera
 from ..perception.lifter import Lifted, default_lifter
@@ -127,6 +128,8 @@ def prepare_track(
         body = with_keypoint_offsets(body)
     measurer, pixels = Measurer(body, camera.intrinsics), camera.undistort(track.keypoints_px)
     lifted = _lift(measurer, track, pixels, ablation)
+    if height_m is not None and height_m < CHILD_BELOW_M:  # the lifting network knows adults alone
+        lifted = lifted.scaled(height_m / body.stature())
     priors = replace(default_priors(body), joint_weights=joint_weights(body))
     priors = with_unknown_stature(priors, body) if height_m is None else with_stature(priors, body, height_m)
     prepared = PreparedTrack(body, track, measurer, pixels, lifted, priors, ablation.weights(WEIGHTS), camera=camera)

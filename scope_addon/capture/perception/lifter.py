@@ -57,6 +57,10 @@ class Lifted:
     sigma_across: NDArray[np.floating[Any]]
     sigma_along: NDArray[np.floating[Any]]
 
+    def scaled(self, scale: float) -> Lifted:
+        """Return the same keypoints of a person who is ``scale`` times as large."""
+        return Lifted(self.points * scale, self.sigma_across * scale, self.sigma_along * scale)
+
 
 def virtual_camera(rays: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
     """Calculate the rotation that brings the person onto the z axis.

@@ -4,13 +4,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,6 +23,7 @@ from ..fitting.focal_fits import FocalFits
 from ..fitting.live_body import LiveBody
 from ..media.exposure import AutoExposure
 from ..media.frame import Frame
+from ..media.opencv_threads import opencv_in_one_thread
 from ..media.video import Video
 from ..options import CaptureOptions, most_people
 from ..perception.adapters.description import description_path
@@ -94,7 +93,7 @@ def observe(
     )
     live = LiveBody(body, camera, options.ablation, next(iter(options.heights_m), None))
     fits = FocalFits(body, options.ablation)
-    with BackgroundEstimators(camera, video.width, video.height, live, fits) as background, _opencv_in_one_thread():
+    with BackgroundEstimators(camera, video.width, video.height, live, fits) as background, opencv_in_one_thread():
         tracker = _tracker(options, threads, execution, kept)
         network = tracker.mask_network if options.ablation.outline else None
         masks = MaskSchedule(network, video.expected_frames)
@@ -210,17 +209,6 @@ def _part_trackers(options: CaptureOptions, threads: int, execution: Execution) 
     hands = HandTracker(threads, execution=execution) if options.hands else None
     # The face's small layers take twice the processor time in two threads, which mostly wait for each other.
     return _Parts(hands, FaceTracker(1, execution=execution) if options.face else None)
-
-
-@contextmanager
-def _opencv_in_one_thread() -> Iterator[None]:
-    """Let whole stages run in parallel, where OpenCV's own threads would wait for one another."""
-    before = cv2.getNumThreads()
-    cv2.setNumThreads(1)
-    try:
-        yield
-    finally:
-        cv2.setNumThreads(before)
 
 
 def _no_person_error(path: Path, frames: int, own_networks: list[Path]) -> NoPersonError:

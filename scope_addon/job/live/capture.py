@@ -36,17 +36,7 @@ def capture_live(request: LiveRequest, job_folder: Path, send: Send, commands: C
 
     chosen = request.values
     source, body = open_source(request.source, online=request.online), load_body(chosen["body"])
-    options = LiveOptions(
-        chosen["live_quality"],
-        chosen["live_people"],
-        tuple(chosen["heights_m"]),
-        chosen["focal_mm"],
-        chosen["fov_deg"],
-        Path(chosen["calibration"]) if chosen["calibration"] else None,
-        chosen["threads"],
-        chosen["provider"],
-        chosen["reconnect_s"],
-    )
+    options = LiveOptions.of(chosen)
     clock = Clock()
     clock.stopped = commands.stopped
     with ExitStack() as stack:

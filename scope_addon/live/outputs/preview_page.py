@@ -94,7 +94,8 @@ class PreviewPage:
 
     def pictures(self) -> Iterator[bytes]:
         """Yield JPEG pictures until the capture ends."""
-        self._viewers += 1
+        with self._changed:  # a browser may ask twice at the same time
+            self._viewers += 1
         try:
             shown = -np.inf
             while not self._is_over.wait(INTERVAL_S):
@@ -107,9 +108,10 @@ class PreviewPage:
                     shown = max(pose.timestamp_s for pose in poses)
                     yield self._drawn(picture, poses)
         finally:
-            self._viewers -= 1
-            if not self._viewers:
-                self._pictures.clear()
+            with self._changed:
+                self._viewers -= 1
+                if not self._viewers:
+                    self._pictures.clear()
 
     def _newest_s(self) -> float:
         return max((pose.timestamp_s for pose in self._poses.values()), default=-np.inf)

@@ -14,10 +14,9 @@ from ..animation_data.actions import fcurves, read_keys, rewrite_keys
 from .animation import on_one_hemisphere
 from .root_object import parent_transform
 
-_TURNED = (
-    "scope_turned"  # custom property of the camera: JSON of where it was before the first turn, and after the last
-)
-_LARGEST = 1e9  # of a number of it
+# custom property of the camera: JSON of where it was before the first turn, and after the last
+_TURNED = "scope_turned"
+_LARGEST = 1e9  # of its numbers
 
 
 def turn_camera(

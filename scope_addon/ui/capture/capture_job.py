@@ -163,16 +163,25 @@ def build_capture(
     with window_shows(scene):
         result = build_scene(motions, load_body(body), footage if shows_footage else None, options)
     store_motions(result, [content for _, content in contents], body)
-    footage_rate = float(motions[0].mocap_framerate)
-    if options.frame_rate == "keep" and abs(footage_rate - result.frame_rate) > 0.01:
-        warnings.append(
-            f"{RATE_WARNING} {result.frame_rate:.5g} frames/s, the footage has {footage_rate:.5g}: keys lie "
-            "between frames; Set Frame Rate from Footage changes the scene's rate and moves them"
-        )
+    warnings += rate_warnings(motions[0], options, result)
     report = dict(report, warnings=[shown(warning) for warning in warnings + result.warnings])
     show_result(result.collection.scope_result, footage, report, result)
     scene.scope.capture = result.collection
     return result
+
+
+def rate_warnings(motion: Motion, options: BuildOptions, result: BuildResult, what: str = "footage") -> list[str]:
+    """Return the warning that a motion's keys lie between the frames of a scene that keeps its frame rate, if so.
+
+    :param what: has the other rate.
+    """
+    rate = float(motion.mocap_framerate)
+    if options.frame_rate != "keep" or len(motion) < 2 or abs(rate - result.frame_rate) <= 0.01:
+        return []
+    return [
+        f"{RATE_WARNING} {result.frame_rate:.5g} frames/s, the {what} has {rate:.5g}: keys lie between frames; Set "
+        "Frame Rate from Footage changes the scene's rate and moves them"
+    ]
 
 
 def capture_request(scene: bpy.types.Scene) -> JobRequest:

@@ -50,7 +50,7 @@ class SCOPE_OT_choose_footage(bpy.types.Operator):
     """Choose a video or image of a person"""
 
     bl_idname = "scope.choose_footage"
-    bl_label = "Choose Video or Picture"
+    bl_label = "Choose Footage"  # short: the button of the file browser shows it, too
     bl_options = {"UNDO"}
 
     filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})

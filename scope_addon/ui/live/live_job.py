@@ -261,9 +261,9 @@ def live_rig(scene: bpy.types.Scene, body: Body) -> LiveRig:
     """
     settings = scene.scope_retarget
     if settings.rig is None or settings.rig.name not in bpy.context.view_layer.objects:
-        raise UsageError("no rig is chosen that is in the scene's view layer; choose one, or switch off Rig")
+        raise UsageError("no rig of this scene's view layer is chosen; choose one, or switch off Rig Follows")
     if settings.rig.library is not None:
-        raise UsageError(f"'{settings.rig.name}' is linked; make an override of it, or switch off Rig")
+        raise UsageError(f"'{settings.rig.name}' is linked; make an override of it, or switch off Rig Follows")
     bones = listed_map(settings) if len(settings.pairs) else guess_bone_map(settings.rig)
     return LiveRig(settings.rig, body, bones, retarget_options(settings))
 

@@ -96,7 +96,7 @@ class SCOPE_PG_live(bpy.types.PropertyGroup):
         name="Play Scene",
         default=False,
         options=set(),
-        description="Play the scene's animation from the Start Frame while recording",
+        description="Play the scene's animation from the First Frame while recording",
     )
 
 

@@ -8,6 +8,7 @@ import bpy
 from ...scene.character.correction_list import listed_corrections
 from ..capture.capture_panel import Tab
 from ..captured_person import captured_armature, has_captured_person
+from .pin_tool import is_running
 
 _ICONS = {"PIN": "PINNED", "CONTACT": "SNAP_FACE", "EXCHANGE": "MOD_MIRROR", "UPRIGHT": "EMPTY_SINGLE_ARROW"}
 
@@ -29,7 +30,7 @@ class SCOPE_PT_corrections(Tab, bpy.types.Panel):
         layout, armature = self.layout, captured_armature(context)
         if armature is None:
             return
-        layout.operator("scope.pin_limb", icon="PINNED")
+        layout.operator("scope.pin_limb", icon="PINNED", depress=is_running())
         row = layout.row(align=True)
         for text, foot in (("Left Foot Stands", "left"), ("Right Foot Stands", "right")):
             row.operator("scope.foot_stands", text=text).foot = foot

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tool that pins limbs with the mouse: drag a handle to where the joint is in the picture, or in space."""
+"""The tool that pins limbs with the mouse: drag a handle to where the joint is in the picture, or in space.
+
+The handles are in every viewport of the file, so that what is dragged beside the footage can be checked, and dragged
+again, in the view from the side.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +20,10 @@ from ..captured_person import captured_armature
 from ..edit.edit_base import may_edit
 from ..reporting import iface_
 from ..view.comparison import camera_of
+from ..view.sidebar import redraw_sidebars
+from ..view.viewports import viewports
 from .correction_operators import last_pin_warnings
-from .drawing import draw_disc, draw_line, redraw_viewport, viewport_of
+from .drawing import draw_disc, draw_line, viewport_of
 from .pointer import Pointer
 
 _SIDED = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "foot")
@@ -33,13 +39,42 @@ class _Session:
     def __init__(self, armature: str, area: int) -> None:
         """Begin with no handle under the mouse.
 
-        :param area: its ``as_pointer``.
+        :param area: ``as_pointer`` of the viewport with the mouse.
         """
         self.armature, self.area = armature, area
         self.hovered = self.dragged = ""
         self.start: tuple[float, float] = (0.0, 0.0)
         self.mouse: tuple[float, float] = (0.0, 0.0)
         self.pointer = Pointer()
+        self._handler = bpy.types.SpaceView3D.draw_handler_add(_draw, (self,), "WINDOW", "POST_PIXEL")
+
+    def follow(self, active: bpy.types.Object | None) -> None:
+        """Show the handles of the active person, whom a click on the body may have changed."""
+        if active is not None and active.name != self.armature:
+            self.armature, self.hovered = active.name, ""
+            _redraw()
+
+    def end(self) -> None:
+        """Remove the handles; the modal operator ends at its next event."""
+        global _running
+        if _running is self:
+            _running = None
+            bpy.types.SpaceView3D.draw_handler_remove(self._handler, "WINDOW")
+        _redraw()
+
+
+_running: _Session | None = None
+
+
+def is_running() -> bool:
+    """Return whether the handles are shown."""
+    return _running is not None
+
+
+def detach() -> None:
+    """Remove the handles: Blender drops a modal operator whose class is unregistered without calling ``cancel``."""
+    if _running is not None:
+        _running.end()
 
 
 class SCOPE_OT_pin_limb(bpy.types.Operator):
@@ -56,25 +91,34 @@ class SCOPE_OT_pin_limb(bpy.types.Operator):
         return may_edit(cls, context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Show the handles."""
+        """Show the handles; hide them if they are shown."""
+        global _running
+        if _running is not None:
+            _running.end()
+            context.workspace.status_text_set(None)
+            return {"FINISHED"}
         armature = captured_armature(context)
         assert armature is not None  # checked by poll
-        self._session = _Session(armature.name, context.area.as_pointer())
-        draw = bpy.types.SpaceView3D.draw_handler_add
-        self._handler = draw(_draw, (self._session,), "WINDOW", "POST_PIXEL")
+        self._session = _running = _Session(armature.name, context.area.as_pointer())
         context.workspace.status_text_set(iface_(_HELP))
         context.window_manager.modal_handler_add(self)
-        context.area.tag_redraw()
+        _redraw()
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Follow the mouse."""
-        session, viewport = self._session, viewport_of(self._session.area)
+        session = self._session
+        if session is not _running:  # ended by its button
+            return {"FINISHED", "PASS_THROUGH"}
+        x, y = session.pointer.place(event)
+        if not session.dragged:
+            session.follow(captured_armature(context))
+            _move_to_viewport(session, context.window, (x, y))
+        viewport = viewport_of(session.area)
         if viewport is None or session.armature not in bpy.data.objects:
             self.cancel(context)
             return {"CANCELLED"}
         area, region = viewport
-        x, y = session.pointer.place(event)
         session.mouse = (x - region.x, y - region.y)
         inside = 0 <= session.mouse[0] < region.width and 0 <= session.mouse[1] < region.height
         if event.type == "MOUSEMOVE":
@@ -99,15 +143,14 @@ class SCOPE_OT_pin_limb(bpy.types.Operator):
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Remove the handles."""
-        bpy.types.SpaceView3D.draw_handler_remove(self._handler, "WINDOW")
+        self._session.end()
         context.workspace.status_text_set(None)
-        redraw_viewport(self._session.area)
 
     def _drop(self, context: bpy.types.Context, area: bpy.types.Area, region: bpy.types.Region) -> None:
         """Pin the dragged joint under the mouse, which is a step to undo of its own."""
         session = self._session
         joint, session.dragged, session.hovered = session.dragged, "", ""
-        area.tag_redraw()
+        _redraw()
         if math.dist(session.mouse, session.start) < _MOVED:
             return
         view = area.spaces.active.region_3d
@@ -117,6 +160,8 @@ class SCOPE_OT_pin_limb(bpy.types.Operator):
             return
         screen = at + Vector(session.mouse) - Vector(session.start)
         location = region_2d_to_location_3d(region, view, screen, was)
+        if (person := bpy.data.objects[session.armature]) != captured_armature(context):  # something else was selected
+            context.view_layer.objects.active = person
         in_image = view.view_perspective == "CAMERA" and context.scene.camera == camera_of(context.scene)
         try:
             bpy.ops.scope.add_pin("EXEC_DEFAULT", True, joint=joint, location=location, in_image=in_image)
@@ -125,6 +170,25 @@ class SCOPE_OT_pin_limb(bpy.types.Operator):
             return
         for warning in last_pin_warnings:
             self.report({"WARNING"}, warning)
+
+
+def _redraw() -> None:
+    """Redraw the viewports with the handles, and the panel with the tool's button."""
+    for _, area in viewports():
+        area.tag_redraw()
+    redraw_sidebars()
+
+
+def _move_to_viewport(session: _Session, window: bpy.types.Window, at: tuple[int, int]) -> None:
+    """Go on in the viewport under the mouse, if there is one.
+
+    :param at: pixels of the window.
+    """
+    for shown, area in viewports():
+        inside = 0 <= at[0] - area.x < area.width and 0 <= at[1] - area.y < area.height
+        if shown == window and inside and area.as_pointer() != session.area:
+            session.hovered, session.area = "", area.as_pointer()
+            _redraw()
 
 
 def _joint_positions(session: _Session) -> dict[str, Vector]:
@@ -147,11 +211,12 @@ def _nearest(session: _Session, area: bpy.types.Area, region: bpy.types.Region) 
 def _draw(session: _Session) -> None:
     """Draw the handles and this frame's pins."""
     context = bpy.context
-    if context.area is None or context.area.as_pointer() != session.area or context.region_data is None:
+    armature, space = bpy.data.objects.get(session.armature), context.space_data
+    if armature is None or context.area is None or context.region_data is None:
         return
-    armature = bpy.data.objects.get(session.armature)
-    if armature is None:
-        return
+    if space.local_view and not armature.evaluated_get(context.view_layer.depsgraph).local_view_get(space):
+        return  # only evaluated objects know in which local views they are
+    here = context.area.as_pointer() == session.area
     frame, scale = context.scene.frame_current, context.preferences.system.ui_scale
     pinned = {e["joint"] for e in listed_corrections(armature) if e["kind"] == "PIN" and e["first"] == frame}
     gpu.state.blend_set("ALPHA")
@@ -159,13 +224,13 @@ def _draw(session: _Session) -> None:
         at = location_3d_to_region_2d(context.region, context.region_data, place)
         if at is None:
             continue
-        if name == session.dragged:
+        if here and name == session.dragged:
             target = (at[0] + session.mouse[0] - session.start[0], at[1] + session.mouse[1] - session.start[1])
             draw_line([tuple(at), target], _LINE)
             draw_disc(target, 1.4 * _RADIUS * scale, _HOVERED)
         color = _HOVERED if name == session.hovered else _PINNED if name in pinned else _FREE
         draw_disc(tuple(at), (1.3 if name == session.hovered else 1.0) * _RADIUS * scale, color)
-        if name in (session.hovered, session.dragged):
+        if here and name in (session.hovered, session.dragged):
             blf.size(0, 13 * scale)
             blf.color(0, 1.0, 1.0, 1.0, 1.0)
             blf.position(0, at[0] + 14 * scale, at[1] + 8 * scale, 0)

@@ -110,9 +110,7 @@ class SCOPE_OT_save_expression_map(_FaceOperator, SaveMapOperator):
         """Write the list."""
         from ...retarget.expression_map import save_expression_map
 
-        listed = listed_expressions(settings)
-        listed.check()
-        save_expression_map(listed, path)
+        save_expression_map(listed_expressions(settings), path)
 
 
 class SCOPE_OT_load_expression_map(_FaceOperator, LoadMapOperator):

@@ -141,9 +141,7 @@ class SCOPE_OT_save_bone_map(_RigOperator, SaveMapOperator):
         """Write the list."""
         from ...retarget.bone_map import save_bone_map
 
-        listed = listed_map(settings)
-        listed.check()
-        save_bone_map(listed, path)
+        save_bone_map(listed_map(settings), path)
 
 
 class SCOPE_OT_load_bone_map(_RigOperator, LoadMapOperator):

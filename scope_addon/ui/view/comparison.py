@@ -46,8 +46,11 @@ def begin(context: bpy.types.Context, area: bpy.types.Area, collection: bpy.type
     """Show a capture over its footage in a viewport, without bones, which would cover the body."""
     space = area.spaces.active
     _show_alone(context, area, collection)
-    _had_bones[space.as_pointer()] = space.overlay.show_bones
+    _had_bones.setdefault(space.as_pointer(), space.overlay.show_bones)  # not again where another capture was compared
     space.overlay.show_bones = False
+    space.camera = (
+        context.scene.camera
+    )  # in local view, Blender keeps the camera of the capture that was compared before
     if space.region_3d.view_perspective != "CAMERA":
         with _in(context.window, area):
             bpy.ops.view3d.view_camera()
@@ -64,6 +67,8 @@ def end(window: bpy.types.Window, area: bpy.types.Area) -> None:
             bpy.ops.view3d.localview(frame_selected=False)
         if space.region_3d.view_perspective == "CAMERA":
             bpy.ops.view3d.view_camera()  # Blender's own toggle restores the previous view
+    if not space.use_local_camera:
+        space.camera = window.scene.camera  # leaving local view brings back the one from before it
 
 
 def side_area(screen: bpy.types.Screen) -> bpy.types.Area | None:

@@ -7,6 +7,7 @@ import bpy
 from bpy.props import IntProperty
 from mathutils import Matrix
 
+from ..captured_person import captured_people
 from ..reporting import ReportingOperator, rpt_, tip_
 from . import comparison
 from .comparison import camera_of, is_looking_through, is_side_view
@@ -81,6 +82,10 @@ class SCOPE_OT_look_through(bpy.types.Operator):
         camera.hide_viewport = False  # a hidden camera shows no footage
         camera.hide_set(False, view_layer=context.view_layer)
         set_resolution(scene, scene.scope.result.collection)
+        for other in [
+            obj for obj in captured_people(context) if obj.name not in scene.scope.result.collection.all_objects
+        ]:
+            hide_again(other, context.view_layer)  # it was compared before
         if not bpy.app.background and context.area and context.area.type == "VIEW_3D":
             comparison.begin(context, context.area, scene.scope.result.collection)
         redraw_sidebars_twice()

@@ -67,6 +67,17 @@ def _refit(prepared, first, stance) -> FittedTrack:
     return track_fit.fit_each_frame(measured, finished, lambda *_: None)
 
 
+def test_a_child_is_lifted_in_its_size():
+    """The same pixels of a person of 1.1 m: of a size that no person had whom the lifting network was trained on."""
+    body, camera = load_body("scope_child"), choose_camera(1080, 1920)
+    prepared = prepare_track(body, _standing_track(body, camera), camera, height_m=1.1)
+    ends = [KEYPOINT_NAMES.index(f"left_{joint}") for joint in ("hip", "knee", "ankle")]
+    leg = np.linalg.norm(np.diff(prepared.lifted.points[:, ends], axis=1), axis=2).sum(axis=1)
+    rest = body.rest_joints()[[body.joint_names.index(f"left_{joint}") for joint in ("hip", "knee", "ankle")]]
+    true = 1.1 / 1.695 * np.linalg.norm(np.diff(rest, axis=0), axis=1).sum()
+    np.testing.assert_allclose(leg, true, rtol=0.1)
+
+
 def test_the_lifting_network_runs_once_for_all_fits(monkeypatch):
     body, camera = load_body("scope"), choose_camera(1080, 1920)
     track = _standing_track(body, camera)

@@ -64,7 +64,7 @@ def test_a_result_is_built_shown_and_cached(fake_worker, footage):
     assert (result.people, result.frames, result.valid_frames) == (1, 10, 7)
     assert result.reprojection_px == pytest.approx(2.0)
     shown = [(w.text, w.spans) for w in result.warnings]
-    assert shown == [("A warning", ""), ("Not visible, the pose is filled in", "4-5,8")]
+    assert shown == [("A warning", ""), ("Not visible: the pose is filled in", "4-5,8")]
     assert result.collection == captures()[0]
     assert (scene.render.fps, scene.frame_start, scene.frame_end) == (25, 1, 10)
     assert job_files() == []

@@ -166,6 +166,15 @@ def test_only_the_active_capture_is_exported(fake_worker, footage, tmp_path):
         bpy.ops.scope.export(filepath=str(tmp_path / "none.bvh"), format="BVH", which="ACTIVE")
 
 
+def test_an_export_does_not_remember_that_the_last_one_wrote_another_capture_or_rig(fake_worker, footage, tmp_path):
+    captured(fake_worker, footage)
+    bpy.ops.scope.capture()
+    assert bpy.ops.scope.export.get_rna_type().properties["which"].is_skip_save
+    bpy.ops.scope.export("INVOKE_DEFAULT", filepath=str(tmp_path / "both.bvh"), format="BVH", which="ALL")
+    bpy.ops.scope.export("INVOKE_DEFAULT", filepath=str(tmp_path / "one.bvh"), format="BVH")
+    assert len(list(tmp_path.glob("one*.bvh"))) == 1
+
+
 def test_an_unwritable_export_is_an_error(fake_worker, footage, tmp_path):
     captured(fake_worker, footage)
     with pytest.raises(RuntimeError, match="does not exist"):

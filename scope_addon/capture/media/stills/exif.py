@@ -11,6 +11,7 @@ import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+PNG = b"\x89PNG\r\n\x1a\n"  # begins the file
 _ORIENTATION, _EXIF_DIRECTORY, _FOCAL_35MM = 0x0112, 0x8769, 0xA405  # tag numbers of the EXIF 2.3 standard
 _INTEGER = {3: "H", 4: "I"}  # TIFF field types SHORT and LONG
 
@@ -34,8 +35,8 @@ def read_exif(data: bytes) -> Exif:
 
 def animation_length(data: bytes) -> int:
     """Count the frames of an animated PNG or WebP; 1 for every other picture."""
-    if data[:8] == b"\x89PNG\r\n\x1a\n":
-        control = next((d for name, d in _png_chunks(data) if name == b"acTL"), b"")
+    if data.startswith(PNG):
+        control = next((content for name, content, _ in png_chunks(data) if name == b"acTL"), b"")
         return max(1, int.from_bytes(control[:4], "big"))
     if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
         return max(1, sum(name == b"ANMF" for name, _ in _riff_chunks(data)))
@@ -45,8 +46,8 @@ def animation_length(data: bytes) -> int:
 def _find_tiff(data: bytes) -> bytes:
     if data[:2] == b"\xff\xd8":
         return _jpeg_app1(data)
-    if data[:8] == b"\x89PNG\r\n\x1a\n":
-        return next((d for name, d in _png_chunks(data) if name == b"eXIf"), b"")
+    if data.startswith(PNG):
+        return next((content for name, content, _ in png_chunks(data) if name == b"eXIf"), b"")
     if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
         found = next((d for name, d in _riff_chunks(data) if name == b"EXIF"), b"")
         return found[6:] if found[:6] == b"Exif\0\0" else found
@@ -63,12 +64,15 @@ def _jpeg_app1(data: bytes) -> bytes:
     return b""
 
 
-def _png_chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """Iterate over the chunks of a PNG, stored as (size, name, data, checksum); yield name and data."""
-    at = 8
+def png_chunks(data: bytes) -> Iterator[tuple[bytes, bytes, int]]:
+    """Iterate over the chunks of a PNG, stored as (size, name, content, checksum).
+
+    :return: name, content, and the size that the content should have: it ends where the file does.
+    """
+    at = len(PNG)
     while at + 8 <= len(data):
         size = int.from_bytes(data[at : at + 4], "big")
-        yield data[at + 4 : at + 8], data[at + 8 : at + 8 + size]
+        yield data[at + 4 : at + 8], data[at + 8 : at + 8 + size], size
         at += 12 + size
 
 

@@ -7,6 +7,7 @@ OpenCV reads JPEG, PNG, WebP, TIFF, BMP and others. Its packages do not read AVI
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 from typing import Any, cast
 
@@ -19,12 +20,12 @@ from ....footage import MAX_PIXELS
 from ..file_names import utf8_name
 from ..frame_readers import decode_items
 from ..image_size import check_size, too_large
-from .exif import animation_length, read_exif
+from .exif import PNG, animation_length, png_chunks, read_exif
 from .heif import assemble, read_layout
 
 _JPEG_STREAMS = (".mjpeg", ".mjpg")  # begin like a JPEG, but are videos
 _HEIF_BRANDS = {b"mif1", b"heic", b"heix", b"heim", b"heis", b"avif"}  # of ISO 23008-12 and of AVIF
-_OPENEXR, _GIF, _PNG = b"v/1\x01", b"GIF8", b"\x89PNG\r\n\x1a\n"
+_OPENEXR, _GIF = b"v/1\x01", b"GIF8"
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ def read_picture(path: Path) -> Picture | None:
     data = path.read_bytes()
     if _brands(data[:64]) & _HEIF_BRANDS:
         return _read_heif(path, data)
-    if data.startswith(_PNG) and not _holds_its_chunks(data):
+    if data.startswith(PNG) and not _holds_its_chunks(data):
         return None  # OpenCV would take as much memory as the chunk claims
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
@@ -80,14 +81,9 @@ def read_picture(path: Path) -> Picture | None:
 
 
 def _holds_its_chunks(data: bytes) -> bool:
-    """Return whether no chunk of a PNG (length, name: 4 bytes each, content, CRC) claims more bytes than follow it."""
-    at = len(_PNG)
-    while at + 8 <= len(data) and data[at + 4 : at + 8] != b"IEND":
-        length = int.from_bytes(data[at : at + 4], "big")
-        if length > len(data) - at - 8:
-            return False
-        at += length + 12
-    return True
+    """Return whether no chunk of a PNG claims more bytes than follow it."""
+    chunks = takewhile(lambda chunk: chunk[0] != b"IEND", png_chunks(data))
+    return all(len(content) == size for _, content, size in chunks)
 
 
 def _brands(head: bytes) -> set[bytes]:

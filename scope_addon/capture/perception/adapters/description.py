@@ -12,7 +12,7 @@ from .....solver.errors import ModelFileError
 from ....json_file import read_json_object
 from .keypoint_sets import KEYPOINT_SETS
 
-_LARGEST = 1e30
+_LARGEST = 1e30  # of a number: networks get single precision
 
 
 @dataclass(frozen=True)

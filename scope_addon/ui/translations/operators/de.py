@@ -10,6 +10,7 @@ OPERATORS = {
     "Cancel Capture": "Erfassung abbrechen",
     "Cancel Live Capture": "Live-Erfassung abbrechen",
     "Capture": "Erfassen",
+    "Choose Footage": "Filmmaterial wählen",
     "Choose Video or Picture": "Video oder Bild wählen",
     "Clear Cache": "Cache leeren",
     "Compare with Footage": "Mit Filmmaterial vergleichen",

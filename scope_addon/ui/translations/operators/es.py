@@ -10,6 +10,7 @@ OPERATORS = {
     "Cancel Capture": "Cancelar captura",
     "Cancel Live Capture": "Cancelar la captura en vivo",
     "Capture": "Capturar",
+    "Choose Footage": "Elegir filmación",
     "Choose Video or Picture": "Elegir video o imagen",
     "Clear Cache": "Vaciar caché",
     "Compare with Footage": "Comparar con la filmación",

@@ -10,6 +10,7 @@ OPERATORS = {
     "Cancel Capture": "取消捕捉",
     "Cancel Live Capture": "取消实时捕捉",
     "Capture": "捕捉",
+    "Choose Footage": "选择素材",
     "Choose Video or Picture": "选择视频或图片",
     "Clear Cache": "清除缓存",
     "Compare with Footage": "与素材对比",

@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What an animator meets around captures, in a Blender with a window: two captures compared, rates, rigs, files.
+
+Usage: ``blender --python details.py -- VIDEO OUT_FOLDER``
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+from session import FOOTAGE, OUT, captured, invoke, picture, press, run, show_tab, use, viewport
+
+# On a screen of 1600 x 1000, of which a laptop of 1366 x 768 shows the first 768 pixels, with two captures in the list.
+FBX_BUTTON, RAW_BUTTON, FOLD = (1090, 453), (1085, 622), 768
+STILL, LOW = OUT / "still.npz", OUT / "low.npz"
+FRAMES, RATE = 120, 60.0
+report: dict[str, object] = {}
+
+
+def space() -> bpy.types.SpaceView3D:
+    """Return the first viewport's settings."""
+    return viewport()["area"].spaces.active
+
+
+def select(take: str) -> None:
+    """Select a capture in the list."""
+    bpy.context.scene.scope.capture_index = bpy.data.collections.find(take)
+
+
+def warnings() -> list[str]:
+    """Return the warnings that the panel shows."""
+    return [warning.text for warning in bpy.context.scene.scope.result.warnings]
+
+
+def two_captures() -> Iterator[float]:
+    """Capture a clip twice, the second time from the cache, in a scene with another frame rate than the clip."""
+    scene = bpy.context.scene
+    scene.render.fps, scene.scope.quality, scene.scope.frame_rate = 20, "FAST", "KEEP"
+    bpy.ops.scope.choose_footage(filepath=FOOTAGE)
+    for take in ("first", "second"):
+        scene.scope.take = take
+        yield from captured()
+        assert scene.scope.result.collection.name == take
+        assert any("keeps its 20 frames/s, the footage has" in text for text in warnings()), warnings()
+
+
+def compared() -> Iterator[float]:
+    """Compare one capture, then the other, without leaving the first: its own camera, no bones, its own side view."""
+    assert space().overlay.show_bones
+    for take in ("first", "second"):
+        select(take)
+        use(bpy.ops.scope.look_through)
+        yield 1.0
+        seen_by = space().camera
+        assert seen_by.name in bpy.data.collections[take].all_objects, (take, seen_by.name)
+        assert bpy.context.scene.camera == seen_by
+        assert not space().overlay.show_bones
+    picture("30_second_compared")
+    use(bpy.ops.scope.side_view)
+    yield 1.0
+    followed = [area.spaces.active.lock_object for area in bpy.context.window_manager.windows[0].screen.areas
+                if area.type == "VIEW_3D" and area.spaces.active.lock_object]  # fmt: skip
+    assert [person.name in bpy.data.collections["second"].all_objects for person in followed] == [True], followed
+    use(bpy.ops.scope.look_through)
+    yield 1.0
+    assert space().overlay.show_bones, "the bones are still hidden after two comparisons"
+    assert space().local_view is None
+    assert sum(area.type == "VIEW_3D" for area in bpy.context.window_manager.windows[0].screen.areas) == 1
+    report["compared"] = "each through its own camera"
+
+
+def above_the_fold() -> Iterator[float]:
+    """Press an export and a refinement where a laptop's screen shows them."""
+    assert max(FBX_BUTTON[1], RAW_BUTTON[1]) < FOLD
+    windows = bpy.context.window_manager.windows
+    select("second")
+    yield 1.0
+    picture("31_fold")
+    keys = curve()
+    yield from press(RAW_BUTTON, lambda: curve() != keys)
+    invoke(bpy.ops.ed.undo)
+    yield 0.5
+    yield from press(FBX_BUTTON, lambda: len(windows) > 1)
+    yield 1.0
+    for window in list(windows)[1:]:
+        with bpy.context.temp_override(window=window):
+            bpy.ops.wm.window_close()
+    yield 0.5
+    report["above_the_fold"] = "export and refine"
+
+
+def curve() -> list[float]:
+    """Return the keys of one curve of the second capture."""
+    action = bpy.data.objects["second"].animation_data.action
+    found = next(each for each in action.fcurves if "left_elbow" in each.data_path)
+    return [point.co[1] for point in found.keyframe_points]
+
+
+def rigs() -> None:
+    """Choose one rig after another: the list of bones is always that of the chosen rig."""
+    settings, found = bpy.context.scene.scope_retarget, []
+    for prefix in ("mixamorig:", "DEF-"):
+        data = bpy.data.objects["first"].data.copy()
+        for bone in data.bones:
+            bone.name = prefix + bone.name
+        settings.rig = bpy.data.objects.new(prefix, data)
+        bpy.context.scene.collection.objects.link(settings.rig)
+        if not found:
+            use(bpy.ops.scope.guess_bones)
+        found.append([pair.bone for pair in settings.pairs])
+        assert found[-1], prefix
+        assert all(bone in data.bones for bone in found[-1]), found[-1]
+    use(bpy.ops.scope.retarget)
+    report["rigs"] = [len(each) for each in found]
+
+
+def exported() -> None:
+    """Export a rig and then captures: everything starts at 0 s, has the take's name, and is what was asked for."""
+    use(bpy.ops.scope.export, filepath=str(OUT / "rig.bvh"), format="BVH", which="RIG")
+    assert "DEF-" in (OUT / "rig.bvh").read_text()
+    select("first")
+    for kind, suffix in (("FBX", "fbx"), ("GLB", "glb"), ("BVH", "bvh"), ("NPZ", "npz")):
+        use(bpy.ops.scope.export, filepath=str(OUT / f"first.{suffix}"), format=kind)
+    text = (OUT / "first.bvh").read_text()
+    assert "DEF-" not in text, "the rig was exported again"
+    longest = max(abs(float(word)) for line in text.splitlines() if "OFFSET" in line for word in line.split()[1:])
+    assert 20.0 < longest < 100.0, f"a BVH in centimetres has no bone of {longest}"
+    content = (OUT / "first.glb").read_bytes()
+    glb = json.loads(content[20 : 20 + struct.unpack("<I", content[12:16])[0]])
+    assert [animation["name"] for animation in glb["animations"]] == ["first"], glb["animations"]
+    starts = {glb["accessors"][sampler["input"]]["min"][0] for sampler in glb["animations"][0]["samplers"]}
+    assert starts == {0.0}, starts
+    before = set(bpy.data.actions)
+    bpy.context.scene.frame_set(1)
+    invoke(bpy.ops.import_scene.fbx, filepath=str(OUT / "first.fbx"), anim_offset=0.0)
+    for action in set(bpy.data.actions) - before:
+        assert "|first|" in action.name, action.name
+        assert abs(action.frame_range[0]) < 0.01, tuple(action.frame_range)
+    invoke(bpy.ops.ed.undo)
+    report["exported"] = ["FBX", "GLB", "BVH", "NPZ"]
+
+
+def usd() -> None:
+    """Say why USD cannot be exported where this Blender was built without it."""
+    if "usd_export" in dir(bpy.ops.wm):
+        return
+    try:
+        use(bpy.ops.scope.export, filepath=str(OUT / "first.usdc"), format="USDC")
+    except RuntimeError as error:
+        report["usd"] = str(error).strip()
+    assert "built without USD" in str(report.get("usd")), report
+
+
+def sequencer() -> None:
+    """Add the footage to the sequencer twice: the second time changes nothing."""
+    counts = []
+    for _ in range(2):
+        use(bpy.ops.scope.footage_to_sequencer)
+        counts.append(len(bpy.context.scene.sequence_editor.sequences_all))
+    assert counts[0] == counts[1] > 0, counts
+    report["strips"] = counts
+
+
+def imported() -> None:
+    """Import a motion without a cycle, of which no loop can be made, and one with two floors, which is warned of."""
+    poses, trans = np.zeros((FRAMES, 24, 3)), np.zeros((FRAMES, 3))
+    poses[:, 0, 0] = np.pi / 2  # AMASS: z is up
+    poses[:, 16, 2] = np.linspace(0.0, 0.8, FRAMES)  # an arm that rises once
+    np.savez(STILL, poses=poses.reshape(FRAMES, -1), trans=trans, mocap_framerate=np.array(RATE))
+    trans[80:, 2] -= 0.3
+    np.savez(LOW, poses=poses.reshape(FRAMES, -1), trans=trans, mocap_framerate=np.array(RATE))
+    use(bpy.ops.scope.import_motion, filepath=str(STILL))
+    assert any("keeps its 20 frames/s, the motion has 60" in text for text in warnings()), warnings()
+    try:
+        use(bpy.ops.scope.loop, start=1, end=40)
+    except RuntimeError as error:
+        report["no_cycle"] = str(error).strip()
+    assert "no_cycle" in report, "a loop was made of a movement that is not repeated"
+    use(bpy.ops.scope.import_motion, filepath=str(LOW))
+    assert any("under the floor" in text for text in warnings()), warnings()
+    markers = [marker.name for marker in bpy.context.scene.timeline_markers]
+    assert any("floor" in name for name in markers), markers
+    report["two_floors"] = markers
+
+
+def steps() -> Iterator[float]:
+    """Run the session; yield the seconds to wait before each next step."""
+    show_tab()
+    yield 1.0
+    show_tab()
+    yield from two_captures()
+    yield from compared()
+    yield from above_the_fold()
+    rigs()
+    yield 0.5
+    exported()
+    yield 0.5
+    usd()
+    sequencer()
+    imported()
+    yield 1.0
+    picture("32_imported")
+    (OUT / "details.json").write_text(json.dumps(report))
+
+
+run(steps())
