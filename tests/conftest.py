@@ -31,30 +31,42 @@ if "BLENDER_USER_RESOURCES" not in os.environ:
 # Tests that use onnxruntime itself, not through Scope, do not report to its makers either.
 os.environ["ORT_DISABLE_TELEMETRY"] = "1"
 
-# In this order, ahead of all others. The first compiles the solver, and the second a version of its own, whose process
-# then takes the third, which needs none: so where two processes run, they do not compile the same. When the first is
-# done, the fourth compiles all other kernels of a capture. The rig that Rigify generates is shared in the same way.
-# Files that take long would otherwise end last, alone.
+# In this order, ahead of all others, so that two processes never compile the same. The first file compiles the solver,
+# and the second a version of its own, whose process then takes the third, which needs none. When the first is done, the
+# fourth compiles all other kernels of a capture, and the next six need none. A process is given another file when two
+# tests are left of its own: the long ones of these files come first in them. The rig that Rigify generates is shared in
+# the same way. Files that take long would otherwise end last, alone.
 FIRST = (
     "solver/test_validation.py",
     "solver/residuals/test_registry.py",
     "capture/tracking/test_tracker.py",
     "job/test_warm_up.py",
     "tools/test_build_body.py",
-    "capture/test_pipeline.py",
     "capture/tracking/test_people.py",
-    "scene/rigs/test_rig_retarget.py",
-    "capture/test_pipeline_own_networks.py",
-    "tools/test_mocap_library.py",
-    "ui/capture/test_capture_job.py",
-    "scene/export/test_export.py",
-    "test_cli.py",
-    "fuzz/test_faults_outputs.py",
     "tools/test_convert_networks.py",
+    "scene/rigs/test_rig_retarget.py",
+    "scene/export/test_export.py",
+    "tools/test_mocap_library.py",
+    "capture/test_pipeline.py",
+    "capture/test_pipeline_own_networks.py",
+    "ui/capture/test_capture_job.py",
+    "fuzz/test_kills.py",
+    "fuzz/test_faults_outputs.py",
     "job/test_batch.py",
+    "solver/compiled/test_code_cache.py",
+    "test_cli.py",
+    "scene/rigs/test_rig_export.py",
     "ui/test_compiled_solver.py",
     "ui/edit/test_edit_operators.py",
     "ui/pins/test_correction_operators.py",
+    "cluster/test_runner.py",
+    "scripts/test_build_extension.py",
+    "ui/capture/test_capture_panel.py",
+    "ui/pins/test_upright_operators.py",
+    "capture/test_pipeline_moving_camera.py",
+    "capture/camera/test_heading_drift.py",
+    "capture/test_pipeline_visitor.py",
+    "live/test_session.py",
 )
 
 

@@ -17,6 +17,7 @@ from typing import Any, Protocol
 from ...solver import Body
 from ..capture.camera.intrinsics import assumed_camera, choose_camera
 from ..capture.fitting.live_body import LiveBody
+from ..capture.fitting.stature import require_stature
 from ..capture.media.frame import Frame
 from ..capture.media.opencv_threads import opencv_in_one_thread
 from ..capture.perception.execution import Execution
@@ -109,6 +110,8 @@ def run_live(
 
     :raises ScopeError: an option is invalid, the source cannot be read, or an output failed.
     """
+    for height_m in options.heights_m:
+        require_stature(body, height_m)
     clock = clock or Clock()
     execution = Execution(options.provider)
     cores = os.cpu_count() or 1

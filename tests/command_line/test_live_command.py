@@ -27,6 +27,7 @@ from scope.scope_addon.motion import Motion
         (["x.mp4", "--keep-footage", "a.mov"], 2, "--keep-footage writes a video: give a name that ends in .mp4, not"),
         (["x.mp4", "--vmc", "39539"], 1, "x.mp4 does not exist"),
         ([str(SAMPLE), "--vmc", "39539"], 2, "--vmc must be HOST:PORT, such as 127.0.0.1:39539, not '39539'"),
+        ([str(SAMPLE), "--height", "70"], 2, "'scope_child' can be 80 to 213 cm tall, not 70: omit the height"),
         (["x.mp4", "--height", "170,180"], 2, "2 heights are given, but --people is 1"),
         (["x.mp4", "--json-port", "70000"], 2, "--json-port must be from 0 to 65535, not 70000"),
         (["x.mp4", "--reconnect", "-1"], 2, "--reconnect must be from 0 to 3600 s, not -1"),

@@ -37,14 +37,13 @@ def inputs(name: str, folder: Path, seed: int) -> Iterator[Path]:
     target, chance = TARGETS[name], random.Random(f"{name} {seed}")
     pool = [*target.seeds(folder), *(path.read_bytes() for path in sorted(CORPUS.glob(f"{name}-*")))]
     for data in pool:
-        yield from _written(folder, target.suffixes, data)
+        for suffix in target.suffixes:
+            yield _written(folder, suffix, data)
     while True:
         data = mutate(chance.choice(pool), chance)
         while chance.random() < _STACKED:
             data = mutate(data, chance)
-        path = folder / f"input{chance.choice(target.suffixes)}"
-        path.write_bytes(data)
-        yield path
+        yield _written(folder, chance.choice(target.suffixes), data)
 
 
 def random_inputs(name: str, folder: Path, seed: int, count: int) -> Iterator[Path]:
@@ -59,16 +58,13 @@ def random_inputs(name: str, folder: Path, seed: int, count: int) -> Iterator[Pa
             whole = chance.choice(pool)
             start = chance.randrange(len(whole) + 1)
             data = whole[:start] + noise + whole[start + len(noise) :]
-        path = folder / f"input{chance.choice(target.suffixes)}"
-        path.write_bytes(data)
-        yield path
+        yield _written(folder, chance.choice(target.suffixes), data)
 
 
-def _written(folder: Path, suffixes: tuple[str, ...], data: bytes) -> Iterator[Path]:
-    for suffix in suffixes:
-        path = folder / f"input{suffix}"
-        path.write_bytes(data)
-        yield path
+def _written(folder: Path, suffix: str, data: bytes) -> Path:
+    path = folder / f"input{suffix}"
+    path.write_bytes(data)
+    return path
 
 
 def check(name: str, path: Path) -> None:

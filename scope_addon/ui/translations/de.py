@@ -166,7 +166,7 @@ TEXTS = {
     "Hands": "Hände",
     "Head": "Kopf",
     "Height (cm)": "Größe (cm)",
-    "Height of the most prominent person in centimetres; sets the scale of the scene. 0: estimated from the footage, usually within 10 %": "Größe der auffälligsten Person in Zentimetern; bestimmt den Maßstab der Szene. 0: aus dem Filmmaterial geschätzt, meist auf 10 % genau",
+    "Height of the most prominent person in centimetres; sets the scale of the scene. 0: estimated from the footage, for adults usually within 10 %; enter that of a child": "Größe der auffälligsten Person in Zentimetern; bestimmt den Maßstab der Szene. 0: aus dem Filmmaterial geschätzt, bei Erwachsenen meist auf 10 % genau; die eines Kindes eingeben",
     "Hide": "Verbergen",
     "Hide the captured person, except when comparing with the footage": "Die erfasste Person verbergen, außer beim Vergleich mit dem Filmmaterial",
     "How the body's shape is exported": "Wie die Körperform exportiert wird",

@@ -166,7 +166,7 @@ TEXTS = {
     "Hands": "Manos",
     "Head": "Cabeza",
     "Height (cm)": "Estatura (cm)",
-    "Height of the most prominent person in centimetres; sets the scale of the scene. 0: estimated from the footage, usually within 10 %": "Estatura de la persona principal en centímetros; define la escala de la escena. 0: estimada de la filmación, en general con un 10 % de margen",
+    "Height of the most prominent person in centimetres; sets the scale of the scene. 0: estimated from the footage, for adults usually within 10 %; enter that of a child": "Estatura de la persona principal en centímetros; define la escala de la escena. 0: estimada de la filmación, en adultos en general con un 10 % de margen; indique la de un niño",
     "Hide": "Ocultar",
     "Hide the captured person, except when comparing with the footage": "Ocultar a la persona capturada, salvo al comparar con la filmación",
     "How the body's shape is exported": "Cómo se exporta la forma del cuerpo",

@@ -166,7 +166,7 @@ TEXTS = {
     "Hands": "Mains",
     "Head": "Tête",
     "Height (cm)": "Taille (cm)",
-    "Height of the most prominent person in centimetres; sets the scale of the scene. 0: estimated from the footage, usually within 10 %": "Taille de la personne principale en centimètres ; fixe l’échelle de la scène. 0 : estimée d’après le métrage, en général à 10 % près",
+    "Height of the most prominent person in centimetres; sets the scale of the scene. 0: estimated from the footage, for adults usually within 10 %; enter that of a child": "Taille de la personne principale en centimètres ; fixe l’échelle de la scène. 0 : estimée d’après le métrage, pour un adulte en général à 10 % près ; saisissez celle d’un enfant",
     "Hide": "Cacher",
     "Hide the captured person, except when comparing with the footage": "Cacher la personne capturée, sauf pendant la comparaison avec le métrage",
     "How the body's shape is exported": "Comment la forme du corps est exportée",

@@ -166,7 +166,7 @@ TEXTS = {
     "Hands": "手",
     "Head": "頭",
     "Height (cm)": "身長（cm）",
-    "Height of the most prominent person in centimetres; sets the scale of the scene. 0: estimated from the footage, usually within 10 %": "最も目立つ人物の身長（センチメートル）。シーンのスケールを決めます。0：フッテージから推定、通常は誤差 10 % 以内",
+    "Height of the most prominent person in centimetres; sets the scale of the scene. 0: estimated from the footage, for adults usually within 10 %; enter that of a child": "最も目立つ人物の身長（センチメートル）。シーンのスケールを決めます。0：フッテージから推定、大人なら通常は誤差 10 % 以内。子供の身長は入力してください",
     "Hide": "隠す",
     "Hide the captured person, except when comparing with the footage": "フッテージとの比較時以外、キャプチャした人物を隠す",
     "How the body's shape is exported": "体型のエクスポート方法",

@@ -166,7 +166,7 @@ TEXTS = {
     "Hands": "手",
     "Head": "头",
     "Height (cm)": "身高 (cm)",
-    "Height of the most prominent person in centimetres; sets the scale of the scene. 0: estimated from the footage, usually within 10 %": "最显著人物的身高（厘米）；决定场景的缩放。0：根据素材估算，误差通常在 10 % 以内",
+    "Height of the most prominent person in centimetres; sets the scale of the scene. 0: estimated from the footage, for adults usually within 10 %; enter that of a child": "最显著人物的身高（厘米）；决定场景的缩放。0：根据素材估算，成人的误差通常在 10 % 以内；儿童的身高请输入",
     "Hide": "隐藏",
     "Hide the captured person, except when comparing with the footage": "隐藏捕捉的人物，与素材对比时除外",
     "How the body's shape is exported": "身体形状的导出方式",

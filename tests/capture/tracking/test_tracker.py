@@ -32,6 +32,39 @@ def largest(tracker: PeopleTracker, image: np.ndarray) -> tuple[int, Observation
     return max(tracker.step(image), key=lambda entry: entry[1].region.side_px, default=None)
 
 
+def test_a_somersault_is_tracked_all_the_way_round(frames: Frames) -> None:
+    """The man turns over once in the air, against the sun, between frames 165 and 183."""
+    tracker = PeopleTracker("best", threads=2)
+    seen: dict[int, dict[int, Observation]] = {}
+    for index, image in enumerate(frames("clips/walk_side_static", start=146, stop=187), 146):
+        for tracklet, observation in tracker.step(image):
+            if observation.keypoints_px[:, 1].mean() < 600:  # the man in the air, not the woman on the grass
+                seen.setdefault(tracklet, {})[index] = observation
+    (man,) = (track for track in seen.values() if 165 in track)
+    assert set(range(156, 187)) <= set(man)
+    head_above_hips = {k: o.keypoints_px[[23, 24], 1].mean() - o.keypoints_px[0, 1] for k, o in man.items()}
+    assert head_above_hips[156] > 0
+    assert head_above_hips[170] < 0
+    assert head_above_hips[186] > 0
+
+
+def test_a_person_who_walks_out_of_the_picture_is_lost(frames: Frames) -> None:
+    """The woman on the grass leaves at the left edge between frames 195 and 207, and nothing replaces her.
+
+    The man runs behind a tree between frames 223 and 229, and no person is found in its bark.
+    """
+    tracker = PeopleTracker("best", 2, 2)
+    seen: dict[int, list[int]] = {}
+    for index, image in enumerate(frames("clips/walk_side_static", start=185), 185):
+        for tracklet, _ in tracker.step(image):
+            seen.setdefault(tracklet, []).append(index)
+    # a tracklet of a third of a second or more is a person
+    lasting = sorted((frames for frames in seen.values() if len(frames) >= 10), key=lambda frames: frames[-1])
+    woman, man = lasting
+    assert 195 <= woman[-1] <= 207
+    assert 223 <= man[-1] <= 226  # behind a tree
+
+
 @pytest.mark.parametrize("clip", ["walk_side_static", "run_moving_camera", "squats_5fps"])
 def test_person_is_found_once_and_kept(tracker: PeopleTracker, frames: Frames, clip: str) -> None:
     seen = [tracker.step(image) for image in frames(f"clips/{clip}", stop=40)]
@@ -122,36 +155,3 @@ def test_odd_images(tracker: PeopleTracker) -> None:
         assert tracker.step(np.zeros((*shape, 3), np.uint8)) == []
     with pytest.raises(ShapeError, match=r"\(5, 5\)"):
         tracker.step(np.zeros((5, 5), np.uint8))
-
-
-def test_a_somersault_is_tracked_all_the_way_round(frames: Frames) -> None:
-    """The man turns over once in the air, against the sun, between frames 165 and 183."""
-    tracker = PeopleTracker("best", threads=2)
-    seen: dict[int, dict[int, Observation]] = {}
-    for index, image in enumerate(frames("clips/walk_side_static", start=146, stop=187), 146):
-        for tracklet, observation in tracker.step(image):
-            if observation.keypoints_px[:, 1].mean() < 600:  # the man in the air, not the woman on the grass
-                seen.setdefault(tracklet, {})[index] = observation
-    (man,) = (track for track in seen.values() if 165 in track)
-    assert set(range(156, 187)) <= set(man)
-    head_above_hips = {k: o.keypoints_px[[23, 24], 1].mean() - o.keypoints_px[0, 1] for k, o in man.items()}
-    assert head_above_hips[156] > 0
-    assert head_above_hips[170] < 0
-    assert head_above_hips[186] > 0
-
-
-def test_a_person_who_walks_out_of_the_picture_is_lost(frames: Frames) -> None:
-    """The woman on the grass leaves at the left edge between frames 195 and 207, and nothing replaces her.
-
-    The man runs behind a tree between frames 223 and 229, and no person is found in its bark.
-    """
-    tracker = PeopleTracker("best", 2, 2)
-    seen: dict[int, list[int]] = {}
-    for index, image in enumerate(frames("clips/walk_side_static", start=185), 185):
-        for tracklet, _ in tracker.step(image):
-            seen.setdefault(tracklet, []).append(index)
-    # a tracklet of a third of a second or more is a person
-    lasting = sorted((frames for frames in seen.values() if len(frames) >= 10), key=lambda frames: frames[-1])
-    woman, man = lasting
-    assert 195 <= woman[-1] <= 207
-    assert 223 <= man[-1] <= 226  # behind a tree
