@@ -23,7 +23,7 @@ EXTENT = r"(?:\.\.\.|\d*\s?(?:[A-Z][A-Z_]*'?|[nmT]|count|None)(?:\s?[+-]\s?\w)*|
 SHAPE = re.compile(rf"\((?:|\.\.\.|{EXTENT},|{EXTENT}(?:, {EXTENT})+)\)")
 ARRAY = re.compile(r"\b(NDArray|ArrayLike|Array)\b")
 CONSTRUCTORS = ("__init__", "__post_init__")
-INTERNAL = {"AssertionError", "NotImplementedError"}  # mistakes in the program, which no caller handles
+INTERNAL = {"AssertionError"}  # a mistake in the program, which no caller handles
 KERNELS = {"kernel", "allocating_kernel", "inlined_kernel", "expanded_kernel", "intrinsic", "compiled"}
 
 

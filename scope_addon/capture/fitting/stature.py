@@ -121,6 +121,5 @@ def _shape_at(body: Body, betas: NDArray[np.float64]) -> tuple[float, NDArray[np
     """Return h₀ and g (P,) of the highest and the lowest vertex of this shape."""
     heights = body.rest_vertices(betas)[:, 1]
     top, bottom = int(heights.argmax()), int(heights.argmin())
-    return float(body.v_template[top, 1] - body.v_template[bottom, 1]), body.shapedirs[top, 1] - body.shapedirs[
-        bottom, 1
-    ]
+    h0 = float(body.v_template[top, 1] - body.v_template[bottom, 1])
+    return h0, body.shapedirs[top, 1] - body.shapedirs[bottom, 1]

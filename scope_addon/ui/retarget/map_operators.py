@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import bpy
 from bpy.props import BoolProperty, StringProperty
@@ -62,12 +62,13 @@ class SaveMapOperator(MapFileOperator):
         self.save(context.scene.scope_retarget, path)
         return rpt_("Saved {file}", file=path)
 
-    def save(self, settings: bpy.types.PropertyGroup, path: str) -> None:
-        """Write the map of the settings to a path.
+    if TYPE_CHECKING:  # implemented by each operator
 
-        :raises InputError: it could not be loaded again.
-        """
-        raise NotImplementedError
+        def save(self, settings: bpy.types.PropertyGroup, path: str) -> None:
+            """Write the map of the settings to a path.
+
+            :raises InputError: it could not be loaded again.
+            """
 
 
 class LoadMapOperator(MapFileOperator):
@@ -78,9 +79,10 @@ class LoadMapOperator(MapFileOperator):
         self.load(context.scene.scope_retarget, bpy.path.abspath(self.filepath))
         return rpt_("Loaded {file}", file=self.filepath)
 
-    def load(self, settings: bpy.types.PropertyGroup, path: str) -> None:
-        """Fill the list of the settings from a path."""
-        raise NotImplementedError
+    if TYPE_CHECKING:  # implemented by each operator
+
+        def load(self, settings: bpy.types.PropertyGroup, path: str) -> None:
+            """Fill the list of the settings from a path."""
 
 
 def edit_list(action: str, pairs: Any, active: int) -> int:

@@ -48,9 +48,8 @@ def begin(context: bpy.types.Context, area: bpy.types.Area, collection: bpy.type
     _show_alone(context, area, collection)
     _had_bones.setdefault(space.as_pointer(), space.overlay.show_bones)  # not again where another capture was compared
     space.overlay.show_bones = False
-    space.camera = (
-        context.scene.camera
-    )  # in local view, Blender keeps the camera of the capture that was compared before
+    # In local view, Blender keeps the camera of the capture that was compared before.
+    space.camera = context.scene.camera
     if space.region_3d.view_perspective != "CAMERA":
         with _in(context.window, area):
             bpy.ops.view3d.view_camera()
