@@ -35,6 +35,7 @@ ASSETS = {
     "assets/lifter/*.onnx": "GPL-3.0-or-later",
     "assets/prior/*.npz": "GPL-3.0-or-later",
     "assets/face/*.npz": "GPL-3.0-or-later",
+    "assets/face/controls/*.json": "CC0-1.0",
     "assets/body/*.npz": "CC0-1.0",
     "assets/sample/*.mp4": "CC0-1.0",
 }

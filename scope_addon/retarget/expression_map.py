@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The expression map: which shape key of a face follows which expressions, and how far. Guessing, reading, writing."""
+"""The expression map: which shape key or control of a face follows which expressions, and how far.
+
+Guessing from names of shape keys, reading, writing. Of faces that bones move, see `face.face_controls`.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +21,9 @@ from ..json_file import load_map, save_map
 from .bone_map import is_name
 
 LARGEST_FACTOR = 10.0
+LARGEST_ANGLE = 180.0  # degrees
+MOVED = ("left", "up", "forward")  # channels of a control: shares of a length of the face
+TURNED = ("pitch", "yaw", "roll")  # degrees about left, up and forward: down, to the left, with the left side up
 _KIND = "expression map"
 _LEAST_ARKIT = 5  # keys with ARKit's names from which others, such as visemes, are left alone
 _BOTH_BLINK = {"eyeBlinkLeft": 0.5, "eyeBlinkRight": 0.5}
@@ -70,26 +76,32 @@ _ARKIT = {name.lower(): name for name in EXPRESSIONS}
 
 @dataclass
 class ExpressionMap:
-    """Shape keys and, for each, the factors of the expressions that it follows: value = Σ factor · weight."""
+    """Shape keys and, for each, the factors of the expressions that it follows: value = Σ factor · weight.
+
+    ``controls`` are bones that move a face; each has such factors for some of the channels `MOVED` and `TURNED`.
+    """
 
     keys: dict[str, dict[str, float]]
+    controls: dict[str, dict[str, dict[str, float]]] = field(default_factory=dict)
 
     def check(self) -> None:
         """Check that the map can be used.
 
-        :raises InputError: when there is no key, an expression is unknown, or a factor is out of range.
+        :raises InputError: when there is no key or control, a channel or an expression is unknown, or a factor is out
+            of range.
         """
-        if not any(self.keys.values()):
-            raise InputError("the expression map has no shape key; add one, and choose its expression")
+        if not any(self.keys.values()) and not any(any(channels.values()) for channels in self.controls.values()):
+            raise InputError("the expression map has no shape key and no control; add one, and choose its expression")
         for key, factors in self.keys.items():
-            for expression, factor in factors.items():
-                if expression not in EXPRESSIONS:
+            _check_factors(f"shape key '{key}'", factors, LARGEST_FACTOR)
+        for bone, channels in self.controls.items():
+            for channel, factors in channels.items():
+                if channel not in (*MOVED, *TURNED):
                     raise InputError(
-                        f"shape key '{key}' is mapped to '{expression}', which is no expression; use one of "
-                        f"{', '.join(EXPRESSIONS)}"
+                        f"control '{bone}' has the channel '{channel}'; use one of {', '.join((*MOVED, *TURNED))}"
                     )
-                if not abs(factor) <= LARGEST_FACTOR:
-                    raise InputError(f"shape key '{key}' has the factor {factor:g}; use at most {LARGEST_FACTOR:g}")
+                largest = LARGEST_ANGLE if channel in TURNED else LARGEST_FACTOR
+                _check_factors(f"control '{bone}'", factors, largest)
 
     def values(self, weights: NDArray[np.floating[Any]]) -> dict[str, NDArray[np.float64]]:
         """Return the value (T,) of each shape key, 0 to 1.
@@ -127,7 +139,8 @@ def save_expression_map(expression_map: ExpressionMap, path: str | Path) -> None
     :raises OutputError: when the file cannot be written, or is something else.
     """
     expression_map.check()
-    save_map(Path(path), _KIND, shape_keys=expression_map.keys)
+    content = {"shape_keys": expression_map.keys, "controls": expression_map.controls}
+    save_map(Path(path), _KIND, **{name: entries for name, entries in content.items() if entries})
 
 
 def load_expression_map(path: str | Path) -> ExpressionMap:
@@ -136,13 +149,24 @@ def load_expression_map(path: str | Path) -> ExpressionMap:
     :raises InputError: when the file cannot be read or is not a valid map.
     """
     path = Path(path)
-    keys = load_map(path, _KIND).get("shape_keys")
-    if not isinstance(keys, dict) or not all(is_name(key) and _are_factors(f) for key, f in keys.items()):
+    content = load_map(path, _KIND)
+    keys, controls = content.get("shape_keys", {}), content.get("controls", {})
+    if not _are_named(keys) or not all(map(_are_factors, keys.values())):
         raise InputError(
             f"{path}: 'shape_keys' must be an object that maps each shape key to expressions and factors; "
             "correct the file"
         )
-    out = ExpressionMap({key: {name: float(f) for name, f in factors.items()} for key, factors in keys.items()})
+    if not _are_named(controls) or not all(
+        _are_named(channels) and all(map(_are_factors, channels.values())) for channels in controls.values()
+    ):
+        raise InputError(
+            f"{path}: 'controls' must be an object that maps each control to channels, and these to expressions and "
+            "factors; correct the file"
+        )
+    out = ExpressionMap(
+        {key: _floats(factors) for key, factors in keys.items()},
+        {bone: {c: _floats(factors) for c, factors in channels.items()} for bone, channels in controls.items()},
+    )
     try:
         out.check()
     except InputError as error:
@@ -157,6 +181,28 @@ def _plain(key: str) -> str:
     if side and (name[side.start()] == "_" or side[1].isupper()):
         name = name[: side.start()] + ("left" if side[1].lower() == "l" else "right")
     return re.sub(r"[^a-z0-9]", "", name.lower())
+
+
+def _check_factors(what: str, factors: dict[str, float], largest: float) -> None:
+    """Check the factors of one shape key, or of one channel of a control.
+
+    :raises InputError: an expression is unknown, or a factor is out of range.
+    """
+    for expression, factor in factors.items():
+        if expression not in EXPRESSIONS:
+            raise InputError(
+                f"{what} is mapped to '{expression}', which is no expression; use one of {', '.join(EXPRESSIONS)}"
+            )
+        if not abs(factor) <= largest:
+            raise InputError(f"{what} has the factor {factor:g}; use at most {largest:g}")
+
+
+def _are_named(entries: object) -> TypeGuard[dict[str, Any]]:
+    return isinstance(entries, dict) and all(map(is_name, entries))
+
+
+def _floats(factors: dict[str, float]) -> dict[str, float]:
+    return {name: float(factor) for name, factor in factors.items()}
 
 
 def _are_factors(factors: object) -> bool:

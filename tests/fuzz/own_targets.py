@@ -157,7 +157,13 @@ def expression_maps(folder: Path) -> list[bytes]:
 
     path = folder / "seed.json"
     save_expression_map(guess_expression_map(EXPRESSIONS), path)
-    return [path.read_bytes()]
+    return [path.read_bytes(), (built_in_maps() / "rigify.json").read_bytes()]
+
+
+def built_in_maps() -> Path:
+    from scope.scope_addon.retarget.face.face_controls import FOLDER
+
+    return FOLDER
 
 
 def descriptions(_: Path) -> list[bytes]:

@@ -97,6 +97,13 @@ def test_what_is_written_is_read_and_other_files_are_kept(tmp_path):
     assert other.read_text() == '{"name": "a game"}'
 
 
+def test_controls_are_written_and_read(tmp_path):
+    written = ExpressionMap({}, {"jaw": {"pitch": {"jawOpen": 17.5}, "up": {"jawOpen": -0.5, "mouthClose": 0.5}}})
+    save_expression_map(written, tmp_path / "face.json")
+    read = load_expression_map(tmp_path / "face.json")
+    assert (read.keys, read.controls) == ({}, written.controls)
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [
@@ -108,7 +115,16 @@ def test_what_is_written_is_read_and_other_files_are_kept(tmp_path):
         ({"shape_keys": {"a": {"jawOpen": 1e9}}}, "use at most 10"),
         ({"shape_keys": {"a": {"jawOpen": float("nan")}}}, "use at most 10"),
         ({"shape_keys": {"a": {"jawOpen": 10**400}}}, "not an expression map: .* a number of 401 digits"),
-        ({"shape_keys": {}}, "no shape key"),
+        ({"shape_keys": {}}, "no shape key and no control"),
+        ({"controls": ["lip.B"]}, "'controls' must be an object"),
+        ({"controls": {"lip.B": {"jawOpen": 1}}}, "'controls' must be an object"),
+        ({"controls": {"lip.B": {"up": {"jawOpen": "1"}}}}, "'controls' must be an object"),
+        ({"controls": {"lip\0": {"up": {"jawOpen": 1}}}}, "'controls' must be an object"),
+        ({"controls": {"lip.B": {"sideways": {"jawOpen": 1}}}}, "'sideways'; use one of left, up, forward, pitch"),
+        ({"controls": {"lip.B": {"up": {"grin": 1}}}}, "control 'lip.B' is mapped to 'grin', which is no expression"),
+        ({"controls": {"lip.B": {"up": {"jawOpen": 11}}}}, "use at most 10"),
+        ({"controls": {"jaw": {"pitch": {"jawOpen": -181}}}}, "use at most 180"),
+        ({"controls": {"jaw": {"pitch": {}}}}, "no shape key and no control"),
     ],
 )
 def test_a_file_that_cannot_be_used_says_why(tmp_path, content, message):

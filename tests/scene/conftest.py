@@ -223,6 +223,39 @@ def rigify_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.fixture(scope="session")
+def rigify_face_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A file with a rig that Rigify has generated from spine, head and face of its metarig, in a few seconds."""
+    import addon_utils  # bpy puts it on the path
+
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    addon_utils.enable("rigify", default_set=True)
+    bpy.ops.object.armature_human_metarig_add()
+    metarig = bpy.context.object
+    bpy.ops.object.mode_set(mode="EDIT")
+    bones = metarig.data.edit_bones
+    kept = {"face", *(bone.name for bone in bones["face"].children_recursive)}
+    for bone in list(bones):
+        if bone.name not in kept and not bone.name.startswith("spine"):
+            bones.remove(bone)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.ops.pose.rigify_generate()
+    bpy.data.objects.remove(metarig)
+    path = tmp_path_factory.mktemp("rigify") / "face.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+@pytest.fixture
+def rigify_face(rigify_face_file: Path) -> bpy.types.Object:
+    """The rig, in the scene."""
+    with bpy.data.libraries.load(str(rigify_face_file)) as (found, wanted):
+        wanted.objects = ["rig"]
+    (rig,) = wanted.objects
+    bpy.context.scene.collection.objects.link(rig)
+    return rig
+
+
 @pytest.fixture
 def rigify_rigs(rigify_file: Path) -> list[tuple[bpy.types.Object, str]]:
     """Rigify's metarig and the rig generated from it, each with what its deforming bones' names begin with."""

@@ -8,7 +8,7 @@ Writing whole coordinate arrays is 20 to 30 times faster than one ``keyframe_ins
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 
 import bpy
@@ -41,9 +41,7 @@ class Channels:
             slot = action.slots.new(id_type=datablock.id_type, name=datablock.name)
             animation.action = action
             animation.action_slot = slot
-            layer = action.layers[0] if action.layers else action.layers.new("Layer")
-            strip = layer.strips[0] if layer.strips else layer.strips.new(type="KEYFRAME")
-            self._owner = strip.channelbag(slot, ensure=True)
+            self._owner = _channelbag(action, slot)
         else:
             if len(action.fcurves):
                 action = bpy.data.actions.new(f"{action.name}_{datablock.id_type.lower()}")
@@ -52,6 +50,24 @@ class Channels:
             self._owner = action
         self.action = action
         self._groups: dict[str, bpy.types.ActionGroup] = {}
+
+    @classmethod
+    def of(cls, datablock: bpy.types.ID) -> Channels:
+        """Return the F-curves of a datablock in its action, to add some to them."""
+        animation = datablock.animation_data
+        if has_slots() and animation.action_slot is None:
+            return cls(datablock, animation.action)
+        out = cls.__new__(cls)
+        out.action = animation.action
+        out._owner = _channelbag(out.action, animation.action_slot) if has_slots() else out.action
+        out._groups = {group.name: group for group in out._owner.groups}
+        return out
+
+    def remove(self, data_paths: Collection[str]) -> None:
+        """Remove the F-curves of some properties."""
+        for curve in [curve for curve in self._owner.fcurves if curve.data_path in data_paths]:
+            self._owner.fcurves.remove(curve)
+        self._groups = {group.name: group for group in self._owner.groups}  # without those that are empty now
 
     def write(
         self,
@@ -92,6 +108,13 @@ class Channels:
         if name not in self._groups:
             self._groups[name] = self._owner.groups.new(name)
         return self._groups[name]
+
+
+def _channelbag(action: bpy.types.Action, slot: bpy.types.ActionSlot) -> bpy.types.ActionChannelbag:
+    """Return the F-curves of a slot, in a Blender with slots."""
+    layer = action.layers[0] if action.layers else action.layers.new("Layer")
+    strip = layer.strips[0] if layer.strips else layer.strips.new(type="KEYFRAME")
+    return strip.channelbag(slot, ensure=True)
 
 
 def bone_path(bone_name: str, channel: str) -> str:

@@ -65,7 +65,7 @@ def write_action(rig: bpy.types.Object, keys: list[BoneKeys], frames: NDArray[np
     action = bpy.data.actions.new(rig.name)
     channels = Channels(rig, action)
     for key in keys:
-        path, values = _rotation_channel(rig.pose.bones[key.bone].rotation_mode, key.rotations)
+        path, values = channel_of_rotation(rig.pose.bones[key.bone].rotation_mode, key.rotations)
         channels.write(bone_path(key.bone, path), frames, values, group=key.bone)
     for key in keys:
         if key.locations is not None:
@@ -118,7 +118,7 @@ def _checksum(action: bpy.types.Action) -> str:
     return found.hexdigest()
 
 
-def _rotation_channel(mode: str, R: NDArray[np.float64]) -> tuple[str, NDArray[np.float64]]:
+def channel_of_rotation(mode: str, R: NDArray[np.float64]) -> tuple[str, NDArray[np.float64]]:
     """Return the data path and the values (T, n) of rotations (T, 3, 3) in a bone's rotation mode."""
     if mode == "QUATERNION":
         return "rotation_quaternion", on_one_hemisphere(quaternion_from_matrix(R))

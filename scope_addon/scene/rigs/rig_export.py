@@ -12,12 +12,14 @@ import bpy
 from ....solver.body import Body
 from ...errors import UsageError
 from ...motion import Motion
+from ...retarget.expression_map import ExpressionMap, guess_expression_map
 from ...retarget.rig_source import RigSource
 from ..build import BuildOptions, build_scene
 from ..export.export import ExportOptions, export
 from ..export.export_states import temporary_scene
 from ..export.output_paths import check_output
-from .face_retarget import captured_expressions, faces_of, retarget_expressions
+from .face_bones import guess_face_bones, has_bone_face
+from .face_retarget import captured_expressions, faces_of, key_names, retarget_expressions
 from .rig_file import load_rig, rig_bone_map, temporary_datablocks, with_meshes
 from .rig_retarget import RetargetOptions, retarget
 
@@ -61,28 +63,40 @@ def export_on_rig(
             if len(motions) > 1:
                 rig.name = f"{rig.name}_person{number}"
             betas, rate = person.motion.betas, result.frame_rate
-            retargeting = RetargetOptions(root=options.root)
+            faces = faces_of(with_meshes(rig, bpy.context.scene.objects))
+            retargeting = RetargetOptions(root=options.root, face=_face_of_bones(rig, faces, source))
             warnings += retarget(person.armature, body, betas, rig, bones, rate, retargeting).warnings
-            warnings += _retarget_face(person.armature, rig, source)
+            warnings += _retarget_face(person.armature, faces, source, bones_move_it=retargeting.face is not None)
         bpy.data.batch_remove([obj for person in result.people for obj in (person.armature, person.mesh)])
         for path in paths:
             written += export(path, [result.collection], options=options.export)
     return written, warnings
 
 
-def _retarget_face(armature: bpy.types.Object, rig: bpy.types.Object, source: RigSource) -> list[str]:
+def _face_of_bones(rig: bpy.types.Object, faces: Sequence[bpy.types.Object], source: RigSource) -> ExpressionMap | None:
+    """Return the expression map if bones move the rig's face; a guess is made only where no shape keys do."""
+    if source.expression_map is not None:
+        return source.expression_map if source.expression_map.controls else None
+    if guess_expression_map(key_names(faces)).keys or not has_bone_face(rig):
+        return None
+    return guess_face_bones(rig)
+
+
+def _retarget_face(
+    armature: bpy.types.Object, faces: Sequence[bpy.types.Object], source: RigSource, *, bones_move_it: bool
+) -> list[str]:
     """Retarget the captured expressions, if there are any, to the rig's meshes; return warnings.
 
+    :param bones_move_it: whether bones show the expressions, so that there may be no shape keys.
     :raises UsageError: when an expression map was given, and no mesh has any of its shape keys.
     """
-    captured = captured_expressions(armature)
-    if captured is None:
+    captured, given = captured_expressions(armature), source.expression_map
+    if captured is None or (bones_move_it and not (given and given.keys)):
         return []
-    faces = faces_of(with_meshes(rig, bpy.context.scene.objects))
     try:
-        retarget_expressions(captured, faces, source.expression_map, armature.name)
+        retarget_expressions(captured, faces, given, armature.name)
     except UsageError as error:
-        if source.expression_map is not None:
+        if given is not None:
             raise
         return [f"the face was not retargeted: {error}"]
     return []

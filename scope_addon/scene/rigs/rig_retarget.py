@@ -16,6 +16,7 @@ from ...edit.clip import Clip
 from ...edit.root_motion import about_z, floor_trajectory
 from ...errors import UsageError
 from ...retarget.bone_map import BoneMap
+from ...retarget.expression_map import ExpressionMap
 from ...retarget.guess import RestBones, guess
 from ...retarget.rig_source import ROOTS
 from ...retarget.skeleton import Pose, Skeleton, basis
@@ -30,6 +31,8 @@ from ..character.root_object import (
     root_object,
     topmost,
 )
+from .face_bones import face_motions, key_face, rest_face
+from .face_retarget import captured_expressions
 from .rig_action import BoneKeys, override_nla, retire, root_locations, write_action
 from .rig_probe import at_rest, blocked_bones, probe
 from .rigify_ik import ik_keys
@@ -42,6 +45,7 @@ class RetargetOptions:
     feet: bool = True  # place the feet where the body's are
     root: str = "bone"  # where the root motion goes: one of ``ROOTS``
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0)  # metres, of the rig from the captured person
+    face: ExpressionMap | None = None  # of the bones that move the rig's face; None: it keeps its pose
 
     def __post_init__(self) -> None:
         """Check the values.
@@ -95,19 +99,21 @@ def retarget(
 ) -> RetargetResult:
     """Key the mapped bones of ``rig`` in a new action so that it moves like the captured ``source``.
 
-    The rig's former action is kept in the file, unless it is an earlier retargeting that was not edited. Fingers keep
-    their pose if none were captured. The rig leaves Edit Mode, Rest Position and its NLA's Tweak Mode, in which it
-    would not move. Its NLA tracks are kept, below the new action.
+    The rig's former action is kept in the file, unless it is an earlier retargeting that was not edited. Fingers and
+    face keep their pose if they were not captured. The rig leaves Edit Mode, Rest Position and its NLA's Tweak Mode, in
+    which it would not move. Its NLA tracks are kept, below the new action.
 
     :param betas: (P,) shape coefficients of the captured person.
     :param rate: scene frames per second.
-    :raises UsageError: when the rig is the source, or lacks a mapped bone.
-    :raises InputError: when the map cannot be used, or a mapped bone does not move.
+    :raises UsageError: when the rig is the source, or lacks a mapped bone or all controls of the face.
+    :raises InputError: when a map cannot be used, or a mapped bone does not move.
     """
     options = options or RetargetOptions()
     bone_map = usable_map(source, body, rig, bone_map)
     clip, frames = read_clip(source, body, rate)
     clip = clip_as_displayed(source, clip, frames)
+    captured = captured_expressions(source) if options.face is not None else None
+    face = face_motions(captured, rig, options.face) if captured is not None and options.face is not None else []
     if rig.animation_data and rig.animation_data.use_tweak_mode:  # in which no action can be assigned
         rig.animation_data.use_tweak_mode = False
     with all_or_nothing(bpy.context.scene, rig, topmost(rig)):
@@ -123,11 +129,14 @@ def retarget(
             keys += ik_keys(rig, keys)
         former = rig.animation_data.action if rig.animation_data else None
         action = write_action(rig, keys, frames)
+        if captured is not None:
+            key_face(captured, rig, face)
         _set_parent(rig, frames, motion)
         rig.data.pose_position = "POSE"
         override_nla(rig.animation_data)
         retire(former)
         action.name = f"{rig.name}_{source.name}"
+    rest_face(rig, face)
     return RetargetResult(action, warnings)
 
 

@@ -189,7 +189,12 @@ def test_a_rig_whose_nla_plays_moves_as_captured(source, prepare):
 
 @pytest.mark.parametrize(
     "step",
-    ["rig_retarget.transfer", "rig_retarget.probe", "rig_action._rotation_channel", "rig_retarget.remove_root_object"],
+    [
+        "rig_retarget.transfer",
+        "rig_retarget.probe",
+        "rig_action.channel_of_rotation",
+        "rig_retarget.remove_root_object",
+    ],
 )
 def test_a_failure_leaves_the_rig_unchanged(source, monkeypatch, step):
     rig, _ = build_rig("unreal")

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Retargeting captured expressions to the bones that move the face of the user's rig."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+from numpy.typing import NDArray
+
+from ...errors import UsageError
+from ...retarget.expression_map import ExpressionMap
+from ...retarget.face.face_controls import ControlMotion, control_motions, guess_control_map, has_face_controls
+from ...retarget.face.face_frame import RestBone
+from ..animation_data.actions import Channels, bone_path
+from ..animation_data.transaction import all_or_nothing
+from .face_retarget import CapturedExpressions
+from .rig_action import channel_of_rotation, mark_written, override_nla, retire
+
+_STILL = 1e-3  # change of a channel, as a share of the bone's length or in radians, below which it is none
+_CHANNELS = ("location", "rotation_quaternion", "rotation_axis_angle", "rotation_euler")
+
+
+def has_bone_face(rig: bpy.types.Object) -> bool:
+    """Return whether bones move the face of an armature, and Scope knows which."""
+    return rig.type == "ARMATURE" and has_face_controls(rig.data.bones.keys())
+
+
+def guess_face_bones(rig: bpy.types.Object) -> ExpressionMap:
+    """Return the map for the face of a rig; an empty one if it is not known."""
+    return guess_control_map(rig.data.bones.keys())
+
+
+def retarget_face_bones(
+    captured: CapturedExpressions, rig: bpy.types.Object, expression_map: ExpressionMap, name: str = "Face"
+) -> bpy.types.Action:
+    """Key the face of a rig so that it shows the captured expressions; its other keys stay as they are.
+
+    They are written to a copy of the rig's action, or to a new one. Its former action is kept in the file, unless
+    retargeting has written it and it was not edited.
+
+    :param name: of the action, after that of the rig.
+    :raises UsageError: when the rig has none of the map's controls.
+    :raises InputError: when the map cannot be used, or the rig's face cannot be measured.
+    """
+    motions = face_motions(captured, rig, expression_map)
+    with all_or_nothing(bpy.context.scene, rig):
+        if rig.animation_data and rig.animation_data.use_tweak_mode:  # in which no action can be assigned
+            rig.animation_data.use_tweak_mode = False
+        former = rig.animation_data.action if rig.animation_data else None
+        if former is None:
+            Channels(rig, bpy.data.actions.new(rig.name))
+        else:
+            slot = getattr(rig.animation_data, "action_slot", None)
+            rig.animation_data.action = former.copy()
+            if slot is not None:
+                same = (s for s in rig.animation_data.action.slots if s.identifier == slot.identifier)
+                rig.animation_data.action_slot = next(same)
+        action = key_face(captured, rig, motions)
+        rig.data.pose_position = "POSE"
+        override_nla(rig.animation_data)
+        retire(former)
+        action.name = f"{rig.name}_{name}"
+    rest_face(rig, motions)
+    return action
+
+
+def face_motions(
+    captured: CapturedExpressions, rig: bpy.types.Object, expression_map: ExpressionMap
+) -> list[ControlMotion]:
+    """Return the channels of the rig's controls.
+
+    :raises UsageError: when the rig has none of the map's controls.
+    :raises InputError: when the map cannot be used, or the rig's face cannot be measured.
+    """
+    expression_map.check()
+    bones = rig.data.bones
+    if not any(control in bones for control in expression_map.controls):
+        raise UsageError(
+            f"'{rig.name}' has none of the controls that the expression map moves; guess the expressions again, or "
+            "choose another map"
+        )
+    rest = {
+        bone.name: RestBone(
+            np.array(bone.head_local, float), np.array(bone.matrix_local.to_3x3(), float), bone.use_local_location
+        )
+        for bone in bones
+    }
+    return control_motions(expression_map, captured.weights, rest)
+
+
+def key_face(
+    captured: CapturedExpressions, rig: bpy.types.Object, motions: Iterable[ControlMotion]
+) -> bpy.types.Action:
+    """Replace the keys of a face in the action of its rig; return the action.
+
+    A channel that never moves gets one key, one that stays at rest none.
+    """
+    channels = Channels.of(rig)
+    motions = list(motions)
+    channels.remove({bone_path(motion.bone, channel) for motion in motions for channel in _CHANNELS})
+    for motion in motions:
+        for path, values, still in _channels(rig, motion):
+            if still == "at rest":
+                continue
+            count, interpolation = (1, "CONSTANT") if still else (len(values), "LINEAR")
+            at = bone_path(motion.bone, path)
+            channels.write(at, captured.frames[:count], values[:count], interpolation, group=motion.bone)
+    mark_written(channels.action)
+    return channels.action
+
+
+def rest_face(rig: bpy.types.Object, motions: Iterable[ControlMotion]) -> None:
+    """Put those controls of a face to rest that got no keys. Cannot fail."""
+    for motion in motions:
+        if all(still == "at rest" for _, _, still in _channels(rig, motion)):
+            rig.pose.bones[motion.bone].matrix_basis = Matrix()
+
+
+def _channels(rig: bpy.types.Object, motion: ControlMotion) -> list[tuple[str, NDArray[np.float64], str]]:
+    """Return a control's channels: name, values (T, n), and ``at rest``, ``still`` or, if it moves, nothing."""
+    bone, found = rig.pose.bones[motion.bone], []
+    if motion.locations is not None:
+        found.append(("location", motion.locations, np.zeros(3), _STILL * bone.length))
+    if motion.rotations is not None:
+        name, values = channel_of_rotation(bone.rotation_mode, motion.rotations)
+        found.append((name, values, channel_of_rotation(bone.rotation_mode, np.eye(3)[None])[1][0], _STILL))
+    return [
+        (
+            name,
+            values,
+            "" if np.ptp(values, axis=0).max() >= least else "at rest" if _near(values, rest, least) else "still",
+        )
+        for name, values, rest, least in found
+    ]
+
+
+def _near(values: NDArray[np.float64], rest: NDArray[np.float64], least: float) -> bool:
+    return bool(np.abs(values - rest).max() < least)
