@@ -161,3 +161,26 @@ def seen(rig, bones, frames=FRAMES):
         posed = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
         out.append([np.array(posed.matrix_world @ posed.pose.bones[name].head) for name in bones])
     return np.array(out)
+
+
+# Where MPFB's default rig has the bones that its face is known and measured by, and the tip of each; decimetres.
+MPFB_FACE = {
+    "jaw": ((0, 6.88, 0.64), (0, 6.16, 1.23)),
+    "eye.L": ((0.31, 7.28, 1.25), (0.32, 7.29, 1.62)),
+    "orbicularis03.L": ((0.31, 7.28, 1.25), (0.32, 7.41, 1.59)),
+    "orbicularis04.L": ((0.31, 7.28, 1.25), (0.32, 7.18, 1.6)),
+    "levator05.L": ((0.3, 6.63, 1.41), (0.26, 6.55, 1.41)),
+}
+
+
+def add_mpfb_face(rig):
+    """Give a rig the bones of the face of MPFB's default rig, by which Scope knows it."""
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    bones, head = rig.data.edit_bones, rig.data.edit_bones["head"]
+    for name, ends in MPFB_FACE.items():
+        for side in (1, -1) if name.endswith(".L") else (1,):
+            bone = bones.new(name if side == 1 else name.replace(".L", ".R"))
+            at = [Vector((side * x, -z, y - 6)) * 0.1 + head.head for x, y, z in ends]
+            (bone.head, bone.tail), bone.parent, bone.roll = at, head, 0.3
+    bpy.ops.object.mode_set(mode="OBJECT")

@@ -1,19 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that retarget captured expressions to a mesh, and that guess, edit, save and load the expression map."""
+"""Operators that retarget captured expressions to a face, and that guess, edit, save and load the expression map."""
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
 
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
 from ..captured_person import captured_armature
 from ..reporting import ReportingOperator, rpt_, tip_
+from .face_list import bones_move, fill_expressions, guessed_map, has_targets, listed_expressions
 from .map_operators import LoadMapOperator, SaveMapOperator, edit_list, is_in_view_layer
-
-if TYPE_CHECKING:
-    from ...retarget.expression_map import ExpressionMap
 
 
 class _FaceOperator(ReportingOperator):
@@ -21,16 +17,16 @@ class _FaceOperator(ReportingOperator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Require a mesh with shape keys in the view layer."""
+        """Require a mesh with shape keys, or a rig whose face is known, in the view layer."""
         face = context.scene.scope_retarget.face
-        if face is None or face.type != "MESH" or face.data.shape_keys is None:
-            cls.poll_message_set(tip_("Choose a mesh with shape keys first"))
+        if not has_targets(face):
+            cls.poll_message_set(tip_("Choose a mesh with shape keys, or a rig with face controls, first"))
             return False
         return is_in_view_layer(cls, context, face)
 
 
 class SCOPE_OT_guess_expressions(_FaceOperator):
-    """Assign the mesh's shape keys to expressions by their names: ARKit's, Oculus' visemes, or VRM's"""
+    """Assign the face's shape keys, named as by ARKit, Oculus or VRM, or the controls of a known rig to expressions"""
 
     bl_idname = "scope.guess_expressions"
     bl_label = "Guess Expressions"
@@ -44,32 +40,35 @@ class SCOPE_OT_guess_expressions(_FaceOperator):
 
         settings = context.scene.scope_retarget
         found = guessed_map(settings.face)
-        if not found.keys:
+        if not found.keys and not found.controls:
             raise UsageError(
                 f"no shape key of '{settings.face.name}' has a name of ARKit, Oculus or VRM; add entries to the list"
             )
         fill_expressions(settings, found)
+        if found.controls:
+            return rpt_("Found {count} controls; check the list", count=len(found.controls))
         return rpt_("Found {count} shape keys; check the list", count=len(found.keys))
 
 
 class SCOPE_OT_retarget_face(_FaceOperator):
-    """Transfer the captured expressions to the mesh's shape keys, as a new action"""
+    """Transfer the captured expressions to the mesh's shape keys or the rig's face, as a new action"""
 
     bl_idname = "scope.retarget_face"
     bl_label = "Retarget Face"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Require a mesh that can be animated in this file, and a captured person."""
+        """Require a face that can be animated in this file, and a captured person."""
         if not super().poll(context):
             return False
         face = context.scene.scope_retarget.face
-        if face.data.library is not None:
+        library = face.library if face.type == "ARMATURE" else face.data.library  # of what is animated
+        if library is not None:
             cls.poll_message_set(
                 tip_(
                     "'{mesh}' is linked from {file}, so its keyframes would not be saved in this file: make it local",
                     mesh=face.name,
-                    file=face.data.library.filepath,
+                    file=library.filepath,
                 )
             )
             return False
@@ -81,9 +80,10 @@ class SCOPE_OT_retarget_face(_FaceOperator):
     def work(self, context: bpy.types.Context) -> str:
         """Write the keys.
 
-        :raises UsageError: the person's face was not captured, or no shape key is mapped.
+        :raises UsageError: the person's face was not captured, or no shape key or control is mapped.
         """
         from ...errors import UsageError
+        from ...scene.rigs.face_bones import retarget_face_bones
         from ...scene.rigs.face_retarget import captured_expressions, retarget_expressions
 
         settings, source = context.scene.scope_retarget, captured_armature(context)
@@ -92,7 +92,10 @@ class SCOPE_OT_retarget_face(_FaceOperator):
         if captured is None:
             raise UsageError(f"the face of '{source.name}' was not captured; capture again with Face")
         chosen = listed_expressions(settings) if len(settings.face_pairs) else guessed_map(settings.face)
-        (action,) = retarget_expressions(captured, [settings.face], chosen, source.name)
+        if bones_move(settings.face):
+            action = retarget_face_bones(captured, settings.face, chosen, source.name)
+        else:
+            (action,) = retarget_expressions(captured, [settings.face], chosen, source.name)
         if not len(settings.face_pairs):
             fill_expressions(settings, chosen)
         return rpt_("'{mesh}' is now animated by the action '{action}'", mesh=settings.face.name, action=action.name)
@@ -138,36 +141,9 @@ class SCOPE_OT_edit_expression_pair(_FaceOperator):
         """Change the list."""
         settings = context.scene.scope_retarget
         settings.face_active = edit_list(self.action, settings.face_pairs, settings.face_active)
+        if self.action == "ADD" and bones_move(settings.face):
+            settings.face_pairs[settings.face_active].channel = "up"
         return rpt_("{count} entries", count=len(settings.face_pairs))
-
-
-def guessed_map(face: bpy.types.Object) -> ExpressionMap:
-    """Return the map that the names of a mesh's shape keys suggest."""
-    from ...retarget.expression_map import guess_expression_map
-    from ...scene.rigs.face_retarget import key_names
-
-    return guess_expression_map(key_names([face]))
-
-
-def fill_expressions(settings: bpy.types.PropertyGroup, expression_map: ExpressionMap) -> None:
-    """Fill the list with a map, one entry for each expression of a shape key."""
-    settings.face_pairs.clear()
-    for key, factors in expression_map.keys.items():
-        for expression, factor in factors.items():
-            pair = settings.face_pairs.add()
-            pair.key, pair.expression, pair.factor = key, expression, factor
-    settings.face_active = 0
-
-
-def listed_expressions(settings: bpy.types.PropertyGroup) -> ExpressionMap:
-    """Return the list as a map; entries without a shape key or an expression are left out."""
-    from ...retarget.expression_map import ExpressionMap
-
-    keys: dict[str, dict[str, float]] = {}
-    for pair in settings.face_pairs:
-        if pair.key and pair.expression:
-            keys.setdefault(pair.key, {})[pair.expression] = round(pair.factor, 6)
-    return ExpressionMap(keys)
 
 
 CLASSES = (

@@ -11,9 +11,11 @@ from bpy.props import EnumProperty, StringProperty
 from ..captured_person import PERSON, betas_of, body_of, captured_armature, captured_people
 from ..reporting import ReportingOperator, rpt_, sentence, tip_
 from .bone_list import fill_list, listed_map
+from .face_list import bones_move, fill_expressions, guessed_map, listed_expressions
 from .map_operators import LoadMapOperator, SaveMapOperator, edit_list, is_in_view_layer
 
 if TYPE_CHECKING:
+    from ...retarget.expression_map import ExpressionMap
     from ...scene.rigs.rig_retarget import RetargetOptions, RetargetResult
 
 _SIDE_OFFSET_M = (1.5, 0.0, 0.0)  # to the left of a person who faces the front view
@@ -100,6 +102,7 @@ def retarget_to_chosen_rig(context: bpy.types.Context, source: bpy.types.Object)
     from ...scene.visibility import hide, show
 
     settings, body = context.scene.scope_retarget, body_of(source)
+    face = face_map(settings)
     guessed = None if len(settings.pairs) else guess_bone_map(settings.rig)
     result = retarget(
         source,
@@ -108,10 +111,12 @@ def retarget_to_chosen_rig(context: bpy.types.Context, source: bpy.types.Object)
         settings.rig,
         guessed or listed_map(settings),
         scene_rate(context.scene),
-        retarget_options(settings),
+        retarget_options(settings, face),
     )
     if guessed is not None:  # not before: what fails changes nothing
         fill_list(settings, guessed)
+    if face is not None and not len(settings.face_pairs):
+        fill_expressions(settings, face)
     settings.rig[PERSON] = source
     if settings.captured == "hide":
         _select_only(context, settings.rig)
@@ -121,12 +126,22 @@ def retarget_to_chosen_rig(context: bpy.types.Context, source: bpy.types.Object)
     return result
 
 
-def retarget_options(settings: bpy.types.PropertyGroup) -> RetargetOptions:
-    """Return the options of the settings."""
+def face_map(settings: bpy.types.PropertyGroup) -> ExpressionMap | None:
+    """Return the expression map if the chosen face is the rig's own, which its bones move; otherwise None."""
+    if settings.face is None or settings.face != settings.rig or not bones_move(settings.face):
+        return None
+    return listed_expressions(settings) if len(settings.face_pairs) else guessed_map(settings.face)
+
+
+def retarget_options(settings: bpy.types.PropertyGroup, face: ExpressionMap | None = None) -> RetargetOptions:
+    """Return the options of the settings.
+
+    :param face: the expression map of the bones that move the rig's face, if any.
+    """
     from ...scene.rigs.rig_retarget import RetargetOptions
 
     offset = _SIDE_OFFSET_M if settings.captured == "beside" else (0.0, 0.0, 0.0)
-    return RetargetOptions(feet=settings.feet, root=settings.root, offset=offset)
+    return RetargetOptions(feet=settings.feet, root=settings.root, offset=offset, face=face)
 
 
 class SCOPE_OT_save_bone_map(_RigOperator, SaveMapOperator):

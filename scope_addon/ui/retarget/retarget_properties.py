@@ -42,24 +42,43 @@ def offered_expressions(_pair: bpy.types.PropertyGroup | None, _context: bpy.typ
 
 
 class SCOPE_PG_expression_pair(bpy.types.PropertyGroup):
-    """One shape key of the user's mesh and an expression that it follows."""
+    """One shape key of the user's mesh, or channel of a rig's control, and an expression that it follows."""
 
-    key: StringProperty(name="Shape Key", description="Shape key of your mesh")
+    key: StringProperty(name="Shape Key or Control", description="Shape key of your mesh, or bone of your rig's face")
+    channel: EnumProperty(
+        name="Channel",
+        items=(
+            ("key", "Shape Key", "Value of a shape key", 0),
+            ("left", "Left", "Moves to the person's left; of the mouth's width, the eyes' distance, the lids' gap", 1),
+            ("up", "Up", "Moves up; of the mouth's width, the eyes' distance, the lids' gap", 2),
+            ("forward", "Forward", "Moves forward; of the mouth's width, the eyes' distance, the lids' gap", 3),
+            ("pitch", "Pitch", "Turns down, in degrees", 4),
+            ("yaw", "Yaw", "Turns to the person's left, in degrees", 5),
+            ("roll", "Roll", "Turns with the left side up, in degrees", 6),
+        ),
+        default="key",
+        translation_context=CONTEXT,
+        description="How a control follows the expression, along the axes of the rig's face",
+    )
     expression: StringProperty(
-        name="Expression", search=offered_expressions, description="Captured expression that this shape key follows"
+        name="Expression", search=offered_expressions, description="Captured expression that this entry follows"
     )
     factor: FloatProperty(
         name="Factor",
         default=1.0,
-        min=-10.0,
-        max=10.0,
-        description="Value of the shape key where the expression is 1; several expressions of a key add up",
+        min=-180.0,
+        max=180.0,
+        soft_min=-10.0,
+        soft_max=10.0,
+        description="Value where the expression is 1: at most 10, or 180 degrees; several expressions add up",
     )
 
 
 def _is_face(_settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
+    from .face_list import has_targets
+
     captured = obj.parent is not None and "scope_source" in obj.parent
-    return obj.type == "MESH" and obj.data.shape_keys is not None and not captured
+    return not captured and has_targets(obj)
 
 
 def _is_armature(_settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
@@ -67,10 +86,17 @@ def _is_armature(_settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> b
 
 
 def _list_bones_of_new_rig(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
-    """Replace the bone list of another rig by a guess; keep that of the same rig, or of one with the same bones."""
+    """Replace the bone list of another rig by a guess; keep that of the same rig, or of one with the same bones.
+
+    A rig whose bones move its face becomes the face as well, unless another one is chosen.
+    """
     rig = settings.rig
     if rig is None:
         return
+    from .face_list import bones_move, face_of_rig
+
+    if settings.face is None or bones_move(settings.face):
+        settings.face = face_of_rig(rig)
     bones = "\n".join(sorted(bone.name for bone in rig.data.bones))
     if settings.listed_bones == bones:
         return
@@ -83,17 +109,17 @@ def _list_bones_of_new_rig(settings: bpy.types.PropertyGroup, _context: bpy.type
 
 
 def _list_keys_of_new_face(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
-    """Replace the expression list of another mesh by a guess; keep that of a mesh with the same keys."""
-    if settings.face is None or settings.face.data.shape_keys is None:
+    """Replace the expression list of another face by a guess; keep that of one with the same shape keys or bones."""
+    from .face_list import fill_expressions, guessed_map, has_targets, target_names
+
+    if not has_targets(settings.face):
         return
-    keys = "\n".join(sorted(block.name for block in settings.face.data.shape_keys.key_blocks))
+    keys = "\n".join(sorted(target_names(settings.face)))
     if settings.listed_keys == keys:
         return
     settings.listed_keys = keys
     if len(settings.face_pairs) == 0:
         return  # nothing to replace: guessed when it is needed
-    from .face_operators import fill_expressions, guessed_map
-
     fill_expressions(settings, guessed_map(settings.face))
 
 
@@ -111,13 +137,13 @@ class SCOPE_PG_retarget(bpy.types.PropertyGroup):
     pairs: CollectionProperty(type=SCOPE_PG_bone_pair)
     active: IntProperty()
     face: PointerProperty(
-        name="Mesh",
+        name="Face",
         type=bpy.types.Object,
         poll=_is_face,
         update=_list_keys_of_new_face,
-        description="Mesh with shape keys to animate with the captured expressions",
+        description="Mesh with shape keys, or rig whose bones move its face, to animate with the captured expressions",
     )
-    listed_keys: StringProperty(options={"HIDDEN"})  # names of all shape keys of the mesh that the list is for
+    listed_keys: StringProperty(options={"HIDDEN"})  # names of all shape keys or bones that the list is for
     face_pairs: CollectionProperty(type=SCOPE_PG_expression_pair)
     face_active: IntProperty()
     feet: BoolProperty(

@@ -21,7 +21,7 @@ from scope.scope_addon.scene.rigs.rig_export import RigExportOptions, export_on_
 from ...edit.walking import motion_of, walk
 from ...made_motion import made_face
 from ..character.test_expression_keys import morph_animation
-from ..made_rigs import build_rig
+from ..made_rigs import add_mpfb_face, build_rig
 
 JAW = np.array([0.0, 0.3, 0.9, 0.2])
 
@@ -148,3 +148,24 @@ def test_a_rig_file_gets_body_and_face(whole_body, tmp_path, names, moving):
     weights = morph_animation(tmp_path / "out.glb")
     np.testing.assert_allclose(weights[moving], 1.5 * np.linspace(0, 0.5, T), atol=1e-4)
     assert not weights["viseme_O"].any()
+
+
+@pytest.mark.parametrize("known_keys", [False, True])
+def test_a_rig_file_whose_bones_move_the_face(whole_body, tmp_path, known_keys):
+    rig, _ = build_rig("mpfb")
+    add_mpfb_face(rig)
+    face_mesh(["viseme_aa"] if known_keys else ["Key 1"], rig)
+    with formats.quiet():
+        formats.write_blend(tmp_path / "hero.blend", bpy.context.scene)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    motion = motion_of(walk(1.0))
+    motion = replace(motion, face=made_face(len(motion.frames), jawOpen=np.linspace(0, 1, len(motion.frames))))
+    _, warnings = export_on_rig(
+        [motion], whole_body, [tmp_path / "out.blend"], RigSource(tmp_path / "hero.blend"), RigExportOptions(NEW_SCENE)
+    )
+    assert not [warning for warning in warnings if "face" in warning]
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out.blend"))
+    (written,) = (obj for obj in bpy.data.objects if obj.type == "ARMATURE")
+    bones = {curve.data_path.split('"')[1] for curve in actions.fcurves(written)}
+    assert "upperarm01.L" in bones
+    assert ("jaw" in bones) != known_keys

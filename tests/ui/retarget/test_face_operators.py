@@ -108,7 +108,7 @@ def test_guessing_without_known_names_leaves_the_list_as_it_is(settings):
 
 def test_what_could_not_be_loaded_again_is_not_saved(settings, tmp_path):
     path = tmp_path / "face.json"
-    with pytest.raises(RuntimeError, match="no shape key; add one"):
+    with pytest.raises(RuntimeError, match="no shape key and no control; add one"):
         bpy.ops.scope.save_expression_map(filepath=str(path))
     bpy.ops.scope.guess_expressions()
     settings.face_pairs[0].expression = "grin"
