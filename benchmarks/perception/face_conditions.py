@@ -25,6 +25,7 @@ CONDITIONS: tuple[tuple[str, str, float], ...] = (  # label, set, face in pixels
     ("head in motion", "talk_in_motion", 0.0),
     ("thin glasses", "talk_thin_glasses", 0.0),
     ("thick frames", "talk_thick_glasses", 0.0),
+    ("thick frames, reflections, Cycles", "talk_reflections", 0.0),
     ("dark glasses", "talk_dark_glasses", 0.0),
     ("beard", "talk_beard", 0.0),
 )

@@ -141,9 +141,13 @@ def pooled(values: NDArray[np.float64]) -> NDArray[np.float64]:
 def rows_of(seen: SeenFaces, rows: NDArray[np.intp], scale: float) -> NDArray[np.float64]:
     """Return what a capture keeps (n, RECORD) of these pictures (n,)."""
     region = Region((0.0, 0.0), 1.0, 0.0)
+    light = np.ones(len(seen.presence)) if seen.eye_light is None else seen.eye_light
     return np.array(
         [
-            record(FaceEstimate(scale * seen.landmarks[t], float(seen.presence[t]), region), seen.weights[t])
+            record(
+                FaceEstimate(scale * seen.landmarks[t], float(seen.presence[t]), region, float(light[t])),
+                seen.weights[t],
+            )
             for t in rows
         ]
     )

@@ -44,6 +44,7 @@ SETS: dict[str, FaceSet] = {
     "talk_in_motion": _condition(in_motion, blurred=True),
     "talk_thin_glasses": _condition(worn="thin glasses"),
     "talk_thick_glasses": _condition(worn="thick glasses"),
+    "talk_reflections": _held_out(worn="thick glasses"),
     "talk_dark_glasses": _condition(worn="dark glasses"),
     "talk_beard": _condition(worn="beard"),
 }
