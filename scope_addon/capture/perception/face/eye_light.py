@@ -23,7 +23,7 @@ def eye_light(image_rgb: NDArray[np.uint8], landmarks: NDArray[np.float64]) -> f
     glasses, at most 0.4 with dark ones; 1 where the skin is too dark or the eye too small to tell.
 
     :param image_rgb: (H, W, 3) uint8.
-    :param landmarks: (478, 2 or 3) pixels.
+    :param landmarks: (478, 2) or (478, 3) pixels; a third column is not used.
     """
     found = []
     for corners, *places in zip(_EYES, _CHEEKS, _FOREHEAD, strict=True):
