@@ -26,7 +26,7 @@ ELSEWHERE = {  # imported where they are wanted: some need packages that others 
     "scenes": (".scenes.accuracy", "scenes"),
     "smplify": (".smplify.comparison", "smplify"),
     "outline": (".perception.outline", "outline"),
-    "faces": (".perception.faces", "faces"),
+    "faces": (".perception.face_conditions", "faces_and_conditions"),
     "blender": (".blender", "blender"),
     "cluster": (".cluster", "cluster"),
 }

@@ -49,9 +49,7 @@ Found = tuple[NDArray[np.float64], NDArray[np.float64]]  # weights (T, 52), gaze
 def faces(quick: bool) -> dict[str, Any]:
     """Render what is missing, measure, print the tables as they come, return the figures by size and way."""
     for name in (CALIBRATION, HELD_OUT):
-        if not list((FOLDER / name).glob("seen_1.npz")):
-            command = (sys.executable, "-m", "scope.tools.render_faces", name)
-            subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        render_missing(name)
     calibrate = monotone_maps(seen_faces(CALIBRATION))
     figures: dict[str, Any] = {}
     for label, scale in (("large faces", 1.0), ("small faces", SMALL))[: 1 if quick else 2]:
@@ -61,8 +59,8 @@ def faces(quick: bool) -> dict[str, Any]:
             "network": lambda rows, _: _values(rows),
             "network, calibrated": lambda rows, _: _values(_with_weights(rows, calibrate(parts(rows)[2]))),
             "fit": lambda rows, times: _values(fitted(rows, times)),
-            "network, smoothed": lambda rows, times: _smoothed(rows, times),
-            "fit, smoothed: the capture": lambda rows, times: _smoothed(fitted(rows, times), times),
+            "network, smoothed": lambda rows, times: smoothed(rows, times),
+            "fit, smoothed: the capture": lambda rows, times: smoothed(fitted(rows, times), times),
         }
         figures[label] = {way: measure(seen, scale, function) for way, function in ways.items()}
         rows = [[way, *(row[key] for key in SHOWN)] for way, row in figures[label].items()]
@@ -72,13 +70,20 @@ def faces(quick: bool) -> dict[str, Any]:
     return figures
 
 
+def render_missing(name: str) -> None:
+    """Render a set, unless it has been seen before."""
+    if not list((FOLDER / name).glob("seen_1.npz")):
+        command = (sys.executable, "-m", "scope.tools.render_faces", name)
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
 def measure(seen: SeenFaces, scale: float, way: Callable[..., Found]) -> dict[str, float]:
     """Return the figures of one way: mean absolute errors of weights, timing of closed eyes, and error of the gaze."""
     truth, person = seen.truth["weights"], seen.truth["person"]
     gaze, weights = np.empty((len(truth), 2, 3)), np.empty_like(truth)
     for p in np.unique(person):
         rows = np.flatnonzero(person == p)
-        weights[rows], gaze[rows] = way(_rows(seen, rows, scale), seen.truth["seconds"][rows])
+        weights[rows], gaze[rows] = way(rows_of(seen, rows, scale), seen.truth["seconds"][rows])
     error = np.delete(abs(weights - truth), TONGUE, axis=1)
     open_eyes = truth[:, BLINKS] < ACTIVE
     out = {
@@ -133,11 +138,16 @@ def pooled(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.repeat([value for value, _ in blocks], [n for _, n in blocks])
 
 
-def _rows(seen: SeenFaces, rows: NDArray[np.intp], scale: float) -> NDArray[np.float64]:
+def rows_of(seen: SeenFaces, rows: NDArray[np.intp], scale: float) -> NDArray[np.float64]:
+    """Return what a capture keeps (n, RECORD) of these pictures (n,)."""
     region = Region((0.0, 0.0), 1.0, 0.0)
+    light = np.ones(len(seen.presence)) if seen.eye_light is None else seen.eye_light
     return np.array(
         [
-            record(FaceEstimate(scale * seen.landmarks[t], float(seen.presence[t]), region), seen.weights[t])
+            record(
+                FaceEstimate(scale * seen.landmarks[t], float(seen.presence[t]), region, float(light[t])),
+                seen.weights[t],
+            )
             for t in rows
         ]
     )
@@ -154,7 +164,8 @@ def _with_weights(rows: NDArray[np.float64], weights: NDArray[np.float64]) -> ND
     return out
 
 
-def _smoothed(rows: NDArray[np.float64], times: NDArray[np.float64]) -> Found:
+def smoothed(rows: NDArray[np.float64], times: NDArray[np.float64]) -> Found:
+    """Return weights and gaze as the capture writes them, from rows (T, RECORD) with weights."""
     face = expression_motion(rows, times, smoothing=True)
     return face["expressions"], face["gaze"]
 
@@ -181,7 +192,7 @@ def _rises(weight: NDArray[np.float64]) -> NDArray[np.intp]:
 
 
 def _fit_ms(seen: SeenFaces, scale: float) -> float:
-    rows, times = _rows(seen, np.arange(len(seen.presence)), scale), np.arange(len(seen.presence)) / 30
+    rows, times = rows_of(seen, np.arange(len(seen.presence)), scale), np.arange(len(seen.presence)) / 30
     begin = time.perf_counter()
     fitted(rows, times)
     return 1000 * (time.perf_counter() - begin) / len(rows)

@@ -28,6 +28,7 @@ class SeenFaces:
     landmarks: NDArray[np.float64]  # (T, 478, 3) pixels, and depth in pixels
     presence: NDArray[np.float64]  # (T,)
     weights: NDArray[np.float64]  # (T, 52) of the expression network
+    eye_light: NDArray[np.float64] | None = None  # (T,); None: as of bare eyes
 
 
 def seen_faces(name: str, scale: float = 1.0) -> SeenFaces:
@@ -39,10 +40,15 @@ def seen_faces(name: str, scale: float = 1.0) -> SeenFaces:
     with np.load(folder / "truth.npz") as data:
         truth = {key: data[key] for key in data.files}
     kept = folder / f"seen_{scale:g}.npz"
-    if not kept.is_file() or len(np.load(kept)["presence"]) != len(truth["weights"]):
+    if not kept.is_file() or not _is_whole(kept, len(truth["weights"])):
         _observe(folder, len(truth["weights"]), scale, kept)
     with np.load(kept) as data:
-        return SeenFaces(truth, data["landmarks"].astype(float), data["presence"], data["weights"])
+        return SeenFaces(truth, data["landmarks"].astype(float), data["presence"], data["weights"], data["eye_light"])
+
+
+def _is_whole(kept: Path, count: int) -> bool:
+    with np.load(kept) as data:
+        return "eye_light" in data and len(data["presence"]) == count
 
 
 def _observe(folder: Path, count: int, scale: float, out: Path) -> None:
@@ -60,6 +66,7 @@ def _observe(folder: Path, count: int, scale: float, out: Path) -> None:
             estimate = network.estimate(rgb, region)
             region = estimate.next_region
         landmarks = estimate.landmarks / scale
-        rows.append((landmarks.astype(np.float32), estimate.presence, network.expression(estimate)))
-    landmarks, presence, weights = (np.array(column) for column in zip(*rows, strict=True))
-    np.savez(out, landmarks=landmarks, presence=presence, weights=weights)
+        expression = network.expression(estimate)
+        rows.append((landmarks.astype(np.float32), estimate.presence, expression, estimate.eye_light))
+    landmarks, presence, weights, light = (np.array(column) for column in zip(*rows, strict=True))
+    np.savez(out, landmarks=landmarks, presence=presence, weights=weights, eye_light=light)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``python -m scope.tools.readme_pictures``: make the pictures. All but ``sample`` need ../shared/data."""
+"""``python -m scope.tools.readme_pictures``: make the pictures. All but the animations need ../shared/data."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ...solver.loaders.body_file import ASSETS
 from . import animation, pictures
 from .clips import DATA
 
-ANIMATION = "sample"
+ANIMATIONS = tuple(animation.CUTS)
 PICTURES = {
     "capture": pictures.sample,
     "against_truth": pictures.against_truth,
@@ -32,7 +32,7 @@ LARGEST_BYTES = 60_000
 
 def main() -> int:
     """Make all pictures, or those that are named."""
-    known = [ANIMATION, *PICTURES]
+    known = [*ANIMATIONS, *PICTURES]
     parser = argparse.ArgumentParser(prog="readme_pictures", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"one of {', '.join(known)}; default: all")
     parser.add_argument("-o", "--out", type=Path, default=ASSETS / "pictures", help="folder (default: assets/pictures)")
@@ -41,13 +41,13 @@ def main() -> int:
     if unknown:
         parser.error(f"there is no picture {', '.join(sorted(unknown))}; choose from {', '.join(known)}")
     names = arguments.names or known
-    if names != [ANIMATION] and not DATA.is_dir():
+    if not set(names) <= set(ANIMATIONS) and not DATA.is_dir():
         print(f"{DATA} does not exist: the pictures show captures of its clips", file=sys.stderr)
         return 1
     arguments.out.mkdir(parents=True, exist_ok=True)
     for name in names:
-        if name == ANIMATION:
-            _write_animation(arguments.out / f"{name}.webp")
+        if name in ANIMATIONS:
+            _write_animation(name, arguments.out / f"{name}.webp")
         else:
             write_jpeg(arguments.out / f"{name}.jpg", PICTURES[name]())
     return 0
@@ -65,11 +65,10 @@ def write_jpeg(path: Path, picture: NDArray[np.uint8]) -> None:
     print(f"{path}: {picture.shape[1]} x {picture.shape[0]}, {len(data) / 1000:.0f} kB, quality {quality}")
 
 
-def _write_animation(path: Path) -> None:
-    """Write the moving picture."""
-    frames = animation.sample_frames()
+def _write_animation(name: str, path: Path) -> None:
+    frames, most_bytes = animation.animation_frames(name), animation.LARGEST_BYTES[name]
     with atomic_path(path) as temporary:
-        quality = animation.write_webp(temporary, frames, 30 / animation.FRAME_STEP)
+        quality = animation.write_webp(temporary, frames, animation.CUTS[name].frames_per_second, most_bytes)
     height, width = frames[0].shape[:2]
     size_kb = path.stat().st_size / 1000
     print(f"{path}: {len(frames)} frames of {width} x {height}, {size_kb:.0f} kB, quality {quality}")

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The README's animation: the sample clip, the captured body over it, and the same motion from the side."""
+"""The README's animations: a clip, the captured body over it, and the same motion from the side."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
@@ -11,40 +12,70 @@ from numpy.typing import NDArray
 
 from ...scope_addon.capture.media.video import open_video
 from ...scope_addon.errors import OutputError
-from .clips import SAMPLE, captured, default_body
+from ...scope_addon.motion import Motion
+from ...solver import Body
+from .clips import SAMPLE, body_with_fingers, captured, captured_in_total, default_body, talk
 from .footage import cropped
-from .panel import Panel, next_to_each_other
-from .shapes import joints, posed
+from .panel import OURS, Panel, next_to_each_other
+from .shapes import colors_with_face, joints, posed
 from .view import from_around
 
-FRAME_STEP = 2  # every second frame: 15 frames per second
-LARGEST_BYTES = 3_000_000
-_SIZE = (300, 306)  # of one panel, pixels
-_CORNER, _TALL = (60.0, 0.0), 480.0  # the part of the footage that is shown: the person stays inside it
-_MIDDLE, _HEIGHT_M = np.array([0.35, 0.0, 0.93]), 2.35  # centre and height of the side view
+LARGEST_BYTES = {"sample": 410_000, "talk": 390_000}
 
 
-def sample_frames() -> list[NDArray[np.uint8]]:
-    """Return (H, W, 3) RGB frames: footage, overlay and side view next to each other."""
-    motion = captured(SAMPLE)[0]
+@dataclass(frozen=True)
+class Cut:
+    """What is shown of a clip: upper left corner and height of a part of the footage, and the view from the side."""
+
+    size: tuple[int, int]  # of a panel with footage, pixels
+    side: tuple[int, int]  # of the panel with the side view
+    corner: tuple[float, float]
+    tall: float
+    middle: tuple[float, float, float]  # of the side view, metres
+    height_m: float  # of the side view
+    turn: float = 90.0  # of the side view, degrees
+    step: int = 2  # frames of the footage for one of the animation
+
+    @property
+    def frames_per_second(self) -> float:
+        """Of the animation; the clips have 30."""
+        return 30 / self.step
+
+
+CUTS = {  # the person stays inside
+    "sample": Cut((300, 306), (300, 306), (60.0, 0.0), 480.0, (0.35, 0.0, 0.93), 2.35),
+    "talk": Cut((308, 240), (204, 240), (0.0, 26.0), 400.0, (0.0, -0.15, 1.375), 0.84, 60.0, 3),
+}
+
+
+def animation_frames(name: str) -> list[NDArray[np.uint8]]:
+    """Return (H, W, 3) RGB frames of an animation: footage, overlay and side view next to each other."""
+    if name == "sample":
+        return _frames(SAMPLE, captured(SAMPLE)[0], None, CUTS[name])
+    return _frames(talk(), captured_in_total(talk()), body_with_fingers(), CUTS[name])
+
+
+def _frames(clip: Path, motion: Motion, body: Body | None, cut: Cut) -> list[NDArray[np.uint8]]:
+    """Return an animation's frames; a body that is given has eyes and mouth in their own colours."""
     rows = {int(frame): row for row, frame in enumerate(motion.frames)}
-    view = from_around(motion, 0, _MIDDLE, _SIZE, 90, _HEIGHT_M)
+    view = from_around(motion, 0, np.array(cut.middle), cut.side, cut.turn, cut.height_m)
     frames = []
-    with open_video(SAMPLE) as video:
+    with open_video(clip) as video:
         for frame in video:
-            if frame.index % FRAME_STEP or frame.index not in rows:
+            if frame.index % cut.step or frame.index not in rows:
                 continue
             row = rows[frame.index]
-            footage = cropped(frame.image_rgb, _CORNER, _TALL, _SIZE)
-            overlay = cropped(frame.image_rgb, _CORNER, _TALL, _SIZE, motion, row)
+            footage = cropped(frame.image_rgb, cut.corner, cut.tall, cut.size)
+            overlay = cropped(frame.image_rgb, cut.corner, cut.tall, cut.size, motion, row, body)
             side = Panel(view, joints(motion, 0)[0])
-            side.body(default_body(), posed(motion, default_body(), row))
+            shown = body or default_body()
+            side.body(shown, posed(motion, shown, row), OURS if body is None else colors_with_face(body, OURS))
             frames.append(next_to_each_other([footage, overlay, side.finished()]))
     return frames
 
 
-def write_webp(path: Path, frames: list[NDArray[np.uint8]], frames_per_second: float) -> int:
-    """Write an endless animated WebP, at the best quality that stays below ``LARGEST_BYTES``; returns that quality.
+def write_webp(path: Path, frames: list[NDArray[np.uint8]], frames_per_second: float, most_bytes: int) -> int:
+    """Write an endless animated WebP, at the best quality that stays below a size; returns that quality.
 
     :param frames: (H, W, 3) uint8 RGB, all of one size.
     :raises OutputError: when the file cannot be written, or is too large at every quality.
@@ -52,9 +83,9 @@ def write_webp(path: Path, frames: list[NDArray[np.uint8]], frames_per_second: f
     animation = cv2.Animation()
     animation.frames = [cv2.cvtColor(frame, cv2.COLOR_RGB2BGR) for frame in frames]
     animation.durations = [round(1000 / frames_per_second)] * len(frames)
-    for quality in range(85, 25, -10):
+    for quality in range(85, 15, -10):
         if not cv2.imwriteanimation(str(path), animation, [cv2.IMWRITE_WEBP_QUALITY, quality]):
             raise OutputError(f"cannot write {path}; check that its folder exists and is writable")
-        if path.stat().st_size <= LARGEST_BYTES:
+        if path.stat().st_size <= most_bytes:
             return quality
-    raise OutputError(f"{path} is larger than {LARGEST_BYTES} bytes at every quality; show fewer frames")
+    raise OutputError(f"{path} is larger than {most_bytes} bytes at every quality; show fewer frames")

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from functools import cache
 from pathlib import Path
 
@@ -13,6 +15,7 @@ from ...scope_addon.capture.pipeline import capture
 from ...scope_addon.motion import Motion
 from ...solver import Body, load_body
 from ...solver.loaders.body_file import ASSETS
+from ..render_talk.shot import FOLDER, VIDEO
 from .shapes import joints, true_joints
 
 DATA = ASSETS.parent.parent / "shared" / "data"
@@ -30,9 +33,29 @@ def default_body() -> Body:
 
 
 @cache
+def body_with_fingers() -> Body:
+    """Load Scope's own body with fingers."""
+    return load_body("scope_h")
+
+
+@cache
 def captured(video: Path, everybody: bool = False) -> list[Motion]:
     """Capture a clip with default settings: everyone, or the most prominent person only."""
     return capture(video, default_body(), CaptureOptions(people="all" if everybody else "largest")).motions
+
+
+@cache
+def captured_in_total(video: Path) -> Motion:
+    """Capture the most prominent person of a clip, with fingers and face."""
+    return capture(video, body_with_fingers(), CaptureOptions(hands=True, face=True)).motions[0]
+
+
+def talk() -> Path:
+    """Return the clip of a person who talks and gestures, which is rendered if it is missing."""
+    if not (FOLDER / VIDEO).is_file():
+        command = (sys.executable, "-m", "scope.tools.render_talk")
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    return FOLDER / VIDEO
 
 
 def camera(number: int) -> tuple[Motion, Path]:

@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 from ...scope_addon.capture.media.video import open_video
 from ...scope_addon.capture.overlay.overlay_video import camera_vertices, draw_overlay
 from ...scope_addon.motion import Motion
+from ...solver import Body
 from .clips import SAMPLE, default_body
 from .panel import FINER, OURS
+from .shapes import colors_with_face, posed_in_camera
 
 _TALL = 446  # pixels of the footage that fill the picture's height
 _OPACITY = 0.72
@@ -34,12 +36,14 @@ def cropped(
     size: tuple[int, int],
     motion: Motion | None = None,
     row: int = 0,
+    body: Body | None = None,
 ) -> NDArray[np.uint8]:
     """Return (H, W, 3) RGB: a part of a frame, with the body over it where a motion is given.
 
     :param corner: upper left corner of the part, pixels of the frame.
     :param height: of the part, pixels of the frame.
     :param size: (width, height) of the result, pixels.
+    :param body: of the motion, whose eyes and mouth have their own colours; the default body if left out.
     """
     scale = FINER * size[1] / height
     crop = np.array([[scale, 0, -corner[0] * scale], [0, scale, -corner[1] * scale], [0, 0, 1.0]])
@@ -47,7 +51,9 @@ def cropped(
     enlarged = cv2.warpAffine(image, crop[:2], wide, flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
     larger = np.asarray(enlarged, np.uint8)
     if motion is not None:
-        body, vertices = default_body(), camera_vertices(motion, default_body(), row)
+        colors = np.array(OURS) if body is None else colors_with_face(body, OURS)
+        body = body or default_body()
+        vertices = posed_in_camera(motion, body, row)
         K = crop @ motion.intrinsics
-        larger = draw_overlay(larger, vertices, body.faces, K, colors=np.array(OURS), opacity=_OPACITY)
+        larger = draw_overlay(larger, vertices, body.faces, K, colors=colors, opacity=_OPACITY)
     return cv2.resize(larger, size, interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)

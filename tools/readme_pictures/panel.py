@@ -36,13 +36,14 @@ class Panel:
         self._depth = np.full(self.image.shape[:2], np.inf, np.float32)
         self._grid(middle)
 
-    def body(self, body: Body, vertices: NDArray[np.float64], color: Color = OURS) -> None:
-        """Draw a body and its shadow under a light from above."""
+    def body(self, body: Body, vertices: NDArray[np.float64], color: Color | NDArray[np.float64] = OURS) -> None:
+        """Draw a body, of one colour or with one (F, 3) for each face, and its shadow under a light from above."""
         triangles = np.concatenate([body.faces[:, [0, 1, 2]], body.faces[:, [0, 2, 3]]])
         self._shadow(vertices, triangles)
         seen = self.view.to_camera(vertices)
-        self.image = draw_overlay(self.image, seen, triangles, self.view.intrinsics, colors=np.array(color), opacity=1)
-        self._depth = np.minimum(self._depth, self._rasterized(seen, triangles, color).depth)
+        colors = np.array(color) if np.ndim(color) == 1 else np.tile(color, (2, 1))
+        self.image = draw_overlay(self.image, seen, triangles, self.view.intrinsics, colors=colors, opacity=1)
+        self._depth = np.minimum(self._depth, self._rasterized(seen, triangles, OURS).depth)
 
     def sticks(self, points: dict[str, NDArray[np.float64]], color: Color = TRUTH, radius: float = 0.014) -> None:
         """Draw a stick figure; parts within or behind a body show through it."""

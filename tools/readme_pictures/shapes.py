@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scope_addon.capture.overlay.overlay_video import camera_vertices
+from ...scope_addon.kinematics.expressions import mouth_faces_of
 from ...scope_addon.motion import Motion
 from ...solver import Body
+from ..render_faces.truth import with_expression
 
 STICKS = (
     ("LShoulder", "RShoulder"), ("LHip", "RHip"), ("LShoulder", "LHip"), ("RShoulder", "RHip"),
@@ -21,11 +23,29 @@ STICKS = (
 )  # fmt: skip
 HIPS = (1, 2)  # SMPL's joints
 _SIDES = 12  # of a stick
+_EYES = {"eye_white": (0.93, 0.95, 0.98), "eye_iris": (0.13, 0.20, 0.33), "eye_pupil": (0.05, 0.07, 0.12)}
 
 
 def posed(motion: Motion, body: Body, row: int) -> NDArray[np.float64]:
-    """Return the body's vertices (V, 3) at a row, metres, world."""
-    return to_world(motion, row, camera_vertices(motion, body, row))
+    """Return the body's vertices (V, 3) at a row, with its expression, metres, world."""
+    return to_world(motion, row, posed_in_camera(motion, body, row))
+
+
+def posed_in_camera(motion: Motion, body: Body, row: int) -> NDArray[np.float64]:
+    """Return the body's vertices (V, 3) at a row, with its expression, metres, in the axes of the row's camera."""
+    shown = with_expression(body, motion.face["expressions"][row]) if motion.face else body
+    return camera_vertices(motion, shown, row)
+
+
+def colors_with_face(body: Body, color: tuple[float, ...]) -> NDArray[np.float64]:
+    """Return a colour (F, 3) for each face of a built-in body: one for all but eyes and mouth."""
+    out = np.tile(color, (len(body.faces), 1))
+    assert body.face_material is not None  # the built-in bodies have materials
+    for number, name in enumerate(body.material_names):
+        if name in _EYES:
+            out[body.face_material == number] = _EYES[name]
+    out[mouth_faces_of(body)] = 0.3 * np.array(color)
+    return out
 
 
 def joints(motion: Motion, row: int) -> NDArray[np.float64]:

@@ -1,60 +1,92 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``python -m scope.tools.render_faces SET``: write a set's pictures and truth to build/faces/SET. Needs bpy."""
+"""``python -m scope.tools.render_faces SET ...``: write sets' pictures and truth to build/faces/SET. Needs bpy."""
 
 from __future__ import annotations
 
 import argparse
 import os
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ...solver.loaders.body_file import load_body
+from .beard import bearded
 from .identities import draw_identity, identity_targets
-from .looks import draw_look
-from .sequences import FaceClip, random_poses, talk_and_grimaces
+from .looks import draw_look, with_beard
+from .sequences import FaceClip
+from .sets import SETS, FaceSet
 from .shaded import ShadedStage
-from .truth import FOLDER, camera_vertices, focal_px, write_truth
+from .truth import FOLDER, focal_px, head_vertices, to_camera, write_truth
+from .worn import Worn, put_on
 
-Kind = tuple[Callable[..., FaceClip], int, dict[str, Any], bool]
-SETS: dict[str, Kind] = {  # what is drawn, the seed, and whether Cycles renders it
-    "poses": (random_poses, 11, {"people": 100, "each": 25}, False),
-    "shaded_talk": (talk_and_grimaces, 14, {"people": 8, "seconds": 5.0}, False),
-    "talk": (talk_and_grimaces, 12, {"people": 6, "seconds": 5.0}, True),
-    "talk_held_out": (talk_and_grimaces, 22, {"people": 4, "seconds": 5.0}, True),
-}
+_SHUTTER = 0.5  # of a frame, for which it is open where motion blurs
+_BODY = "body"
+Places = dict[str, NDArray[np.float64]]  # vertices (N, 3) of the body and of what is worn, camera frame, metres
 
 
 def main() -> int:
     """Render what is missing of a set."""
     parser = argparse.ArgumentParser(prog="render_faces", description=__doc__)
-    parser.add_argument("set", choices=SETS)
-    parser.add_argument("-o", "--out", type=Path, help="folder (default: build/faces/SET)")
+    parser.add_argument("sets", nargs="+", choices=SETS, metavar="SET", help=f"one of {', '.join(SETS)}")
+    parser.add_argument("-o", "--out", type=Path, default=FOLDER, help="folder of the sets' folders")
+    parser.add_argument("--frames", type=int, nargs="*", help="render only these frames")
     arguments = parser.parse_args()
-    draw, seed, sizes, cycles = SETS[arguments.set]
-    rng = np.random.default_rng(seed)
-    clip = draw(rng, **sizes)
     targets = identity_targets()
-    identities = np.array([draw_identity(targets, rng) for _ in range(sizes["people"])])
-    folder = arguments.out or FOLDER / arguments.set
-    folder.mkdir(parents=True, exist_ok=True)
-    body = load_body("scope")
+    for name in arguments.sets:
+        (arguments.out / name).mkdir(parents=True, exist_ok=True)
+        _render(SETS[name], targets, arguments.out / name, arguments.frames)
+    return 0
+
+
+def _render(faces: FaceSet, targets: NDArray[np.float64], folder: Path, frames: list[int] | None) -> None:
+    rng, body = np.random.default_rng(faces.seed), load_body("scope")
+    clip = faces.change(faces.draw(rng, **faces.sizes))
+    identities = np.array([draw_identity(targets, rng) for _ in range(faces.sizes["people"])])
     write_truth(folder / "truth.npz", body, clip, identities)
-    stage, dressed = _stage(body, cycles), -1
-    for t in range(len(clip.weights)):
+    stage, dressed, worn = _stage(body, faces.cycles), -1, Worn({})
+    for t in range(len(clip.weights)) if frames is None else frames:
+        path = folder / f"{t:04d}.png"
+        if path.is_file():
+            continue
         if clip.person[t] != dressed:
             dressed = int(clip.person[t])
-            look = np.random.default_rng([seed, dressed])
-            stage.dress(draw_look(body, look), look)
-        path = folder / f"{t:04d}.png"
-        if not path.is_file():
-            stage.render(camera_vertices(body, clip, identities, t), focal_px(clip.distance[t]), path)
-            print(f"{t + 1} / {len(clip.weights)}", file=sys.stderr, flush=True)
-    return 0
+            worn = _dress(stage, body, faces, dressed, identities[dressed])
+        places = _places(body, clip, identities, worn, t)
+        stage.render(places.pop(_BODY), focal_px(float(clip.distance[t])), path, *([places] if places else []))
+        if faces.blurred:
+            _blur(path, clip, t)
+        print(f"{t + 1} / {len(clip.weights)}", file=sys.stderr, flush=True)
+
+
+def _dress(stage: Any, body: Body, faces: FaceSet, person: int, identity: NDArray[np.float64]) -> Worn:
+    rng = np.random.default_rng([faces.seed, person])
+    look = draw_look(body, rng)
+    stage.dress(with_beard(look, bearded(body)) if faces.worn == "beard" else look, rng)
+    worn = put_on(faces.worn, body, body.v_template + identity, np.random.default_rng(person))
+    if worn.faces:
+        stage.wear(worn.faces)
+    return worn
+
+
+def _places(body: Body, clip: FaceClip, identities: NDArray[np.float64], worn: Worn, t: int) -> Places:
+    face = head_vertices(body, clip.weights[t], identities[clip.person[t]])
+    return {name: to_camera(clip, t, points) for name, points in ({_BODY: face} | worn.vertices(face)).items()}
+
+
+def _blur(path: Path, clip: FaceClip, t: int) -> None:
+    """Blur a picture along the way that the head's middle goes while the shutter is open."""
+    before, after = clip.middle[max(t - 1, 0)], clip.middle[min(t + 1, len(clip.middle) - 1)]
+    x, y = _SHUTTER * (after - before)[:2] / 2 * focal_px(float(clip.distance[t])) / clip.distance[t]
+    size = 2 * int(np.ceil(max(abs(x), abs(y)) / 2)) + 3
+    kernel, middle = np.zeros((size, size), np.float32), np.array([size // 2, size // 2])
+    start, end = (np.round(16 * (middle + side * np.array([x, y]) / 2)).astype(int).tolist() for side in (-1, 1))
+    cv2.line(kernel, start, end, (1.0,), 1, cv2.LINE_AA, 4)
+    cv2.imwrite(str(path), cv2.filter2D(cv2.imread(str(path)), -1, kernel / kernel.sum()))
 
 
 def _stage(body: Body, cycles: bool) -> Any:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +32,7 @@ def draw_look(body: Body, rng: np.random.Generator) -> Look:
     skin = np.array(SKINS[rng.integers(len(SKINS))]) * rng.uniform(0.85, 1.15)
     hair = HAIR * rng.uniform(0.5, 4.0)
     colors = np.tile(skin, (len(body.v_template), 1))
-    lips, brows, lashes = (mask[:, None] for mask in _masks(body))
+    lips, brows, lashes = (mask[:, None] for mask in masks(body))
     for mask, strength, color in (
         (lips, rng.uniform(0.4, 1.0), skin * LIPS),
         (brows, rng.uniform(0.5, 0.95), hair),
@@ -42,7 +42,15 @@ def draw_look(body: Body, rng: np.random.Generator) -> Look:
     return Look(colors, hair, np.array(IRISES[rng.integers(len(IRISES))]))
 
 
-def _masks(body: Body) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def with_beard(look: Look, covered: NDArray[np.float64]) -> Look:
+    """Return a look whose skin under the beard is darker, as between hairs.
+
+    :param covered: (V,) 1 where the beard is, otherwise 0.
+    """
+    return replace(look, skin=look.skin + 0.7 * covered[:, None] * (look.hair - look.skin))
+
+
+def masks(body: Body) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Return how far each vertex (V,) belongs to the lips, the brows and the lashes, 0 to 1."""
     V, keys = body.v_template, {e.name: e for e in expressions_of(body)}
     lips, lashes = np.zeros(len(V)), np.zeros(len(V))

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +55,12 @@ class FaceClip:
     distance: NDArray[np.float64]  # (T,) metres of the point between the eyes
     person: NDArray[np.intp]  # (T,)
     seconds: NDArray[np.float64]  # (T,)
+    shift: NDArray[np.float64]  # (T, 3) metres by which the head is beside that distance along the camera's axis
+
+    @property
+    def middle(self) -> NDArray[np.float64]:
+        """(T, 3) the point between the eyes in the camera frame, metres."""
+        return self.shift + self.distance[:, None] * [0.0, 0.0, 1.0]
 
 
 def random_poses(rng: np.random.Generator, people: int, each: int) -> FaceClip:
@@ -66,9 +72,8 @@ def random_poses(rng: np.random.Generator, people: int, each: int) -> FaceClip:
             angles[t] *= 0.1
         elif rng.uniform() > 0.1:
             _draw_weights(weights[t], rng)
-    return FaceClip(
-        weights, _rotations(angles), rng.uniform(0.45, 1.6, T), np.repeat(np.arange(people), each), np.arange(T) / FPS
-    )
+    distance, person = rng.uniform(0.45, 1.6, T), np.repeat(np.arange(people), each)
+    return FaceClip(weights, _rotations(angles), distance, person, np.arange(T) / FPS, np.zeros((T, 3)))
 
 
 def _draw_weights(w: NDArray[np.float64], rng: np.random.Generator) -> None:
@@ -111,7 +116,26 @@ def talk_and_grimaces(rng: np.random.Generator, people: int, seconds: float) -> 
     clips = [_one_person(rng, T) for _ in range(people)]
     weights, angles, distance = (np.concatenate(parts) for parts in zip(*clips, strict=True))
     times = np.tile(np.arange(T) / FPS, people)
-    return FaceClip(weights, _rotations(angles), distance, np.repeat(np.arange(people), T), times)
+    person = np.repeat(np.arange(people), T)
+    return FaceClip(weights, _rotations(angles), distance, person, times, np.zeros((len(times), 3)))
+
+
+def turned_away(clip: FaceClip) -> FaceClip:
+    """Return the clip with heads turned by 45° to 60°, every second person's to the other side."""
+    phase = 2 * np.pi * clip.seconds
+    side = np.where(clip.person % 2, 1.0, -1.0)
+    yaw = side * (52.5 + 7.5 * np.sin(0.4 * phase))
+    angles = np.stack([6.0 * np.sin(0.3 * phase), yaw, 5.0 * np.sin(0.2 * phase)], axis=1)
+    return replace(clip, R_camera_head=_rotations(angles))
+
+
+def in_motion(clip: FaceClip) -> FaceClip:
+    """Return the clip with heads that shake by 20° and nod by 8°, 3 and 2 cm to and fro, more than once a second."""
+    phase = 2 * np.pi * (clip.seconds + 0.3 * clip.person)
+    shaking, nodding = np.sin(1.1 * phase), np.sin(1.7 * phase)
+    turn = exp(np.radians(np.stack([8.0 * nodding, 20.0 * shaking, 0 * phase], axis=1)))
+    shift = np.stack([0.03 * shaking, 0.02 * nodding, 0 * phase], axis=1)
+    return replace(clip, R_camera_head=np.asarray(clip.R_camera_head @ turn, float), shift=shift)
 
 
 def _one_person(
@@ -121,12 +145,12 @@ def _one_person(
     t = rng.integers(8, 14)  # at rest at first
     while t < half:
         length = int(rng.integers(3, 7))
-        _add(weights, VISEMES[rng.integers(len(VISEMES))], t, length + 3, rng.uniform(0.7, 1.2))
+        add_pose(weights, VISEMES[rng.integers(len(VISEMES))], t, length + 3, rng.uniform(0.7, 1.2))
         t += length
     t = half + 4
     while t < T - 12:
         length = int(rng.integers(18, 28))
-        _add(weights, GRIMACES[rng.integers(len(GRIMACES))], t, length, rng.uniform(0.8, 1.05))
+        add_pose(weights, GRIMACES[rng.integers(len(GRIMACES))], t, length, rng.uniform(0.8, 1.05))
         t += length + int(rng.integers(0, 6))
     gaze, t = np.zeros((T, 2)), 0
     while t < T:
@@ -147,7 +171,7 @@ def _one_person(
     return np.clip(weights, 0, 1), angles, distance
 
 
-def _add(weights: NDArray[np.float64], pose: dict[str, float], start: int, length: int, strength: float) -> None:
+def add_pose(weights: NDArray[np.float64], pose: dict[str, float], start: int, length: int, strength: float) -> None:
     """Add a pose that comes and goes: in, held in the middle, out."""
     t = np.arange(min(length, len(weights) - start))
     rise = max(2, length // 4)

@@ -14,6 +14,7 @@ from ...scope_addon.kinematics.expressions import mouth_faces_of
 from ...solver.body import Body
 from .looks import Look
 from .truth import SIZE, head_faces
+from .worn import WORN
 
 _OVER = 2  # pixels are drawn so many times finer
 _CONCAVE = 300.0  # per metre: how much darker hollows are
@@ -30,6 +31,7 @@ class ShadedStage:
         self._material, self._names = body.face_material[kept], list(body.material_names)
         self._palette = np.asarray(body.material_colors)[:, :3]
         self._mouth = np.isin(np.flatnonzero(kept), mouth_faces_of(body))
+        self._worn: dict[str, tuple[NDArray[np.int32], NDArray[np.float32]]] = {}
         self._quads, self._edges = quads, np.concatenate([quads[:, [k, (k + 1) % 4]] for k in range(4)])
 
     def dress(self, look: Look, rng: np.random.Generator) -> None:
@@ -47,9 +49,32 @@ class ShadedStage:
         self._ambient = rng.uniform(0.35, 0.65)
         self._background = rng.uniform(60, 220, 3)
         self._noise = np.random.default_rng(rng.integers(1 << 30))
+        self._hair = look.hair
 
-    def render(self, vertices_camera: NDArray[np.float64], focal_px: float, path: Path) -> None:
-        """Render the vertices (V, 3), metres in the camera frame, to a picture of SIZE × SIZE pixels."""
+    def wear(self, things: dict[str, list[tuple[int, ...]]]) -> None:
+        """Put on things, by the names of `WORN`, with these faces; what was worn is taken off."""
+        self._worn = {}
+        for name, faces in things.items():
+            color, stopped = WORN[name][:2]
+            if stopped < 1.0:
+                continue  # clear lenses: reflections are not drawn
+            triangles = np.array([(f[0], f[k], f[k + 1]) for f in faces for k in range(1, len(f) - 1)], np.int32)
+            srgb = np.clip(self._hair if name == "beard" else color, 0, 1) ** (1 / 2.2)
+            both = np.concatenate([triangles, triangles[:, ::-1]])  # hairs are seen from both sides
+            self._worn[name] = both, np.tile(srgb, (len(both), 1)).astype(np.float32)
+
+    def render(
+        self,
+        vertices_camera: NDArray[np.float64],
+        focal_px: float,
+        path: Path,
+        worn: dict[str, NDArray[np.float64]] | None = None,
+    ) -> None:
+        """Render a picture of SIZE × SIZE pixels.
+
+        :param vertices_camera: (V, 3) of the body, metres in the camera frame.
+        :param worn: vertices (N, 3) of what is worn, likewise.
+        """
         V = np.ascontiguousarray(vertices_camera, float)
         normals = vertex_normals(V, self._triangles)
         a, b = self._edges.T
@@ -64,6 +89,9 @@ class ShadedStage:
         K = np.array([[focal_px * _OVER, 0, side / 2 - 0.5], [0, focal_px * _OVER, side / 2 - 0.5], [0, 0, 1.0]])
         canvas = Canvas.blank(side, side)
         rasterize(canvas, V, self._triangles, self._colors, K, shading=shading)
+        for name, (triangles, colors) in self._worn.items():
+            places = np.ascontiguousarray((worn or {})[name], float)
+            rasterize(canvas, places, triangles, colors, K, shading=np.tile([0.9, 0.0], (len(places), 1)))
         image = np.where(canvas.coverage[..., None], canvas.rgba[..., :3], self._background)
         image = cv2.resize(cv2.GaussianBlur(image, (0, 0), 1.2), (SIZE, SIZE), interpolation=cv2.INTER_AREA)
         noisy = image + self._noise.normal(0, 2.5, image.shape)

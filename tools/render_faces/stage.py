@@ -14,8 +14,9 @@ from ...solver.body import Body
 from ..render_sample.stage import render_to, set_up_rendering
 from .looks import Look
 from .truth import SIZE, head_faces
+from .worn import WORN
 
-SAMPLES = 4
+SAMPLES, SAMPLES_OF_LENSES = 4, 8
 
 
 class Stage:
@@ -25,6 +26,7 @@ class Stage:
         bpy.ops.wm.read_factory_settings(use_empty=True)
         set_up_rendering(bpy.context.scene, (SIZE, SIZE))
         bpy.context.scene.cycles.samples = SAMPLES
+        self._worn: dict[str, bpy.types.Mesh] = {}
         self._camera()
         self._lamps()
         self._head(body)
@@ -43,11 +45,42 @@ class Stage:
         background.inputs["Color"].default_value = (*rng.uniform(0.5, 1.0, 3), 1)
         background.inputs["Strength"].default_value = rng.uniform(0.3, 0.8)
 
-    def render(self, vertices_camera: NDArray[np.float64], focal_px: float, path: Path) -> None:
-        """Render the vertices (V, 3), metres in the camera frame, to a picture of SIZE × SIZE pixels."""
+    def wear(self, things: dict[str, list[tuple[int, ...]]]) -> None:
+        """Put on things, by the names of `WORN`, with these faces; what was worn is taken off."""
+        for mesh in self._worn.values():
+            bpy.data.meshes.remove(mesh)  # and its object
+        self._worn = {}
+        bpy.context.scene.cycles.samples = SAMPLES_OF_LENSES if "clear lenses" in things else SAMPLES
+        for name, faces in things.items():
+            mesh = bpy.data.meshes.new(name)
+            count = 1 + max(max(face) for face in faces)
+            mesh.from_pydata(np.zeros((count, 3)).tolist(), [], faces)
+            mesh.materials.append(_worn_material(name))
+            if name == "beard":
+                hair = self._mesh.materials["hair"].node_tree.nodes["Principled BSDF"].inputs["Base Color"]
+                surface = mesh.materials[0].node_tree.nodes["Principled BSDF"]
+                surface.inputs["Base Color"].default_value = hair.default_value
+            bpy.context.scene.collection.objects.link(bpy.data.objects.new(name, mesh))
+            self._worn[name] = mesh
+
+    def render(
+        self,
+        vertices_camera: NDArray[np.float64],
+        focal_px: float,
+        path: Path,
+        worn: dict[str, NDArray[np.float64]] | None = None,
+    ) -> None:
+        """Render a picture of SIZE × SIZE pixels.
+
+        :param vertices_camera: (V, 3) of the body, metres in the camera frame.
+        :param worn: vertices (N, 3) of what is worn, likewise.
+        """
         points = np.ascontiguousarray(vertices_camera[self._kept], np.float32)
         self._mesh.vertices.foreach_set("co", points.ravel())
         self._mesh.update()
+        for name, places in (worn or {}).items():
+            self._worn[name].vertices.foreach_set("co", np.ascontiguousarray(places, np.float32).ravel())
+            self._worn[name].update()
         bpy.context.scene.camera.data.lens = focal_px / SIZE * 36.0
         for lamp in self._lights:
             direction = np.array([0.0, 0.0, 1.0]) * points[:, 2].mean() - np.array(lamp.location)
@@ -104,6 +137,22 @@ def _material(name: str, color: tuple[float, ...]) -> bpy.types.Material:
         tint = nodes.new("ShaderNodeVertexColor")
         tint.layer_name = "tint"
         material.node_tree.links.new(tint.outputs["Color"], surface.inputs["Base Color"])
+    return material
+
+
+def _worn_material(name: str) -> bpy.types.Material:
+    color, stopped, roughness, metal = WORN[name]
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    surface = nodes["Principled BSDF"]
+    surface.inputs["Base Color"].default_value = (*color, 1)
+    surface.inputs["Roughness"].default_value, surface.inputs["Metallic"].default_value = roughness, float(metal)
+    mix = nodes.new("ShaderNodeMixShader")
+    mix.inputs["Fac"].default_value = stopped
+    links.new(nodes.new("ShaderNodeBsdfTransparent").outputs["BSDF"], mix.inputs[1])
+    links.new(surface.outputs["BSDF"], mix.inputs[2])
+    links.new(mix.outputs["Shader"], nodes["Material Output"].inputs["Surface"])
     return material
 
 

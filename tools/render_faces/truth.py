@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -55,10 +56,19 @@ def head_vertices(body: Body, weights: NDArray[np.float64], identity: NDArray[np
     return out
 
 
+def with_expression(body: Body, weights: NDArray[np.floating[Any]]) -> Body:
+    """Return the body with a face at rest that shows the weights (52,)."""
+    return replace(body, v_template=head_vertices(body, np.asarray(weights, float), np.zeros(3)))
+
+
 def camera_vertices(body: Body, clip: FaceClip, identities: NDArray[np.float64], t: int) -> NDArray[np.float64]:
     """Return the vertices (V, 3) of frame t in the camera frame, metres."""
-    vertices = head_vertices(body, clip.weights[t], identities[clip.person[t]])
-    out: NDArray[np.float64] = (vertices - MIDDLE) @ clip.R_camera_head[t].T + [0.0, 0.0, clip.distance[t]]
+    return to_camera(clip, t, head_vertices(body, clip.weights[t], identities[clip.person[t]]))
+
+
+def to_camera(clip: FaceClip, t: int, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Transform points (N, 3) of frame t from the model frame to the camera frame, metres."""
+    out: NDArray[np.float64] = (points - MIDDLE) @ clip.R_camera_head[t].T + clip.middle[t]
     return out
 
 

@@ -39,7 +39,7 @@ def choreograph(body: Body, betas: NDArray[np.float64], fps: float) -> tuple[NDA
     upper = _upper_body()
     for f, t in enumerate(times):
         for name, keys in upper.items():
-            rotations[f, index[name]] = _rotation_at(keys, t)
+            rotations[f, index[name]] = rotation_at(keys, t)
         pelvis = np.array([*_curve(_PELVIS_XY, t), stand + _curve(_PELVIS_DROP, t)[0]])
         R_root = exp(np.radians([0, 0, _eased(_YAW, t)])) @ R_WORLD_MODEL @ exp(np.radians([_eased(_LEAN, t), 0, 0]))
         rotations[f, 0], trans[f] = R_root, pelvis - J[0]
@@ -133,7 +133,7 @@ _LEAN = [(0.0, 0.0), (SQUAT[0], 0.0), (SQUAT[1], 32.0), (SQUAT[2], 32.0), (SQUAT
 # Above the hips
 
 
-def _arm(
+def arm_pose(
     raised: float, ahead: float = 0.0, pitch: float = 0.0, twist: float = 0.0, elbow: float = 10.0
 ) -> dict[str, NDArray[np.float64]]:
     """Return rotations of left collar, shoulder and elbow; ``raised``: −90 hangs, 0 T-pose; ``pitch`` > 0: ahead."""
@@ -148,36 +148,37 @@ def _arm(
     }
 
 
-_MIRROR = np.diag([-1.0, 1.0, 1.0])
+MIRROR = np.diag([-1.0, 1.0, 1.0])
 
 
 def _upper_body() -> dict[str, list[Key]]:
-    hanging = _arm(-74, ahead=10, elbow=14)
-    reaching = _arm(-8, ahead=78, pitch=42, elbow=12)
-    high_open, high_bent = _arm(38, twist=-70, elbow=28), _arm(38, twist=-78, elbow=72)
+    hanging = arm_pose(-74, ahead=10, elbow=14)
+    reaching = arm_pose(-8, ahead=78, pitch=42, elbow=12)
+    high_open, high_bent = arm_pose(38, twist=-70, elbow=28), arm_pose(38, twist=-78, elbow=72)
     left = [(0.0, hanging), (0.35, hanging)]
-    left += [(0.95, _arm(34, twist=-72, elbow=45)), (1.65, _arm(40, twist=-72, elbow=38))]
+    left += [(0.95, arm_pose(34, twist=-72, elbow=45)), (1.65, arm_pose(40, twist=-72, elbow=38))]
     right = [(0.0, hanging), (0.35, hanging), (0.90, high_open)]
     right += [(0.90 + 0.2 * (i + 1), high_bent if i % 2 == 0 else high_open) for i in range(4)]
     for arm in (left, right):
-        arm += [(SQUAT[0] + 0.1, _arm(-50, ahead=40)), (SQUAT[1], reaching), (SQUAT[2], reaching), (SQUAT[3], hanging)]
-    forward, backward = _arm(-76, pitch=26, elbow=32), _arm(-76, pitch=-24, elbow=12)
+        arm += [(SQUAT[0] + 0.1, arm_pose(-50, ahead=40)), (SQUAT[1], reaching)]
+        arm += [(SQUAT[2], reaching), (SQUAT[3], hanging)]
+    forward, backward = arm_pose(-76, pitch=26, elbow=32), arm_pose(-76, pitch=-24, elbow=12)
     left += [(_WALK[1], backward), (_WALK[2], forward), (_WALK[3], backward), (_WALK[4], hanging)]
     right += [(_WALK[1], forward), (_WALK[2], backward), (_WALK[3], forward), (_WALK[4], hanging)]
     keys: dict[str, list[Key]] = {}
     for side, arm in (("left", left), ("right", right)):
         for joint in ("collar", "shoulder", "elbow", "wrist"):
             values = [(t, pose[joint]) for t, pose in arm]
-            keys[f"{side}_{joint}"] = [(t, _MIRROR @ R @ _MIRROR) for t, R in values] if side == "right" else values
-    lean = _turns([(SQUAT[0], 0, 0), (SQUAT[1], 7, 0), (SQUAT[2], 7, 0), (SQUAT[3], 0, 0), (_WALK[1], 0, -4)])
-    keys["spine1"] = keys["spine2"] = lean + _turns([(_WALK[2], 0, 4), (_WALK[3], 0, -4), (_WALK[4], 0, 0)])
-    keys["spine3"] = _turns([(0.4, 0, 0), (1.2, -4, 0), (1.7, -4, 0), (SQUAT[0], 0, 0)])
+            keys[f"{side}_{joint}"] = [(t, MIRROR @ R @ MIRROR) for t, R in values] if side == "right" else values
+    lean = turns([(SQUAT[0], 0, 0), (SQUAT[1], 7, 0), (SQUAT[2], 7, 0), (SQUAT[3], 0, 0), (_WALK[1], 0, -4)])
+    keys["spine1"] = keys["spine2"] = lean + turns([(_WALK[2], 0, 4), (_WALK[3], 0, -4), (_WALK[4], 0, 0)])
+    keys["spine3"] = turns([(0.4, 0, 0), (1.2, -4, 0), (1.7, -4, 0), (SQUAT[0], 0, 0)])
     look = [(0.2, 0, 0), (0.8, -6, 8), (1.7, -6, 8), (SQUAT[0], 0, 0), (SQUAT[1], -12, 0), (SQUAT[3], 0, 0)]
-    keys["neck"] = keys["head"] = _turns([*look, (_WALK[1], 2, 12), (_WALK[3], 2, 0), (DURATION, 0, -10)])
+    keys["neck"] = keys["head"] = turns([*look, (_WALK[1], 2, 12), (_WALK[3], 2, 0), (DURATION, 0, -10)])
     return keys
 
 
-def _turns(keys: list[tuple[float, float, float]]) -> list[Key]:
+def turns(keys: list[tuple[float, float, float]]) -> list[Key]:
     """Convert (time, degrees forward, degrees to the left) to rotations."""
     return [(t, np.matmul(exp(np.radians([0, turn, 0])), exp(np.radians([nod, 0, 0])))) for t, nod, turn in keys]
 
@@ -202,7 +203,7 @@ def _eased(keys: list[tuple[float, float]], t: float) -> float:
     return keys[i][1] + _ease(s) * (keys[i + 1][1] - keys[i][1])
 
 
-def _rotation_at(keys: list[Key], t: float) -> NDArray[np.float64]:
+def rotation_at(keys: list[Key], t: float) -> NDArray[np.float64]:
     """Interpolate rotations from key to key about one axis."""
     i, s = _span(keys, t)
     return keys[i][1] @ exp(_ease(s) * log(keys[i][1].T @ keys[i + 1][1]))

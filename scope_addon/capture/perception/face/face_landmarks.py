@@ -14,6 +14,7 @@ from .....solver.names import EXPRESSIONS
 from ..execution import Execution
 from ..region import Region
 from ..sessions import network_path, open_session
+from .eye_light import eye_light
 from .face_region import region_from_landmarks
 
 INPUT_SIZE = 256
@@ -36,12 +37,13 @@ class FaceEstimate:
     """The networks' estimate for one region.
 
     ``landmarks`` (478, 3): image pixels, and depth in pixels in the region's axes, away from the camera; ``presence``:
-    probability that there is a face; ``region``: the input region.
+    probability that there is a face; ``region``: the input region; ``eye_light``: see `eye_light`.
     """
 
     landmarks: NDArray[np.float64]
     presence: float
     region: Region
+    eye_light: float = 1.0
 
     @property
     def next_region(self) -> Region:
@@ -67,10 +69,12 @@ class FaceNetwork:
         landmarks, presence = self._landmarks.run(["landmarks", "presence"], {"input": blob})
         points = landmarks.reshape(FACE_POINTS, 3).astype(float) / INPUT_SIZE
         depth = region.side_px * points[:, 2:]
+        placed = np.concatenate([region.image_from_crop(points[:, :2]), depth], axis=1)
         return FaceEstimate(
-            landmarks=np.concatenate([region.image_from_crop(points[:, :2]), depth], axis=1),
+            landmarks=placed,
             presence=float(1.0 / (1.0 + np.exp(-presence.item()))),
             region=region,
+            eye_light=eye_light(image_rgb, placed) if np.isfinite(placed).all() else 1.0,
         )
 
     def expression(self, estimate: FaceEstimate) -> NDArray[np.float64]:

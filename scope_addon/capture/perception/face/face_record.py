@@ -27,7 +27,8 @@ _GAZE = slice(_WEIGHTS.stop, _WEIGHTS.stop + 6)
 _KEPT = np.unique(CONTOURS + EXPRESSION_POINTS)
 _AT_CONTOURS = np.searchsorted(_KEPT, CONTOURS)
 _POINTS = slice(_GAZE.stop, _GAZE.stop + 3 * len(_KEPT))
-RECORD = _POINTS.stop  # numbers in a row
+_LIGHT = _POINTS.stop
+RECORD = _LIGHT + 1  # numbers in a row
 # A face of 16 pixels shows nothing, one of 64 everything; one that is seen from the side shows only half.
 _FACE_PX = (16.0, 64.0)
 _FACING = (0.2, 0.6)  # cosine of the angle between the face's direction and the one to the camera
@@ -35,7 +36,9 @@ _SCALE = 1.5  # side of a region over the face's
 
 
 def record(estimate: FaceEstimate | None, weights: NDArray[np.float64] | None) -> NDArray[np.float64]:
-    """Return the row (RECORD,) of a face: confidence, size in pixels, weights, gaze, landmarks; zeros if there is none.
+    """Return the row (RECORD,) of a face; zeros if there is none.
+
+    Its numbers: confidence, size in pixels, weights, gaze, landmarks, and the light around the eyes.
 
     :param weights: (52,) of the expressions; None: they and the gaze stay 0, to be fitted to the landmarks.
     """
@@ -48,7 +51,7 @@ def record(estimate: FaceEstimate | None, weights: NDArray[np.float64] | None) -
     row[0], row[1] = max(confidence, 1e-3), size
     if weights is not None:
         row[_WEIGHTS], row[_GAZE] = weights, gaze(estimate.landmarks).ravel()
-    row[_POINTS] = estimate.landmarks[_KEPT].ravel()
+    row[_POINTS], row[_LIGHT] = estimate.landmarks[_KEPT].ravel(), estimate.eye_light
     return row
 
 
@@ -70,6 +73,11 @@ def landmarks_of(rows: NDArray[np.floating[Any]], numbers: NDArray[np.int64]) ->
     :param numbers: (n,) of the contours, or of those that the expression network takes.
     """
     return rows[:, _POINTS].reshape(len(rows), len(_KEPT), 3)[:, np.searchsorted(_KEPT, numbers)]
+
+
+def eye_light_of(rows: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    """Return the light around the eyes (T,) of rows, see `eye_light`."""
+    return rows[:, _LIGHT]
 
 
 def with_expression(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .....solver.names import EXPRESSIONS
 from ....kinematics.smoothing import gaussian_smooth
 from ....motion import FACE_KEYS
-from ...perception.face.face_record import CONTOURS, parts
+from ...perception.face.face_record import CONTOURS, eye_light_of, parts
 
 CALM_HZ = 2.0  # cut-off frequency at rest
 NOISE = 0.05  # deviation of a weight from the calm motion that counts as noise, of a large face
@@ -20,8 +20,12 @@ GAZE_NOISE = 0.06
 SURE_PX = 64.0  # size of a face from which it is large
 RELEASE_S = 0.5  # in which an expression goes to rest after the face was last seen, and comes back before it is again
 CLOSED = 0.5  # weight of a blink above which the iris is not seen
+DARK_GLASSES = 0.4  # light around the eyes below which they are not seen; small ones in thick frames have 0.45
+GLASSES_S = 1.0  # time over which the median of that is taken: a hand or a shadow that passes is none
+SURE_OF_MOUTH = 0.5  # times the confidence of a face whose eyes are not seen
 LEAST_S = 2.0  # of a face, from which it is known how the network sees its open eyes
 MOST_OPEN = 0.65  # weight of a blink that may be an open eye
+_EYES = [k for k, name in enumerate(EXPRESSIONS) if name.startswith("eye")]
 _BLINKS = [EXPRESSIONS.index(f"eyeBlink{side}") for side in ("Left", "Right")]
 _FORWARD = np.array([0.0, 0.0, 1.0])
 
@@ -37,28 +41,48 @@ def expression_motion(
     """
     confidence, size, weights, directions, contours = parts(np.asarray(rows, float))
     seen = confidence > 0
-    weights = with_open_eyes(weights, seen, times)
-    open_eyes = seen[:, None] & (weights[:, _BLINKS] < CLOSED)
-    weights, sure = released(weights, seen, times, np.zeros(len(EXPRESSIONS))), confidence
+    eyes_seen = seen & ~behind_glasses(eye_light_of(rows), seen, times)
+    weights = with_open_eyes(weights, eyes_seen, times)
+    open_eyes = eyes_seen[:, None] & (weights[:, _BLINKS] < CLOSED)
+    eyes = released(weights[:, _EYES], eyes_seen, times, np.zeros(len(_EYES)))
+    weights = released(weights, seen, times, np.zeros(len(EXPRESSIONS)))
+    weights[:, _EYES], sure = eyes, np.where(eyes_seen, confidence, SURE_OF_MOUTH * confidence)
     if smoothing and len(rows) > 2:
         noise = np.where(seen, np.clip((SURE_PX / np.maximum(size, 1.0)) ** 2, 1.0, MOST_NOISE), 1.0)
         weights = np.clip(calmed(weights, times, NOISE * noise[:, None]), 0.0, 1.0)
-        sure = np.where(seen, np.clip(gaussian_smooth(confidence, times, CALM_HZ), 0.0, 1.0), 0.0)
-    eyes = np.empty_like(directions)
+        sure = np.where(seen, np.clip(gaussian_smooth(sure, times, CALM_HZ), 0.0, 1.0), 0.0)
+    gaze = np.empty_like(directions)
     for k in range(len(_BLINKS)):
-        eyes[:, k] = released(directions[:, k], open_eyes[:, k], times, _FORWARD)
+        gaze[:, k] = released(directions[:, k], open_eyes[:, k], times, _FORWARD)
         if smoothing and len(rows) > 2:
-            eyes[:, k] = calmed(eyes[:, k], times, np.array(GAZE_NOISE))
-    eyes /= np.linalg.norm(eyes, axis=-1, keepdims=True)
+            gaze[:, k] = calmed(gaze[:, k], times, np.array(GAZE_NOISE))
+    gaze /= np.linalg.norm(gaze, axis=-1, keepdims=True)
     values = (
         weights.astype(np.float32),
         np.array(EXPRESSIONS),
         sure.astype(np.float32),
-        eyes.astype(np.float32),
+        gaze.astype(np.float32),
         contours.astype(np.float32),
         np.array(CONTOURS, np.int64),
     )
     return dict(zip(FACE_KEYS, values, strict=True))
+
+
+def behind_glasses(
+    light: NDArray[np.floating[Any]], seen: NDArray[np.bool_], times: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Return (T,) where the eyes are behind dark glasses, by the median of the light around them over `GLASSES_S`.
+
+    :param light: (T,) see `eye_light`.
+    :param seen: (T,) where the face was seen.
+    :param times: (T,) seconds.
+    """
+    rows = np.flatnonzero(seen)
+    starts = np.searchsorted(times[rows], times[rows] - GLASSES_S / 2)
+    ends = np.searchsorted(times[rows], times[rows] + GLASSES_S / 2, side="right")
+    out = np.zeros(len(seen), bool)
+    out[rows] = [np.median(light[rows[a:b]]) < DARK_GLASSES for a, b in zip(starts, ends, strict=True)]
+    return out
 
 
 def with_open_eyes(

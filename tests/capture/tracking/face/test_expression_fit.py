@@ -105,7 +105,8 @@ def test_a_rendered_face_that_the_network_sees(tmp_path):
     """The default body, which nothing was calibrated on, turned by 20°, through the real landmark network."""
     body, rng, truth = load_body("scope"), np.random.default_rng(8), talk(66)
     R = np.diag([1.0, -1.0, -1.0]) @ exp(np.radians([0, 20.0, 0]))
-    clip = FaceClip(truth, np.tile(R, (66, 1, 1)), np.full(66, 0.8), np.zeros(66, int), np.arange(66) / FPS)
+    times = np.arange(66) / FPS
+    clip = FaceClip(truth, np.tile(R, (66, 1, 1)), np.full(66, 0.8), np.zeros(66, int), times, np.zeros((66, 3)))
     stage, network, rows = ShadedStage(body), FaceNetwork(1), []
     stage.dress(draw_look(body, rng), rng)
     region = Region((SIZE / 2, SIZE / 2), 0.8 * SIZE, 0.0)

@@ -12,6 +12,7 @@ from scope.solver.names import EXPRESSIONS
 JAW, BLINK = EXPRESSIONS.index("jawOpen"), EXPRESSIONS.index("eyeBlinkLeft")
 T = 120
 TIMES = np.arange(T) / 30
+LIGHT = RECORD - 1
 GAZE = slice(2 + len(EXPRESSIONS), 8 + len(EXPRESSIONS))
 
 
@@ -19,6 +20,7 @@ def seen_face(size: float = 100.0) -> np.ndarray:
     rows = np.zeros((T, RECORD))
     rows[:, 0], rows[:, 1] = 0.9, size
     rows[:, GAZE] = [0, 0, 1, 0, 0, 1]
+    rows[:, LIGHT] = 1.0
     return rows
 
 
@@ -106,3 +108,23 @@ def test_eyes_that_may_be_closed_stay_so(weight, frames):
     rows[frames:] = 0.0
     found = expression_motion(rows, TIMES, smoothing=True)["expressions"][:, BLINK]
     np.testing.assert_allclose(found[: frames - 5], weight, atol=0.05)
+
+
+@pytest.mark.parametrize("smoothing", [False, True])
+def test_behind_dark_glasses_eyes_go_to_rest_and_the_mouth_goes_on(smoothing):
+    rows = seen_face()
+    rows[:, 2 + JAW] = 0.5
+    rows[::9, 2 + BLINK] = 0.8
+    rows[:, GAZE] = [0.6, 0, 0.8, 0.6, 0, 0.8]
+    rows[:60, LIGHT] = 0.3
+    rows[[20, 40], LIGHT] = 1.2  # a reflection in two frames
+    rows[100, LIGHT] = 0.1  # a shadow that passes
+    face = expression_motion(rows, TIMES, smoothing)
+    weights, sure = face["expressions"], face["expression_confidence"]
+    assert weights[:40, BLINK].max() < 0.02
+    np.testing.assert_allclose(face["gaze"][:40], [[[0, 0, 1]] * 2] * 40, atol=0.05)
+    np.testing.assert_allclose(weights[:, JAW], 0.5, atol=1e-3)
+    assert sure[:45].max() < 0.6
+    assert sure[80:].min() > 0.85
+    assert weights[75:, BLINK].max() > 0.7
+    np.testing.assert_allclose(face["gaze"][[70, 80, 119], 0], [[0.6, 0, 0.8]] * 3, atol=0.05)
