@@ -49,7 +49,11 @@ class SCOPE_OT_guess_expressions(_FaceOperator):
                 f"no shape key of '{settings.face.name}' has a name of ARKit, Oculus or VRM; add entries to the list"
             )
         fill_expressions(settings, found)
-        return rpt_("Found {count} shape keys; check the list", count=len(found.keys))
+        count = len(found.keys)
+        return rpt_(
+            "Found {count} shape key; check the list" if count == 1 else "Found {count} shape keys; check the list",
+            count=count,
+        )
 
 
 class SCOPE_OT_retarget_face(_FaceOperator):
@@ -138,7 +142,8 @@ class SCOPE_OT_edit_expression_pair(_FaceOperator):
         """Change the list."""
         settings = context.scene.scope_retarget
         settings.face_active = edit_list(self.action, settings.face_pairs, settings.face_active)
-        return rpt_("{count} entries", count=len(settings.face_pairs))
+        count = len(settings.face_pairs)
+        return rpt_("{count} entry" if count == 1 else "{count} entries", count=count)
 
 
 def guessed_map(face: bpy.types.Object) -> ExpressionMap:
