@@ -69,7 +69,8 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
         report = run_live(source, body, options, [*outputs, *with_camera], listeners)
         saved = [footage.save()] if footage else []
         if footage and footage.lost:
-            say(f"{footage.lost} frames are missing in {values['keep_footage']}, since the computer was too busy")
+            lost = "1 frame is" if footage.lost == 1 else f"{footage.lost} frames are"
+            say(f"{lost} missing in {values['keep_footage']}, since the computer was too busy")
     saved = [*(recording.save() if recording else []), *saved]
     report["outputs"] = [str(path) for path in saved if path]
     if not args.json:

@@ -118,8 +118,12 @@ class CausalFit:
             np.concatenate([state.R_camera_root[None], state.Omega]),
             state.t_camera_root,
             observation.keypoints_confidence @ self._shares,
-            self._measurer.rays(self._camera.undistort(observation.keypoints_px[_SOLE_KEYPOINTS])),
+            self.soles(observation),
         )
+
+    def soles(self, observation: Observation) -> NDArray[np.floating[Any]]:
+        """Return where the image shows the soles (4, 2), normalized image coordinates."""
+        return self._measurer.rays(self._camera.undistort(observation.keypoints_px[_SOLE_KEYPOINTS]))
 
     def _solve(self, measurements: Measurements, initial: State | None, options: Options) -> Fit:
         return self._solver.fit(measurements, initial, self._priors, options)

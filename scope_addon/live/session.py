@@ -113,7 +113,7 @@ class LiveSession:
             self._fit = CausalFit(self._body, observation, self._current.camera, self._height_m)
             self._fit.set_shape(self._current.betas)
             self._first_s, self._calibrations = time_s, 1
-        fitted = self._fit.fit(time_s, observation, self._root_of_feet(time_s), self._support(time_s))
+        fitted = self._fit.fit(time_s, observation, self._root_of_feet(time_s), self._support(time_s, observation))
         if fitted is not None:
             self._seen.append(_Seen(time_s, observation, fitted))
             while self._seen[0].time_s < time_s - FOLLOWED_S:
@@ -128,10 +128,11 @@ class LiveSession:
         is_recent = time_s - self._last_seen_s < HOLD_S
         return self._last.root_cam if self._last is not None and is_recent and self._feet.is_holding else None
 
-    def _support(self, time_s: float) -> Support | None:
+    def _support(self, time_s: float, observation: Observation) -> Support | None:
         """Return what the body stands on, if it was seen a moment ago."""
-        is_recent = time_s - self._last_seen_s < HOLD_S
-        return self._feet.support(self._current.T_world_camera) if is_recent and self._current is not None else None
+        if self._current is None or self._fit is None or time_s - self._last_seen_s >= HOLD_S:
+            return None
+        return self._feet.support(self._current.T_world_camera, self._fit.soles(observation))
 
     def _settle(self, time_s: float) -> None:
         """Start estimates that are due, take those that are done, and approach the newest one."""

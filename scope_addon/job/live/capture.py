@@ -68,7 +68,8 @@ def save_footage(footage: Footage) -> list[str]:
         footage.save()
     except ScopeError as error:
         return [str(error)]
-    return [f"{footage.lost} frames are missing in the footage"] if footage.lost else []
+    lost = "1 frame is" if footage.lost == 1 else f"{footage.lost} frames are"
+    return [f"{lost} missing in the footage"] if footage.lost else []
 
 
 class _Sender:

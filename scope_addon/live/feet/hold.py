@@ -38,10 +38,12 @@ from .support import Support
 from .transition import Transition
 
 WINDOW_S = 0.6
+SPEED_FRAMES = 3  # at least in the window, from which speeds can be computed
 BEGIN, END = 0.5, 0.3  # probability of contact
 LONGEST_STRETCH_M = 0.15  # between a held point and where the body has it
 EARLY_DRIFT_S, DRIFT_S = 0.5, 3.0  # time constants of the places, while the estimates settle and afterwards
 TRANSITION_HZ = 6.0
+MOVED_M = 0.06  # in the image since the frame before: more than noise of a foot at rest
 SOFT_M = 0.005  # the floor raises soles from about this height on
 
 
@@ -81,16 +83,24 @@ class FootHold:
         """Whether a foot or palm was held in the last frame."""
         return bool(self._is_held.any())
 
-    def support(self, T_world_camera: NDArray[np.float64]) -> Support | None:
+    def support(self, T_world_camera: NDArray[np.float64], soles: NDArray[np.floating[Any]]) -> Support | None:
         """Return what the body stands on in the next frame; None before the first.
 
+        A foot that rested can have taken a step since then, the more so the rarer the frames are. Its place in the
+        image then says so, before the frame is fitted.
+
         :param T_world_camera: (4, 4) the floor at z = 0.
+        :param soles: (4, 2) where the image of the next frame shows the soles, normalized image coordinates.
         """
         if not self._window:
             return None
+        last = self._window[-1]
+        moved_m = np.linalg.norm(soles - last.rays, axis=1) * last.points[: len(SOLES), 2]
+        contact = self._probability.copy()
+        contact[: len(SOLES)] *= logistic(8 * (1 - moved_m / MOVED_M))
         R, t = T_world_camera[:3, :3], T_world_camera[:3, 3]
-        on_floor = self._probability * floor_probability(self._window[-1].points @ R[2] + t[2])
-        return Support((self._anchors - t) @ R, self._is_held * self._probability, on_floor, R[2], -float(t[2]))
+        on_floor = contact * floor_probability(last.points @ R[2] + t[2])
+        return Support((self._anchors - t) @ R, self._is_held * contact, on_floor, R[2], -float(t[2]))
 
     def hold(
         self,
@@ -114,7 +124,7 @@ class FootHold:
         visible = np.clip(frame.joint_confidence[self._visible_parts] / VISIBLE_CONFIDENCE, 0.0, 1.0)
         step_s = time_s - self._window[-1].time_s if self._window else 0.0
         self._window.append(_Entry(time_s, points, visible, frame.soles))
-        while self._window[0].time_s < time_s - WINDOW_S:
+        while len(self._window) > SPEED_FRAMES and self._window[0].time_s < time_s - WINDOW_S:
             self._window.popleft()
         self._probability = self._contact(T_world_camera[2, :3])
         R, t = T_world_camera[:3, :3], T_world_camera[:3, 3]
@@ -124,9 +134,9 @@ class FootHold:
         was_held = self._is_held
         self._update(points_world, step_s, DRIFT_S if is_settled else EARLY_DRIFT_S)
         new = self._away(before), self._away(points_world)
-        self._transition.advance(step_s)
         changed = (self._is_held != was_held)[: len(SOLES)].reshape(2, 2).any(axis=1)
         self._transition.change(changed, old, new, step_s)
+        self._transition.advance(step_s)
         self._points_world = points_world
         self._shift = new[1] + self._transition.remainder
         self._shift[:, 2] += _rise((points_world[: len(SOLES), 2].reshape(2, 2) + self._shift[:, 2:]).min(axis=1))

@@ -45,13 +45,15 @@ class Transition:
         new: tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]],
         step_s: float,
     ) -> None:
-        """Take over the difference of two courses of the offsets.
+        """Take over the difference of two courses of the offsets as of the frame before; `advance` comes after it.
+
+        A long step then leaves time for the difference to die away.
 
         :param where: (n,) which offsets change from one to the other.
         :param old: (n, 3) as they were in the frame before, and would be now.
         :param new: (n, 3) as they would have been in the frame before, and are now.
         :param step_s: seconds between the two frames.
         """
-        self._r = self._r + where[:, None] * (old[1] - new[1])
+        self._r = self._r + where[:, None] * (old[0] - new[0])
         if step_s > 0:
             self._v = self._v + where[:, None] * ((old[1] - old[0]) - (new[1] - new[0])) / step_s

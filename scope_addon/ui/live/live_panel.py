@@ -77,13 +77,22 @@ def _draw_status(context: bpy.types.Context, layout: bpy.types.UILayout) -> None
         text = iface_("Nothing has come from the source for {seconds:.0f} s", seconds=job.quiet_s)
         draw_text(context, layout.box(), text, "ERROR")
     else:
-        said = iface_("{rate:.0f} poses/s, latency {latency:.0f} ms", rate=status.rate, latency=status.latency_ms)
-        draw_text(context, layout, said)
+        draw_text(context, layout, _speed(status.rate, status.latency_ms))
         if status.presence != "seen":
             text = iface_("Nobody is seen" if status.presence == "lost" else "Not seen for a moment")
             draw_text(context, layout, text, "INFO")
     if job.recording:
         draw_text(context, layout, iface_("Recorded: {seconds:.1f} s", seconds=status.recorded_s), "REC")
+
+
+def _speed(rate: float, latency_ms: float) -> str:
+    return iface_(
+        "{rate:.0f} pose/s, latency {latency:.0f} ms"
+        if round(rate) == 1
+        else "{rate:.0f} poses/s, latency {latency:.0f} ms",
+        rate=rate,
+        latency=latency_ms,
+    )
 
 
 CLASSES = (SCOPE_PT_live,)

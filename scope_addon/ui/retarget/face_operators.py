@@ -47,7 +47,11 @@ class SCOPE_OT_guess_expressions(_FaceOperator):
         fill_expressions(settings, found)
         if found.controls:
             return rpt_("Found {count} controls; check the list", count=len(found.controls))
-        return rpt_("Found {count} shape keys; check the list", count=len(found.keys))
+        count = len(found.keys)
+        return rpt_(
+            "Found {count} shape key; check the list" if count == 1 else "Found {count} shape keys; check the list",
+            count=count,
+        )
 
 
 class SCOPE_OT_retarget_face(_FaceOperator):
@@ -143,7 +147,8 @@ class SCOPE_OT_edit_expression_pair(_FaceOperator):
         settings.face_active = edit_list(self.action, settings.face_pairs, settings.face_active)
         if self.action == "ADD" and bones_move(settings.face):
             settings.face_pairs[settings.face_active].channel = "up"
-        return rpt_("{count} entries", count=len(settings.face_pairs))
+        count = len(settings.face_pairs)
+        return rpt_("{count} entry" if count == 1 else "{count} entries", count=count)
 
 
 CLASSES = (

@@ -46,7 +46,10 @@ class SCOPE_OT_guess_bones(_RigOperator):
 
         found = guess_bone_map(context.scene.scope_retarget.rig)
         fill_list(context.scene.scope_retarget, found)
-        return rpt_("Found {count} bones; check the list", count=len(found.parts))
+        count = len(found.parts)
+        return rpt_(
+            "Found {count} bone; check the list" if count == 1 else "Found {count} bones; check the list", count=count
+        )
 
 
 class SCOPE_OT_retarget(_RigOperator):
@@ -184,7 +187,8 @@ class SCOPE_OT_edit_bone_pair(_RigOperator):
         """Change the list."""
         settings = context.scene.scope_retarget
         settings.active = edit_list(self.action, settings.pairs, settings.active)
-        return rpt_("{count} bones", count=len(settings.pairs))
+        count = len(settings.pairs)
+        return rpt_("{count} bone" if count == 1 else "{count} bones", count=count)
 
 
 def _select_only(context: bpy.types.Context, rig: bpy.types.Object) -> None:

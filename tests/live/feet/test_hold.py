@@ -29,33 +29,55 @@ def stepped():
         rotations, p = feet.hold(time_s, np.zeros(supported.P), frame, T_world_camera, True)
         held.append(place(rotations[None], seen[k][None])[2][0, :4] @ R.T + t)
         contact.append(p)
-    return true[:, :4] @ R.T + t, np.array(held), np.array(contact), feet, T_world_camera
+    return true[:, :4] @ R.T + t, np.array(held), np.array(contact), feet, T_world_camera, frame.soles
 
 
 def test_a_foot_that_stands_stays_where_it_is_while_the_distance_errs(stepped):
-    _, held, contact, _, _ = stepped
+    _, held, contact, *_ = stepped
     assert contact[5:, RIGHT].min() > 0.5
     stands = held[5:, RIGHT]
     assert np.linalg.norm(stands - stands.mean(axis=0), axis=2).max() < 0.02  # of errors that span 8 cm
 
 
 def test_a_raised_foot_is_let_go_and_rests_again(stepped):
-    true, held, contact, _, _ = stepped
+    true, held, contact, *_ = stepped
     assert contact[40:50, LEFT].max() < 0.3  # it is raised from 1 s to 2 s
     assert contact[75:, LEFT].min() > 0.5
     assert np.abs(held[40:50, LEFT, 2] - true[40:50, LEFT, 2]).max() < 0.03
 
 
 def test_no_sole_is_below_the_floor(stepped):
-    _, held, _, _, _ = stepped
+    _, held, *_ = stepped
     assert held[..., 2].min() > -0.01
 
 
 def test_the_next_frame_is_supported_where_feet_rest(stepped):
-    _, held, _, feet, T = stepped
-    support = feet.support(T)
+    _, held, _, feet, T, soles = stepped
+    support = feet.support(T, soles)
     places = support.places @ T[:3, :3].T + T[:3, 3]
     assert np.linalg.norm(places[RIGHT] - held[-1, RIGHT], axis=1).max() < 0.02
     assert support.rests[:4].min() > 0.5
     assert support.rests[4:].max() == 0.0  # palms
-    assert FootHold(feet._body).support(T) is None
+    assert FootHold(feet._body).support(T, soles) is None
+
+
+def test_a_foot_that_the_next_image_shows_elsewhere_supports_nothing(stepped):
+    *_, feet, T, soles = stepped
+    stepped_aside = soles.copy()
+    stepped_aside[RIGHT, 0] += 0.2 / 4  # by 20 cm, 4 m away
+    support = feet.support(T, stepped_aside)
+    assert support.rests[RIGHT].max() < 0.01
+    assert support.on_floor[RIGHT].max() < 0.01
+    assert support.rests[LEFT].min() > 0.5
+
+
+def test_feet_are_not_drawn_back_to_where_they_were_two_frames_a_second_ago():
+    supported, omega, root, place, T, _ = stepping_person()
+    feet = FootHold(supported)
+    for k in range(8):
+        where = root[0] + (k >= 5) * np.array([0.5, 0.0, 0.0])  # a step aside
+        true = place(omega[:1], where[None])[2][0, :4]
+        frame = FittedFrame(omega[0], where, np.ones(len(omega[0])), true[:, :2] / true[:, 2:])
+        rotations, _ = feet.hold(0.45 * k, np.zeros(supported.P), frame, T, True)
+        held = place(rotations[None], where[None])[2][0, :4]
+        assert np.linalg.norm(held - true, axis=1).max() < 0.03

@@ -7,6 +7,7 @@ import bpy
 import pytest
 from scope.scope_addon.ui.capture.capture_operators import state as capture_state
 from scope.scope_addon.ui.live.live_operators import end_live
+from scope.scope_addon.ui.live.live_panel import _speed
 from scope.scope_addon.ui.live.live_state import state
 
 
@@ -77,3 +78,7 @@ def test_disabling_the_extension_ends_the_process(job):
     end_live()
     assert job.done == ["close"]
     assert state.job is None
+
+
+def test_one_pose_per_second_is_singular():
+    assert [_speed(rate, 20.0).split(",")[0] for rate in (0.3, 1.4, 2.0)] == ["0 poses/s", "1 pose/s", "2 poses/s"]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Write flow_by_torch.npz: parameters of a random PyTorch flow, states, and what PyTorch makes of them.
 
-Needs PyTorch, which the tests do not: ``python tests/tools/make_flow_fixture.py``.
+Needs PyTorch, which the tests do not: ``python tests/tools/train_prior/make_flow_fixture.py``.
 """
 
 from pathlib import Path
