@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..capture.media.frame_readers import upright
 from ..capture.media.image_size import check_size
 from ..capture.media.video import open_video
 from ..errors import OfflineError, VideoError
@@ -139,7 +140,7 @@ class StreamSource:
             try:
                 for index, frame in enumerate(container.decode(stream)):
                     now_s = clock.now()
-                    yield Picture(index, now_s, now_s, self._image(frame))
+                    yield Picture(index, now_s, now_s, self._image(frame, float(stream.sample_aspect_ratio or 1)))
             except (av.error.FFmpegError, OSError, ValueError) as error:
                 raise VideoError(f"{self.name} was interrupted ({_reason(error)})") from error
 
@@ -159,9 +160,11 @@ class StreamSource:
                 f"{self.name} cannot be opened ({_reason(error)}); check the address, and whether its server runs"
             ) from error
 
-    def _image(self, frame: av.VideoFrame) -> NDArray[np.uint8]:
+    def _image(self, frame: av.VideoFrame, aspect: float) -> NDArray[np.uint8]:
+        """Return the frame as it is to be shown; phones send what they film upright as rotated."""
         check_size(Path(self.name), frame.width, frame.height)
-        return cast(NDArray[np.uint8], frame.to_ndarray(format="rgb24"))
+        image = cast(NDArray[np.uint8], frame.to_ndarray(format="rgb24"))
+        return upright(Path(self.name), image, aspect, -round(frame.rotation))
 
 
 class CameraSource:

@@ -2,7 +2,10 @@
 """Files in real time, streams from a server made here, and what cannot be opened."""
 
 import sys
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from itertools import islice
+from threading import Thread
 
 import numpy as np
 import pytest
@@ -13,6 +16,7 @@ from scope.scope_addon.live.clock import Clock
 from scope.scope_addon.live.newest_frame import NewestFrame
 from scope.scope_addon.live.sources import is_stream, open_source
 
+from ..capture.media.made_video import patch_track_header, write_video
 from .fake_source import FakeClock
 from .mjpeg_server import mjpeg_server
 
@@ -43,6 +47,22 @@ def test_a_stream_is_read_and_after_its_end_read_again(pictures):
     assert all(b.timestamp_s > a.timestamp_s for a, b in zip(taken, taken[1:], strict=False))
     assert said
     assert said[0].endswith("connecting again in 0.05 s")
+
+
+def test_a_stream_s_rotation_and_pixel_aspect_are_applied(tmp_path, monkeypatch):
+    image = np.full((96, 160, 3), 30, np.uint8)
+    image[:48] = 220  # the upper half is bright; rotated clockwise, the right one is
+    path = write_video(tmp_path / "a.mp4", [image] * 4, codec="mjpg")  # each frame by itself
+    patch_track_header(path, (0, 65536, 0, -65536, 0, 0, 0, 0, 1 << 30), width=320)
+    monkeypatch.setattr(SimpleHTTPRequestHandler, "log_message", lambda *_: None)
+    handler = partial(SimpleHTTPRequestHandler, directory=str(tmp_path))
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        Thread(target=server.serve_forever, daemon=True).start()
+        source = open_source(f"http://127.0.0.1:{server.server_port}/a.mp4")
+        rotated = next(source.pictures(Clock())).image_rgb.astype(int)
+        server.shutdown()
+    assert rotated.shape == (320, 96, 3)
+    assert rotated[:, 60:].mean() - rotated[:, :36].mean() > 150
 
 
 @pytest.mark.parametrize(

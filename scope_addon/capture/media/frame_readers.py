@@ -76,9 +76,12 @@ def _size(width: float, height: float, aspect: float) -> tuple[int, int]:
     return (round(width * aspect), round(height)) if aspect > 1 else (round(width), round(height / aspect))
 
 
-def _upright(path: Path, image: NDArray[np.uint8], aspect: float, clockwise_deg: int) -> NDArray[np.uint8]:
-    """Stretch an image of a file until pixels are square, then rotate it.
+def upright(path: Path, image: NDArray[np.uint8], aspect: float, clockwise_deg: int) -> NDArray[np.uint8]:
+    """Stretch an image (H, W, 3) of a file or stream until its pixels are square, then rotate it.
 
+    :param path: its name, for messages.
+    :param aspect: width of a pixel over its height.
+    :param clockwise_deg: a multiple of 90; others do not rotate.
     :raises VideoError: it is too large or too long (see `image_size`).
     """
     height, width = image.shape[:2]
@@ -230,7 +233,7 @@ class PyavReader:
         frame = next(self._frames, None)
         if frame is None:
             return None
-        image = _upright(self._path, _bt601_rgb(frame), self._aspect, -round(frame.rotation))
+        image = upright(self._path, _bt601_rgb(frame), self._aspect, -round(frame.rotation))
         return self._time(frame), image
 
     def skip_to(self, seconds: float, fps: Fraction) -> int:
