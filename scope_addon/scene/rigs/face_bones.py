@@ -11,12 +11,12 @@ from mathutils import Matrix
 from numpy.typing import NDArray
 
 from ...errors import UsageError
-from ...retarget.expression_map import ExpressionMap
+from ...retarget.expression_map import ExpressionMap, guess_expression_map
 from ...retarget.face.face_controls import ControlMotion, control_motions, guess_control_map, has_face_controls
 from ...retarget.face.face_frame import RestBone
 from ..animation_data.actions import Channels, bone_path
 from ..animation_data.transaction import all_or_nothing
-from .face_retarget import CapturedExpressions
+from .face_retarget import CapturedExpressions, key_names
 from .rig_action import channel_of_rotation, mark_written, override_nla, retire
 
 _STILL = 1e-3  # change of a channel, as a share of the bone's length or in radians, below which it is none
@@ -26,6 +26,11 @@ _CHANNELS = ("location", "rotation_quaternion", "rotation_axis_angle", "rotation
 def has_bone_face(rig: bpy.types.Object) -> bool:
     """Return whether bones move the face of an armature, and Scope knows which."""
     return rig.type == "ARMATURE" and has_face_controls(rig.data.bones.keys())
+
+
+def only_bones_move(rig: bpy.types.Object, meshes: Iterable[bpy.types.Object]) -> bool:
+    """Return whether bones move the face of an armature, and no shape keys of its meshes with names that are known."""
+    return has_bone_face(rig) and not guess_expression_map(key_names(meshes)).keys
 
 
 def guess_face_bones(rig: bpy.types.Object) -> ExpressionMap:

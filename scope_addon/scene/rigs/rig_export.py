@@ -12,14 +12,14 @@ import bpy
 from ....solver.body import Body
 from ...errors import UsageError
 from ...motion import Motion
-from ...retarget.expression_map import ExpressionMap, guess_expression_map
+from ...retarget.expression_map import ExpressionMap
 from ...retarget.rig_source import RigSource
 from ..build import BuildOptions, build_scene
 from ..export.export import ExportOptions, export
 from ..export.export_states import temporary_scene
 from ..export.output_paths import check_output
-from .face_bones import guess_face_bones, has_bone_face
-from .face_retarget import captured_expressions, faces_of, key_names, retarget_expressions
+from .face_bones import guess_face_bones, only_bones_move
+from .face_retarget import captured_expressions, faces_of, retarget_expressions
 from .rig_file import load_rig, rig_bone_map, temporary_datablocks, with_meshes
 from .rig_retarget import RetargetOptions, retarget
 
@@ -77,9 +77,7 @@ def _face_of_bones(rig: bpy.types.Object, faces: Sequence[bpy.types.Object], sou
     """Return the expression map if bones move the rig's face; a guess is made only where no shape keys do."""
     if source.expression_map is not None:
         return source.expression_map if source.expression_map.controls else None
-    if guess_expression_map(key_names(faces)).keys or not has_bone_face(rig):
-        return None
-    return guess_face_bones(rig)
+    return guess_face_bones(rig) if only_bones_move(rig, faces) else None
 
 
 def _retarget_face(

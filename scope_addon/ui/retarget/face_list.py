@@ -22,9 +22,9 @@ def bones_move(face: bpy.types.Object | None) -> bool:
 
 def has_targets(face: bpy.types.Object | None) -> bool:
     """Return whether an object is a face: it has shape keys, or bones move it."""
-    return face is not None and (
-        face.data.shape_keys is not None if face.type == "MESH" else face.type == "ARMATURE" and bones_move(face)
-    )
+    if face is not None and face.type == "MESH":
+        return face.data.shape_keys is not None
+    return bones_move(face)
 
 
 def target_names(face: bpy.types.Object) -> list[str]:
@@ -34,14 +34,13 @@ def target_names(face: bpy.types.Object) -> list[str]:
 
 def face_of_rig(rig: bpy.types.Object) -> bpy.types.Object | None:
     """Return the rig if its bones move its face, and no shape keys of its meshes with names that are known."""
-    from ...retarget.expression_map import guess_expression_map
-    from ...scene.rigs.face_retarget import faces_of, key_names
+    from ...scene.rigs.face_bones import only_bones_move
+    from ...scene.rigs.face_retarget import faces_of
     from ...scene.rigs.rig_file import with_meshes
 
     if not bones_move(rig):
         return None
-    meshes = faces_of(with_meshes(rig, bpy.context.scene.objects))
-    return None if guess_expression_map(key_names(meshes)).keys else rig
+    return rig if only_bones_move(rig, faces_of(with_meshes(rig, bpy.context.scene.objects))) else None
 
 
 def guessed_map(face: bpy.types.Object) -> ExpressionMap:
@@ -51,6 +50,11 @@ def guessed_map(face: bpy.types.Object) -> ExpressionMap:
     from ...scene.rigs.face_retarget import key_names
 
     return guess_face_bones(face) if bones_move(face) else guess_expression_map(key_names([face]))
+
+
+def listed_or_guessed(settings: bpy.types.PropertyGroup) -> ExpressionMap:
+    """Return the list as a map or, if it is empty, the map that the names of the chosen face suggest."""
+    return listed_expressions(settings) if len(settings.face_pairs) else guessed_map(settings.face)
 
 
 def fill_expressions(settings: bpy.types.PropertyGroup, expression_map: ExpressionMap) -> None:

@@ -8,7 +8,14 @@ from bpy.props import EnumProperty, StringProperty
 
 from ..captured_person import captured_armature
 from ..reporting import ReportingOperator, rpt_, tip_
-from .face_list import bones_move, fill_expressions, guessed_map, has_targets, listed_expressions
+from .face_list import (
+    bones_move,
+    fill_expressions,
+    guessed_map,
+    has_targets,
+    listed_expressions,
+    listed_or_guessed,
+)
 from .map_operators import LoadMapOperator, SaveMapOperator, edit_list, is_in_view_layer
 
 
@@ -95,7 +102,7 @@ class SCOPE_OT_retarget_face(_FaceOperator):
         captured = captured_expressions(source)
         if captured is None:
             raise UsageError(f"the face of '{source.name}' was not captured; capture again with Face")
-        chosen = listed_expressions(settings) if len(settings.face_pairs) else guessed_map(settings.face)
+        chosen = listed_or_guessed(settings)
         if bones_move(settings.face):
             action = retarget_face_bones(captured, settings.face, chosen, source.name)
         else:

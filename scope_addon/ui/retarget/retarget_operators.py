@@ -11,7 +11,7 @@ from bpy.props import EnumProperty, StringProperty
 from ..captured_person import PERSON, betas_of, body_of, captured_armature, captured_people
 from ..reporting import ReportingOperator, rpt_, sentence, tip_
 from .bone_list import fill_list, listed_map
-from .face_list import bones_move, fill_expressions, guessed_map, listed_expressions
+from .face_list import bones_move, fill_expressions, listed_or_guessed
 from .map_operators import LoadMapOperator, SaveMapOperator, edit_list, is_in_view_layer
 
 if TYPE_CHECKING:
@@ -133,7 +133,7 @@ def face_map(settings: bpy.types.PropertyGroup) -> ExpressionMap | None:
     """Return the expression map if the chosen face is the rig's own, which its bones move; otherwise None."""
     if settings.face is None or settings.face != settings.rig or not bones_move(settings.face):
         return None
-    return listed_expressions(settings) if len(settings.face_pairs) else guessed_map(settings.face)
+    return listed_or_guessed(settings)
 
 
 def retarget_options(settings: bpy.types.PropertyGroup, face: ExpressionMap | None = None) -> RetargetOptions:
