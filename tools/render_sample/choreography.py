@@ -148,7 +148,22 @@ def arm_pose(
     }
 
 
-MIRROR = np.diag([-1.0, 1.0, 1.0])
+_MIRROR = np.diag([-1.0, 1.0, 1.0])
+Arm = list[tuple[float, dict[str, NDArray[np.float64]]]]  # times, and poses of the left arm
+
+
+def arm_keys(left: Arm, right: Arm) -> dict[str, list[Key]]:
+    """Return the keys of both arms' joints."""
+    keys = {}
+    for side, arm in (("left", left), ("right", right)):
+        for joint in ("collar", "shoulder", "elbow", "wrist"):
+            keys[f"{side}_{joint}"] = on_side(side, [(t, pose[joint]) for t, pose in arm])
+    return keys
+
+
+def on_side(side: str, keys: list[Key]) -> list[Key]:
+    """Return the keys of a joint of the left side, mirrored for the right one."""
+    return [(t, _MIRROR @ R @ _MIRROR) for t, R in keys] if side == "right" else keys
 
 
 def _upper_body() -> dict[str, list[Key]]:
@@ -165,11 +180,7 @@ def _upper_body() -> dict[str, list[Key]]:
     forward, backward = arm_pose(-76, pitch=26, elbow=32), arm_pose(-76, pitch=-24, elbow=12)
     left += [(_WALK[1], backward), (_WALK[2], forward), (_WALK[3], backward), (_WALK[4], hanging)]
     right += [(_WALK[1], forward), (_WALK[2], backward), (_WALK[3], forward), (_WALK[4], hanging)]
-    keys: dict[str, list[Key]] = {}
-    for side, arm in (("left", left), ("right", right)):
-        for joint in ("collar", "shoulder", "elbow", "wrist"):
-            values = [(t, pose[joint]) for t, pose in arm]
-            keys[f"{side}_{joint}"] = [(t, MIRROR @ R @ MIRROR) for t, R in values] if side == "right" else values
+    keys = arm_keys(left, right)
     lean = turns([(SQUAT[0], 0, 0), (SQUAT[1], 7, 0), (SQUAT[2], 7, 0), (SQUAT[3], 0, 0), (_WALK[1], 0, -4)])
     keys["spine1"] = keys["spine2"] = lean + turns([(_WALK[2], 0, 4), (_WALK[3], 0, -4), (_WALK[4], 0, 0)])
     keys["spine3"] = turns([(0.4, 0, 0), (1.2, -4, 0), (1.7, -4, 0), (SQUAT[0], 0, 0)])

@@ -14,7 +14,7 @@ from ...solver.body import Body
 from ...solver.names import EXPRESSIONS
 from ...solver.rotations import exp
 from ..render_faces.sequences import GRIMACES, INDEX, VISEMES, add_pose, with_gaze
-from ..render_sample.choreography import MIRROR, Key, arm_pose, rotation_at, turns
+from ..render_sample.choreography import Key, arm_keys, arm_pose, on_side, rotation_at, turns
 
 DURATION = 4.0
 FINGERS = ("index", "middle", "ring", "pinky")
@@ -59,10 +59,7 @@ def _upper_body() -> dict[str, list[Key]]:
     left = [(0.0, ready), (0.9, ready), (1.4, arm_pose(-78, ahead=6, twist=-62, elbow=134)), (1.9, ready)]
     left += [(2.35, shrug), (3.0, shrug), (3.5, raised), (DURATION, ready)]
     right += [(3.5, raised), (DURATION, ready)]
-    keys: dict[str, list[Key]] = {}
-    for side, arm in (("left", left), ("right", right)):
-        for joint in ("collar", "shoulder", "elbow", "wrist"):
-            keys[f"{side}_{joint}"] = _on_side(side, [(t, pose[joint]) for t, pose in arm])
+    keys = arm_keys(left, right)
     nods: list[tuple[float, float, float]] = [(0.0, 0, 4), (0.9, 2, -4), (1.9, 3, -7), (2.4, -5, 0), (3.1, 0, 3)]
     nods += [(DURATION, 2, 4)]
     keys["neck"] = keys["head"] = turns(nods)
@@ -79,7 +76,7 @@ def _fingers() -> dict[str, list[Key]]:
         for part in (1, 2, 3):
             spread = _SPREAD[finger] if part == 1 else 0.0
             bent = [(t, exp(np.radians([0, spread * (1 - bend / 75.0), 0])) @ _bend(bend)) for t, bend in bends]
-            keys[f"right_{finger}{part}"] = _on_side("right", bent)
+            keys[f"right_{finger}{part}"] = on_side("right", bent)
             keys[f"left_{finger}{part}"] = [(0.0, bent[0][1]), (DURATION, bent[0][1])]
     return keys
 
@@ -87,7 +84,3 @@ def _fingers() -> dict[str, list[Key]]:
 def _bend(degrees: float) -> NDArray[np.float64]:
     """Bend a finger of the left hand, which points along x, towards the palm, which faces −y."""
     return np.asarray(exp(np.radians([0.0, 0.0, -degrees])), float)
-
-
-def _on_side(side: str, keys: list[Key]) -> list[Key]:
-    return [(t, MIRROR @ R @ MIRROR) for t, R in keys] if side == "right" else keys
