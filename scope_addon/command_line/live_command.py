@@ -68,9 +68,8 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
         listeners = Listeners(say, lambda state: line(str(state)), begin, receive)
         report = run_live(source, body, options, [*outputs, *with_camera], listeners)
         saved = [footage.save()] if footage else []
-        if footage and footage.lost:
-            lost = "1 frame is" if footage.lost == 1 else f"{footage.lost} frames are"
-            say(f"{lost} missing in {values['keep_footage']}, since the computer was too busy")
+        if footage and footage.missing:
+            say(f"{footage.missing} in {values['keep_footage']}, since the computer was too busy")
     saved = [*(recording.save() if recording else []), *saved]
     report["outputs"] = [str(path) for path in saved if path]
     if not args.json:

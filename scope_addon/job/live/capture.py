@@ -68,8 +68,7 @@ def save_footage(footage: Footage) -> list[str]:
         footage.save()
     except ScopeError as error:
         return [str(error)]
-    lost = "1 frame is" if footage.lost == 1 else f"{footage.lost} frames are"
-    return [f"{lost} missing in the footage"] if footage.lost else []
+    return [f"{footage.missing} in the footage"] if footage.missing else []
 
 
 class _Sender:

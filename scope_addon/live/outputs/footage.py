@@ -47,6 +47,13 @@ class Footage:
         except queue.Full:
             self.lost += 1
 
+    @property
+    def missing(self) -> str:
+        """Say how many pictures were left out; empty if none were."""
+        if not self.lost:
+            return ""
+        return "1 frame is missing" if self.lost == 1 else f"{self.lost} frames are missing"
+
     def save(self) -> Path | None:
         """Finish the file; None if no picture came.
 

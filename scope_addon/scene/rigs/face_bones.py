@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -21,6 +22,14 @@ from .rig_action import channel_of_rotation, mark_written, override_nla, retire
 
 _STILL = 1e-3  # change of a channel, as a share of the bone's length or in radians, below which it is none
 _CHANNELS = ("location", "rotation_quaternion", "rotation_axis_angle", "rotation_euler")
+
+
+@dataclass(frozen=True)
+class FaceKeys:
+    """The keys of a face: for each of its ``controls``, channels that are not at rest, with values (1, n) or (T, n)."""
+
+    frames: NDArray[np.float64]  # (T,)
+    controls: dict[str, dict[str, NDArray[np.float64]]]
 
 
 def has_bone_face(rig: bpy.types.Object) -> bool:
@@ -50,7 +59,7 @@ def retarget_face_bones(
     :raises UsageError: when the rig has none of the map's controls.
     :raises InputError: when the map cannot be used, or the rig's face cannot be measured.
     """
-    motions = face_motions(captured, rig, expression_map)
+    keys = face_keys(captured, rig, expression_map)
     with all_or_nothing(bpy.context.scene, rig):
         if rig.animation_data and rig.animation_data.use_tweak_mode:  # in which no action can be assigned
             rig.animation_data.use_tweak_mode = False
@@ -63,19 +72,19 @@ def retarget_face_bones(
             if slot is not None:
                 same = (s for s in rig.animation_data.action.slots if s.identifier == slot.identifier)
                 rig.animation_data.action_slot = next(same)
-        action = key_face(captured, rig, motions)
+        action = key_face(rig, keys)
         rig.data.pose_position = "POSE"
         override_nla(rig.animation_data)
         retire(former)
         action.name = f"{rig.name}_{name}"
-    rest_face(rig, motions)
+    rest_face(rig, keys)
     return action
 
 
-def face_motions(
-    captured: CapturedExpressions, rig: bpy.types.Object, expression_map: ExpressionMap
-) -> list[ControlMotion]:
-    """Return the channels of the rig's controls.
+def face_keys(captured: CapturedExpressions, rig: bpy.types.Object, expression_map: ExpressionMap) -> FaceKeys:
+    """Return the keys of the rig's controls.
+
+    A channel that never moves gets one key, one that stays at rest none.
 
     :raises UsageError: when the rig has none of the map's controls.
     :raises InputError: when the map cannot be used, or the rig's face cannot be measured.
@@ -93,54 +102,41 @@ def face_motions(
         )
         for bone in bones
     }
-    return control_motions(expression_map, captured.weights, rest)
+    motions = control_motions(expression_map, captured.weights, rest)
+    return FaceKeys(captured.frames, {motion.bone: _channels(rig, motion) for motion in motions})
 
 
-def key_face(
-    captured: CapturedExpressions, rig: bpy.types.Object, motions: Iterable[ControlMotion]
-) -> bpy.types.Action:
-    """Replace the keys of a face in the action of its rig; return the action.
-
-    A channel that never moves gets one key, one that stays at rest none.
-    """
+def key_face(rig: bpy.types.Object, keys: FaceKeys) -> bpy.types.Action:
+    """Replace the keys of a face in the action of its rig; return the action."""
     channels = Channels.of(rig)
-    motions = list(motions)
-    channels.remove({bone_path(motion.bone, channel) for motion in motions for channel in _CHANNELS})
-    for motion in motions:
-        for path, values, still in _channels(rig, motion):
-            if still == "at rest":
-                continue
-            count, interpolation = (1, "CONSTANT") if still else (len(values), "LINEAR")
-            at = bone_path(motion.bone, path)
-            channels.write(at, captured.frames[:count], values[:count], interpolation, group=motion.bone)
+    channels.remove({bone_path(bone, channel) for bone in keys.controls for channel in _CHANNELS})
+    for bone, moved in keys.controls.items():
+        for path, values in moved.items():
+            interpolation = "CONSTANT" if len(values) == 1 else "LINEAR"
+            channels.write(bone_path(bone, path), keys.frames[: len(values)], values, interpolation, group=bone)
     mark_written(channels.action)
     return channels.action
 
 
-def rest_face(rig: bpy.types.Object, motions: Iterable[ControlMotion]) -> None:
+def rest_face(rig: bpy.types.Object, keys: FaceKeys) -> None:
     """Put those controls of a face to rest that got no keys. Cannot fail."""
-    for motion in motions:
-        if all(still == "at rest" for _, _, still in _channels(rig, motion)):
-            rig.pose.bones[motion.bone].matrix_basis = Matrix()
+    for bone, moved in keys.controls.items():
+        if not moved:
+            rig.pose.bones[bone].matrix_basis = Matrix()
 
 
-def _channels(rig: bpy.types.Object, motion: ControlMotion) -> list[tuple[str, NDArray[np.float64], str]]:
-    """Return a control's channels: name, values (T, n), and ``at rest``, ``still`` or, if it moves, nothing."""
+def _channels(rig: bpy.types.Object, motion: ControlMotion) -> dict[str, NDArray[np.float64]]:
+    """Return the values (T, n) of a control's channels; (1, n) of those that do not move, and none of those at rest."""
     bone, found = rig.pose.bones[motion.bone], []
     if motion.locations is not None:
         found.append(("location", motion.locations, np.zeros(3), _STILL * bone.length))
     if motion.rotations is not None:
         name, values = channel_of_rotation(bone.rotation_mode, motion.rotations)
         found.append((name, values, channel_of_rotation(bone.rotation_mode, np.eye(3)[None])[1][0], _STILL))
-    return [
-        (
-            name,
-            values,
-            "" if np.ptp(values, axis=0).max() >= least else "at rest" if _near(values, rest, least) else "still",
-        )
-        for name, values, rest, least in found
-    ]
-
-
-def _near(values: NDArray[np.float64], rest: NDArray[np.float64], least: float) -> bool:
-    return bool(np.abs(values - rest).max() < least)
+    out = {}
+    for name, values, rest, least in found:
+        if np.ptp(values, axis=0).max() >= least:
+            out[name] = values
+        elif np.abs(values - rest).max() >= least:
+            out[name] = values[:1]
+    return out

@@ -31,7 +31,7 @@ from ..character.root_object import (
     root_object,
     topmost,
 )
-from .face_bones import face_motions, key_face, rest_face
+from .face_bones import face_keys, key_face, rest_face
 from .face_retarget import captured_expressions
 from .rig_action import BoneKeys, override_nla, retire, root_locations, write_action
 from .rig_probe import at_rest, blocked_bones, probe
@@ -113,7 +113,7 @@ def retarget(
     clip, frames = read_clip(source, body, rate)
     clip = clip_as_displayed(source, clip, frames)
     captured = captured_expressions(source) if options.face is not None else None
-    face = face_motions(captured, rig, options.face) if captured is not None and options.face is not None else []
+    face = face_keys(captured, rig, options.face) if captured is not None and options.face is not None else None
     if rig.animation_data and rig.animation_data.use_tweak_mode:  # in which no action can be assigned
         rig.animation_data.use_tweak_mode = False
     with all_or_nothing(bpy.context.scene, rig, topmost(rig)):
@@ -129,14 +129,15 @@ def retarget(
             keys += ik_keys(rig, keys)
         former = rig.animation_data.action if rig.animation_data else None
         action = write_action(rig, keys, frames)
-        if captured is not None:
-            key_face(captured, rig, face)
+        if face is not None:
+            key_face(rig, face)
         _set_parent(rig, frames, motion)
         rig.data.pose_position = "POSE"
         override_nla(rig.animation_data)
         retire(former)
         action.name = f"{rig.name}_{source.name}"
-    rest_face(rig, face)
+    if face is not None:
+        rest_face(rig, face)
     return RetargetResult(action, warnings)
 
 
