@@ -57,7 +57,7 @@ def _render(faces: FaceSet, targets: NDArray[np.float64], folder: Path, frames: 
             dressed = int(clip.person[t])
             worn = _dress(stage, body, faces, dressed, identities[dressed])
         places = _places(body, clip, identities, worn, t)
-        stage.render(places.pop(_BODY), focal_px(float(clip.distance[t])), path, *([places] if places else []))
+        stage.render(places.pop(_BODY), focal_px(float(clip.distance[t])), path, places)
         if faces.blurred:
             _blur(path, clip, t)
         print(f"{t + 1} / {len(clip.weights)}", file=sys.stderr, flush=True)
