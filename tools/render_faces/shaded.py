@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -77,11 +78,7 @@ class ShadedStage:
         """
         V = np.ascontiguousarray(vertices_camera, float)
         normals = vertex_normals(V, self._triangles)
-        a, b = self._edges.T
-        step = V[b] - V[a]
-        hollow = np.bincount(a, np.einsum("ex,ex->e", step, normals[a]), len(V)) / np.maximum(
-            np.bincount(a, np.linalg.norm(step, axis=1) ** 2, len(V)), 1e-12
-        )
+        hollow = hollows(V, normals, self._edges)
         light = self._ambient + np.maximum(normals @ self._lights.T, 0) @ self._strength
         light *= np.clip(1.0 - hollow / _CONCAVE * 3.0, 0.25, 1.1)
         shading = np.stack([np.clip(light, 0, 1.3), np.zeros(len(V))], axis=1)
@@ -96,3 +93,19 @@ class ShadedStage:
         image = cv2.resize(cv2.GaussianBlur(image, (0, 0), 1.2), (SIZE, SIZE), interpolation=cv2.INTER_AREA)
         noisy = image + self._noise.normal(0, 2.5, image.shape)
         cv2.imwrite(str(path), np.clip(noisy, 0, 255).astype(np.uint8)[..., ::-1])
+
+
+def hollows(
+    vertices: NDArray[np.float64], normals: NDArray[np.float64], edges: NDArray[np.integer[Any]]
+) -> NDArray[np.float64]:
+    """Return how much the surface curves towards its outside at each vertex (V,), per metre.
+
+    :param vertices: (V, 3) metres.
+    :param normals: (V, 3).
+    :param edges: (E, 2) from a vertex to another.
+    """
+    a, b = edges.T
+    step, count = vertices[b] - vertices[a], len(vertices)
+    rise = np.bincount(a, np.einsum("ex,ex->e", step, normals[a]), count)
+    out: NDArray[np.float64] = rise / np.maximum(np.bincount(a, np.linalg.norm(step, axis=1) ** 2, count), 1e-12)
+    return out

@@ -15,6 +15,7 @@ from ...scope_addon.capture.overlay.video_writer import VideoWriter
 from ...scope_addon.kinematics.expressions import mouth_faces_of
 from ...solver.body import Body
 from ..render_faces.looks import HAIR, draw_look
+from ..render_faces.shaded import hollows
 from .shot import TalkShot
 
 _OVER = 2  # pixels are drawn so many times finer
@@ -30,8 +31,7 @@ class PersonPainter:
     def __init__(self, body: Body, shot: TalkShot, room: NDArray[np.uint8]) -> None:
         self._body, self._shot, self._room = body, shot, room.astype(float)
         self._triangles, self._colors = body.triangles(), _colors(body)
-        edges = np.concatenate([body.faces[:, [k, (k + 1) % 4]] for k in range(4)])
-        self._a, self._b = edges.T
+        self._edges = np.concatenate([body.faces[:, [k, (k + 1) % 4]] for k in range(4)])
 
     def picture(self, frame: int) -> NDArray[np.uint8]:
         """Draw a frame, (H, W, 3) uint8 RGB."""
@@ -50,13 +50,11 @@ class PersonPainter:
     def _shading(self, V: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return brightness and rim light (V, 2) by two lamps, darker in hollows."""
         normals = vertex_normals(np.ascontiguousarray(V), self._triangles)
-        step, count = V[self._b] - V[self._a], len(V)
-        hollow = np.bincount(self._a, np.einsum("ex,ex->e", step, normals[self._a]), count)
-        hollow = hollow / np.maximum(np.bincount(self._a, np.linalg.norm(step, axis=1) ** 2, count), 1e-12)
+        hollow = hollows(V, normals, self._edges)
         directions = _LIGHTS / np.linalg.norm(_LIGHTS, axis=1, keepdims=True)
         light = _AMBIENT + np.maximum(normals @ directions.T, 0) @ _STRENGTH
         light *= np.clip(1.0 - hollow / _CONCAVE, 0.45, 1.1)
-        return np.stack([np.clip(light, 0, 1.15), np.zeros(count)], axis=1)
+        return np.stack([np.clip(light, 0, 1.15), np.zeros(len(V))], axis=1)
 
 
 def draw_clip(body: Body, shot: TalkShot, room: NDArray[np.uint8], path: Path, temporary: Path) -> None:
