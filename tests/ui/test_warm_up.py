@@ -5,6 +5,7 @@ import sys
 import time
 
 import pytest
+from scope.scope_addon.job import start_worker
 from scope.scope_addon.ui import warm_up
 from scope.scope_addon.ui.preferences import cache
 
@@ -14,7 +15,7 @@ def process(tmp_path, monkeypatch):
     """Replace what the process runs."""
 
     def use(code):
-        monkeypatch.setattr(warm_up, "worker_command", lambda *_: ([sys.executable, "-c", code], None))
+        monkeypatch.setattr(start_worker, "worker_command", lambda *_: ([sys.executable, "-c", code], None))
 
     monkeypatch.setattr(warm_up, "_INTERVAL_S", 0.01)
     yield use
@@ -84,8 +85,7 @@ def test_it_ends_with_the_extension(process):
 
 
 def test_a_capture_ends_it_for_good(process, fake_worker, footage):
-    import bpy
-
+    
     process("import time; time.sleep(100)")
     fake_worker("finish()")
     assert warm_up.step() is not None
@@ -98,6 +98,5 @@ def test_a_capture_ends_it_for_good(process, fake_worker, footage):
 
 
 def test_without_a_window_it_does_not_begin():
-    import bpy
-
+    
     assert not bpy.app.timers.is_registered(warm_up.step)

@@ -11,7 +11,6 @@ import bpy
 from bpy.props import StringProperty
 
 from ...footage import FOOTAGE_SUFFIXES
-from ...job.progress import duration
 from .. import warm_up
 from ..live.live_state import state as live_state
 from ..reporting import iface_, rpt_, tip_
@@ -206,6 +205,8 @@ class SCOPE_OT_cancel(bpy.types.Operator):
         seconds = time.monotonic() - state.started
         if seconds <= ASK_AFTER_S or bpy.app.background:
             return self.execute(context)
+        from ...job.progress import duration
+
         outcome: set[str] = context.window_manager.invoke_confirm(
             self,
             event,
