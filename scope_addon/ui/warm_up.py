@@ -39,7 +39,7 @@ class WarmUp:
 def attach() -> None:
     """Begin in a few seconds, in a Blender with a window where Scope is enabled as an extension."""
     if not bpy.app.background and preferences() is not None:
-        bpy.app.timers.register(step, first_interval=_DELAY_S)
+        bpy.app.timers.register(step, first_interval=_DELAY_S, persistent=True)  # also if a file is opened meanwhile
 
 
 def detach() -> None:

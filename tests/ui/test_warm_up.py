@@ -3,7 +3,9 @@
 
 import sys
 import time
+from types import SimpleNamespace
 
+import bpy
 import pytest
 from scope.scope_addon.job import start_worker
 from scope.scope_addon.ui import warm_up
@@ -85,7 +87,8 @@ def test_it_ends_with_the_extension(process):
 
 
 def test_a_capture_ends_it_for_good(process, fake_worker, footage):
-    
+    import bpy
+
     process("import time; time.sleep(100)")
     fake_worker("finish()")
     assert warm_up.step() is not None
@@ -98,5 +101,18 @@ def test_a_capture_ends_it_for_good(process, fake_worker, footage):
 
 
 def test_without_a_window_it_does_not_begin():
-    
+    import bpy
+
     assert not bpy.app.timers.is_registered(warm_up.step)
+
+
+def test_it_begins_also_if_a_file_is_opened_at_once(monkeypatch):
+    window = SimpleNamespace(app=SimpleNamespace(background=False, timers=bpy.app.timers))
+    monkeypatch.setattr(warm_up, "bpy", window)
+    monkeypatch.setattr(warm_up, "preferences", object)
+    warm_up.attach()
+    try:
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        assert bpy.app.timers.is_registered(warm_up.step)
+    finally:
+        warm_up.detach()
