@@ -4,9 +4,17 @@
 
 def register() -> None:
     """Register the extension; Blender calls this when it is enabled."""
-    from .scope_addon import ui
+    import gc
 
-    ui.register()
+    collects = gc.isenabled()
+    gc.disable()  # importing leaves no garbage, and to look for some among all of Blender's objects takes long
+    try:
+        from .scope_addon import ui
+
+        ui.register()
+    finally:
+        if collects:
+            gc.enable()
 
 
 def unregister() -> None:

@@ -8,6 +8,7 @@ import sys
 from typing import Any
 
 from ...solver.loaders.skeletons import SKELETONS
+from ..counts import counted
 from ..errors import UsageError
 from ..options import Place, options_at
 from ..scene.export.output_paths import SUFFIXES
@@ -61,7 +62,7 @@ def run_import(args: argparse.Namespace) -> dict[str, Any]:
         say(f"warning: {note}")
     frames, rate = len(imported.motion), imported.motion.mocap_framerate
     if not args.json and not args.quiet:
-        print(f"{frames} frames at {rate:g} frames/s; wrote {', '.join(map(str, written))}", file=sys.stderr)
+        print(f"{counted(frames, 'frame')} at {rate:g} frames/s; wrote {', '.join(map(str, written))}", file=sys.stderr)
     return {
         "source": str(args.motion),
         "body": imported.body.name,

@@ -10,6 +10,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..counts import counted
 from ..errors import UsageError
 from ..installed import CAPTURE, check_installed, check_live
 from ..options import Place, options_at
@@ -155,7 +156,7 @@ def _preview(body: Body, stack: ExitStack) -> PreviewPage:
 def _summary(report: Mapping[str, Any]) -> str:
     latency = report["latency_ms"]
     return (
-        f"{report['poses']} poses, {report['poses_per_second']:g}/s, latency {latency['median']:.0f} ms"
-        f" (p95 {latency['p95']:.0f} ms), {report['dropped']} of {report['frames']} frames dropped"
+        f"{counted(report['poses'], 'pose')}, {report['poses_per_second']:g}/s, latency {latency['median']:.0f} ms"
+        f" (p95 {latency['p95']:.0f} ms), {report['dropped']} of {counted(report['frames'], 'frame')} dropped"
         + "".join(f"; wrote {path}" for path in report["outputs"])
     )

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...solver.body import Body
 from ...solver.loaders.body_file import ASSETS
+from ..counts import counted
 from ..errors import UsageError
 from ..footage import shown
 from ..installed import check_installed
@@ -164,10 +165,9 @@ def _footage(video: Path, args: argparse.Namespace) -> Path | None:
 
 def summary(report: dict[str, Any]) -> str:
     """Describe a capture in one line."""
-    people = "1 person" if report["people"] == 1 else f"{report['people']} people"
-    frames = "1 frame" if report["frames"] == 1 else f"{report['frames']} frames"
+    people = counted(report["people"], "person", "people")
     return (
-        f"{people}, {frames}, {report['fps']['total']:.1f} frames/s, "
+        f"{people}, {counted(report['frames'], 'frame')}, {report['fps']['total']:.1f} frames/s, "
         f"reprojection error {report['reprojection_px']:.1f} px, networks on {report['execution']}; "
         f"wrote {', '.join(report['outputs'])}"
     )

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ...solver.body import Body
 from ..atomic_write import atomic_path, reason
 from ..capture.media.video_range import FootageRange
+from ..counts import counted
 from ..errors import OutputError
 from ..footage import shown
 from ..kinematics.foot_skin import under_floor
@@ -110,11 +111,10 @@ def header_facts(clip: CapturedClip) -> dict[str, str]:
     report, motion = clip.report, clip.motions[0]
     rate = report["frame_rate"][0] / report["frame_rate"][1]
     width, height = motion.image_size.tolist()
-    people = report["people"]
     return {
-        "Duration": f"{len(motion) / rate:.2f} s, {len(motion)} frames at {rate:.6g} per second",
+        "Duration": f"{len(motion) / rate:.2f} s, {counted(len(motion), 'frame')} at {rate:.6g} per second",
         "Image": f"{width} × {height}",
-        "People": "1 person" if people == 1 else f"{people} people",
+        "People": counted(report["people"], "person", "people"),
         "Preset": str(report["quality"]),
         "Body": str(report["body"]),
         "Camera": str(report["camera"]),

@@ -26,18 +26,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.rotations import exp
+from .skeleton import rotated
 
+_LEVEL = np.array([1.0, 1.0, 0.0])
 _SOFT_M = 0.004  # scale of the logistic function: difference in height of heel and ball
 _DROP_S = 4 / 30  # duration, before and after, over which the pelvis is lowered
 
 
 @dataclass(frozen=True)
 class FootRest:
-    """One foot at rest, in metres of its own skeleton, world axes."""
+    """Feet at rest, in metres of their own skeleton, world axes."""
 
-    heel: NDArray[np.float64]  # (3,) from the ankle
-    ball: NDArray[np.float64]  # (3,) from the ankle
-    height: float  # of the ankle above the floor
+    heel: NDArray[np.float64]  # (..., 3) from the ankle
+    ball: NDArray[np.float64]  # (..., 3) from the ankle
+    height: NDArray[np.float64]  # (...) of the ankle above the floor
 
 
 def ankle_goal(
@@ -48,54 +50,57 @@ def ankle_goal(
     ankle: NDArray[np.float64],
     floor: float = 0.0,
 ) -> NDArray[np.float64]:
-    """Compute the goal of the rig's ankle.
+    """Compute the goals of the rig's ankles, for any number of frames and feet at once.
 
-    :param source: the body's foot.
-    :param rig: the rig's foot.
+    :param source: the body's feet.
+    :param rig: the rig's feet.
     :param scale: the rig's leg length divided by the body's.
-    :param turn: (T, 3, 3) D, the rotation of both feet from rest.
-    :param ankle: (T, 3) the body's, metres.
+    :param turn: (..., 3, 3) D, the rotation of both feet from rest.
+    :param ankle: (..., 3) the body's, metres.
     :param floor: height of the body's floor, metres.
-    :return: (T, 3) metres.
+    :return: (..., 3) metres.
     """
     yaw = _heading(turn)
-    goals, heights = [], []
+    goals, heights, rolled = [], [], []
     for s, q in ((source.heel, rig.heel), (source.ball, rig.ball)):
-        point = ankle + turn @ s
-        above = point[:, 2] - floor - (source.height + s[2])  # height above its rest position on the floor
+        point, rig_point = ankle + rotated(turn, s), rotated(turn, q)
+        above = point[..., 2] - floor - (source.height + s[..., 2])  # height above its rest position on the floor
         place = scale * point
-        place[:, 2] = scale * above + rig.height + q[2]
-        goals.append(place + yaw @ ((q - scale * s) * [1, 1, 0]) - turn @ q)
+        place[..., 2] = scale * above + rig.height + q[..., 2]
+        goals.append(place + rotated(yaw, (q - scale * s) * _LEVEL) - rig_point)
         heights.append(above)
+        rolled.append(rig_point[..., 2] - (rig.height + q[..., 2]))
     share = 1.0 / (1.0 + np.exp(np.clip((heights[1] - heights[0]) / _SOFT_M, -50, 50)))  # 1: the ball is in contact
-    goal: NDArray[np.float64] = (1 - share)[:, None] * goals[0] + share[:, None] * goals[1]
-    lowest = np.stack([goal[:, 2] + (turn @ q)[:, 2] - (rig.height + q[2]) for q in (rig.heel, rig.ball)]).min(axis=0)
-    goal[:, 2] += np.maximum(0.0, -lowest)
+    goal: NDArray[np.float64] = goals[0] + share[..., None] * (goals[1] - goals[0])
+    goal[..., 2] = np.maximum(goal[..., 2], -np.minimum(rolled[0], rolled[1]))
     return goal
 
 
 def flat_toes(
-    toe: NDArray[np.float64], rest: NDArray[np.float64], ball: NDArray[np.float64], ball_rest: float
+    toe: NDArray[np.float64], rest: NDArray[np.float64], ball: NDArray[np.float64], ball_rest: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Raise toes whose tips would penetrate the floor.
 
     A capture in which the toes never bend pushes them into the floor when the heel rises; here they stay flat on it.
 
-    :param toe: (T, 3, 3) rotations of the toes from rest.
-    :param rest: (3,) from ball to tip at rest, metres.
-    :param ball: (T, 3) metres.
-    :param ball_rest: height of the ball at rest, metres.
-    :return: (T, 3, 3) rotations of the toes from rest.
+    :param toe: (..., 3, 3) rotations of the toes from rest.
+    :param rest: (..., 3) from ball to tip at rest, metres.
+    :param ball: (..., 3) metres.
+    :param ball_rest: (...) height of the ball at rest, metres.
+    :return: (..., 3, 3) rotations of the toes from rest.
     """
-    tip = toe @ rest
-    length = max(float(np.linalg.norm(rest)), 1e-9)
-    lowest = np.clip(rest[2] - (ball[:, 2] - ball_rest), -length, length)
-    across = np.hypot(tip[:, 0], tip[:, 1])
-    angle = np.arcsin(np.clip(tip[:, 2] / length, -1, 1))
-    lift = np.where(tip[:, 2] < lowest, np.arcsin(lowest / length) - angle, 0.0)
-    lift = np.where(across > 0.05 * length, lift, 0.0)  # the axis is undefined for toes that point straight down
-    side = np.stack([tip[:, 1], -tip[:, 0], np.zeros(len(tip))], axis=1) / np.maximum(across, 1e-9)[:, None]
-    raised: NDArray[np.float64] = exp(side * lift[:, None]) @ toe
+    tip = rotated(toe, rest)
+    length = np.maximum(np.sqrt((rest * rest).sum(axis=-1)), 1e-9)
+    lowest = np.clip(rest[..., 2] - (ball[..., 2] - ball_rest), -length, length)
+    across = np.hypot(tip[..., 0], tip[..., 1])
+    # The axis is undefined for toes that point straight down.
+    penetrates = (tip[..., 2] < lowest) & (across > 0.05 * length)
+    if not penetrates.any():
+        return toe
+    angle = np.arcsin(np.clip(tip[..., 2] / length, -1, 1))
+    lift = np.where(penetrates, np.arcsin(lowest / length) - angle, 0.0)
+    side = np.stack([tip[..., 1], -tip[..., 0], np.zeros_like(across)], axis=-1) / np.maximum(across, 1e-9)[..., None]
+    raised: NDArray[np.float64] = exp(side * lift[..., None]) @ toe
     return raised
 
 
@@ -125,6 +130,11 @@ def pelvis_drop(
 
 
 def _heading(turn: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the rotations (T, 3, 3) about the vertical alone, from the sideways axis, which stays horizontal."""
-    angle = np.arctan2(turn[:, 1, 0], turn[:, 0, 0])
-    return exp(np.stack([np.zeros_like(angle), np.zeros_like(angle), angle], axis=1))
+    """Return the rotations (..., 3, 3) about the vertical alone, from the sideways axis, which stays horizontal."""
+    angle = np.arctan2(turn[..., 1, 0], turn[..., 0, 0])
+    yaw = np.zeros_like(turn)
+    yaw[..., 0, 0] = yaw[..., 1, 1] = np.cos(angle)
+    yaw[..., 1, 0] = np.sin(angle)
+    yaw[..., 0, 1] = -yaw[..., 1, 0]
+    yaw[..., 2, 2] = 1.0
+    return yaw

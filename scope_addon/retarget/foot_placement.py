@@ -13,17 +13,28 @@ from ...solver.body import Body
 from ..kinematics.axes import R_WORLD_MODEL
 from .feet import FootRest, ankle_goal, flat_toes, pelvis_drop
 from .legs import solve_leg
-from .skeleton import Skeleton, head_positions
+from .skeleton import Skeleton, head_positions, rotated
 
 _SOLE_M, _HEEL_M = 0.015, 0.02  # thickness of the sole, and length of the heel region
+_REACH = 0.9995  # of a leg's length; beyond it the pelvis is lowered
+_SIDES = ("left", "right")
 
 
 @dataclass(frozen=True)
-class BodyFeet:
-    """The captured body's feet, by side."""
+class Legs:
+    """The L legs of a rig that have an ankle, beside the body's, at rest. Bones are the rig's, by index."""
 
-    rest: dict[str, FootRest]
-    ankles: dict[str, NDArray[np.float64]]  # (T, 3) metres, world frame
+    hips: list[int]
+    knees: list[int]
+    ankles: list[int]
+    joints: list[int]  # the body's ankles
+    toed: list[int]  # the legs that have a bone for the toes
+    toes: list[int]  # these bones
+    body: FootRest  # (L, 3) and (L,)
+    rig: FootRest
+    tips: NDArray[np.float64]  # (len(toed), 3) from the ball to the tip of the toes, metres
+    lengths: NDArray[np.float64]  # (L,) of the legs, nearly stretched, metres
+    scale: float  # the rig's leg length divided by the body's
 
 
 @dataclass(frozen=True)
@@ -36,86 +47,73 @@ class RigMotion:
     heads: NDArray[np.float64]  # (T, B, 3)
 
 
-def body_feet(body: Body, rest: dict[str, FootRest], joints: NDArray[np.float64]) -> BodyFeet:
-    """Collect the ankles of the body's motion.
+def legs_at_rest(
+    rig: Skeleton,
+    row: dict[str, int],
+    alignment: NDArray[np.float64],
+    body: Body,
+    betas: NDArray[np.floating[Any]],
+    scale: float,
+) -> Legs | None:
+    """Measure the legs of a rig and of the body at rest; None if the rig has no ankles.
 
-    :param rest: of ``feet_at_rest``.
-    :param joints: (T, K+1, 3) metres, world frame.
-    """
-    return BodyFeet(rest, {side: joints[:, body.joint_names.index(f"{side}_ankle")] for side in rest})
-
-
-def feet_at_rest(body: Body, betas: NDArray[np.floating[Any]]) -> dict[str, FootRest]:
-    """Measure the feet of the body at rest, by side.
-
-    The heel is the rear end of what the foot, without its toes, stands on.
-
+    :param row: the rig's bone of each body part.
+    :param alignment: (B, 3, 3) A_b F.
     :param betas: (P,) shape coefficients.
+    :param scale: the rig's leg length divided by the body's.
     """
+    sides = [side for side in _SIDES if f"{side}_ankle" in row]
+    if not sides:
+        return None
+    hips, knees, ankles = ([row[f"{side}_{part}"] for side in sides] for part in ("hip", "knee", "ankle"))
+    toe_of = [row.get(f"{side}_foot") for side in sides]
+    source = _body_feet(body, betas, sides)
+    pairs = zip(ankles, toe_of, source, strict=True)
+    feet = [_rig_foot(rig, alignment[ankle], ankle, toe, foot, scale) for ankle, toe, foot in pairs]
+    toed = [leg for leg, toe in enumerate(toe_of) if toe is not None]
+    toes = [toe for toe in toe_of if toe is not None]
+    sizes = [np.linalg.norm(rig.tails[toe] - rig.heads[toe]) for toe in toes]
+    # The tails of imported bones may point anywhere, so the direction of the toes is taken from the foot.
+    tips = [
+        feet[leg].ball * [1, 1, 0] / np.linalg.norm(feet[leg].ball[:2]) * size
+        for leg, size in zip(toed, sizes, strict=True)
+    ]
+    places = rig.heads[[hips, knees, ankles]]  # (3, L, 3)
+    return Legs(
+        hips=hips,
+        knees=knees,
+        ankles=ankles,
+        joints=[body.joint_names.index(f"{side}_ankle") for side in sides],
+        toed=toed,
+        toes=toes,
+        body=_stacked(source),
+        rig=_stacked(feet),
+        tips=np.array(tips).reshape(-1, 3),
+        lengths=_REACH * np.linalg.norm(np.diff(places, axis=0), axis=2).sum(axis=0),
+        scale=scale,
+    )
+
+
+def _body_feet(body: Body, betas: NDArray[np.floating[Any]], sides: list[str]) -> list[FootRest]:
+    """Measure the feet of the body at rest. The heel is the rear end of what the foot, without its toes, stands on."""
     v, J = body.rest_vertices(betas) @ R_WORLD_MODEL.T, body.rest_joints(betas) @ R_WORLD_MODEL.T
     strongest = body.skin_joints[np.arange(len(v)), body.skin_weights.argmax(1)]
     low = float(v[:, 2].min())
-    rest = {}
-    for side in ("left", "right"):
+    feet = []
+    for side in sides:
         part = body.joint_names.index(f"{side}_ankle")
         ankle, ball = J[part], J[body.joint_names.index(f"{side}_foot")]
         sole = v[(strongest == part) & (v[:, 2] < low + _SOLE_M)]
         heel = sole[sole[:, 1] > sole[:, 1].max() - _HEEL_M].mean(axis=0) if len(sole) else ankle
-        rest[side] = FootRest(np.array([*heel[:2], low]) - ankle, ball - ankle, float(ankle[2]) - low)
-    return rest
-
-
-def place_feet(
-    rig: Skeleton,
-    row: dict[str, int],
-    motion: RigMotion,
-    source: BodyFeet,
-    scale: float,
-    times: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Move the rig's ankles, and with them heels and balls, to where the body's are.
-
-    :param row: the rig's bone of each body part.
-    :param scale: the rig's leg length divided by the body's.
-    :param times: (T,) seconds.
-    :return: the changed rotations (T, B, 3, 3) and heads (T, B, 3).
-    """
-    world, heads = motion.rotations.copy(), motion.heads.copy()
-    legs, goals = [], []
-    for side in (side for side in ("left", "right") if f"{side}_ankle" in row):
-        hip, knee, ankle = (row[f"{side}_{part}"] for part in ("hip", "knee", "ankle"))
-        toe = row.get(f"{side}_foot")
-        foot = _rig_foot(rig, motion.alignment[ankle], ankle, toe, source.rest[side], scale)
-        goal = ankle_goal(source.rest[side], foot, scale, motion.turns[:, ankle], source.ankles[side])
-        legs.append((hip, knee, ankle))
-        goals.append(goal)
-        if toe is not None:
-            world[:, toe] = _toe_rotations(rig, motion, ankle, toe, foot, goal)
-    if not legs:
-        return world, heads
-    hips = [leg[0] for leg in legs]
-    rested = [[np.linalg.norm(rig.heads[b] - rig.heads[a]) for a, b in zip(leg, leg[1:], strict=False)] for leg in legs]
-    lengths = 0.9995 * np.array(rested).sum(1)
-    heads[..., 2] -= pelvis_drop(heads[:, hips], np.stack(goals, 1), lengths, times)[:, None]
-    thighs, shins, ankles = (list(bones) for bones in zip(*legs, strict=True))
-    joints = _rows(heads[:, thighs]), _rows(heads[:, shins]), _rows(heads[:, ankles])
-    solved = solve_leg(_rows(world[:, thighs]), _rows(world[:, shins]), joints, _rows(np.stack(goals, 1)))
-    world[:, thighs], world[:, shins] = (R.reshape(len(world), len(legs), 3, 3) for R in solved)
-    placed = head_positions(rig, world)
-    placed += (heads[:, hips[0]] - placed[:, hips[0]])[:, None]
-    return world, placed
-
-
-def _rows(of_legs: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the entries (T·L, ...) of T frames and L legs, (T, L, ...), which are solved at once."""
-    return of_legs.reshape(-1, *of_legs.shape[2:])
+        feet.append(FootRest(np.array([*heel[:2], low]) - ankle, ball - ankle, ankle[2] - low))
+    return feet
 
 
 def _rig_foot(
     rig: Skeleton, AF: NDArray[np.float64], ankle: int, toe: int | None, source: FootRest, scale: float
 ) -> FootRest:
     """Measure the rig's foot; without a bone at the ball, its length is taken from the body's."""
-    height = float(rig.heads[ankle, 2]) - rig.floor
+    height = rig.heads[ankle, 2] - rig.floor
     ball = AF @ ((rig.heads[toe] if toe is not None else rig.tails[ankle]) - rig.heads[ankle])
     length = float(np.linalg.norm(source.ball[:2]))
     share = float(np.linalg.norm(ball[:2])) / length
@@ -125,16 +123,39 @@ def _rig_foot(
     return FootRest(heel, ball, height)
 
 
-def _toe_rotations(
-    rig: Skeleton, motion: RigMotion, ankle: int, toe: int, foot: FootRest, goal: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return the toe bone's rotations (T, 3, 3) in the world, with the toes above the floor.
+def _stacked(feet: list[FootRest]) -> FootRest:
+    """Return several feet as one, with their number as the first axis."""
+    heels, balls, heights = zip(*((foot.heel, foot.ball, foot.height) for foot in feet), strict=True)
+    return FootRest(np.array(heels), np.array(balls), np.array(heights))
 
-    :param goal: (T, 3) the ankle's positions, metres.
+
+def place_feet(
+    rig: Skeleton, legs: Legs, motion: RigMotion, joints: NDArray[np.float64], times: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Move the rig's ankles, and with them heels and balls, to where the body's are.
+
+    :param joints: (T, K+1, 3) of the body, metres, world frame.
+    :param times: (T,) seconds.
+    :return: the changed rotations (T, B, 3, 3) and heads (T, B, 3).
     """
-    ball = goal + motion.turns[:, ankle] @ foot.ball
-    # The tails of imported bones may point anywhere, so the direction of the toes is taken from the foot.
-    tip = foot.ball * [1, 1, 0] / np.linalg.norm(foot.ball[:2]) * np.linalg.norm(rig.tails[toe] - rig.heads[toe])
-    flat = flat_toes(motion.turns[:, toe], tip, ball, foot.height + foot.ball[2])
-    world: NDArray[np.float64] = flat @ motion.alignment[toe] @ rig.rotations[toe]
-    return world
+    world, heads = motion.rotations.copy(), motion.heads.copy()
+    turns = motion.turns[:, legs.ankles]
+    goals = ankle_goal(legs.body, legs.rig, legs.scale, turns, joints[:, legs.joints])
+    if legs.toed:
+        balls = (goals + rotated(turns, legs.rig.ball))[:, legs.toed]
+        rested = (legs.rig.height + legs.rig.ball[:, 2])[legs.toed]
+        flat = flat_toes(motion.turns[:, legs.toes], legs.tips, balls, rested)
+        world[:, legs.toes] = flat @ (motion.alignment[legs.toes] @ rig.rotations[legs.toes])
+    heads[..., 2] -= pelvis_drop(heads[:, legs.hips], goals, legs.lengths, times)[:, None]
+    at = _rows(heads[:, legs.hips]), _rows(heads[:, legs.knees]), _rows(heads[:, legs.ankles])
+    solved = solve_leg(_rows(world[:, legs.hips]), _rows(world[:, legs.knees]), at, _rows(goals))
+    world[:, legs.hips], world[:, legs.knees] = (R.reshape(len(world), -1, 3, 3) for R in solved)
+    placed = head_positions(rig, world)
+    first = legs.hips[0]
+    placed += (heads[:, first] - placed[:, first])[:, None]
+    return world, placed
+
+
+def _rows(of_legs: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the entries (T·L, ...) of T frames and L legs, (T, L, ...), which are solved at once."""
+    return of_legs.reshape(-1, *of_legs.shape[2:])

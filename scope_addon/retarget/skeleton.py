@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,20 @@ class Skeleton:
     rotations: NDArray[np.float64]  # (B, 3, 3) bone to world
     floor: float = 0.0  # height of the floor under the rig at rest, metres
 
+    @cached_property
+    def offsets(self) -> NDArray[np.float64]:
+        """From the head of each bone's carrier to its own (B, 3), metres, in its axes; undefined for roots."""
+        out: NDArray[np.float64] = rotated(
+            np.swapaxes(self.rotations[self.carriers], 1, 2), self.heads - self.heads[self.carriers]
+        )
+        return out
+
+    @cached_property
+    def rested(self) -> NDArray[np.float64]:
+        """R_parent0ᵀ R_b0 of each bone (B, 3, 3); undefined without a parent."""
+        out: NDArray[np.float64] = np.swapaxes(self.rotations[self.parents], 1, 2) @ self.rotations
+        return out
+
 
 @dataclass(frozen=True)
 class Pose:
@@ -41,8 +56,7 @@ def basis(rig: Skeleton, world: NDArray[np.float64]) -> NDArray[np.float64]:
     :param world: (T, B, 3, 3) bone to world.
     :return: (T, B, 3, 3) rotations relative to parent and rest pose.
     """
-    local = np.swapaxes(rig.rotations[rig.parents], 1, 2) @ rig.rotations
-    rested = world[:, rig.parents] @ local
+    rested = world[:, rig.parents] @ rig.rested
     roots = rig.parents < 0
     rested[:, roots] = rig.rotations[roots]
     out: NDArray[np.float64] = np.swapaxes(rested, 2, 3) @ world
@@ -55,11 +69,16 @@ def head_positions(rig: Skeleton, world: NDArray[np.float64]) -> NDArray[np.floa
     :param world: (T, B, 3, 3) bone to world.
     :return: (T, B, 3) metres.
     """
-    heads = np.empty((*world.shape[:2], 3))
-    for b, carrier in enumerate(rig.carriers):
+    heads = rotated(world[:, rig.carriers], rig.offsets)
+    for b, carrier in enumerate(rig.carriers.tolist()):
         if carrier < 0:
             heads[:, b] = rig.heads[b]
         else:
-            offset = rig.rotations[carrier].T @ (rig.heads[b] - rig.heads[carrier])
-            heads[:, b] = heads[:, carrier] + world[:, carrier] @ offset
+            heads[:, b] += heads[:, carrier]
     return heads
+
+
+def rotated(rotations: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the vectors (..., 3) rotated by (..., 3, 3)."""
+    out: NDArray[np.float64] = (rotations @ vectors[..., None])[..., 0]
+    return out

@@ -24,7 +24,7 @@ from ...solver.body import Body
 from ..edit.clip import Clip, interpolate_rotations
 from ..kinematics.axes import R_WORLD_MODEL
 from .bone_map import SPINE, BoneMap
-from .foot_placement import RigMotion, body_feet, feet_at_rest, place_feet
+from .foot_placement import RigMotion, legs_at_rest, place_feet
 from .rest_alignment import heading_alignment, rest_alignment
 from .skeleton import Pose, Skeleton, head_positions
 
@@ -52,13 +52,15 @@ class Transfer:
         :param feet: as in ``transfer``.
         """
         self._body, self._betas, self._rig = body, betas, rig
-        self._index = index = {part: k for k, part in enumerate(body.joint_names)}
+        index = {part: k for k, part in enumerate(body.joint_names)}
         rest = body.rest_joints(betas) @ R_WORLD_MODEL.T
-        self._row = row = {part: rig.names.index(bone) for bone, part in bone_map.parts.items() if bone in rig.names}
-        self._part_of = [bone_map.parts[name] for name in rig.names]
+        row = {part: rig.names.index(bone) for bone, part in bone_map.parts.items() if bone in rig.names}
+        part_of = [bone_map.parts[name] for name in rig.names]
+        self._first, self._second, self._shares = _between(part_of, index)
         F = heading_alignment(rig, row)
         self._facing = float(np.arctan2(F[1, 0], F[0, 0]))
-        self._alignment = rest_alignment(rig, self._part_of, row, rest, index, F) @ F
+        self._alignment = rest_alignment(rig, part_of, row, rest, index, F) @ F
+        self._rested = self._alignment @ rig.rotations
         self._scale = _leg_length(rig.heads, row) / _leg_length(rest, {part: index[part] for part in row})
         self._hips = [row["left_hip"], row["right_hip"]]
         self._source_hips = [index["left_hip"], index["right_hip"]]
@@ -66,22 +68,29 @@ class Transfer:
         self._lift = np.zeros(3)
         rested = rest[self._source_hips, 2].mean() - _sole_height(body, betas)
         self._lift[2] = (rig.heads[self._hips, 2].mean() - rig.floor) - self._scale * rested
-        self._feet = feet_at_rest(body, betas) if feet else None
+        self._legs = legs_at_rest(rig, row, self._alignment, body, betas, self._scale) if feet else None
 
     def pose(self, clip: Clip) -> Pose:
         """Compute the rig's motion."""
         body, betas, rig = self._body, self._betas, self._rig
         R, joints = body.forward_kinematics(clip.rotations, clip.root - body.rest_joints(betas)[0], betas)
-        turns = _turns(R @ R_WORLD_MODEL.T, self._part_of, self._index)
-        world = turns @ (self._alignment @ rig.rotations)
+        turns = self._turns(R @ R_WORLD_MODEL.T)
+        world = turns @ self._rested
         heads = head_positions(rig, world)
         source_hips = joints[:, self._source_hips].mean(axis=1)
         heads += (self._scale * source_hips + self._lift - heads[:, self._hips].mean(axis=1))[:, None]
-        if self._feet is not None:
+        if self._legs is not None:
             motion = RigMotion(turns, self._alignment, world, heads)
-            source = body_feet(body, self._feet, joints)
-            world, heads = place_feet(rig, self._row, motion, source, self._scale, clip.times)
+            world, heads = place_feet(rig, self._legs, motion, joints, clip.times)
         return Pose(world, heads, self._facing)
+
+    def _turns(self, D: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return D of each bone (T, B, 3, 3) from D of each joint; spine and neck are distributed over their bones."""
+        out: NDArray[np.float64] = D[:, self._first]
+        bones = np.flatnonzero(self._shares)
+        if len(bones):
+            out[:, bones] = interpolate_rotations(out[:, bones], D[:, self._second[bones]], self._shares[bones])
+        return out
 
 
 def _leg_length(points: NDArray[np.float64], rows: dict[str, int]) -> float:
@@ -95,20 +104,23 @@ def _leg_length(points: NDArray[np.float64], rows: dict[str, int]) -> float:
     return total
 
 
-def _turns(D: NDArray[np.float64], part_of: list[str], index: dict[str, int]) -> NDArray[np.float64]:
-    """Return D of each bone (T, B, 3, 3); spine and neck are distributed over the rig's bones for them."""
-    out = np.empty((len(D), len(part_of), 3, 3))
-    for b, part in enumerate(part_of):
-        out[:, b] = D[:, index[part]]
+def _between(
+    part_of: list[str], index: dict[str, int]
+) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]:
+    """Return the two joints (B,) that each bone turns between, and its share (B,) of the way to the second, below 1.
+
+    Bones turn with the joint of their own part, except those of spine and neck.
+    """
+    first = np.array([index[part] for part in part_of])
+    second, shares = first.copy(), np.zeros(len(first))
     for chain, parts in ((("pelvis", *SPINE), SPINE), (("spine3", "neck"), ("neck",))):
         bones = [b for b, part in enumerate(part_of) if part in parts]
         for k, b in enumerate(bones):
             place = (len(chain) - 1) * (k + 1) / len(bones)
-            low = min(int(place), len(chain) - 2)
-            first, second = D[:, index[chain[low]]], D[:, index[chain[low + 1]]]
-            share = place - low
-            out[:, b] = second if share == 1 else interpolate_rotations(first, second, share)
-    return out
+            low, last = int(place), len(chain) - 1
+            first[b], second[b] = index[chain[low]], index[chain[min(low + 1, last)]]
+            shares[b] = place - low
+    return first, second, shares
 
 
 def _sole_height(body: Body, betas: NDArray[np.floating[Any]]) -> float:

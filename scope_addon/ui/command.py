@@ -10,13 +10,12 @@ from pathlib import Path
 
 import bpy
 
-from ..job.start_worker import load_package
-
 _handle: object | None = None
 
 
 def run(argv: list[str]) -> int:
     """Run the command line with the arguments after ``scope``; return the exit status. Blender calls this."""
+    from ..job.start_worker import load_package
     from .preferences import cache
 
     os.environ.setdefault("NUMBA_CACHE_DIR", str(cache().kernels))

@@ -13,7 +13,6 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
-from ..job.start_worker import load_package
 from .preferences import cache
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -27,6 +26,8 @@ def load() -> None:
     if OWN_NAME == NAME:
         return
     if NAME not in sys.modules:
+        from ..job.start_worker import load_package
+
         load_package(ROOT)
         _loaded.append(NAME)
     for name in [OWN_NAME, *([NAME] if is_ours() else [])]:

@@ -6,16 +6,18 @@ from __future__ import annotations
 import math
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import bpy
 from bpy.props import IntProperty, StringProperty
 
-from ..job.cache import Cache
-from ..job.private_folder import private_folder
 from ..options import Place
 from . import keymap
 from .declared_properties import with_options
 from .reporting import iface_, rpt_
+
+if TYPE_CHECKING:
+    from ..job.cache import Cache
 
 PACKAGE = __package__.rpartition(".scope_addon")[0]  # "bl_ext.<repository>.scope" in Blender, "scope" outside
 DEFAULT_CACHE_GB = 2
@@ -89,6 +91,8 @@ def preferences() -> SCOPE_AP_preferences | None:
 
 def cache() -> Cache:
     """Return the cache: in the folder of the preferences, or else in the user folder."""
+    from ..job.cache import Cache
+
     chosen = preferences()
     if chosen and chosen.cache_folder:
         # In a subfolder, because clearing the cache must never remove the user's files.
@@ -98,6 +102,8 @@ def cache() -> Cache:
 
 def user_folder() -> Path:
     """Return a folder that upgrades keep; one among the user's caches if Scope is not enabled as an extension."""
+    from ..job.private_folder import private_folder
+
     try:
         return Path(bpy.utils.extension_path_user(PACKAGE, create=True))
     except ValueError:
@@ -106,6 +112,8 @@ def user_folder() -> Path:
 
 def _cache_size(root: Path) -> int:
     """Measure the cache, at most every few seconds: the window is redrawn at every movement of the mouse."""
+    from ..job.cache import Cache
+
     size, when = _measured.get(root, (0, -math.inf))
     if time.monotonic() - when > 3.0:
         size = Cache(root).size()

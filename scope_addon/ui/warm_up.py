@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 
 import bpy
 
-from ..job.start_worker import worker_command
 from .preferences import PACKAGE, cache, preferences
 from .reporting import iface_
 
@@ -40,7 +39,7 @@ class WarmUp:
 def attach() -> None:
     """Begin in a few seconds, in a Blender with a window where Scope is enabled as an extension."""
     if not bpy.app.background and preferences() is not None:
-        bpy.app.timers.register(step, first_interval=_DELAY_S)
+        bpy.app.timers.register(step, first_interval=_DELAY_S, persistent=True)  # also if a file is opened meanwhile
 
 
 def detach() -> None:
@@ -68,6 +67,8 @@ def start() -> bool:
     """Start the process; return whether that worked. If not, the first capture compiles the solver."""
     import subprocess
     import tempfile
+
+    from ..job.start_worker import worker_command
 
     windows_flags = getattr(subprocess, "CREATE_NO_WINDOW", 0) | getattr(subprocess, "IDLE_PRIORITY_CLASS", 0)
     python = [sys.executable, *getattr(bpy.app, "python_args", ("-I",))]

@@ -56,7 +56,7 @@ ROOMS = {
     },
     "scope_addon/cli": {"scope_addon/command_line"},
 }
-SHARED = ("errors", "installed", "motion", "atomic_write", "footage", "json_file", "review_spans", "__init__")
+SHARED = ("errors", "installed", "motion", "atomic_write", "footage", "counts", "json_file", "review_spans", "__init__")
 LARGEST_FOLDER = 14  # Python files
 CAPTURE_FILES = 3  # directly in scope_addon/capture, beside its rooms
 

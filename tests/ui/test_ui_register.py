@@ -54,15 +54,26 @@ def test_enabling_twice_as_an_extension_with_preferences(unregistered, tmp_path,
         bpy.context.preferences.extensions.repos.remove(repository)
 
 
-def test_enabling_loads_no_heavy_library(tmp_path):
+def test_enabling_loads_no_heavy_library_and_collects_no_garbage():
     heavy = {"numba", "cv2", "onnxruntime", "llvmlite"}
-    slow = {"json", "hashlib", "subprocess", "tempfile", "shutil", "textwrap"}  # 20 ms of a start, together
+    slow = {
+        "json",
+        "hashlib",
+        "subprocess",
+        "tempfile",
+        "shutil",
+        "textwrap",
+        "gpu_extras",
+    }  # 20 ms of a start, together
+    ours = {"scope.solver", "scope.scope_addon.job", "scope.scope_addon.capture"}  # not before a capture begins
     code = (
-        f"import sys, os, bpy, scope; [sys.modules.pop(name, None) for name in {slow}]; scope.register();"
-        f"print(sorted({heavy | slow} & set(sys.modules)), flush=True); os._exit(0)"
+        f"import gc, sys, os, bpy, scope; [sys.modules.pop(name, None) for name in {slow}]; collected = [];"
+        "gc.callbacks.append(lambda _, about: collected.append(about['generation'])); scope.register();"
+        "gc.callbacks.clear(); assert gc.isenabled();"
+        f"print(sorted({heavy | slow | ours} & set(sys.modules)), max(collected, default=0), flush=True); os._exit(0)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip().splitlines()[-1] == "[]"
+    assert done.stdout.strip().splitlines()[-1] == "[] 0"
 
 
 def test_a_failing_registration_leaves_nothing(unregistered, monkeypatch):

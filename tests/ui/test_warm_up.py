@@ -3,8 +3,11 @@
 
 import sys
 import time
+from types import SimpleNamespace
 
+import bpy
 import pytest
+from scope.scope_addon.job import start_worker
 from scope.scope_addon.ui import warm_up
 from scope.scope_addon.ui.preferences import cache
 
@@ -14,7 +17,7 @@ def process(tmp_path, monkeypatch):
     """Replace what the process runs."""
 
     def use(code):
-        monkeypatch.setattr(warm_up, "worker_command", lambda *_: ([sys.executable, "-c", code], None))
+        monkeypatch.setattr(start_worker, "worker_command", lambda *_: ([sys.executable, "-c", code], None))
 
     monkeypatch.setattr(warm_up, "_INTERVAL_S", 0.01)
     yield use
@@ -101,3 +104,15 @@ def test_without_a_window_it_does_not_begin():
     import bpy
 
     assert not bpy.app.timers.is_registered(warm_up.step)
+
+
+def test_it_begins_also_if_a_file_is_opened_at_once(monkeypatch):
+    window = SimpleNamespace(app=SimpleNamespace(background=False, timers=bpy.app.timers))
+    monkeypatch.setattr(warm_up, "bpy", window)
+    monkeypatch.setattr(warm_up, "preferences", object)
+    warm_up.attach()
+    try:
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        assert bpy.app.timers.is_registered(warm_up.step)
+    finally:
+        warm_up.detach()

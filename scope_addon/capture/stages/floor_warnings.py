@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.body import Body
+from ...counts import counted
 from ...kinematics.foot_skin import UNDER_FLOOR_M, foot_heights, lower_floors, steps, upper_floors
 from ...motion import Motion
 from .clock import at_times
@@ -62,4 +63,4 @@ def _under_floor(who: str, heights: NDArray[np.float64], motion: Motion) -> list
     if not count:
         return []
     deepest = -100 * float(lowest.min())
-    return [f"a foot of {who} is up to {deepest:.0f} cm under the floor in {count} of {len(motion)} frames"]
+    return [f"a foot of {who} is up to {deepest:.0f} cm under the floor in {count} of {counted(len(motion), 'frame')}"]

@@ -10,6 +10,7 @@ import numpy as np
 
 from ....solver.body import Body
 from ....solver.names import BODY_JOINTS
+from ...counts import counted
 from ...motion import Motion
 from ..media.video import Video
 from ..options import CaptureOptions
@@ -72,7 +73,8 @@ def capture_warnings(name: str, options: CaptureOptions, cuts_s: list[float], mo
         who = "the person" if len(motions) == 1 else f"person {number}"
         missing = int((~motion.valid).sum())
         if missing:
-            warnings.append(f"{name}: {who} was not seen in {missing} of {len(motion)} frames; these are filled in")
+            frames = counted(len(motion), "frame")
+            warnings.append(f"{name}: {who} was not seen in {missing} of {frames}; these are filled in")
         if _legs_confidence(motion) < MIN_LEG_CONFIDENCE:
             warnings.append(f"{name}: the legs of {who} were not seen, so their motion is a guess")
         if options.hands and not any(hand_frames(motion).values()):

@@ -16,6 +16,7 @@ from types import TracebackType
 from ....solver.errors import ScopeError
 from ...atomic_write import atomic_path, reason
 from ...capture.overlay.video_writer import VideoWriter
+from ...counts import counted
 from ...errors import OutputError
 from ..sources import Picture
 
@@ -52,7 +53,7 @@ class Footage:
         """Say how many pictures were left out; empty if none were."""
         if not self.lost:
             return ""
-        return "1 frame is missing" if self.lost == 1 else f"{self.lost} frames are missing"
+        return f"{counted(self.lost, 'frame')} {'is' if self.lost == 1 else 'are'} missing"
 
     def save(self) -> Path | None:
         """Finish the file; None if no picture came.

@@ -32,10 +32,13 @@ def quaternion_from_rotation_vector(rotation_vectors: NDArray[np.float64]) -> ND
 
 def quaternion_product(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return ``a ⊗ b`` (..., 4) of quaternions (w, x, y, z), a and b (..., 4): the rotation b followed by a."""
-    aw, av = a[..., :1], a[..., 1:]
-    bw, bv = b[..., :1], b[..., 1:]
-    w = aw * bw - (av * bv).sum(axis=-1, keepdims=True)
-    return np.concatenate([w, aw * bv + bw * av + np.cross(av, bv)], axis=-1)
+    aw, ax, ay, az = np.moveaxis(a, -1, 0)
+    bw, bx, by, bz = np.moveaxis(b, -1, 0)
+    w = aw * bw - ax * bx - ay * by - az * bz
+    x = aw * bx + ax * bw + ay * bz - az * by
+    y = aw * by + ay * bw + az * bx - ax * bz
+    z = aw * bz + az * bw + ax * by - ay * bx
+    return np.stack([w, x, y, z], axis=-1)
 
 
 def quaternion_from_matrix(R: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -27,6 +27,7 @@ from ..character import armature, body_mesh, bone_display, shape_keys
 from ..character.animation import quaternion_from_matrix, quaternion_product
 from .datablocks import NewDatablocks, found, remove
 
+_Q_MODEL_WORLD = quaternion_from_matrix(R_WORLD_MODEL.T)
 _LEAST_CHANGE = 0.01  # of a shape coefficient that changes the mesh: less than half a millimetre
 
 
@@ -66,11 +67,12 @@ class LiveBody:
         if rig is None or mesh is None or [bone.name for bone in rig.pose.bones] != self._names:
             rig, mesh = self._create(betas)
             created = True
-        blocks = mesh.data.shape_keys.key_blocks if mesh.data.shape_keys else ()
-        if np.abs(betas - self._betas).max(initial=0.0) > _LEAST_CHANGE and len(blocks) == len(betas) + 1:
+        keys = mesh.data.shape_keys
+        changed = np.abs(betas - self._betas).max(initial=0.0) > _LEAST_CHANGE
+        if changed and keys is not None and len(keys.key_blocks) == len(betas) + 1:
             self._betas = betas
-            for p, beta in enumerate(betas.tolist()):
-                blocks[p + 1].value = beta  # after Basis
+            keys.key_blocks.foreach_set("value", np.array([0.0, *betas], np.float32))  # after Basis
+            keys.update_tag()
         values, locations = self._channels(rotations, pelvis)
         rig.pose.bones.foreach_set("rotation_quaternion", values[self._order].astype(np.float32).ravel())
         rig.pose.bones.foreach_set("location", locations[self._order].astype(np.float32).ravel())
@@ -129,12 +131,12 @@ class LiveBody:
         """Return the quaternions (K+1, 4) and locations (K+1, 3) of the bones, in the order of the joints."""
         self._shown = rotations, pelvis
         values = rotations.copy()
-        values[0] = quaternion_product(quaternion_from_matrix(R_WORLD_MODEL.T), rotations[0])
+        values[0] = quaternion_product(_Q_MODEL_WORLD, rotations[0])
         C = np.swapaxes(self._M, 1, 2) @ R_WORLD_MODEL
         values[:, 1:] = np.einsum("kij,kj->ki", C, values[:, 1:])
         offsets = (self._body.rest_joints(self._betas) - self._rest_joints) @ R_WORLD_MODEL.T
-        turned = R_WORLD_MODEL @ matrix_from_quaternion(rotations) @ R_WORLD_MODEL.T
-        turned[0] = matrix_from_quaternion(rotations[0]) @ R_WORLD_MODEL.T
+        turned = matrix_from_quaternion(rotations) @ R_WORLD_MODEL.T
+        turned[1:] = R_WORLD_MODEL @ turned[1:]
         moved = offsets - np.einsum("kij,kj->ki", turned, offsets)
         locations = np.einsum("kji,kj->ki", self._M, moved)
         locations[0] = pelvis - turned[0] @ offsets[0] - self._head

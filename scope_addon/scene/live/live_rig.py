@@ -64,6 +64,7 @@ class LiveRig:
         # The location channel is linear in the head's offset. Nothing is inverted for each pose: LAPACK's threads wait.
         self._rest = self._skeleton.heads[self._root]
         self._location = root_locations(rig, place, self._skeleton, self._root, self._rest + np.eye(3))
+        self._names, self._places = list[str](), dict[str, int]()  # of all the rig's bones
         self._transfer: Transfer | None = None
         self._betas, self._due_s = np.zeros(body.P), 0.0
 
@@ -91,21 +92,37 @@ class LiveRig:
             heads[:, :2] = self._rest[:2]
         heads = heads @ self._inverse[:3, :3].T + self._inverse[:3, 3]
         turns = basis(self._skeleton, self._turn @ pose.rotations)[0]
-        location = (heads[0] - self._rest) @ self._location
-        quaternions = quaternion_from_matrix(turns).tolist()
-        bones = rig.pose.bones
-        for name, turned, quaternion in zip(self._skeleton.names, turns, quaternions, strict=True):
-            bone = bones.get(name)
-            if bone is None:
+        self._write(rig, turns, (heads[0] - self._rest) @ self._location)
+
+    def _write(self, rig: bpy.types.Object, turns: NDArray[np.float64], location: NDArray[np.float64]) -> None:
+        """Set the channels of the mapped bones that still exist, each in its own rotation mode.
+
+        All at once where possible: setting a property of a single bone has every editor that shows it drawn again.
+
+        :param turns: (B, 3, 3) of the mapped bones.
+        :param location: (3,) of the root bone.
+        """
+        bones, values = rig.pose.bones, quaternion_from_matrix(turns)
+        if (names := bones.keys()) != self._names:
+            self._names, self._places = names, {name: place for place, name in enumerate(names)}
+        quaternions, locations = np.empty((len(names), 4), np.float32), np.empty((len(names), 3), np.float32)
+        bones.foreach_get("rotation_quaternion", quaternions.ravel())
+        bones.foreach_get("location", locations.ravel())
+        for b, name in enumerate(self._skeleton.names):
+            place = self._places.get(name)
+            if place is None:
                 continue
-            if bone.rotation_mode == "QUATERNION":
-                bone.rotation_quaternion = quaternion
+            if b == self._root:
+                locations[place] = location
+            if (bone := bones[name]).rotation_mode == "QUATERNION":
+                quaternions[place] = values[b]
             else:
-                place = bone.location.copy()
-                bone.matrix_basis = Matrix(turned.tolist()).to_4x4()  # in the bone's own rotation mode
-                bone.location = place
-        if (root := bones.get(self._skeleton.names[self._root])) is not None:
-            root.location = location.tolist()
+                matrix = Matrix(turns[b].tolist()).to_4x4()  # in the bone's own rotation mode
+                matrix.translation = bone.location
+                bone.matrix_basis = matrix
+        bones.foreach_set("rotation_quaternion", quaternions.ravel())
+        bones.foreach_set("location", locations.ravel())
+        rig.update_tag(refresh={"DATA"})
 
     def _transfer_of(self, betas: NDArray[np.floating[Any]]) -> Transfer:
         """Return the transfer for a shape, or for a slightly older one."""

@@ -11,7 +11,6 @@ import bpy
 from bpy.props import StringProperty
 
 from ...footage import FOOTAGE_SUFFIXES
-from ...job.progress import duration
 from .. import warm_up
 from ..live.live_state import state as live_state
 from ..reporting import iface_, rpt_, tip_
@@ -24,6 +23,7 @@ if TYPE_CHECKING:
     from .capture_job import CaptureJob
 
 SAMPLE = Path(__file__).resolve().parents[3] / "assets" / "sample" / "sample.mp4"
+DRAWN_EVERY_S = 0.3  # between two drawings of a stage's progress; previews come as often
 ASK_AFTER_S = 10.0  # a capture that has run longer is cancelled only after a question
 
 
@@ -96,7 +96,8 @@ class SCOPE_OT_capture(JobOperator):
 
     timer_s = 0.1
     job_state = state
-    _shown: tuple[str, int] | None = None  # the progress that was drawn last
+    _shown = ("", "", 0)  # the stage, progress and messages that were drawn last
+    _drawn_s = 0.0  # when that was
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -143,8 +144,11 @@ class SCOPE_OT_capture(JobOperator):
         assert job is not None
         outcome = self._advance()
         progress = ", ".join(job.progress.lines(iface_))
-        if self._shown != (progress, job.messages):  # drawing the same again costs time in which Blender does not react
-            self._shown = progress, job.messages
+        shown, now_s = (job.progress.stage, progress, job.messages), time.monotonic()
+        is_due = shown[0] != self._shown[0] or now_s - self._drawn_s >= DRAWN_EVERY_S
+        # Drawing costs time in which Blender does not react, even if it is the same again.
+        if shown != self._shown and is_due:
+            self._shown, self._drawn_s = shown, now_s
             context.workspace.status_text_set(
                 iface_("Scope: {progress}   (Esc over the Scope panel to cancel)", progress=progress)
             )
@@ -201,6 +205,8 @@ class SCOPE_OT_cancel(bpy.types.Operator):
         seconds = time.monotonic() - state.started
         if seconds <= ASK_AFTER_S or bpy.app.background:
             return self.execute(context)
+        from ...job.progress import duration
+
         outcome: set[str] = context.window_manager.invoke_confirm(
             self,
             event,

@@ -4,11 +4,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import bpy
 
 from ...footage import shown
-from ...job.progress import JobProgress, duration
 from .. import warm_up
 from ..export_operators import FORMATS, is_available
 from ..presets import SCOPE_PT_capture_presets
@@ -19,6 +19,9 @@ from . import preview_picture
 from .capture_operators import state
 from .captures import draw_captures, people_of, people_text, shown_capture
 from .frame_rate_operators import differs, keyed_for
+
+if TYPE_CHECKING:
+    from ...job.progress import JobProgress
 
 _PIXELS_PER_CHARACTER = 7.0
 
@@ -242,6 +245,8 @@ def _draw_figures(layout: bpy.types.UILayout, result: bpy.types.PropertyGroup) -
     seconds = result.frames / result.frames_per_second if result.frames_per_second else 0.0
     frames = iface_("{count} frame" if result.frames == 1 else "{count} frames", count=result.frames)
     if seconds:
+        from ...job.progress import duration
+
         frames = iface_("{frames}, captured in {time}", frames=frames, time=duration(seconds))
     column.label(text=frames, icon="TIME")
     if result.camera:

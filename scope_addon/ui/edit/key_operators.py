@@ -112,7 +112,9 @@ class SCOPE_OT_reduce_keys(EditOperator):
         betas = betas_of(armature, body)
         found = reduce_keys(armature, body, betas, rate, math.radians(self.degrees), self.millimetres / 1000.0)
         return rpt_(
-            "Reduced {before} keys to {after}; maximum error {angle:.2f} degrees for bones, "
+            "Reduced {before} key to {after}; maximum error {angle:.2f} degrees for bones, {distance:.1f} mm for joints"
+            if found.before == 1
+            else "Reduced {before} keys to {after}; maximum error {angle:.2f} degrees for bones, "
             "{distance:.1f} mm for joints",
             before=found.before,
             after=found.after,
@@ -148,7 +150,11 @@ class SCOPE_OT_bake_rate(EditOperator):
             before, after = len(frames), len(baked)
         else:
             before, after = bake_whole_frames(armature, body, rate)
-        return rpt_("Replaced {before} keys by {after}", before=before, after=after)
+        return rpt_(
+            "Replaced {before} key by {after}" if before == 1 else "Replaced {before} keys by {after}",
+            before=before,
+            after=after,
+        )
 
 
 CLASSES = (SCOPE_OT_loop, SCOPE_OT_reduce_keys, SCOPE_OT_bake_rate)

@@ -38,8 +38,10 @@ def floor_warning(armature: bpy.types.Object, body: Body) -> str:
     if not count:
         return ""
     return rpt_(
-        "The corrections put a foot up to {depth:.0f} cm under the floor in {count} of {total} frames: move the pin "
-        "up, or use Snap Feet to Floor",
+        "The corrections put a foot up to {depth:.0f} cm under the floor: move the pin up, or use Snap Feet to Floor"
+        if len(motion) == 1
+        else "The corrections put a foot up to {depth:.0f} cm under the floor in {count} of {total} frames: "
+        "move the pin up, or use Snap Feet to Floor",
         depth=100 * depth,
         count=count,
         total=len(motion),

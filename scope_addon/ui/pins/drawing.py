@@ -6,8 +6,6 @@ from __future__ import annotations
 import math
 
 import bpy
-import gpu
-from gpu_extras.batch import batch_for_shader
 
 from ..view.viewports import viewport_at
 
@@ -29,6 +27,9 @@ def redraw_viewport(pointer: int) -> None:
 
 def draw_disc(center: tuple[float, float], radius: float, color: tuple[float, ...]) -> None:
     """Draw a disc with a dark rim."""
+    import gpu
+    from gpu_extras.batch import batch_for_shader
+
     for size, fill in ((radius + 1.5, (0.0, 0.0, 0.0, 0.6)), (radius, color)):
         rim = [(center[0] + size * math.cos(a), center[1] + size * math.sin(a)) for a in _ANGLES]
         triangles = [(0, k + 1, (k + 1) % len(rim) + 1) for k in range(len(rim))]
@@ -40,6 +41,9 @@ def draw_disc(center: tuple[float, float], radius: float, color: tuple[float, ..
 
 def draw_line(points: list[tuple[float, float]], color: tuple[float, ...]) -> None:
     """Draw a line between two points."""
+    import gpu
+    from gpu_extras.batch import batch_for_shader
+
     gpu.state.line_width_set(2.0)
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     batch = batch_for_shader(shader, "LINES", {"pos": points})

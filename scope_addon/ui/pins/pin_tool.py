@@ -9,10 +9,7 @@ from __future__ import annotations
 
 import math
 
-import blf
 import bpy
-import gpu
-from bpy_extras.view3d_utils import location_3d_to_region_2d, region_2d_to_location_3d
 from mathutils import Vector
 
 from ...scene.character.correction_list import listed_corrections
@@ -148,6 +145,8 @@ class SCOPE_OT_pin_limb(bpy.types.Operator):
 
     def _drop(self, context: bpy.types.Context, area: bpy.types.Area, region: bpy.types.Region) -> None:
         """Pin the dragged joint under the mouse, which is a step to undo of its own."""
+        from bpy_extras.view3d_utils import location_3d_to_region_2d, region_2d_to_location_3d
+
         session = self._session
         joint, session.dragged, session.hovered = session.dragged, "", ""
         _redraw()
@@ -200,6 +199,8 @@ def _joint_positions(session: _Session) -> dict[str, Vector]:
 
 def _nearest(session: _Session, area: bpy.types.Area, region: bpy.types.Region) -> str:
     """Return the handle under the mouse, or an empty name."""
+    from bpy_extras.view3d_utils import location_3d_to_region_2d
+
     best, found = _NEAR * bpy.context.preferences.system.ui_scale, ""
     for name, place in _joint_positions(session).items():
         at = location_3d_to_region_2d(region, area.spaces.active.region_3d, place)
@@ -210,6 +211,10 @@ def _nearest(session: _Session, area: bpy.types.Area, region: bpy.types.Region) 
 
 def _draw(session: _Session) -> None:
     """Draw the handles and this frame's pins."""
+    import blf
+    import gpu
+    from bpy_extras.view3d_utils import location_3d_to_region_2d
+
     context = bpy.context
     armature, space = bpy.data.objects.get(session.armature), context.space_data
     if armature is None or context.area is None or context.region_data is None:

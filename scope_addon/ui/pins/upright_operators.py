@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import bpy
 from bpy.props import FloatVectorProperty
-from bpy_extras.view3d_utils import region_2d_to_origin_3d, region_2d_to_vector_3d
 
 from ..captured_person import captured_armature, motion_of
 from ..edit.edit_base import EditOperator, may_edit
@@ -105,6 +104,8 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
 
     def _finish(self, context: bpy.types.Context, area: bpy.types.Area, region: bpy.types.Region) -> None:
         """Set what is upright, which is a step to undo of its own."""
+        from bpy_extras.view3d_utils import region_2d_to_origin_3d, region_2d_to_vector_3d
+
         from ....solver.errors import ScopeError
 
         view = area.spaces.active.region_3d

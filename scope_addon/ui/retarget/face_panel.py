@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import bpy
 
-from ....solver.names import EXPRESSIONS
 from ..capture.capture_panel import Tab
 from ..translations import CONTEXT
 from .face_list import SHAPE_KEY, has_targets
@@ -25,6 +24,8 @@ class SCOPE_UL_expression_pairs(bpy.types.UIList):
         _active_property: str,
     ) -> None:
         """Draw one entry: expression, and shape key or control with its channel; see `SCOPE_UL_bone_pairs`."""
+        from ....solver.names import EXPRESSIONS
+
         known = _is_known(settings.face, item)
         split = layout.split(factor=0.5, align=True)
         row = split.row(align=True)

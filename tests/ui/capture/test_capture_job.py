@@ -209,25 +209,36 @@ def test_an_unexpected_error_ends_the_capture():
     assert state.job is None  # otherwise no other capture could be started
 
 
-def test_the_panel_is_drawn_again_only_for_news(monkeypatch):
-    drawn = []
+def test_the_panel_is_drawn_again_only_for_news_and_three_times_a_second(monkeypatch):
+    drawn, now = [], [100.0]
     monkeypatch.setattr(capture_operators, "redraw_sidebars", lambda: drawn.append(None))
+    monkeypatch.setattr(capture_operators, "time", SimpleNamespace(monotonic=lambda: now[0]))
     lines = ["Finding the person"]
-    progress = SimpleNamespace(lines=lambda _: lines)
+    progress = SimpleNamespace(lines=lambda _: lines, stage="finding the person")
     state.job = SimpleNamespace(progress=progress, messages=0, step=lambda: True, cancelled=False)
-    operator = SimpleNamespace(_shown=None, job_state=state)
+    operator = SimpleNamespace(_shown=("", "", 0), _drawn_s=0.0, job_state=state)
     operator.step, operator._advance = (
         partial(getattr(SCOPE_OT_capture, name), operator) for name in ("step", "_advance")
     )
     timer = SimpleNamespace(type="TIMER", value="NOTHING")
-    counts = []
-    for change in (None, None, "messages", None, "lines", None):
-        state.job.messages += change == "messages"
-        lines += ["1 s left"] if change == "lines" else []
+
+    def drawings(seconds=0.4):
+        now[0] += seconds
         capture_operators.SCOPE_OT_capture.modal(operator, bpy.context, timer)
-        counts.append(len(drawn))
+        return len(drawn)
+
+    assert [drawings(), drawings()] == [1, 1]
+    state.job.messages += 1
+    assert [drawings(), drawings()] == [2, 2]
+    lines.append("1 s left")
+    assert [drawings(), drawings()] == [3, 3]
+    for _ in range(30):  # a second with news at every step
+        state.job.messages += 1
+        drawings(1 / 30)
+    assert len(drawn) == 6
+    progress.stage = "building the scene"  # at once: it stops Blender for a while
+    assert drawings(0.01) == 7
     state.job = None
-    assert counts == [1, 1, 2, 2, 3, 3]
 
 
 def test_a_linked_scene_is_refused(footage, tmp_path):
