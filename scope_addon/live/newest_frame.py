@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads a source in its own thread and keeps the newest frame only: those that come while it is not taken are dropped.
 
-An interrupted stream is opened again after a pause, and frame numbers and times continue.
+An interrupted stream is opened again after a pause, and frame numbers and times continue. Where a server changes the
+resolution while it runs, pictures keep the first one, so that what was estimated from them still holds.
 """
 
 from __future__ import annotations
@@ -10,14 +11,20 @@ import threading
 from collections.abc import Callable, Generator
 from contextlib import closing
 from dataclasses import replace
-from typing import cast
+from typing import Any, cast
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.errors import ScopeError
 from ..errors import VideoError
 from .clock import Clock
 from .sources import Picture, Source
+from .sources.stream import STALLED_S
 
 _POLLING_INTERVAL_S = 0.2  # in which a waiting main thread reacts to Ctrl-C on every system
+SAME_SHAPE = 0.01  # relative difference of two pictures' width over height
 _CLOSING_S = 0.5  # for which the end of the capture waits for the source to be closed
 
 
@@ -45,6 +52,9 @@ class NewestFrame:
         self._is_over = False
         self._said = ""  # what was said of the interruption that lasts
         self._next_index, self._last_s, self._began_s = 0, 0.0, 0.0
+        self._size: tuple[int, int] | None = None  # of the pictures that are given
+        self._last_image: NDArray[Any] | None = None  # as it came
+        self._changed_s, self._is_frozen = 0.0, False  # when it last differed from the one before
         self.received = self.dropped = 0
         self._thread = threading.Thread(target=self._run, name="scope-live-source", daemon=True)
 
@@ -121,7 +131,8 @@ class NewestFrame:
                 self._began_s = 0.0 if self._source.ends else picture.timestamp_s
         index = self._first_index + picture.index
         time_s = max(picture.timestamp_s - self._began_s, self._last_s + 1e-3 if self.received else 0.0)
-        picture = replace(picture, index=index, timestamp_s=time_s)
+        self._watch(picture)
+        picture = replace(picture, index=index, timestamp_s=time_s, image_rgb=self._in_first_size(picture.image_rgb))
         self._received(picture)
         with self._changed:
             self.dropped += self._newest is not None
@@ -129,3 +140,26 @@ class NewestFrame:
             self._newest = picture
             self._next_index, self._last_s = index + 1, time_s
             self._changed.notify_all()
+
+    def _watch(self, picture: Picture) -> None:
+        """Say that a source shows the same picture again and again, as servers do that have lost their camera."""
+        last, self._last_image = self._last_image, picture.image_rgb
+        if last is None or not _equal(last, picture.image_rgb):
+            self._changed_s, self._is_frozen = picture.arrived_s, False
+        elif picture.arrived_s - self._changed_s > STALLED_S and not self._is_frozen and not self._source.ends:
+            self._is_frozen = True
+            self._say(f"{self._source.name} has shown the same picture for {STALLED_S:g} s; check whether it is frozen")
+
+    def _in_first_size(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Return a picture in the size of the first one, unless its shape is another one."""
+        size, wanted = (image.shape[1], image.shape[0]), self._size
+        if wanted is None or abs(size[0] * wanted[1] / (size[1] * wanted[0]) - 1) > SAME_SHAPE:
+            self._size = size
+        if wanted is None or self._size == size:
+            return image
+        interpolation = cv2.INTER_AREA if size > wanted else cv2.INTER_LINEAR
+        return cast(NDArray[np.uint8], cv2.resize(image, wanted, interpolation=interpolation))
+
+
+def _equal(a: NDArray[Any], b: NDArray[Any]) -> bool:
+    return a.shape == b.shape and np.array_equal(a[::16, ::16], b[::16, ::16]) and np.array_equal(a, b)

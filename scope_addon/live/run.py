@@ -161,6 +161,11 @@ class _Poses:
         """Return the poses in a picture."""
         height, width = picture.image_rgb.shape[:2]
         if self._people is None or self._size != (width, height):
+            if self._people is not None:
+                self._listeners.say(
+                    f"{self._source.name} now gives pictures of another shape ({width} × {height}): body, lens and"
+                    " floor are estimated again, and a recording ends with the picture before"
+                )
             options = self._options
             camera = choose_camera(
                 width,

@@ -32,14 +32,16 @@ class FakeSource:
     """Plays each of several lists of timestamps; between two of them, it is interrupted.
 
     :param before: called before each picture with its place in the list; may wait.
+    :param images: of each list's pictures.
     """
 
     name = "fake"
     fps = Fraction(30)
     focal_35mm = None
 
-    def __init__(self, *runs, ends=False, before=lambda _: None, error=None):
+    def __init__(self, *runs, ends=False, before=lambda _: None, error=None, images=None):
         self.runs, self.ends, self.before, self.error = list(runs), ends, before, error
+        self.images = images
         self.opened = self.closed = 0
 
     def pictures(self, clock):
@@ -49,7 +51,8 @@ class FakeSource:
                 raise VideoError("fake is gone")
             for index, time_s in enumerate(self.runs.pop(0)):
                 self.before(index)
-                yield Picture(index, time_s, clock.now(), np.zeros((4, 4, 3), np.uint8))
+                image = self.images[index] if self.images else np.zeros((4, 4, 3), np.uint8)
+                yield Picture(index, time_s, clock.now(), image)
             if self.error:
                 raise self.error
         finally:

@@ -3,11 +3,14 @@
 
 import threading
 
+import numpy as np
 import pytest
 from scope.scope_addon.errors import VideoError
 from scope.scope_addon.live.newest_frame import NewestFrame
 
 from .fake_source import FakeClock, FakeSource
+
+WIDE, TALL = np.zeros((40, 60, 3), np.uint8), np.zeros((60, 40, 3), np.uint8)
 
 
 def all_taken(reader):
@@ -99,3 +102,25 @@ def test_stopping_does_not_wait_for_a_source_that_is_stalled():
         assert reader._thread.is_alive()
     finally:
         stalled.set()
+
+
+def test_pictures_of_another_shape_are_given_as_they_are():
+    taken = []
+    source = FakeSource(np.arange(5) / 10, ends=True, images=[WIDE, TALL, TALL[::2, ::2], WIDE[::2, ::2], WIDE])
+    with NewestFrame(source, FakeClock(), received=taken.append) as reader:
+        reader._thread.join(5)
+    shapes = [(40, 60, 3), (60, 40, 3), (60, 40, 3), (20, 30, 3), (20, 30, 3)]
+    assert [picture.image_rgb.shape for picture in taken] == shapes
+
+
+def test_a_source_that_is_frozen_is_said_once_each_time():
+    said, clock = [], FakeClock()
+    times = np.arange(0, 26, 0.5)
+    images = [WIDE + np.uint8(0 if t < 2 else 1 if t < 10 else 2 + t % 2 if t < 17 else 7) for t in times]
+
+    def before(index):
+        clock.time_s = 100.0 + times[index]
+
+    with NewestFrame(FakeSource(times, images=images, before=before), clock, 0.0, said.append) as reader:
+        reader._thread.join(5)
+    assert said == ["fake has shown the same picture for 5 s; check whether it is frozen"] * 2

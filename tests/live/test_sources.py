@@ -2,10 +2,7 @@
 """Files in real time, streams from a server made here, and what cannot be opened."""
 
 import sys
-from functools import partial
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from itertools import islice
-from threading import Thread
 
 import numpy as np
 import pytest
@@ -19,6 +16,7 @@ from scope.scope_addon.live.sources import is_stream, open_source
 from ..capture.media.made_video import patch_track_header, write_video
 from .fake_source import FakeClock
 from .mjpeg_server import mjpeg_server
+from .stream_server import encoded, served, without_first
 
 
 def test_a_file_is_paced_by_its_timestamps():
@@ -49,20 +47,92 @@ def test_a_stream_is_read_and_after_its_end_read_again(pictures):
     assert said[0].endswith("connecting again in 0.05 s")
 
 
-def test_a_stream_s_rotation_and_pixel_aspect_are_applied(tmp_path, monkeypatch):
+def test_a_stream_s_rotation_and_pixel_aspect_are_applied(tmp_path):
     image = np.full((96, 160, 3), 30, np.uint8)
     image[:48] = 220  # the upper half is bright; rotated clockwise, the right one is
     path = write_video(tmp_path / "a.mp4", [image] * 4, codec="mjpg")  # each frame by itself
     patch_track_header(path, (0, 65536, 0, -65536, 0, 0, 0, 0, 1 << 30), width=320)
-    monkeypatch.setattr(SimpleHTTPRequestHandler, "log_message", lambda *_: None)
-    handler = partial(SimpleHTTPRequestHandler, directory=str(tmp_path))
-    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        Thread(target=server.serve_forever, daemon=True).start()
-        source = open_source(f"http://127.0.0.1:{server.server_port}/a.mp4")
-        rotated = next(source.pictures(Clock())).image_rgb.astype(int)
-        server.shutdown()
+    with served(tmp_path, "a.mp4", path.read_bytes()) as address:
+        rotated = next(open_source(address).pictures(Clock())).image_rgb.astype(int)
     assert rotated.shape == (320, 96, 3)
     assert rotated[:, 60:].mean() - rotated[:, :36].mean() > 150
+
+
+def moving(count, size=(160, 96), first=0):
+    """Pictures of a slope over which a bright bar moves; the k-th is told from the others by `which`."""
+    width, height = size
+    pictures = np.zeros((count, height, width, 3), np.uint8)
+    pictures += np.linspace(20, 120, height).astype(np.uint8)[:, None, None]
+    for k in range(count):
+        pictures[k, :, (first + k) * width // 40 : ((first + k) * width // 40) + width // 8] = 240
+    return list(pictures)
+
+
+def which(image):
+    """The number of a picture of `moving`, and by how much it deviates from it."""
+    height, width = image.shape[:2]
+    off = [np.abs(image.astype(int) - picture).mean() for picture in moving(36, (width, height))]
+    return int(np.argmin(off)), min(off)
+
+
+def all_pictures(address):
+    return list(open_source(address).pictures(Clock()))
+
+
+@pytest.mark.parametrize("missed", [0, 4])
+def test_a_stream_begins_with_its_first_key_frame(tmp_path, missed):
+    data = without_first(encoded(moving(30), "mpeg4", "mp4"), missed)  # whose decoder shows the others on grey
+    with served(tmp_path, "a.mp4", data) as address:
+        shown = [which(picture.image_rgb) for picture in all_pictures(address)]
+    assert [k for k, _ in shown] == list(range(10 if missed else 0, 30))
+    assert max(off for _, off in shown) < 5
+
+
+def test_a_stream_without_key_frames_is_shown_after_a_while(tmp_path):
+    clock = FakeClock()
+    times = iter(np.arange(100.0, 200.0, 0.5))
+    clock.now = lambda: next(times)
+    data = without_first(encoded(moving(36), "mpeg4", "mp4", group=100), 1)
+    with served(tmp_path, "a.mp4", data) as address:
+        first = next(open_source(address).pictures(clock))
+    assert 110 <= first.timestamp_s <= 112
+
+
+def test_damaged_packets_cost_their_own_frames_only(tmp_path):
+    data = bytearray(encoded(moving(30), "mjpeg", "nut"))
+    pieces = [at for at in range(len(data)) if data[at : at + 3] == b"\xff\xd8\xff"]
+    assert len(pieces) == 30
+    data[pieces[11] : pieces[12] - 40] = bytes(pieces[12] - 40 - pieces[11])
+    with served(tmp_path, "a.nut", bytes(data)) as address:
+        shown = [which(picture.image_rgb) for picture in all_pictures(address)]
+    assert [k for k, off in shown if off < 5] == [*range(11), *range(12, 30)]
+
+
+def test_a_server_s_timestamps_may_jump_and_its_rate_change(tmp_path):
+    parts = [encoded(moving(12), begins_s=9.0), encoded(moving(12, first=12), begins_s=3609.0)]
+    parts += [encoded(moving(12, first=24), begins_s=4.0, rate=10)]
+    clock, taken = Clock(), []
+    with served(tmp_path, "a.ts", b"".join(parts)) as address:
+        began_s = clock.now()
+        with NewestFrame(open_source(address), clock, received=taken.append) as reader:
+            reader._thread.join(30)
+        passed_s = clock.now() - began_s
+    assert [which(picture.image_rgb)[0] for picture in taken] == list(range(36))
+    times = np.array([picture.timestamp_s for picture in taken])
+    assert (np.diff(times) > 0).all()
+    assert times[-1] <= passed_s + 36e-3
+
+
+def test_a_stream_that_changes_its_resolution_keeps_the_first_one(tmp_path):
+    data = encoded(moving(12)) + encoded(moving(12, (80, 48), first=12)) + encoded(moving(12, first=24))
+    taken = []
+    with served(tmp_path, "a.ts", data) as address:
+        with NewestFrame(open_source(address), Clock(), received=taken.append) as reader:
+            reader._thread.join(30)
+    assert {picture.image_rgb.shape for picture in taken} == {(96, 160, 3)}
+    shown = [which(picture.image_rgb) for picture in taken]
+    assert [k for k, _ in shown if k not in (11, 23)] == [k for k in range(36) if k not in (11, 23)]  # before a change
+    assert max(off for _, off in shown) < 10
 
 
 @pytest.mark.parametrize(

@@ -24,15 +24,20 @@ class PeopleRecording:
     def __init__(self, paths: Sequence[Path], body: Body, source: Source, *, from_zero: bool = False) -> None:
         self._recordings = [Recording(path, body, source, from_zero=from_zero) for path in paths]
         self.origin: tuple[int, float] | None = None  # the frame number and time that become 0, if not the first ones
+        self._is_over = False
 
     def begin(self, people: LivePeople, size: tuple[int, int]) -> None:
-        """Note where the poses come from."""
+        """Note where the poses come from; once there are some, those of pictures of another size are left out."""
+        self._is_over = any(recording.first is not None for recording in self._recordings)
+        if self._is_over:
+            return
         for recording, session in zip(self._recordings, people.sessions, strict=True):
             recording.begin(session, size)
 
     def send(self, pose: LivePose, latency_ms: float) -> None:
         """Keep a pose in which the person is seen."""
-        self._recordings[pose.person].send(pose, latency_ms)
+        if not self._is_over:
+            self._recordings[pose.person].send(pose, latency_ms)
 
     def save(self) -> list[Path]:
         """Write the motion files of those who were seen.

@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A video that is played in real time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from ...capture.media.video import open_video
+from ..clock import Clock
+from .source import Picture
+
+
+class FileSource:
+    """A video, played at its own speed."""
+
+    ends = True
+
+    def __init__(self, path: Path) -> None:
+        """Check the file.
+
+        :raises VideoError: it cannot be used.
+        """
+        self._path, self.name = path, path.name
+        with open_video(path) as video:
+            self.fps, self.focal_35mm = video.fps, video.focal_35mm
+
+    def pictures(self, clock: Clock) -> Iterator[Picture]:
+        """See `Source`."""
+        with open_video(self._path) as video:
+            began_s = clock.now()
+            for frame in video:
+                due_s = began_s + frame.timestamp_s
+                clock.sleep(due_s - clock.now())
+                yield Picture(frame.index, frame.timestamp_s, max(due_s, clock.now()), frame.image_rgb)

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A stream from the network, read by FFmpeg."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import suppress
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...capture.media.frame_readers import upright
+from ...capture.media.image_size import check_size
+from ...errors import VideoError
+from ..clock import Clock
+from .source import DEFAULT_FPS, Picture
+
+if TYPE_CHECKING:
+    import av
+    from av.container import InputContainer
+    from av.video.stream import VideoStream
+
+SCHEMES = ("http", "https", "rtsp", "rtsps", "rtmp", "rtmps", "srt", "udp", "rtp", "tcp")
+# What a stream may open in turn, such as the segments of a playlist: never a file of this computer.
+_PROTOCOLS = "http,https,httpproxy,tcp,tls,udp,rtp,rtmp,rtmps,rtsp,rtsps,srt,srtp,crypto"
+_FORMATS = (
+    "rtsp,rtp,sdp,mpjpeg,mjpeg,jpeg_pipe,hls,dash,flv,live_flv,mpegts,mpeg,mov,matroska,webm,avi,h264,hevc,m4v,ogg,asf,"
+    "nut"
+)
+STALLED_S = 5.0  # without data, after which a stream counts as interrupted
+KEY_FRAME_S = 10.0  # for which a stream that is joined in the middle is left out until its next key frame
+UNREADABLE_S = KEY_FRAME_S + STALLED_S  # without a picture, after which a stream counts as interrupted
+
+
+class StreamSource:
+    """A stream from the network."""
+
+    ends = False
+
+    def __init__(self, url: str) -> None:
+        self._url, self.name = url, re.sub(r"//[^/@]*@", "//", url)  # without a password
+        self.fps = DEFAULT_FPS
+        self.focal_35mm: float | None = None
+
+    def pictures(self, clock: Clock) -> Iterator[Picture]:
+        """See `Source`.
+
+        :raises VideoError: it cannot be opened, carries no video, or was interrupted.
+        """
+        import av
+
+        container = self._open()
+        with container:
+            stream = next(iter(container.streams.video), None)
+            if stream is None:
+                raise VideoError(f"{self.name} carries no video; check the address")
+            stream.thread_type = "SLICE"  # decoding in several frames' threads delays each of them
+            if stream.average_rate and 1 <= stream.average_rate <= 240:
+                self.fps = Fraction(stream.average_rate)
+            try:
+                for index, frame in enumerate(self._frames(container, stream, clock)):
+                    now_s = clock.now()
+                    yield Picture(index, now_s, now_s, self._image(frame, float(stream.sample_aspect_ratio or 1)))
+            except (av.error.FFmpegError, OSError, ValueError) as error:
+                raise VideoError(f"{self.name} was interrupted ({_reason(error)})") from error
+
+    def _frames(self, container: InputContainer, stream: VideoStream, clock: Clock) -> Iterator[av.VideoFrame]:
+        """Yield what can be decoded, from the first key frame on.
+
+        Frames before it continue pictures that never came, and some decoders show them on grey. A packet that was
+        damaged on its way costs its own frame only.
+
+        :raises VideoError: nothing could be decoded for a while.
+        """
+        import av
+
+        has_begun, began_s = False, clock.now()
+        seen_s = began_s
+        for packet in container.demux(stream):
+            now_s = clock.now()
+            has_begun = has_begun or packet.is_keyframe or now_s - began_s > KEY_FRAME_S  # streams may have none
+            frames: list[av.VideoFrame] = []
+            if has_begun:
+                with suppress(av.error.InvalidDataError):
+                    frames = packet.decode()
+            if frames:
+                seen_s = now_s
+            elif now_s - seen_s > UNREADABLE_S:
+                raise VideoError(f"{self.name} was interrupted (no picture could be decoded for {UNREADABLE_S:g} s)")
+            yield from frames
+
+    def _open(self) -> InputContainer:
+        import av
+
+        options = {"protocol_whitelist": _PROTOCOLS, "format_whitelist": _FORMATS}
+        # Without FFmpeg's "nobuffer", which throws away what tells the format: the first key frame, too.
+        options |= {"flags": "low_delay", "probesize": "500000", "analyzeduration": "1000000"}
+        if self._url.startswith("rtsp"):
+            options["rtsp_transport"] = "tcp"
+        try:
+            return av.open(
+                self._url, options=options, container_options=options, timeout=(STALLED_S, STALLED_S), mode="r"
+            )
+        except (av.error.FFmpegError, OSError, ValueError) as error:
+            raise VideoError(
+                f"{self.name} cannot be opened ({_reason(error)}); check the address, and whether its server runs"
+            ) from error
+
+    def _image(self, frame: av.VideoFrame, aspect: float) -> NDArray[np.uint8]:
+        """Return the frame as it is to be shown; phones send what they film upright as rotated."""
+        check_size(Path(self.name), frame.width, frame.height)
+        image = cast(NDArray[np.uint8], frame.to_ndarray(format="rgb24"))
+        return upright(Path(self.name), image, aspect, -round(frame.rotation))
+
+
+def _reason(error: Exception) -> str:
+    text = str(getattr(error, "strerror", None) or error).lower()
+    return f"nothing came for {STALLED_S:g} s" if "immediate exit" in text else text  # as FFmpeg calls a timeout

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A running capture whose source changes."""
+
+import threading
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scope.scope_addon.live.outputs.people_recording import PeopleRecording
+from scope.scope_addon.live.pose import Presence
+from scope.scope_addon.live.run import Listeners, LiveOptions, run_live
+
+from .fake_source import FakeClock, FakeSource
+
+WIDE, TALL = np.zeros((96, 160, 3), np.uint8), np.zeros((160, 96, 3), np.uint8)
+
+
+@pytest.mark.usefixtures("networks")
+def test_pictures_of_another_shape_are_said_and_begin_new_estimates(body):
+    given, said, sizes, poses = threading.Semaphore(1), [], [], []
+    source = FakeSource([0.0, 0.1, 0.2], ends=True, images=[WIDE, WIDE, TALL], before=lambda _: given.acquire())
+
+    def send(pose, latency_ms):
+        poses.append(pose)
+        given.release()
+
+    listeners = Listeners(say=said.append, camera=lambda people, size: sizes.append(size))
+    run_live(source, body, LiveOptions(), [SimpleNamespace(send=send)], listeners, FakeClock())
+    assert len(poses) == 3
+    assert sizes == [(160, 96), (96, 160)]
+    assert len(said) == 1
+    assert said[0].startswith("fake now gives pictures of another shape (96 × 160): body, lens and floor are estimated")
+
+
+def test_a_recording_ends_where_pictures_of_another_shape_begin(body, tmp_path):
+    def people(camera):
+        return SimpleNamespace(sessions=[SimpleNamespace(camera=camera)] * 2)
+
+    def pose(person, time_s):
+        return SimpleNamespace(person=person, index=round(10 * time_s), timestamp_s=time_s, presence=Presence.SEEN)
+
+    recording = PeopleRecording([tmp_path / "a.npz", tmp_path / "b.npz"], body, SimpleNamespace(name="fake"))
+    recording.begin(people("of nobody yet"), (96, 160))
+    recording.begin(people("first"), (160, 96))
+    recording.send(pose(0, 1.0), 0.0)
+    recording.send(pose(0, 1.5), 0.0)
+    recording.begin(people("second"), (96, 160))
+    recording.send(pose(0, 2.0), 0.0)
+    recording.send(pose(1, 2.0), 0.0)
+    assert (recording.seconds, recording.camera) == (0.5, "first")
