@@ -14,6 +14,9 @@ from scope.scope_addon.footage import shown
 from scope.scope_addon.motion import Motion
 
 
+BRIEF = ["--quality", "fast", "--end", "0.1", "--threads", "1"]  # several would wait for each other in busy loops
+
+
 def run(capsys, *argv):
     status = main([str(a) for a in argv])
     out, err = capsys.readouterr()
@@ -137,7 +140,7 @@ def test_outputs_that_are_the_same_file_are_written_once(tmp_path, capfd, monkey
     (tmp_path / "linked").symlink_to("out")
     names = ["out/case.npz", "out/../out/case.npz", tmp_path / "out" / "case.npz", "linked/case.npz", "case.npz"]
     options = [text for name in names for text in ("-o", name)]
-    status, out, err = run(capfd, "capture", SAMPLE, "--end", "0.1", "--quality", "fast", "--json", *options)
+    status, out, err = run(capfd, "capture", SAMPLE, *BRIEF, "--json", *options)
     assert status == 0, err
     assert json.loads(out)["outputs"] == ["out/case.npz", "case.npz"]
     assert files_below(tmp_path) == ["case.npz", "linked", "out", "out/case.npz"]
@@ -149,7 +152,7 @@ def test_an_interrupt_during_the_overlay_leaves_complete_files(tmp_path, capsys,
 
     monkeypatch.setattr("scope.scope_addon.capture.overlay.overlay_video.write_overlay", interrupted)
     motion = tmp_path / "a.npz"
-    options = ["--end", "0.1", "--quality", "fast", "-o", motion, "--overlay", tmp_path / "a.mp4"]
+    options = [*BRIEF, "-o", motion, "--overlay", tmp_path / "a.mp4"]
     status, _, err = run(capsys, "capture", SAMPLE, *options)
     assert status == 130
     assert err == "scope: stopped; some results may have been written already, each of them complete\n"
@@ -164,11 +167,10 @@ def test_no_command_writes_into_scopes_own_folders(tmp_path, capfd, monkeypatch)
 
     monkeypatch.chdir(tmp_path)
     before = state()
-    brief = ["--quality", "fast", "--end", "0.1", "--threads", "1"]  # several would wait for each other in busy loops
     for argv in (
-        ["capture", *brief],
-        ["capture", SAMPLE, *brief, "--overlay", "check.mp4"],
-        ["batch", SAMPLE.parent, "--out", "motions", "--formats", "npz", *brief],
+        ["capture", *BRIEF],
+        ["capture", SAMPLE, *BRIEF, "--overlay", "check.mp4"],
+        ["batch", SAMPLE.parent, "--out", "motions", "--formats", "npz", *BRIEF],
     ):
         status, _, err = run(capfd, *argv)
         assert status == 0, err
