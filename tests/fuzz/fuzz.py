@@ -28,6 +28,7 @@ CORPUS = Path(__file__).with_name("corpus")
 FOUND = ROOT / "build" / "fuzz"
 RANDOM_BYTES = 10_000_000  # for every target, before a release
 SLOWEST_S = 20.0  # of one input; a hang ends the process
+LARGEST_MB = 2600.0  # of a target's process; the largest picture that is read takes 2200
 _STACKED = 0.3  # share of inputs that are damaged again
 _LARGEST_NOISE = 16.0  # of a file of random bytes, in powers of two
 
@@ -96,6 +97,7 @@ def run_target(name: str, seconds: float, seed: int, count: int = 0) -> None:
         faulthandler.dump_traceback_later(SLOWEST_S, exit=True)
         check(name, path)
         faulthandler.cancel_dump_traceback_later()
+        assert _peak_megabytes() < LARGEST_MB, f"{_peak_megabytes():.0f} MB of memory"
         done += 1
         if not count and time.monotonic() > end:
             break

@@ -48,14 +48,23 @@ def test_a_large_transparent_image_takes_little_memory(tmp_path):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks at /proc")
-@pytest.mark.parametrize("claimed", [1 << 30, (1 << 32) - 1])
-def test_a_chunk_larger_than_its_file_takes_no_memory(tmp_path, claimed):
-    """OpenCV would reserve, and fill, as much as the chunk claims."""
+@pytest.mark.parametrize(
+    "damaged",
+    [
+        lambda png, at: png[:at] + struct.pack(">I", 1 << 30) + png[at + 4 :],
+        lambda png, at: png[:at] + struct.pack(">I", (1 << 32) - 1) + png[at + 4 :],
+        lambda png, at: png[:at] + struct.pack(">I", 3 << 30),  # and no more
+        lambda png, at: png[:at] + struct.pack(">I", 3 << 30) + b"IEND" + bytes(4),
+    ],
+    ids=["1 GB", "4 GB", "of a chunk without a name", "of the end"],
+)
+def test_a_chunk_larger_than_its_file_takes_no_memory(tmp_path, damaged):
+    """OpenCV would reserve, and fill, as much as the chunk claims: up to 4.3 GB."""
     whole = png(32, 24, 24)
-    at = whole.index(b"IDAT") - 4
     path = tmp_path / "chunk.png"
-    path.write_bytes(whole[:at] + struct.pack(">I", claimed) + whole[at + 4 :])
+    path.write_bytes(damaged(whole, whole.index(b"IDAT") - 4))
     read = f"{READ}print(open('/proc/self/status').read().split('VmHWM:')[1].split()[0])"  # kB
+    read = read.replace("3 << 30", "8 << 30")  # so that it could
     done = subprocess.run([sys.executable, "-c", read, path], capture_output=True, text=True, check=True)
     message, peak = done.stdout.splitlines()
     assert "cannot be decoded; it may be damaged" in message

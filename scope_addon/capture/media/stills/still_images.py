@@ -8,7 +8,6 @@ which nobody films in: these are refused. Its packages do not read AVIF and HEIC
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import takewhile
 from pathlib import Path
 from typing import Any, cast
 
@@ -97,9 +96,13 @@ def _is_for_opencv(head: bytes) -> bool:
 
 
 def _holds_its_chunks(data: bytes) -> bool:
-    """Return whether no chunk of a PNG claims more bytes than follow it."""
-    chunks = takewhile(lambda chunk: chunk[0] != b"IEND", png_chunks(data))
-    return all(len(content) == size for _, content, size in chunks)
+    """Return whether a PNG has an end, and no chunk up to it claims more bytes than follow it."""
+    for name, content, size in png_chunks(data):
+        if len(content) != size:
+            return False
+        if name == b"IEND":
+            return True
+    return False
 
 
 def _brands(head: bytes) -> set[bytes]:
