@@ -30,6 +30,7 @@ CALIBRATE_AT_S = (0.0, 0.3, 0.7, 1.2, CALIBRATED_S)
 FOLLOW_S, FOLLOWED_S = 1.0, 4.0  # between two estimates of the world afterwards, and how much each of them sees
 SETTLING_S, FOLLOWING_S = 0.3, 10.0  # time constants towards the estimates, the second at least
 HOLD_S = 0.5  # for which the pose of a person who is not seen is held, rather than lost
+STANDS_S = 2.0  # for which somebody who stood on the floor and is not seen is still not below it
 
 Start = Callable[..., "Future[Calibration]"]
 
@@ -130,9 +131,11 @@ class LiveSession:
 
     def _support(self, time_s: float, observation: Observation) -> Support | None:
         """Return what the body stands on, if it was seen a moment ago."""
-        if self._current is None or self._fit is None or time_s - self._last_seen_s >= HOLD_S:
+        pause_s = time_s - self._last_seen_s
+        if self._current is None or self._fit is None or pause_s >= STANDS_S:
             return None
-        return self._feet.support(self._current.T_world_camera, self._fit.soles(observation))
+        support = self._feet.support(self._current.T_world_camera, self._fit.soles(observation))
+        return support if support is None or pause_s < HOLD_S else support.after_a_pause()
 
     def _settle(self, time_s: float) -> None:
         """Start estimates that are due, take those that are done, and approach the newest one."""

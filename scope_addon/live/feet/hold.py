@@ -104,8 +104,11 @@ class FootHold:
         contact = self._probability.copy()
         contact[: len(SOLES)] *= logistic(8 * (1 - moved_m / MOVED_M))
         R, t = T_world_camera[:3, :3], T_world_camera[:3, 3]
-        on_floor = contact * floor_probability(last.points @ R[2] + t[2])
-        return Support((self._anchors - t) @ R, self._is_held * contact, on_floor, R[2], -float(t[2]))
+        by_height = floor_probability(last.points @ R[2] + t[2])
+        on_floor, stands = contact * by_height, float(by_height[: len(SOLES)].max())
+        # Points that are not in contact may be below the floor as well as above it, as on stairs.
+        rests = self._is_held * contact
+        return Support((self._anchors - t) @ R, rests, on_floor, on_floor, stands, R[2], -float(t[2]))
 
     def hold(
         self,

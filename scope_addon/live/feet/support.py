@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from ....solver import Floor, FootContacts, Measurements
 
+AFTER_A_PAUSE = 0.01  # of the floor's weight; three times as much tilts bodies whose distance begins too far
+
 
 @dataclass(frozen=True)
 class Support:
@@ -22,6 +24,8 @@ class Support:
     places: NDArray[np.floating[Any]]  # (6, 3) where points rest
     rests: NDArray[np.floating[Any]]  # (6,) probability that each of them rests there
     on_floor: NDArray[np.floating[Any]]  # (6,) probability that it rests on the floor
+    not_below: NDArray[np.floating[Any]]  # (6,) probability that it is not below the floor
+    stands: float  # probability that the lowest sole was on the floor
     floor_normal: NDArray[np.floating[Any]]  # (3,) unit, upwards
     floor_offset: float
 
@@ -33,6 +37,11 @@ class Support:
         return replace(
             measurements,
             foot_contacts=FootContacts(points, self.places, self.rests),
-            # Points that are not in contact may be below the floor as well as above it, as on stairs.
-            floor=Floor(points, self.floor_normal, self.floor_offset, self.on_floor, below=self.on_floor),
+            floor=Floor(points, self.floor_normal, self.floor_offset, self.on_floor, below=self.not_below),
         )
+
+    def after_a_pause(self) -> Support:
+        """Return what is left of it when points may have moved since: who stood on the floor is not below it now."""
+        nothing = np.zeros_like(self.rests)
+        not_below = np.full_like(nothing, AFTER_A_PAUSE * self.stands)
+        return replace(self, rests=nothing, on_floor=nothing, not_below=not_below)

@@ -8,6 +8,7 @@ import pytest
 from scope.scope_addon.kinematics.standing import line_of_sight
 from scope.scope_addon.live.causal_fit import FittedFrame
 from scope.scope_addon.live.feet.hold import FootHold
+from scope.scope_addon.live.feet.support import AFTER_A_PAUSE
 from scope.solver.rotations import exp
 
 from ...kinematics.posed_people import stepping_person
@@ -118,3 +119,14 @@ def test_feet_are_not_drawn_back_to_where_they_were_two_frames_a_second_ago():
         rotations, _ = feet.hold(0.45 * k, np.zeros(supported.P), frame, T, True)
         held = place(rotations[None], where[None])[2][0, :4]
         assert np.linalg.norm(held - true, axis=1).max() < 0.03
+
+
+@pytest.mark.parametrize(("height_m", "weight"), [(0.0, AFTER_A_PAUSE), (1.5, 0.0)])
+def test_after_a_pause_who_stood_on_the_floor_is_not_below_it(stepped, height_m, weight):
+    *_, feet, T, soles = stepped
+    higher = T.copy()
+    higher[2, 3] += height_m  # the floor is that far below the feet
+    support = feet.support(higher, soles).after_a_pause()
+    assert not support.rests.any()
+    assert not support.on_floor.any()
+    assert support.not_below == pytest.approx(np.full(6, weight), abs=0.1 * AFTER_A_PAUSE)
