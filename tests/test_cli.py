@@ -3,7 +3,6 @@
 
 import json
 import os
-import signal
 import subprocess
 import sys
 
@@ -13,6 +12,9 @@ from scope.scope_addon import cli
 from scope.scope_addon.cli import SAMPLE, main
 from scope.scope_addon.footage import shown
 from scope.scope_addon.motion import Motion
+
+
+BRIEF = ["--quality", "fast", "--end", "0.1", "--threads", "1"]  # several would wait for each other in busy loops
 
 
 def run(capsys, *argv):
@@ -138,7 +140,7 @@ def test_outputs_that_are_the_same_file_are_written_once(tmp_path, capfd, monkey
     (tmp_path / "linked").symlink_to("out")
     names = ["out/case.npz", "out/../out/case.npz", tmp_path / "out" / "case.npz", "linked/case.npz", "case.npz"]
     options = [text for name in names for text in ("-o", name)]
-    status, out, err = run(capfd, "capture", SAMPLE, "--end", "0.1", "--quality", "fast", "--json", *options)
+    status, out, err = run(capfd, "capture", SAMPLE, *BRIEF, "--json", *options)
     assert status == 0, err
     assert json.loads(out)["outputs"] == ["out/case.npz", "case.npz"]
     assert files_below(tmp_path) == ["case.npz", "linked", "out", "out/case.npz"]
@@ -150,7 +152,7 @@ def test_an_interrupt_during_the_overlay_leaves_complete_files(tmp_path, capsys,
 
     monkeypatch.setattr("scope.scope_addon.capture.overlay.overlay_video.write_overlay", interrupted)
     motion = tmp_path / "a.npz"
-    options = ["--end", "0.1", "--quality", "fast", "-o", motion, "--overlay", tmp_path / "a.mp4"]
+    options = [*BRIEF, "-o", motion, "--overlay", tmp_path / "a.mp4"]
     status, _, err = run(capsys, "capture", SAMPLE, *options)
     assert status == 130
     assert err == "scope: stopped; some results may have been written already, each of them complete\n"
@@ -165,11 +167,10 @@ def test_no_command_writes_into_scopes_own_folders(tmp_path, capfd, monkeypatch)
 
     monkeypatch.chdir(tmp_path)
     before = state()
-    brief = ["--quality", "fast", "--end", "0.1", "--threads", "1"]  # several would wait for each other in busy loops
     for argv in (
-        ["capture", *brief],
-        ["capture", SAMPLE, *brief, "--overlay", "check.mp4"],
-        ["batch", SAMPLE.parent, "--out", "motions", "--formats", "npz", *brief],
+        ["capture", *BRIEF],
+        ["capture", SAMPLE, *BRIEF, "--overlay", "check.mp4"],
+        ["batch", SAMPLE.parent, "--out", "motions", "--formats", "npz", *BRIEF],
     ):
         status, _, err = run(capfd, *argv)
         assert status == 0, err
@@ -259,33 +260,6 @@ def test_output_of_c_libraries_is_not_part_of_the_report():
     buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=buffered)
     assert (done.stdout, done.stderr) == ("{}\n", "Blender 9.9\nexporting\n")
-
-
-def test_no_temporary_folder_of_blender_is_left(tmp_path):
-    code = "import bpy\nfrom scope.scope_addon import cli\ncli.main = lambda: print(bpy.app.tempdir) or 0\ncli.run()"
-    environment = dict(os.environ, TMPDIR=str(tmp_path), TEMP=str(tmp_path))
-    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
-    assert str(tmp_path) in done.stdout
-    assert files_below(tmp_path) == []
-
-
-@pytest.mark.skipif(os.name == "nt", reason="Windows ends a process at once")
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGINT)])
-def test_a_signal_while_the_program_is_loaded_has_its_word(tmp_path, number):
-    """Numpy is imported after the handlers are installed; this stand-in sends the signal then."""
-    code = (
-        "import os, runpy, signal, sys\n"
-        f"signal.signal({int(number)}, signal.SIG_DFL)\n"  # under nohup, SIGHUP is ignored, and stays so
-        "class Finder:\n"
-        "    def find_spec(name, *_):\n"
-        f"        name == 'numpy' and os.kill(os.getpid(), {int(number)})\n"
-        "sys.meta_path.insert(0, Finder)\n"
-        "sys.argv = ['scope', 'capture']\n"
-        "runpy.run_module('scope.scope_addon', run_name='__main__')\n"
-    )
-    command = [sys.executable, "-c", code]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout, done.stderr) == (130, "", "scope: stopped\n")
 
 
 @pytest.mark.parametrize(

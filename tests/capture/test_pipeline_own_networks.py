@@ -63,7 +63,7 @@ def test_a_network_that_finds_nobody_is_named(tmp_path: Path) -> None:
 def test_a_lost_person_is_found_again(own_networks: tuple[Path, Path]) -> None:
     video = cv2.VideoCapture(str(SAMPLE))
     images = [np.ascontiguousarray(video.read()[1][:, :, ::-1]) for _ in range(6)]
-    tracker = PeopleTracker("fast", 2, detector=own_networks[0], keypoints=own_networks[1])
+    tracker = PeopleTracker("fast", 1, detector=own_networks[0], keypoints=own_networks[1])
     before = [tracker.step(image) for image in images[:3]]
     assert [tracker.step(np.zeros_like(images[0])) for _ in range(3)] == [[]] * 3
     after = [tracker.step(image) for image in images[3:]]
@@ -80,7 +80,7 @@ def test_left_right_swaps_of_a_users_network_are_repaired(shared: Path, tmp_path
     tool = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(tool)
     keypoints = coco_simcc(tmp_path / "full.onnx", "pose_landmark_full")
-    options = CaptureOptions(keypoints=keypoints, threads=2, wanted=VideoRange(end_s=1.0))
+    options = CaptureOptions(keypoints=keypoints, threads=1, wanted=VideoRange(end_s=1.0))
     found = capture(shared / "data/pose2sim/cam2.mp4", load_body("scope"), options)
     found.motions[0].save(tmp_path / "cam2.npz")
     with np.errstate(all="ignore"), warnings.catch_warnings():
@@ -91,7 +91,7 @@ def test_left_right_swaps_of_a_users_network_are_repaired(shared: Path, tmp_path
 
 
 def test_two_people_keep_their_identities(own_networks: tuple[Path, Path], frames: Frames) -> None:
-    tracker = PeopleTracker("fast", 2, people=4, detector=own_networks[0], keypoints=own_networks[1])
+    tracker = PeopleTracker("fast", 1, people=4, detector=own_networks[0], keypoints=own_networks[1])
     for image in frames("clips/two_people_portrait", stop=24):
         seen = dict(tracker.step(image))
         assert sorted(seen) == [0, 1]
@@ -100,7 +100,7 @@ def test_two_people_keep_their_identities(own_networks: tuple[Path, Path], frame
 
 def test_a_runner_is_tracked_at_a_low_frame_rate(own_networks: tuple[Path, Path], frames: Frames) -> None:
     """Without auxiliary points, at 7.5 frames per second, every limb stays in the predicted region."""
-    tracker, numbers = PeopleTracker("fast", 2, detector=own_networks[0], keypoints=own_networks[1]), set()
+    tracker, numbers = PeopleTracker("fast", 1, detector=own_networks[0], keypoints=own_networks[1]), set()
     for image in frames("clips/run_moving_camera", every=4):
         ((number, seen),) = tracker.step(image)
         numbers.add(number)
@@ -111,7 +111,7 @@ def test_a_runner_is_tracked_at_a_low_frame_rate(own_networks: tuple[Path, Path]
 
 def test_the_track_of_a_person_who_leaves_the_image_ends(own_networks: tuple[Path, Path], frames: Frames) -> None:
     """The woman on the grass leaves at the left edge between frames 195 and 207."""
-    tracker, woman = PeopleTracker("fast", 2, people=2, keypoints=own_networks[1]), []
+    tracker, woman = PeopleTracker("fast", 1, people=2, keypoints=own_networks[1]), []
     for index, image in enumerate(frames("clips/walk_side_static", start=185, stop=215), 185):
         seen = tracker.step(image)
         woman += [index for _, observation in seen if observation.keypoints_px[:, 0].mean() < 200]

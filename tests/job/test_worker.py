@@ -37,7 +37,7 @@ def folder(tmp_path):
 
 def test_an_isolated_worker_starts_and_reports(folder):
     """-I ignores PYTHONPATH, the script's folder and the current folder, as inside Blender."""
-    worker = WorkerProcess(JobRequest(SAMPLE, quality="fast"), folder, None, [sys.executable, "-I"])
+    worker = WorkerProcess(JobRequest(SAMPLE, quality="fast", threads=1), folder, None, [sys.executable, "-I"])
     messages = []
     wait_for(lambda: messages.extend(worker.poll()) or {"progress", "preview"} <= {m["event"] for m in messages})
     assert all(m["event"] in {"progress", "preview"} for m in messages)

@@ -94,7 +94,7 @@ def beside(body, networks):
         frames = [Frame(f.index, f.timestamp_s, np.hstack([f.image_rgb] * 2)) for f in islice(video, FRAMES)]
     height, width = frames[0].image_rgb.shape[:2]
     camera = choose_camera(width, height, fov_deg=85.0)
-    people = LivePeople(body, PeopleTracker("fast", 2, 2), camera, (width, height), count=2)
+    people = LivePeople(body, PeopleTracker("fast", 1, 2), camera, (width, height), count=2)
     return people, [people.step(frame) for frame in frames], (width, height)
 
 

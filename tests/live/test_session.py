@@ -36,7 +36,7 @@ def frames():
 
 def people_of(body, frames):
     height, width = frames[0].image_rgb.shape[:2]
-    return LivePeople(body, PeopleTracker("fast", 2), choose_camera(width, height), (width, height))
+    return LivePeople(body, PeopleTracker("fast", 1), choose_camera(width, height), (width, height))
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +68,7 @@ def test_later_frames_do_not_change_earlier_poses(body, live, frames):
 
 def test_the_recording_is_close_to_the_offline_capture(body, recorded):
     (offline,) = capture(
-        SAMPLE, body, CaptureOptions(quality="fast", wanted=VideoRange(end_s=(FRAMES - 1) / 30))
+        SAMPLE, body, CaptureOptions(quality="fast", threads=1, wanted=VideoRange(end_s=(FRAMES - 1) / 30))
     ).motions
     assert len(recorded) == FRAMES - LATE  # the last poses would have been given later
     assert list(recorded.frames) == list(offline.frames[:-LATE])

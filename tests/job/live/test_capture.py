@@ -30,7 +30,7 @@ def folder(tmp_path):
 
 
 def test_what_is_recorded_is_what_was_shown(folder, networks, body):
-    live = LiveProcess(LiveRequest(SAMPLE, reconnect_s=0.0), folder, None, [sys.executable, "-I"])
+    live = LiveProcess(LiveRequest(SAMPLE, reconnect_s=0.0, threads=1), folder, None, [sys.executable, "-I"])
     live.record()
     poses, result = [], []
 
