@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The operators of a capture: drawing its progress, cancelling, failures."""
+
+import time
+from functools import partial
+from types import SimpleNamespace
+
+import bpy
+import pytest
+from scope.scope_addon.ui.capture import capture_operators
+from scope.scope_addon.ui.capture.capture_job import CaptureJob
+from scope.scope_addon.ui.capture.capture_operators import (
+    SAMPLE,
+    SCOPE_OT_cancel,
+    SCOPE_OT_capture,
+    end_capture,
+    state,
+)
+from scope.scope_addon.ui.capture.job_operator import JobOperator
+
+
+def window_with_sidebar(category="Scope", width=200):
+    """Return what the operator reads of a window whose 3D viewport has its sidebar at x 800 to 1000."""
+    sidebar = SimpleNamespace(type="UI", x=800, y=100, width=width, height=500, active_panel_category=category)
+    viewport = SimpleNamespace(type="VIEW_3D", regions=[SimpleNamespace(type="WINDOW"), sidebar])
+    timeline = SimpleNamespace(type="DOPESHEET_EDITOR", regions=[])
+    return SimpleNamespace(screen=SimpleNamespace(areas=[timeline, viewport]))
+
+
+def test_the_cancel_operator_ends_the_worker_immediately(fake_worker, footage):
+    fake_worker("time.sleep(600)")
+    bpy.context.scene.scope.footage = str(footage)
+    assert not bpy.ops.scope.cancel.poll()
+    state.job = CaptureJob(bpy.context.scene)
+    assert not bpy.ops.scope.capture.poll()
+    bpy.ops.scope.cancel()
+    assert state.job.cancelled
+    assert not state.job.worker.alive
+    capture_operators.end_capture()
+    assert bpy.ops.scope.capture.poll()
+
+
+def test_an_unexpected_error_ends_the_capture():
+    closed = []
+    state.job = SimpleNamespace(close=lambda: closed.append(True), step=lambda: 1 / 0, cancelled=False)
+    operator = SimpleNamespace(job_state=state, stop_job=capture_operators.stop_job)
+    operator.step, operator._advance = (
+        partial(getattr(SCOPE_OT_capture, name), operator) for name in ("step", "_advance")
+    )
+    operator.end = partial(JobOperator.end, operator)
+    with pytest.raises(ZeroDivisionError):
+        capture_operators.SCOPE_OT_capture.modal(operator, bpy.context, SimpleNamespace(type="TIMER", value="NOTHING"))
+    assert closed
+    assert state.job is None  # otherwise no other capture could be started
+
+
+def test_the_panel_is_drawn_again_only_for_news_and_rarely(monkeypatch):
+    drawn, now = [], [100.0]
+    monkeypatch.setattr(capture_operators, "redraw_sidebars", lambda: drawn.append(None))
+    monkeypatch.setattr(capture_operators, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    lines = ["Finding the person"]
+    progress = SimpleNamespace(lines=lambda _: lines, stage="finding the person")
+    state.job = SimpleNamespace(progress=progress, messages=0, step=lambda: True, cancelled=False)
+    operator = SimpleNamespace(_shown=("", "", 0), _drawn_s=0.0, _pause_s=0.3, timer_s=0.1, job_state=state)
+    operator.step, operator._advance = (
+        partial(getattr(SCOPE_OT_capture, name), operator) for name in ("step", "_advance")
+    )
+    timer = SimpleNamespace(type="TIMER", value="NOTHING")
+
+    def drawings(seconds=0.4):
+        now[0] += seconds
+        capture_operators.SCOPE_OT_capture.modal(operator, bpy.context, timer)
+        return len(drawn)
+
+    def seconds_of_news(seconds, step_s):
+        drawn.clear()
+        for _ in range(round(seconds / step_s)):
+            state.job.messages += 1
+            drawings(step_s)
+        return len(drawn)
+
+    assert [drawings(0.1), drawings(0.1)] == [1, 1]
+    state.job.messages += 1
+    assert [drawings(0.1), drawings(0.11), drawings(0.1)] == [1, 2, 2]
+    lines.append("1 s left")
+    assert [drawings(0.3), drawings(0.1)] == [3, 3]
+    assert seconds_of_news(6.0, 0.1) in (15, 20)  # about three a second
+    assert seconds_of_news(6.0, 0.2) in (5, 6)  # where a drawing lasts for 0.2 s, one a second
+    drawn.clear()
+    progress.stage = "building the scene"  # at once: it stops Blender for a while
+    assert drawings(0.01) == 1
+    state.job = None
+
+
+def test_the_status_bar_is_cleared_in_every_workspace(monkeypatch):
+    texts = {}
+
+    def tell(_, text):  # like Blender, for the context's workspace
+        texts[bpy.context.workspace.name] = text
+
+    monkeypatch.setattr(bpy.types.WorkSpace, "status_text_set", tell)
+    capture_operators.end_capture()
+    assert len(texts) > 1
+    assert texts == dict.fromkeys((workspace.name for workspace in bpy.data.workspaces), None)
+
+
+def test_the_sample_exists():
+    bpy.ops.scope.use_sample()
+    assert bpy.context.scene.scope.footage == str(SAMPLE)
+    assert SAMPLE.is_file()
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "window", "cancels"),
+    [
+        (900, 300, window_with_sidebar(), True),
+        (400, 300, window_with_sidebar(), False),  # over the viewport
+        (900, 50, window_with_sidebar(), False),  # over the timeline below
+        (900, 300, window_with_sidebar("Item"), False),
+        (800, 300, window_with_sidebar(width=1), False),  # the sidebar is hidden
+    ],
+)
+def test_escape_cancels_only_over_the_panel(fake_worker, footage, x, y, window, cancels):
+    fake_worker("time.sleep(600)")
+    bpy.context.scene.scope.footage = str(footage)
+    state.job, state.started = CaptureJob(bpy.context.scene), time.monotonic()
+    operator = SimpleNamespace(job_state=state, ask_to_cancel=partial(SCOPE_OT_capture.ask_to_cancel, None))
+    context = SimpleNamespace(window=window)
+    escape = SimpleNamespace(type="ESC", value="PRESS", mouse_x=x, mouse_y=y)
+    outcome = SCOPE_OT_capture.modal(operator, context, escape)
+    assert outcome == ({"RUNNING_MODAL"} if cancels else {"PASS_THROUGH"})
+    assert state.job.cancelled is cancels
+    end_capture()
+
+
+@pytest.mark.parametrize(("seconds", "asks"), [(3.0, False), (30.0, True)])
+def test_cancelling_asks_when_more_than_ten_seconds_are_done(monkeypatch, seconds, asks):
+    state.job, state.started = SimpleNamespace(cancelled=False, close=lambda: None), time.monotonic() - seconds
+    questions = []
+    manager = SimpleNamespace(invoke_confirm=lambda *_, **texts: questions.append(texts) or {"RUNNING_MODAL"})
+    monkeypatch.setattr(capture_operators.bpy, "app", SimpleNamespace(background=False))
+    operator = SimpleNamespace(execute=lambda _: setattr(state.job, "cancelled", True) or {"FINISHED"})
+    try:
+        SCOPE_OT_cancel.invoke(operator, SimpleNamespace(window_manager=manager), None)
+        assert bool(questions) is asks
+        assert state.job.cancelled is not asks
+        assert not asks or "30 s" in questions[0]["message"]
+    finally:
+        monkeypatch.undo()
+        state.job = None
