@@ -14,7 +14,6 @@ from scope.scope_addon.cli import SAMPLE, main
 from scope.scope_addon.footage import shown
 from scope.scope_addon.motion import Motion
 
-
 BRIEF = ["--quality", "fast", "--end", "0.1", "--threads", "1"]  # several would wait for each other in busy loops
 
 
