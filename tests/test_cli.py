@@ -3,7 +3,6 @@
 
 import json
 import os
-import signal
 import subprocess
 import sys
 
@@ -260,33 +259,6 @@ def test_output_of_c_libraries_is_not_part_of_the_report():
     buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=buffered)
     assert (done.stdout, done.stderr) == ("{}\n", "Blender 9.9\nexporting\n")
-
-
-def test_no_temporary_folder_of_blender_is_left(tmp_path):
-    code = "import bpy\nfrom scope.scope_addon import cli\ncli.main = lambda: print(bpy.app.tempdir) or 0\ncli.run()"
-    environment = dict(os.environ, TMPDIR=str(tmp_path), TEMP=str(tmp_path))
-    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
-    assert str(tmp_path) in done.stdout
-    assert files_below(tmp_path) == []
-
-
-@pytest.mark.skipif(os.name == "nt", reason="Windows ends a process at once")
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGINT)])
-def test_a_signal_while_the_program_is_loaded_has_its_word(tmp_path, number):
-    """Numpy is imported after the handlers are installed; this stand-in sends the signal then."""
-    code = (
-        "import os, runpy, signal, sys\n"
-        f"signal.signal({int(number)}, signal.SIG_DFL)\n"  # under nohup, SIGHUP is ignored, and stays so
-        "class Finder:\n"
-        "    def find_spec(name, *_):\n"
-        f"        name == 'numpy' and os.kill(os.getpid(), {int(number)})\n"
-        "sys.meta_path.insert(0, Finder)\n"
-        "sys.argv = ['scope', 'capture']\n"
-        "runpy.run_module('scope.scope_addon', run_name='__main__')\n"
-    )
-    command = [sys.executable, "-c", code]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout, done.stderr) == (130, "", "scope: stopped\n")
 
 
 @pytest.mark.parametrize(

@@ -4,13 +4,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.body import Body
-from ..kinematics.axes import R_WORLD_MODEL
 from .feet import FootRest, ankle_goal, flat_toes, pelvis_drop
 from .legs import solve_leg
 from .skeleton import Skeleton, head_positions, rotated
@@ -52,14 +50,14 @@ def legs_at_rest(
     row: dict[str, int],
     alignment: NDArray[np.float64],
     body: Body,
-    betas: NDArray[np.floating[Any]],
+    rest: tuple[NDArray[np.float64], NDArray[np.float64]],
     scale: float,
 ) -> Legs | None:
     """Measure the legs of a rig and of the body at rest; None if the rig has no ankles.
 
     :param row: the rig's bone of each body part.
     :param alignment: (B, 3, 3) A_b F.
-    :param betas: (P,) shape coefficients.
+    :param rest: the body's vertices (V, 3) and joints (K+1, 3) at rest, metres, world axes.
     :param scale: the rig's leg length divided by the body's.
     """
     sides = [side for side in _SIDES if f"{side}_ankle" in row]
@@ -67,7 +65,7 @@ def legs_at_rest(
         return None
     hips, knees, ankles = ([row[f"{side}_{part}"] for side in sides] for part in ("hip", "knee", "ankle"))
     toe_of = [row.get(f"{side}_foot") for side in sides]
-    source = _body_feet(body, betas, sides)
+    source = _body_feet(body, *rest, sides)
     pairs = zip(ankles, toe_of, source, strict=True)
     feet = [_rig_foot(rig, alignment[ankle], ankle, toe, foot, scale) for ankle, toe, foot in pairs]
     toed = [leg for leg, toe in enumerate(toe_of) if toe is not None]
@@ -94,9 +92,8 @@ def legs_at_rest(
     )
 
 
-def _body_feet(body: Body, betas: NDArray[np.floating[Any]], sides: list[str]) -> list[FootRest]:
+def _body_feet(body: Body, v: NDArray[np.float64], J: NDArray[np.float64], sides: list[str]) -> list[FootRest]:
     """Measure the feet of the body at rest. The heel is the rear end of what the foot, without its toes, stands on."""
-    v, J = body.rest_vertices(betas) @ R_WORLD_MODEL.T, body.rest_joints(betas) @ R_WORLD_MODEL.T
     strongest = body.skin_joints[np.arange(len(v)), body.skin_weights.argmax(1)]
     low = float(v[:, 2].min())
     feet = []

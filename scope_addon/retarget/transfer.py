@@ -66,9 +66,10 @@ class Transfer:
         self._source_hips = [index["left_hip"], index["right_hip"]]
         # Both stand on their floors at rest: heights are measured from there.
         self._lift = np.zeros(3)
-        rested = rest[self._source_hips, 2].mean() - _sole_height(body, betas)
+        vertices = body.rest_vertices(betas) @ R_WORLD_MODEL.T
+        rested = rest[self._source_hips, 2].mean() - vertices[:, 2].min()
         self._lift[2] = (rig.heads[self._hips, 2].mean() - rig.floor) - self._scale * rested
-        self._legs = legs_at_rest(rig, row, self._alignment, body, betas, self._scale) if feet else None
+        self._legs = legs_at_rest(rig, row, self._alignment, body, (vertices, rest), self._scale) if feet else None
 
     def pose(self, clip: Clip) -> Pose:
         """Compute the rig's motion."""
@@ -121,8 +122,3 @@ def _between(
             first[b], second[b] = index[chain[low]], index[chain[min(low + 1, last)]]
             shares[b] = place - low
     return first, second, shares
-
-
-def _sole_height(body: Body, betas: NDArray[np.floating[Any]]) -> float:
-    """Return the height of the lowest point of the body at rest, metres, world axes."""
-    return float((body.rest_vertices(betas) @ R_WORLD_MODEL.T)[:, 2].min())

@@ -17,6 +17,7 @@ import bpy
 
 from .preferences import PACKAGE, cache, preferences
 from .reporting import iface_
+from .view.sidebar import redraw_sidebars
 
 if TYPE_CHECKING:
     import subprocess
@@ -59,7 +60,7 @@ def step() -> float | None:
             with contextlib.suppress(OSError):
                 _marker().touch()
         stop()
-    _redraw()
+    redraw_sidebars()  # the panel alone: drawing a viewport without a graphics card takes a fifth of a second
     return _INTERVAL_S if WarmUp.process else None
 
 
@@ -125,10 +126,3 @@ def _marker() -> Path:
     installed = (ROOT / "__init__.py").stat().st_mtime_ns
     digest = hashlib.sha256(f"{PACKAGE} {ROOT} {installed} {sys.version}".encode(errors="replace"))
     return cache().kernels / f"{digest.hexdigest()[:16]}.ready"
-
-
-def _redraw() -> None:
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type in {"VIEW_3D", "PREFERENCES"}:
-                area.tag_redraw()

@@ -100,7 +100,7 @@ def main(video: Path, work: Path, parts: list[str]) -> int:
         problems += panel(video, work / "out", shell_out, report)
     if "headless" in parts:
         problems += headless((work / "clips").resolve(), work / "out", shell_out, report)
-    for part in ("undo", "trouble", "stored", "pins", "details", "live", "first", "startup", "walk"):
+    for part in ("undo", "trouble", "stored", "pins", "details", "live", "first", "startup", "reload", "walk"):
         if part in parts:
             report[part] = json.loads((work / "out" / f"{part}.json").read_text())
     print(json.dumps(report, indent=1))

@@ -45,7 +45,7 @@ case $1 in
             { cat "$log" >&2; exit 1; }
         ;;
     panel) in_window panel.py "/scope/$2" /scope/out ;;
-    undo | trouble | stored | pins | live | details) in_window "$1.py" /scope/clips/walk.mp4 /scope/out ;;
+    undo | trouble | stored | pins | live | details | reload) in_window "$1.py" /scope/clips/walk.mp4 /scope/out ;;
     startup) on_screen python3 parts/startup.py 15 ;;
     walk) on_screen python3 parts/walk.py "$3" ;;
     first) # on a computer without the cache of earlier captures
@@ -55,5 +55,5 @@ case $1 in
         exit $status
         ;;
     headless) python3 parts/headless.py 2>&1 | tee "$log" >&2 ;;
-    *) echo "run.sh: no part '$1'; there are panel, headless, undo, trouble, stored, pins, details, live, first, startup and walk" >&2; exit 2 ;;
+    *) echo "run.sh: no part '$1'; there are panel, headless, undo, trouble, stored, pins, details, live, first, startup, reload and walk" >&2; exit 2 ;;
 esac

@@ -14,11 +14,20 @@ from importlib import import_module
 from pathlib import Path
 
 import bpy
+from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
 from file_state import State, identities, same, state
 from session import FOOTAGE, OUT, addon, captured, invoke, picture, run, show_tab, until, use, viewport
 
+# Bones of the face by which a rig like MPFB's is known, and the tip of each, from the head's bone; metres.
+FACE = {
+    "jaw": ((0.0, -0.064, 0.088), (0.0, -0.123, 0.016)),
+    "eye.L": ((0.031, -0.125, 0.128), (0.032, -0.162, 0.129)),
+    "orbicularis03.L": ((0.031, -0.125, 0.128), (0.032, -0.159, 0.141)),
+    "orbicularis04.L": ((0.031, -0.125, 0.128), (0.032, -0.16, 0.118)),
+    "levator05.L": ((0.03, -0.141, 0.063), (0.026, -0.141, 0.055)),
+}
 report: dict[str, list[str]] = {"undone_and_redone": []}
 
 
@@ -69,14 +78,43 @@ def armature() -> bpy.types.Object:
 
 
 def add_rig() -> None:
-    """Make a user's own rig: the captured skeleton a fifth larger, without any of the extension's properties."""
+    """Make a user's own rig: the captured skeleton a fifth larger, without the extension's properties, with a face."""
     source = armature()
     rig = bpy.data.objects.new("rig", source.data.copy())
     bpy.context.scene.collection.objects.link(rig)
+    add_face(rig)
     rig.scale = (1.2, 1.2, 1.2)
     rig.location = (2.0, 0.0, 0.0)
     bpy.context.scene.scope_retarget.rig = rig
     invoke(bpy.ops.ed.undo_push, message="A rig")
+
+
+def add_face(rig: bpy.types.Object) -> None:
+    """Give a rig bones that move its face, and leave the active object as it was."""
+    layer = bpy.context.view_layer
+    active, layer.objects.active = layer.objects.active, rig
+    invoke(bpy.ops.object.mode_set, mode="EDIT")
+    bones, head = rig.data.edit_bones, rig.data.edit_bones["head"]
+    for name, ends in FACE.items():
+        for side in (1, -1) if name.endswith(".L") else (1,):
+            bone = bones.new(name if side == 1 else name.replace(".L", ".R"))
+            bone.head, bone.tail = (head.head + Vector((side * x, y, z)) for x, y, z in ends)
+            bone.parent = head
+    invoke(bpy.ops.object.mode_set, mode="OBJECT")
+    layer.objects.active = active
+
+
+def jaw_moves() -> bool:
+    """Return whether the action of the rig opens and closes its mouth."""
+    data = bpy.data.objects["rig"].animation_data
+    return data is not None and any('"jaw"' in curve.data_path for curve in data.action.fcurves)
+
+
+def retarget_face() -> None:
+    """Move the captured expressions to the face of the rig."""
+    assert bpy.context.scene.scope_retarget.face == bpy.data.objects["rig"]
+    use(bpy.ops.scope.retarget_face)
+    assert jaw_moves(), "the face does not move"
 
 
 def edits() -> dict[str, Callable[[], object]]:
@@ -95,6 +133,8 @@ def edits() -> dict[str, Callable[[], object]]:
         "guess bones": lambda: use(scope.guess_bones),
         "retarget": lambda: use(scope.retarget),
         "retarget, root motion on an object, next to the person": retarget_beside,
+        "retarget face": retarget_face,
+        "add an expression": lambda: use(scope.edit_expression_pair, action="ADD"),
         "mark as asset": lambda: use(scope.mark_asset, author="Ada"),
         "footage to sequencer": lambda: use(scope.footage_to_sequencer),
     }
@@ -116,7 +156,7 @@ def retarget_beside() -> None:
 def capturing() -> Iterator[float]:
     """Try the capture, and undoing something else while it runs."""
     yield from tried("choose footage", lambda: use(bpy.ops.scope.choose_footage, filepath=FOOTAGE), keep=True)
-    bpy.context.scene.scope.quality = "FAST"
+    bpy.context.scene.scope.quality, bpy.context.scene.scope.face = "FAST", True
     invoke(bpy.ops.ed.undo_push, message="Quality")
     before = state()
     yield from captured()

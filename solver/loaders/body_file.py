@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..body import Body
 from ..errors import ModelFileError
-from .arrays import OPTIONAL, REQUIRED, check_arrays, check_body
+from .arrays import OPTIONAL, REQUIRED, check_arrays, check_body, check_extent
 from .model_file import is_motion, is_user_model, load_model
 from .npz import read_npz
 
@@ -98,6 +98,7 @@ def load_body(which: str | Path = "scope") -> Body:
         file="" if str(which) in BUILT_IN else str(path.resolve()),
     )
     check_body(body, path)
+    check_extent(body.v_template, path)
     return body
 
 

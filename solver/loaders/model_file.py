@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ..body import Body
 from ..errors import ModelFileError
 from .archive import npz_keys, read_members
-from .arrays import Form, check_arrays, check_body
+from .arrays import Form, check_arrays, check_body, check_extent
 from .keypoints import derive_keypoints
 from .pickled_values import to_array
 from .restricted_pickle import read_pickle
@@ -32,7 +32,6 @@ from .skeletons import recognise_skeleton
 MAX_BETAS = 16  # as AMASS; SMPL-X and STAR files carry 300, most of them below a millimetre
 SMPLX_SHAPE, SMPLX_EXPRESSION = 300, 100  # how a full SMPL-X file divides shapedirs; older ones have 10 and 10
 MOST_VERTICES, MOST_JOINTS, MOST_WEIGHTS = 200_000, 500, 20_000_000  # SMPL-X: 10475, 55, 576125
-_LEAST_EXTENT_M, _LARGEST_EXTENT_M = 0.01, 50.0  # of a template along each axis
 STAR_CORRECTIVES = 93  # 23 quaternions and one shape coefficient; SMPL has 207
 
 _NUMERIC = ("v_template", "shapedirs", "J_regressor", "kintree_table", "weights", "f")
@@ -138,7 +137,7 @@ def _make_body(tables: Tables, path: Path, max_betas: int) -> Body:
     for key, array in (("J_regressor", regressor), ("v_template", v_template), ("shapedirs", shapedirs)):
         if not np.isfinite(array).all():
             raise ModelFileError(f"{path}: {key} contains NaN or infinity; download it again")
-    _check_extent(v_template, path)
+    check_extent(v_template, path)
     body = Body(
         name=name,
         joint_names=skeleton.joint_names if skeleton else _joint_names(arrays.get("joint_names"), len(parents)),
@@ -153,15 +152,6 @@ def _make_body(tables: Tables, path: Path, max_betas: int) -> Body:
         license=_license(name, path),
     )
     return derive_keypoints(body)
-
-
-def _check_extent(v_template: NDArray[np.float64], path: Path) -> None:
-    extent = np.ptp(v_template, axis=0)
-    if not (extent.min() >= _LEAST_EXTENT_M and extent.max() <= _LARGEST_EXTENT_M):
-        size = " × ".join(f"{side:.3g}" for side in extent)
-        raise ModelFileError(
-            f"{path}: v_template measures {size} m, which no body does; choose a file whose unit is the metre"
-        )
 
 
 def _parents(kintree: NDArray[np.integer[Any]], path: Path) -> NDArray[np.int32]:

@@ -139,6 +139,7 @@ def test_a_stream_that_changes_its_resolution_keeps_the_first_one(tmp_path):
     ("text", "message"),
     [
         ("missing.mp4", "missing.mp4 does not exist; check the path"),
+        ("10.0.0.7/stream", "10.0.0.7/stream does not exist; .* and a stream with its kind, as in rtsp://"),
         ("gopher://host/x", "'gopher' is not a kind of stream that can be read; use http, https, rtsp"),
         ("file:///etc/passwd", "'file' is not a kind of stream"),
     ],

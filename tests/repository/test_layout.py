@@ -28,6 +28,7 @@ CROSS_CUTTING = {
     "repository/test_wheel.py": "the wheel, installed",
     "fuzz/test_faults.py": "what writes files, on failing system calls",
     "fuzz/test_faults_outputs.py": "exports, outputs of captures and batches, on failing system calls",
+    "fuzz/test_findings.py": "what once broke under attack, from outside",
     "fuzz/test_kills.py": "commands, killed or refused a system call from outside",
     "fuzz/test_fuzz.py": "every reader of files and messages of others, on damaged ones",
     "scripts/test_flamenco.py": "the job type for Flamenco, a JavaScript file",

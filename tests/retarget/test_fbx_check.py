@@ -4,36 +4,12 @@
 import random
 import struct
 import tracemalloc
-import zlib
 
 import pytest
 from scope.scope_addon.retarget.fbx_check import check_fbx
 from scope.solver.errors import InputError
 
-
-def array(kind, length, content, *, compressed=True, size=None):
-    data = zlib.compress(content) if compressed else content
-    return kind + struct.pack("<III", length, compressed, len(data) if size is None else size) + data
-
-
-def node(at, name, properties=(), children=()):
-    """A node of version 7400 at an offset; children are functions of their offset."""
-    body = b"".join(properties)
-    inside, inner = at + 13 + len(name) + len(body), b""
-    for child in children:
-        inner += child(inside + len(inner))
-    inner += bytes(13) if children else b""
-    end = inside + len(inner)
-    return struct.pack("<IIIB", end, len(properties), len(body), len(name)) + name + body + inner
-
-
-def fbx(path, *properties):
-    header = b"Kaydara FBX Binary  \0\x1a\0" + struct.pack("<I", 7400)
-    made = node(
-        27, b"Objects", [b"L" + bytes(8), b"S" + struct.pack("<I", 3) + b"abc"], [lambda at: node(at, b"A", properties)]
-    )
-    path.write_bytes(header + made + bytes(13) + b"footer of any content")
-    return path
+from .made_files import array, fbx
 
 
 def test_a_whole_file_passes(tmp_path):

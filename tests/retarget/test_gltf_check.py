@@ -5,11 +5,12 @@ import copy
 import json
 import os
 import random
-import struct
 
 import pytest
 from scope.scope_addon.retarget.gltf_check import check_gltf
 from scope.solver.errors import InputError
+
+from .made_files import glb
 
 GLTF = {
     "asset": {"version": "2.0"},
@@ -29,14 +30,6 @@ GLTF = {
         },
     ],
 }
-
-
-def glb(path, gltf, binary=bytes(400)):
-    text = json.dumps(gltf).encode()
-    text += b" " * (-len(text) % 4)
-    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(binary), b"BIN\0") + binary
-    path.write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks)
-    return path
 
 
 def changed(*keys, to):

@@ -97,6 +97,14 @@ def test_a_body_without_joints_is_refused(tmp_path):
         load_body(saved(tmp_path / "body.npz", arrays))
 
 
+@pytest.mark.parametrize("factors", [(1, 0, 1), (1e-9, 1e-9, 1e-9), (1000, 1000, 1000)])
+def test_a_body_that_is_flat_tiny_or_in_millimetres_is_refused(tmp_path, factors):
+    arrays = small_body()
+    arrays["v_template"] = arrays["v_template"] * np.array(factors)
+    with pytest.raises(ModelFileError, match=r"body\.npz: v_template measures .* m, which no body does; .* metre"):
+        load_body(saved(tmp_path / "body.npz", arrays))
+
+
 def test_a_motion_is_told_from_a_body(tmp_path):
     motion = {"poses": np.zeros((4, 72)), "trans": np.zeros((4, 3)), "betas": np.zeros(10), "gender": np.array("male")}
     with pytest.raises(

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import VideoError
+from ...footage import MAX_PIXELS
 from .file_names import utf8_name
 from .image_size import check_size
 
@@ -111,6 +112,9 @@ def _open_with_pyav(path: Path) -> tuple[type[Exception], InputContainer | None]
             container = av.open(name, options=_ONLY, container_options=_ONLY)
     except (av.error.FFmpegError, OSError, ValueError):
         return av.error.FFmpegError, None
+    for stream in container.streams.video:  # whose images may be larger than the container says
+        if stream.codec_context:
+            stream.codec_context.options = {"max_pixels": str(MAX_PIXELS)}
     return av.error.FFmpegError, container
 
 

@@ -29,6 +29,20 @@ def check_size(path: Path, width: float, height: float) -> None:
         )
 
 
+def check_depth(path: Path, width: int, height: int, bits: int) -> None:
+    """Refuse a still that takes more memory than one of `MAX_PIXELS` pixels with four channels of 16 bits: 2.2 GB.
+
+    :param path: of the file, for the message.
+    :param width: of the image, pixels.
+    :param height: likewise.
+    :param bits: of one channel.
+    :raises VideoError: it does.
+    """
+    cost = 2 * bits if bits > 16 else 16  # to decode the deeper ones, OpenCV takes three times their size, not twice
+    if width * height * cost > 16 * MAX_PIXELS:
+        raise too_large(path, f"{width} × {height} pixels of {bits} bits")
+
+
 def too_large(path: Path, size: str) -> VideoError:
     """Make the error for an image with too many pixels."""
     return VideoError(

@@ -3,10 +3,11 @@
 
 Contact is estimated as offline (`standing`), from a window that ends with the newest frame, and from the speed at which
 heels and toes move in the image, which no fit can hold back. A point whose probability exceeds `BEGIN` is held where it
-is shown then; the hold ends below `END`, or when the body has moved too far away from it. The next frame is fitted to
-these places and to the floor (`Support`), from which the distance of the body follows. The legs then bridge what
-smoothing has left between held feet and their places: they bend, and the rest of the body stays. Where a hold begins or
-ends, what it would change abruptly dies away (`transition`).
+is shown then; the hold ends below `END`, or when the body has moved too far away from it. A foot that stands is often
+taken for the other one while that swings past it: meanwhile, it is let go only after `PASSED_S`, or when it rises. The
+next frame is fitted to these places and to the floor (`Support`), from which the distance of the body follows. The legs
+then bridge what smoothing has left between held feet and their places: they bend, and the rest of the body stays. Where
+a hold begins or ends, what it would change abruptly dies away (`transition`).
 
 The places drift towards where the fits have the points, because an error in where a hold began would otherwise tilt the
 body for as long as it lasts: fast while size and floor are being estimated, slowly afterwards.
@@ -44,6 +45,8 @@ LONGEST_STRETCH_M = 0.15  # between a held point and where the body has it
 EARLY_DRIFT_S, DRIFT_S = 0.5, 3.0  # time constants of the places, while the estimates settle and afterwards
 TRANSITION_HZ = 6.0
 MOVED_M = 0.06  # in the image since the frame before: more than noise of a foot at rest
+SWING_M_S = 0.7  # in the image, of a foot that swings past the other one
+PASSED_S, RISE_M = 0.15, 0.03  # for which, and up to which height, the other one is not let go
 SOFT_M = 0.005  # the floor raises soles from about this height on
 
 
@@ -73,6 +76,8 @@ class FootHold:
         self._window: deque[_Entry] = deque()
         self._anchors = np.zeros((n, 3))  # world
         self._is_held = np.zeros(n, bool)
+        self._moving_s = np.zeros(n)  # since the contact of each point ended
+        self._speed: NDArray[np.floating[Any]] = np.zeros(len(SOLES))  # of the soles in the image, m/s
         self._points_world: NDArray[np.floating[Any]] | None = None
         self._shift: NDArray[np.float64] = np.zeros((2, 3))  # of each foot in the last frame, world
         self._transition = Transition(2, TRANSITION_HZ)
@@ -161,7 +166,8 @@ class FootHold:
         # Depth is left out: a mean one turns the motion in the image into metres.
         seen = np.concatenate([rays, np.ones((*rays.shape[:2], 1))], axis=2)
         seen *= points[:, : len(SOLES), 2].mean(axis=0)[:, None]
-        contact[: len(SOLES)] *= logistic(4 * (1 - speed_across(seen, times, None)[-1] / CONTACT_SPEED_M_S))
+        self._speed = speed_across(seen, times, None)[-1]
+        contact[: len(SOLES)] *= logistic(4 * (1 - self._speed / CONTACT_SPEED_M_S))
         return contact
 
     def _update(self, points_world: NDArray[np.floating[Any]], step_s: float, drift_s: float) -> None:
@@ -175,7 +181,17 @@ class FootHold:
         self._anchors[begins] = shown[begins]
         self._anchors[begins, 2] *= 1 - floor_probability(shown[begins, 2])
         far = np.linalg.norm(points_world - self._anchors, axis=1) > LONGEST_STRETCH_M
-        self._is_held = (self._is_held | begins) & (contact > END) & ~far
+        self._moving_s = np.where(contact > END, 0.0, self._moving_s + step_s)
+        stays = (contact > END) | self._is_passed(points_world)
+        self._is_held = (self._is_held | begins) & stays & ~far
+
+    def _is_passed(self, points_world: NDArray[np.floating[Any]]) -> NDArray[np.bool_]:
+        """Return which points (6,) are of a foot that the other one swings past, and may only seem to move."""
+        swings = self._speed.reshape(2, 2).mean(axis=1) > SWING_M_S
+        is_passed = np.zeros(len(points_world), bool)
+        is_passed[: len(SOLES)] = np.repeat(swings[::-1], 2)
+        rise = (points_world - self._anchors)[:, 2]
+        return np.asarray(is_passed & (self._moving_s < PASSED_S) & (rise < RISE_M))
 
     def _away(self, points_world: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
         """Return by how much each foot (2, 3) is away from where it is held, world; 0 where it is not."""

@@ -37,4 +37,9 @@ def open_source(text: str, *, online: bool = True) -> Source:
         if not online:
             raise OfflineError
         return StreamSource(text)
+    if not Path(text).exists():
+        raise VideoError(
+            f"{text} does not exist; check the path, give a camera as a number such as 0, and a stream with its kind,"
+            " as in rtsp://192.168.1.20/stream"
+        )
     return FileSource(Path(text))

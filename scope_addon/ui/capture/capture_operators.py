@@ -98,6 +98,7 @@ class SCOPE_OT_capture(JobOperator):
     job_state = state
     _shown = ("", "", 0)  # the stage, progress and messages that were drawn last
     _drawn_s = 0.0  # when that was
+    _pause_s = 0.0  # after it, until the next drawing
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -145,10 +146,13 @@ class SCOPE_OT_capture(JobOperator):
         outcome = self._advance()
         progress = ", ".join(job.progress.lines(iface_))
         shown, now_s = (job.progress.stage, progress, job.messages), time.monotonic()
-        is_due = shown[0] != self._shown[0] or now_s - self._drawn_s >= DRAWN_EVERY_S
-        # Drawing costs time in which Blender does not react, even if it is the same again.
+        if not self._pause_s:  # the first step after a drawing: its delay tells how long Blender drew
+            delay_s = now_s - self._drawn_s
+            self._pause_s = 5.0 * delay_s if delay_s > 1.5 * self.timer_s else DRAWN_EVERY_S
+        is_due = shown[0] != self._shown[0] or now_s - self._drawn_s >= self._pause_s
+        # Drawing costs time in which Blender does not react: without a graphics card 0.1 s, and more on a busy machine.
         if shown != self._shown and is_due:
-            self._shown, self._drawn_s = shown, now_s
+            self._shown, self._drawn_s, self._pause_s = shown, now_s, 0.0
             context.workspace.status_text_set(
                 iface_("Scope: {progress}   (Esc over the Scope panel to cancel)", progress=progress)
             )

@@ -8,6 +8,7 @@ import pytest
 from scope.scope_addon.kinematics.standing import line_of_sight
 from scope.scope_addon.live.causal_fit import FittedFrame
 from scope.scope_addon.live.feet.hold import FootHold
+from scope.solver.rotations import exp
 
 from ...kinematics.posed_people import stepping_person
 
@@ -37,6 +38,42 @@ def test_a_foot_that_stands_stays_where_it_is_while_the_distance_errs(stepped):
     assert contact[5:, RIGHT].min() > 0.5
     stands = held[5:, RIGHT]
     assert np.linalg.norm(stands - stands.mean(axis=0), axis=2).max() < 0.02  # of errors that span 8 cm
+
+
+def taken_for_the_swinging_foot(lift_m):
+    """Right soles (T, 2, 3) of somebody whose left foot swings past, and whose right one seems to follow for 4 frames.
+
+    :param lift_m: of the body in each of these frames, which then does leave the floor.
+    """
+    supported, omega, root, place, T_world_camera, times = stepping_person()
+    R, t = T_world_camera[:3, :3], T_world_camera[:3, 3]
+    true = place(omega, root)[2]
+    feet, held = FootHold(supported), []
+    hip = supported.joint_names.index("right_hip")
+    for k, time_s in enumerate(times[:60]):
+        rays = true[k, :4, :2] / true[k, :4, 2:]
+        rays[LEFT, 0] += 0.02 * max(k - 30, 0)  # 2.4 m/s at 4 m
+        rotations, raised = omega[k].copy(), 0.0
+        if 40 <= k < 44:
+            rays[RIGHT, 0] += 0.02
+            rotations[hip] = rotations[hip] @ exp(np.array([0.0, 0.0, 0.09]))  # the foot is 8 cm aside
+        if k >= 40:
+            raised = lift_m * (k - 39)
+        at = root[k] + raised * R[2]
+        frame = FittedFrame(rotations, at, np.ones(len(omega[k])), rays)
+        shown, _ = feet.hold(time_s, np.zeros(supported.P), frame, T_world_camera, True)
+        held.append(place(shown[None], at[None])[2][0, RIGHT] @ R.T + t)
+    return np.array(held)
+
+
+def test_a_foot_that_the_other_one_is_taken_for_stays():
+    held = taken_for_the_swinging_foot(0.0)
+    assert np.linalg.norm(held[36:50] - held[36], axis=2).max() < 0.01
+
+
+def test_a_foot_that_leaves_the_floor_while_the_other_one_swings_is_let_go():
+    held = taken_for_the_swinging_foot(0.03)  # 0.9 m/s upwards
+    assert held[46, :, 2].min() > 0.1
 
 
 def test_a_raised_foot_is_let_go_and_rests_again(stepped):

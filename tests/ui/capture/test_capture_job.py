@@ -209,14 +209,14 @@ def test_an_unexpected_error_ends_the_capture():
     assert state.job is None  # otherwise no other capture could be started
 
 
-def test_the_panel_is_drawn_again_only_for_news_and_three_times_a_second(monkeypatch):
+def test_the_panel_is_drawn_again_only_for_news_and_rarely(monkeypatch):
     drawn, now = [], [100.0]
     monkeypatch.setattr(capture_operators, "redraw_sidebars", lambda: drawn.append(None))
     monkeypatch.setattr(capture_operators, "time", SimpleNamespace(monotonic=lambda: now[0]))
     lines = ["Finding the person"]
     progress = SimpleNamespace(lines=lambda _: lines, stage="finding the person")
     state.job = SimpleNamespace(progress=progress, messages=0, step=lambda: True, cancelled=False)
-    operator = SimpleNamespace(_shown=("", "", 0), _drawn_s=0.0, job_state=state)
+    operator = SimpleNamespace(_shown=("", "", 0), _drawn_s=0.0, _pause_s=0.3, timer_s=0.1, job_state=state)
     operator.step, operator._advance = (
         partial(getattr(SCOPE_OT_capture, name), operator) for name in ("step", "_advance")
     )
@@ -227,17 +227,23 @@ def test_the_panel_is_drawn_again_only_for_news_and_three_times_a_second(monkeyp
         capture_operators.SCOPE_OT_capture.modal(operator, bpy.context, timer)
         return len(drawn)
 
-    assert [drawings(), drawings()] == [1, 1]
+    def seconds_of_news(seconds, step_s):
+        drawn.clear()
+        for _ in range(round(seconds / step_s)):
+            state.job.messages += 1
+            drawings(step_s)
+        return len(drawn)
+
+    assert [drawings(0.1), drawings(0.1)] == [1, 1]
     state.job.messages += 1
-    assert [drawings(), drawings()] == [2, 2]
+    assert [drawings(0.1), drawings(0.11), drawings(0.1)] == [1, 2, 2]
     lines.append("1 s left")
-    assert [drawings(), drawings()] == [3, 3]
-    for _ in range(30):  # a second with news at every step
-        state.job.messages += 1
-        drawings(1 / 30)
-    assert len(drawn) == 6
+    assert [drawings(0.3), drawings(0.1)] == [3, 3]
+    assert seconds_of_news(6.0, 0.1) in (15, 20)  # about three a second
+    assert seconds_of_news(6.0, 0.2) in (5, 6)  # where a drawing lasts for 0.2 s, one a second
+    drawn.clear()
     progress.stage = "building the scene"  # at once: it stops Blender for a while
-    assert drawings(0.01) == 7
+    assert drawings(0.01) == 1
     state.job = None
 
 

@@ -12,6 +12,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 PNG = b"\x89PNG\r\n\x1a\n"  # begins the file
+TIFF = (b"II*\0", b"MM\0*")  # one of these does; a TIFF of more than 4 GB would begin otherwise
+_WIDTH, _HEIGHT, _BITS = 0x0100, 0x0101, 0x0102  # tag numbers of TIFF 6.0
+_DEEPEST = 64  # bits of one channel
 _ORIENTATION, _EXIF_DIRECTORY, _FOCAL_35MM = 0x0112, 0x8769, 0xA405  # tag numbers of the EXIF 2.3 standard
 _INTEGER = {3: "H", 4: "I"}  # TIFF field types SHORT and LONG
 
@@ -43,6 +46,31 @@ def animation_length(data: bytes) -> int:
     return 1
 
 
+def tiff_size(data: bytes) -> tuple[int, int, int]:
+    """Read the size of a TIFF's first image: width and height in pixels, 0 if not stated, and bits of a channel.
+
+    A tag that is repeated counts with its largest value, and a depth that cannot be read as 64 bits, the largest.
+    """
+    endian = "<" if data[:1] == b"I" else ">"
+    found = {_WIDTH: 0, _HEIGHT: 0, _BITS: 1}
+    try:
+        at = struct.unpack_from(endian + "I", data, 4)[0]
+        for i in range(struct.unpack_from(endian + "H", data, at)[0]):
+            entry = at + 2 + 12 * i
+            tag, kind, count = struct.unpack_from(endian + "HHI", data, entry)
+            if tag not in found:
+                continue
+            value = _DEEPEST if tag == _BITS else 0
+            if kind in _INTEGER and count > 0:
+                size = struct.calcsize(_INTEGER[kind])
+                place = entry + 8 if count * size <= 4 else struct.unpack_from(endian + "I", data, entry + 8)[0]
+                value = struct.unpack_from(endian + _INTEGER[kind], data, place)[0]
+            found[tag] = max(found[tag], value)
+    except struct.error:
+        found[_BITS] = _DEEPEST
+    return found[_WIDTH], found[_HEIGHT], found[_BITS]
+
+
 def _find_tiff(data: bytes) -> bytes:
     if data[:2] == b"\xff\xd8":
         return _jpeg_app1(data)
@@ -51,7 +79,7 @@ def _find_tiff(data: bytes) -> bytes:
     if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
         found = next((d for name, d in _riff_chunks(data) if name == b"EXIF"), b"")
         return found[6:] if found[:6] == b"Exif\0\0" else found
-    return data if data[:4] in (b"II*\0", b"MM\0*") else b""
+    return data if data.startswith(TIFF) else b""
 
 
 def _jpeg_app1(data: bytes) -> bytes:

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads a picture file as upright 8-bit RGB: a still, or one frame of an image sequence.
 
-OpenCV reads JPEG, PNG, WebP, TIFF, BMP and others. Its packages do not read AVIF and HEIC, which PyAV decodes.
+OpenCV reads JPEG, PNG, WebP, TIFF and BMP. It could read others, in which a few hundred bytes can take gigabytes, and
+which nobody films in: these are refused. Its packages do not read AVIF and HEIC, which PyAV decodes.
 """
 
 from __future__ import annotations
@@ -15,17 +16,21 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .....solver.loaders.regular_file import check_regular
 from ....errors import VideoError
 from ....footage import MAX_PIXELS
 from ..file_names import utf8_name
 from ..frame_readers import decode_items
-from ..image_size import check_size, too_large
-from .exif import PNG, animation_length, png_chunks, read_exif
+from ..image_size import check_depth, check_size, too_large
+from .exif import PNG, TIFF, animation_length, png_chunks, read_exif, tiff_size
 from .heif import assemble, read_layout
 
 _JPEG_STREAMS = (".mjpeg", ".mjpg")  # begin like a JPEG, but are videos
 _HEIF_BRANDS = {b"mif1", b"heic", b"heix", b"heim", b"heis", b"avif"}  # of ISO 23008-12 and of AVIF
 _OPENEXR, _GIF = b"v/1\x01", b"GIF8"
+_READ = (PNG, *TIFF, b"\xff\xd8\xff", b"BM")  # how files begin that OpenCV is given; and WebP
+_MAX_BYTES = 8 * MAX_PIXELS  # of a file: as many as its image may take, with four channels of 16 bits
+_ROWS = 256  # that are converted at a time
 
 
 @dataclass(frozen=True)
@@ -40,30 +45,37 @@ class Picture:
 def is_picture(path: Path) -> bool:
     """Check by its content whether a file is a picture that can be read, rather than a video or anything else.
 
-    :raises VideoError: it is a picture in a format that is not supported (OpenEXR).
+    :raises VideoError: it is a picture in a format that is not read.
     """
     with path.open("rb") as file:
         head = file.read(64)
     if _brands(head) & _HEIF_BRANDS:
         return True
-    if head.startswith(_OPENEXR):
-        raise VideoError(f"{path} is an OpenEXR image, which cannot be read here; export it as PNG or TIFF")
     if head.startswith(_GIF) or path.suffix.lower() in _JPEG_STREAMS:
         return False
+    if _is_for_opencv(head):
+        return True
     with utf8_name(path) as name:
-        return bool(cv2.haveImageReader(name))
+        if head.startswith(_OPENEXR) or cv2.haveImageReader(name):
+            raise VideoError(f"{path} is an image in a format that is not read here; export it as PNG, TIFF or JPEG")
+    return False
 
 
 def read_picture(path: Path) -> Picture | None:
     """Decode a picture; None if that fails. Transparent parts become white, except in AVIF and HEIC.
 
-    :raises VideoError: it is too large or too long (see `image_size`), or AVIF or HEIC, and PyAV is not installed.
+    :raises VideoError: it is too large, deep or long (see `image_size`), or AVIF or HEIC, and PyAV is not installed.
     """
+    check_regular(path, VideoError, "picture", _MAX_BYTES)
     data = path.read_bytes()
     if _brands(data[:64]) & _HEIF_BRANDS:
         return _read_heif(path, data)
+    if not _is_for_opencv(data[:64]):
+        return None
     if data.startswith(PNG) and not _holds_its_chunks(data):
         return None  # OpenCV would take as much memory as the chunk claims
+    if data.startswith(TIFF):
+        check_depth(path, *tiff_size(data))
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error as error:
@@ -75,9 +87,13 @@ def read_picture(path: Path) -> Picture | None:
     check_size(path, image.shape[1], image.shape[0])
     exif = read_exif(data)
     rgb = _as_rgb8(image)
-    if data[:4] not in (b"II*\0", b"MM\0*"):  # OpenCV rotates a TIFF upright even with IMREAD_UNCHANGED
+    if not data.startswith(TIFF):  # OpenCV rotates a TIFF upright even with IMREAD_UNCHANGED
         rgb = _upright(rgb, exif.orientation)
     return Picture(rgb, exif.focal_35mm, animation_length(data))
+
+
+def _is_for_opencv(head: bytes) -> bool:
+    return head.startswith(_READ) or (head[:4], head[8:12]) == (b"RIFF", b"WEBP")
 
 
 def _holds_its_chunks(data: bytes) -> bool:
@@ -106,7 +122,17 @@ def _read_heif(path: Path, data: bytes) -> Picture | None:
 
 
 def _as_rgb8(image: NDArray[Any]) -> NDArray[np.uint8]:
-    """Convert grey, BGR or BGRA of any depth to RGB uint8, on white where it is transparent."""
+    """Convert grey, BGR or BGRA of any depth to RGB uint8, on white where it is transparent.
+
+    A few rows at a time: as numbers with a fraction, a whole image may take several gigabytes.
+    """
+    rgb = np.empty((*image.shape[:2], 3), np.uint8)
+    for start in range(0, len(image), _ROWS):
+        rgb[start : start + _ROWS] = _rows_as_rgb8(image[start : start + _ROWS])
+    return rgb
+
+
+def _rows_as_rgb8(image: NDArray[Any]) -> NDArray[np.uint8]:
     if image.dtype == np.uint16:
         image = cv2.convertScaleAbs(image, alpha=1 / 257)
     elif image.dtype != np.uint8:
@@ -119,12 +145,9 @@ def _as_rgb8(image: NDArray[Any]) -> NDArray[np.uint8]:
 
 
 def _on_white(bgra: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Blend with white, row by row: as numbers with a fraction, a whole image may take several gigabytes."""
-    bgr = np.empty((*bgra.shape[:2], 3), np.uint8)
-    for row, blended in zip(bgra, bgr, strict=True):
-        alpha = row[:, 3:].astype(np.float32) / 255
-        blended[:] = row[:, :3] * alpha + 255 * (1 - alpha) + 0.5
-    return bgr
+    alpha = bgra[..., 3:].astype(np.float32) / 255
+    blended: NDArray[np.float32] = bgra[..., :3] * alpha + 255 * (1 - alpha) + 0.5
+    return blended.astype(np.uint8)
 
 
 def _upright(image: NDArray[np.uint8], orientation: int) -> NDArray[np.uint8]:

@@ -69,10 +69,20 @@ def test_damaged_avif(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         open_video(tmp_path / "a.avif")
 
 
-def test_openexr_is_refused_with_advice(tmp_path: Path) -> None:
-    (tmp_path / "render.exr").write_bytes(b"v/1\x01" + bytes(99))
-    with pytest.raises(VideoError, match=r"render\.exr is an OpenEXR image.*PNG"):
-        open_video(tmp_path / "render.exr")
+@pytest.mark.parametrize("suffix", [".exr", ".jp2", ".hdr", ".pfm", ".ppm", ".ras"])
+def test_other_formats_are_refused_with_advice(tmp_path: Path, suffix: str) -> None:
+    """A few hundred bytes of JPEG 2000 can take 2 GB, and nobody films in any of these."""
+    path = tmp_path / f"render{suffix}"
+    if suffix == ".exr":  # OpenCV writes none
+        path.write_bytes(b"v/1\x01" + bytes(99))
+    else:
+        cv2.imwrite(str(path), GREY.astype(np.float32 if suffix in (".hdr", ".pfm") else np.uint8))
+    with pytest.raises(VideoError, match=rf"render\{suffix} is an image in a format that is not read here; .*PNG"):
+        open_video(path)
+    for k in (1, 2):  # whatever the name
+        (tmp_path / f"a_{k}.png").write_bytes(path.read_bytes())
+    with pytest.raises(VideoError, match=r"a_1\.png is an image that cannot be decoded"):
+        open_video(tmp_path / "a_#.png")
 
 
 @pytest.mark.parametrize("asked", [("5", None, None), ("00:00:01:00", None, None), (None, None, "9")])

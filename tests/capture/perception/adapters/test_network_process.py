@@ -12,67 +12,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from onnx import TensorProto, helper
 from scope.scope_addon.capture.perception.adapters import network_process
 from scope.scope_addon.capture.perception.adapters.keypoints.keypoint_network import KeypointNetwork
 from scope.scope_addon.capture.perception.adapters.network_process import SERVER, NetworkProcess
 from scope.scope_addon.capture.perception.adapters.network_server import OUT_OF_MEMORY
 from scope.solver.errors import ModelFileError
 
-from ...small_graphs import picture_input, save, simcc
-
-LONGEST = np.array(2**62, np.int64)
+from ...small_graphs import simcc
+from .made_networks import looping
 
 
 def grey(network: NetworkProcess) -> list[np.ndarray]:
     return network.run(None, {"images": np.zeros((1, 3, 32, 32), np.float32)})
-
-
-def looping(path: Path, *, while_bright: bool = False) -> Path:
-    """Write a network that loops for ever, for every image, or for those of which a pixel exceeds 1000."""
-    inside = [helper.make_node("Identity", ["go"], ["go_on"]), helper.make_node("Sin", ["x"], ["y"])]
-    body = helper.make_graph(
-        inside,
-        "body",
-        [
-            helper.make_tensor_value_info("i", TensorProto.INT64, []),
-            helper.make_tensor_value_info("go", TensorProto.BOOL, []),
-            helper.make_tensor_value_info("x", TensorProto.FLOAT, None),
-        ],
-        [
-            helper.make_tensor_value_info("go_on", TensorProto.BOOL, []),
-            helper.make_tensor_value_info("y", TensorProto.FLOAT, None),
-        ],
-    )
-    nodes = [
-        helper.make_node("ReduceMax", ["images"], ["most"], keepdims=0),
-        helper.make_node("Greater", ["most", "threshold"], ["start"]),
-        helper.make_node("Loop", ["longest", "start", "images"], ["out"], body=body),
-    ]
-    out = helper.make_tensor_value_info("out", TensorProto.FLOAT, [1, 3, 32, 32])
-    threshold = np.array(1000.0 if while_bright else -1.0, np.float32)
-    return save(path, nodes, [picture_input(32, 32)], [out], {"longest": LONGEST, "threshold": threshold})
-
-
-def huge(path: Path, elements: int) -> Path:
-    """Write a network with a constant of so many floats, which depends on the image, so that it is made in a run."""
-    nodes = [
-        helper.make_node("ReduceMin", ["images"], ["least"], keepdims=0),
-        helper.make_node("Cast", ["least"], ["zero"], to=TensorProto.INT64),
-        helper.make_node("Mul", ["zero", "nothing"], ["none"]),
-        helper.make_node("Add", ["none", "elements"], ["shape"]),
-        helper.make_node("ConstantOfShape", ["shape"], ["block"]),
-        helper.make_node("ReduceSum", ["block"], ["out"], keepdims=0),
-    ]
-    constants = {"elements": np.array([elements], np.int64), "nothing": np.array([0], np.int64)}
-    out = helper.make_tensor_value_info("out", TensorProto.FLOAT, [])
-    return save(path, nodes, [picture_input(32, 32)], [out], constants)
-
-
-def test_an_endless_loop_ends_at_the_trial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(network_process, "DEFAULT_OPENING_S", 1.5)
-    with pytest.raises(ModelFileError, match=r"m\.onnx was stopped because it gave no result within 1\.5 s; choose"):
-        KeypointNetwork(looping(tmp_path / "m.onnx"), threads=1)
 
 
 def test_a_loop_that_only_some_images_start_ends_as_well(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -83,13 +34,6 @@ def test_a_loop_that_only_some_images_start_ends_as_well(tmp_path: Path, monkeyp
         network.run(None, {"images": np.full((1, 3, 32, 32), 2000, np.float32)})
     with pytest.raises(RuntimeError, match="its process has ended"):
         grey(network)
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="other systems watch the memory, see below")
-def test_memory_is_refused_by_the_system(tmp_path: Path) -> None:
-    with pytest.raises(ModelFileError, match=r"m\.onnx cannot be run .*[Ff]ailed to allocate") as caught:
-        KeypointNetwork(huge(tmp_path / "m.onnx", 3_000_000_000), threads=1)
-    assert "\n" not in str(caught.value)
 
 
 def test_watched_memory_ends_the_process() -> None:

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Open other files amid whatever keeps running in the window: a capture, a live one, the tools with the mouse, undo.
+
+Usage: ``blender --python reload.py -- VIDEO OUT_FOLDER``
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).parent))
+from session import FOOTAGE, OUT, addon, captured, inventory, invoke, run, show_tab, until, use, viewport
+
+SAVED = OUT / "reload.blend"
+report: dict[str, int] = {"files_opened": 0}
+
+
+def module(name: str):
+    """Return a module of the extension's interface."""
+    return sys.modules[addon().__name__.replace("capture.capture_operators", name)]
+
+
+def ways() -> tuple[Callable[[], object], ...]:
+    """Return the ways to open another file."""
+    wm = bpy.ops.wm
+    return (
+        lambda: wm.read_homefile(use_factory_startup=True),
+        lambda: wm.open_mainfile(filepath=str(SAVED)),
+        lambda: wm.read_homefile(use_empty=True, use_factory_startup=True),
+        lambda: wm.open_mainfile(filepath=str(SAVED), load_ui=False),
+        wm.revert_mainfile,
+    )
+
+
+def open_file(way: Callable[[], object]) -> Iterator[float]:
+    """Open another file, and look that nothing of the extension goes on in it."""
+    way()
+    report["files_opened"] += 1
+    for _ in range(10):
+        yield 0.05
+    assert addon().state.job is None
+    assert module("live.live_state").state.job is None
+    assert not module("pins.pin_tool").is_running()
+
+
+def prepared() -> Iterator[float]:
+    """Open the saved file with the panel's tab."""
+    bpy.ops.wm.open_mainfile(filepath=str(SAVED))
+    yield 0.3
+    show_tab()
+    yield 0.3
+    bpy.context.view_layer.objects.active = next(o for o in bpy.data.objects if "scope_source" in o)
+
+
+def capturing() -> Iterator[float]:
+    """Begin a capture."""
+    settings = bpy.context.scene.scope
+    settings.footage, settings.quality = FOOTAGE, "BEST"
+    assert use(bpy.ops.scope.capture, "INVOKE_DEFAULT") == {"RUNNING_MODAL"}
+    yield from until(lambda: addon().state.job.messages > 0, 120, "the worker")
+
+
+def live() -> Iterator[float]:
+    """Begin a live capture of a file."""
+    settings = bpy.context.scene.scope_live
+    settings.source, settings.file = "FILE", FOOTAGE
+    assert use(bpy.ops.scope.live, "INVOKE_DEFAULT") == {"RUNNING_MODAL"}
+    state = module("live.live_state").state
+    yield from until(lambda: state.job is None or state.job.has_body, 120, "the first pose")
+    assert state.job is not None, state.message
+
+
+def pins() -> Iterator[float]:
+    """Show the handles."""
+    assert use(bpy.ops.scope.pin_limb, "INVOKE_DEFAULT") == {"RUNNING_MODAL"}
+    yield 0.3
+
+
+def upright() -> Iterator[float]:
+    """Begin to draw the upright line in the comparison, beside the view from the side."""
+    use(bpy.ops.scope.look_through)
+    yield 0.3
+    use(bpy.ops.scope.side_view)
+    yield 0.3
+    assert use(bpy.ops.scope.upright_line, "INVOKE_DEFAULT") == {"RUNNING_MODAL"}
+    yield 0.1
+
+
+def undone() -> Iterator[float]:
+    """Pin, retarget to a duplicate, push to the NLA, compare, and undo all but the first, which is left to timers."""
+    use(bpy.ops.scope.add_pin, joint="left_wrist", location=(0.5, 0.0, 1.2), frame=20)
+    use(bpy.ops.scope.push_to_nla)
+    use(bpy.ops.object.duplicate)
+    use(bpy.ops.scope.look_through)
+    for _ in range(3):
+        invoke(bpy.ops.ed.undo)
+    yield 0.0
+
+
+def steps() -> Iterator[float]:
+    """Run the session; yield the seconds to wait before each next step."""
+    show_tab()
+    yield 1.0
+    settings = bpy.context.scene.scope
+    settings.footage, settings.quality = FOOTAGE, "FAST"
+    yield from captured()
+    bpy.ops.wm.save_as_mainfile(filepath=str(SAVED))
+    before = None
+    for way, begin in itertools.product(ways(), (capturing, pins, undone, upright, live)):
+        yield from prepared()
+        before = before or inventory()
+        assert inventory() == before, (inventory(), before)
+        yield from begin()
+        yield from open_file(way)
+    viewport()["area"].tag_redraw()
+    yield 0.5
+    (OUT / "reload.json").write_text(json.dumps(report))
+
+
+run(steps())

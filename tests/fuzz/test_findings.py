@@ -1,0 +1,498 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What once broke under attack, F1 to F15 and three more, each as its finder saw it: from outside.
+
+Details are tested beside the modules. Where a finding was a crash, much memory or the shell's, a process of its own is
+started, so that it would fail alone.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import shutil
+import signal
+import stat
+import struct
+import subprocess
+import sys
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from scope.scope_addon import cli
+from scope.scope_addon.capture.perception.adapters import network_process
+from scope.scope_addon.cli import SAMPLE, main
+
+from ..capture.media.made_video import patch_track_header, write_video
+from ..capture.perception.adapters.made_networks import huge, looping
+from ..retarget.made_files import array, fbx, glb
+from ..solver.compiled.small_package import LONG_CALLEE, make_package
+from .fuzz import CORPUS
+from .targets import ASSETS, TARGETS, npz
+
+posix = pytest.mark.skipif(os.name == "nt", reason="needs POSIX's shell, signals or pipes")
+linux = pytest.mark.skipif(
+    sys.platform != "linux", reason="macOS does not enforce the limit, nor take any bytes as names"
+)
+PROGRAM = [sys.executable, "-m", "scope.scope_addon"]
+Said = Callable[..., str]
+
+
+@pytest.fixture
+def refused(tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Said:
+    """Run a command line in the test's folder; check that it fails in one sentence and writes nothing."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: str, status: int = 1) -> str:
+        before = sorted(tmp_path.iterdir())
+        assert main(arguments) == status
+        out, said = capfd.readouterr()
+        assert out == ""
+        assert one_sentence(said)
+        assert sorted(tmp_path.iterdir()) == before
+        return said
+
+    return run
+
+
+def one_sentence(said: str) -> bool:
+    return said.startswith("scope: ") and said.count("\n") == 1 and "internal error" not in said
+
+
+def shell(line: str, folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run a line of the shell, in which SCOPE is the program."""
+    line = line.replace("SCOPE", shlex.join(PROGRAM))
+    options: dict[str, Any] = {"capture_output": True, "text": True, "check": False, "stdin": subprocess.DEVNULL}
+    return subprocess.run(["bash", "-c", line], cwd=folder, env={**os.environ, **environment}, **options)
+
+
+def python(code: str, folder: Path, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    options: dict[str, Any] = {"capture_output": True, "text": True, "check": False, "errors": "surrogateescape"}
+    command = [sys.executable, "-c", code, *arguments]
+    return subprocess.run(command, cwd=folder, env={**os.environ, **environment}, **options)
+
+
+def walk(folder: Path) -> None:
+    (folder / "walk.npz").write_bytes(TARGETS["motion"].seeds(folder)[0])
+
+
+# F1
+
+THREE = "from .compiled.kernel import kernel\n" + "".join(
+    f"@kernel\ndef add{n}(x): return x + {n}.0\n" for n in range(3)
+)
+RUN_THREE = """
+from package import kernels
+made = [kernels.add0, kernels.add1, kernels.add2]
+print([kernel(1.0) for kernel in made], sum(sum(kernel.stats.cache_hits.values()) for kernel in made))
+"""
+
+
+def test_f1_damaged_code_of_kernels_is_compiled_again(tmp_path: Path) -> None:
+    """An empty, cut or changed file stopped every capture for ever, and so did a cache folder without room."""
+    (make_package(tmp_path) / "kernels.py").write_text(THREE)
+    cache = tmp_path / "cache"
+    assert python(RUN_THREE, tmp_path, NUMBA_CACHE_DIR=str(cache)).stdout == "[1.0, 2.0, 3.0] 0\n"
+    empty, cut, flipped = cache.rglob("*.code")
+    empty.write_bytes(b"")
+    cut.write_bytes(cut.read_bytes()[:500])
+    flipped.write_bytes(bytes([*flipped.read_bytes()[:-1], 0xFF]))
+    for hits in (0, 3):
+        done = python(RUN_THREE, tmp_path, NUMBA_CACHE_DIR=str(cache))
+        assert (done.stdout, done.stderr) == (f"[1.0, 2.0, 3.0] {hits}\n", "")
+    done = python(RUN_THREE, tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "package" / "kernels.py"))  # is no folder
+    assert done.stdout == "[1.0, 2.0, 3.0] 0\n"
+    assert "cannot be kept" in done.stderr
+
+
+# F2, F3, F8, F13: footage
+
+OPEN = """
+import sys
+from pathlib import Path
+from scope.scope_addon.capture.media.video import open_video
+for name in sys.argv[1:]:
+    with open_video(Path(name)) as video:
+        print(video.width, len(list(video)))
+"""
+
+
+@linux
+def test_f2_names_that_are_not_utf8(tmp_path: Path) -> None:
+    r"""``caf\xe9.png`` and ``.mp4`` ended the process by SIGSEGV."""
+    names = [os.fsdecode(name) for name in (b"caf\xe9.png", b"caf\xe9.mp4")]
+    picture = np.zeros((48, 64, 3), np.uint8)
+    (tmp_path / names[0]).write_bytes(cv2.imencode(".png", picture)[1].tobytes())
+    write_video(tmp_path / "a.mp4", [picture] * 3).rename(tmp_path / names[1])
+    done = python(OPEN, tmp_path, *names)
+    assert (done.returncode, done.stdout) == (0, "64 1\n64 3\n"), done.stderr
+
+
+@linux
+def test_f3_a_picture_of_too_many_pixels(tmp_path: Path) -> None:
+    """A PNG of 1.6 MB with 20,000 × 20,000 pixels took 13.8 GiB."""
+    shutil.copy(CORPUS / "picture-20000.png", tmp_path / "bomb.png")
+    done = shell("ulimit -v 3000000; SCOPE capture bomb.png -o a.npz", tmp_path)
+    assert done.returncode == 1
+    assert done.stderr.startswith("scope: bomb.png has too many pixels, and at most 134 million can be read")
+    assert one_sentence(done.stderr)
+
+
+@pytest.mark.parametrize(("width", "height"), [(4000, 2), (65_000, 3)])
+def test_f8_a_picture_that_is_very_long(tmp_path: Path, refused: Said, width: int, height: int) -> None:
+    """The detector ran thousands of times."""
+    cv2.imwrite(str(tmp_path / "long.png"), np.zeros((height, width, 3), np.uint8))
+    assert f"long.png shows {width} × {height} pixels" in refused("capture", "long.png", "-o", "a.npz")
+
+
+def test_f8_pixels_that_are_very_wide(tmp_path: Path, refused: Said) -> None:
+    """An aspect ratio of 255:1, likewise."""
+    patch_track_header(write_video(tmp_path / "wide.mp4", [np.zeros((48, 64, 3), np.uint8)] * 2), None, 64 * 255)
+    assert "wide.mp4 shows 16320 × 48 pixels" in refused("capture", "wide.mp4", "-o", "a.npz")
+
+
+def test_f13_a_list_of_other_files(tmp_path: Path, refused: Said) -> None:
+    """ffconcat text named .mp4 opened the files that it names."""
+    shutil.copy(SAMPLE, tmp_path / "inner.mp4")
+    (tmp_path / "list.mp4").write_text("ffconcat version 1.0\nfile inner.mp4\n")
+    assert "list.mp4 is a playlist or other text" in refused("capture", "list.mp4", "-o", "a.npz")
+
+
+# F4: rigs
+
+IMPORT = """
+import resource, sys
+resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
+resource.setrlimit(resource.RLIMIT_CPU, (60, 60))
+from scope.scope_addon.cli import main
+for rig in sys.argv[1:]:
+    print(main(["import", "walk.npz", "--retarget", rig, "-o", "out.glb"]), flush=True)
+sys.stderr.flush()
+import os
+os._exit(0)  # without Blender's exit handlers
+"""
+GLTF: dict[str, Any] = {
+    "asset": {"version": "2.0"},
+    "scenes": [{"nodes": [0]}],
+    "nodes": [{"name": "Hips", "children": [1]}, {"name": "Spine", "translation": [0, 1, 0]}],
+    "skins": [{"joints": [0, 1], "inverseBindMatrices": 0}],
+    "buffers": [{"byteLength": 128}],
+    "bufferViews": [{"buffer": 0, "byteLength": 128}],
+    "accessors": [{"bufferView": 0, "componentType": 5126, "count": 2, "type": "MAT4"}],
+}
+
+
+@linux
+def test_f4_rigs_that_ask_for_everything(tmp_path: Path) -> None:
+    """NaN gave a traceback; a count or /dev/zero took 9 GiB; a pipe was waited for; FBX took 60 s and 7.8 GiB."""
+    walk(tmp_path)
+    bones = [GLTF["nodes"][0], {"translation": [np.nan] * 3}]
+    glb(tmp_path / "nan.glb", {**GLTF, "nodes": bones}, struct.pack("<f", np.nan) * 32)
+    count = [{**GLTF["accessors"][0], "count": 2_000_000_000}]
+    glb(tmp_path / "count.glb", {**GLTF, "accessors": count}, bytes(128))
+    for name, uri in (("zero", "/dev/zero"), ("other", "/etc/passwd")):
+        text = json.dumps({**GLTF, "buffers": [{"byteLength": 128, "uri": uri}]})
+        (tmp_path / f"{name}.gltf").write_text(text)
+    os.mkfifo(tmp_path / "pipe.glb")
+    fbx(tmp_path / "bomb.fbx", array(b"d", 3, bytes(100_000_000)))
+    damaged = bytearray(fbx(tmp_path / "mutated.fbx", array(b"d", 3, bytes(24))).read_bytes())
+    damaged[60] ^= 0xFF
+    (tmp_path / "mutated.fbx").write_bytes(damaged)
+    says = {
+        "nan.glb": "nan.glb: ",
+        "count.glb": "count.glb: this glTF file is damaged",
+        "zero.gltf": "refers to '/dev/zero', outside its own folder",
+        "other.gltf": "refers to '/etc/passwd', outside its own folder",
+        "pipe.glb": "pipe.glb is a pipe or a device",
+        "bomb.fbx": "bomb.fbx: this FBX file is damaged",
+        "mutated.fbx": "mutated.fbx: this FBX file is damaged",
+    }
+    done = python(IMPORT, tmp_path, *says)
+    assert (done.returncode, done.stdout) == (0, "1\n" * len(says)), done.stderr
+    for said, expected in zip(done.stderr.splitlines(keepends=True), says.values(), strict=True):
+        assert one_sentence(said)
+        assert expected in said
+    assert not (tmp_path / "out.glb").exists()
+
+
+# F5, F6: bodies
+
+
+@pytest.mark.parametrize("header", ["{'shape': (3,", "{'a':\n\t 1}\n  x", " {\n1\n  2}\n\n x", "\0{"])
+def test_f5_headers_at_which_numpy_fails(tmp_path: Path, refused: Said, header: str) -> None:
+    """TokenError and IndentationError of the arrays' headers were not caught."""
+    with zipfile.ZipFile(ASSETS / "body" / "scope.npz") as whole, zipfile.ZipFile(tmp_path / "body.npz", "w") as bad:
+        for name in whole.namelist():
+            changed = b"\x93NUMPY\1\0" + struct.pack("<H", len(header)) + header.encode() + bytes(99)
+            bad.writestr(name, changed if name == "v_template.npy" else whole.read(name))
+    assert "body.npz is not a readable body file" in refused("capture", "--body", "body.npz", "-o", "a.npz")
+
+
+@pytest.mark.parametrize("factors", [(1, 0, 1), (1e-9, 1e-9, 1e-9), (0, 0, 0)])
+@pytest.mark.parametrize("form", ["scope", "smpl"])
+def test_f6_flat_and_tiny_bodies(tmp_path: Path, refused: Said, form: str, factors: tuple[float, ...]) -> None:
+    """``argmax of an empty sequence``; one of Scope's own form was captured, 134 pixels off."""
+    with np.load(ASSETS / "body" / "scope.npz") as file:
+        body = {key: file[key] for key in file.files}
+    body["v_template"] = body["v_template"] * np.array(factors)
+    if form == "smpl":
+        count, joints = len(body["v_template"]), body["kintree_table"].shape[1]
+        body["weights"] = np.eye(joints)[np.arange(count) % joints]
+        body |= {"J_regressor": np.full((joints, count), 1 / count), "f": body["faces"][:, :3]}
+        body = {k: body[k] for k in ("v_template", "shapedirs", "kintree_table", "weights", "J_regressor", "f")}
+    (tmp_path / "body.npz").write_bytes(npz(body))
+    assert "v_template measures" in refused("capture", "--body", "body.npz", "-o", "a.npz")
+
+
+# F7: networks
+
+
+def test_f7_an_endless_loop(tmp_path: Path, refused: Said, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The capture never ended."""
+    monkeypatch.setattr(network_process, "DEFAULT_OPENING_S", 1.5)
+    looping(tmp_path / "loop.onnx")
+    said = refused("capture", str(SAMPLE), "--keypoints", "loop.onnx", "-o", "a.npz")
+    assert "loop.onnx was stopped because it gave no result within 1.5 s; choose" in said
+
+
+@linux
+def test_f7_a_constant_of_12_gigabytes(tmp_path: Path, refused: Said) -> None:
+    """ConstantOfShape of 3e9 took all memory."""
+    huge(tmp_path / "huge.onnx", 3_000_000_000)
+    said = refused("capture", str(SAMPLE), "--keypoints", "huge.onnx", "-o", "a.npz")
+    assert "huge.onnx cannot be run" in said
+    assert "ailed to allocate" in said
+
+
+# F9: standard streams
+
+MOTION = """
+import sys
+from scope.scope_addon import cli
+cli.run_capture = lambda args: (args.output[0].write_text("motion"), print("of a library"), {"frames": 3})[-1]
+cli.run()
+"""
+
+
+def captured(redirection: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run a command line that captures nothing, but writes a file, with a shell's redirections."""
+    command = shlex.join([sys.executable, "-c", MOTION, "capture", "-o", "a.npz", "--json"])
+    done = shell(redirection.replace("COMMAND", command), folder)
+    assert (folder / "a.npz").read_text() == "motion"  # and no message
+    return done
+
+
+@posix
+@pytest.mark.parametrize(
+    ("redirection", "says"),
+    [
+        ("COMMAND > /dev/full", "(No space left on device)"),
+        ("COMMAND >&-", "(Bad file descriptor)"),
+        ("(trap '' PIPE; sleep 0.2; COMMAND) | true; exit ${PIPESTATUS[0]}", "(Broken pipe)"),
+    ],
+)
+def test_f9_a_report_that_cannot_be_written(tmp_path: Path, redirection: str, says: str) -> None:
+    """``--json >/dev/full`` and ``--json | true`` ended with a wrong status or message."""
+    done = captured(redirection, tmp_path)
+    assert done.returncode == 1
+    assert f"the report cannot be written to standard output {says}; all results are complete" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert "Exception" not in done.stderr
+
+
+@posix
+@pytest.mark.parametrize("redirection", ["COMMAND 2>&-", "COMMAND <&- 2>&-", "COMMAND <&-"])
+def test_f9_messages_that_cannot_be_written_change_nothing(tmp_path: Path, redirection: str) -> None:
+    """``2>&-`` ended with a wrong status, or wrote messages into the next file that was opened."""
+    done = captured(redirection, tmp_path)
+    assert (done.returncode, done.stdout) == (0, '{"frames": 3}\n')
+
+
+# F10, F14, F15: one sentence, whatever happens
+
+
+def test_f10_an_error_of_our_own(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever nobody had thought of came as a traceback."""
+
+    def fail(_: object) -> None:
+        np.linalg.inv(np.zeros((2, 2)))
+
+    monkeypatch.setattr(cli, "run_capture", fail)
+    assert main(["capture"]) == 1
+    out, said = capsys.readouterr()
+    assert out == ""
+    assert said.startswith("scope: an internal error, LinAlgError: Singular matrix; please report it")
+    assert said.count("\n") == 1
+    monkeypatch.setenv("SCOPE_TRACEBACK", "1")
+    with pytest.raises(np.linalg.LinAlgError):
+        main(["capture"])
+
+
+FULL = """
+import resource
+resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
+from scope.scope_addon.cli import run
+run()
+"""
+
+
+@posix
+def test_f10_a_full_disk(tmp_path: Path) -> None:
+    """The writer's traceback came before the sentence."""
+    walk(tmp_path)
+    done = python(FULL, tmp_path, "import", "walk.npz", "-o", "out.npz", PYTHONDONTWRITEBYTECODE="1")
+    assert done.returncode == 1
+    assert one_sentence(done.stderr), done.stderr
+    assert "out.npz" in done.stderr
+    assert os.listdir(tmp_path) == ["walk.npz"]
+
+
+@posix
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGINT)])
+def test_f14_a_signal_while_the_program_is_loaded(tmp_path: Path, number: int) -> None:
+    """SIGTERM in the first two seconds ended it without a word.
+
+    Numpy is imported after the handlers are installed; this stand-in sends the signal then.
+    """
+    code = (
+        "import os, runpy, signal, sys\n"
+        f"signal.signal({int(number)}, signal.SIG_DFL)\n"  # under nohup, SIGHUP is ignored, and stays so
+        "class Finder:\n"
+        "    def find_spec(name, *_):\n"
+        f"        name == 'numpy' and os.kill(os.getpid(), {int(number)})\n"
+        "sys.meta_path.insert(0, Finder)\n"
+        "sys.argv = ['scope', 'capture']\n"
+        "runpy.run_module('scope.scope_addon', run_name='__main__')\n"
+    )
+    done = python(code, tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "scope: stopped\n")
+
+
+@linux
+@pytest.mark.parametrize(
+    ("limit_kb", "output", "says"),
+    [
+        (1_500_000, "out.glb", "this shell limits a process to 1.54 GB of address space, but a capture needs 3.20 GB"),
+        (500_000, "out.npz", "this shell limits a process to 0.51 GB of address space, but a capture needs 2.50 GB"),
+        (250_000, "out.npz", "there is too little memory to load the program; free memory"),
+        (110_000, "out.npz", "there is too little memory to load the program; free memory"),
+    ],
+)
+def test_f15_a_shell_that_limits_memory(tmp_path: Path, limit_kb: int, output: str, says: str) -> None:
+    """``ulimit -v 1500000`` gave SIGSEGV: Blender's module was half loaded."""
+    done = shell(f"ulimit -v {limit_kb}; exec SCOPE capture -o {output}", tmp_path)
+    assert done.returncode == 1
+    assert done.stderr.startswith(f"scope: {says}")
+    assert one_sentence(done.stderr)
+    assert not any(tmp_path.iterdir())
+
+
+# F11 and the files that differed
+
+KILLED = """
+import os, signal
+from pathlib import Path
+from scope.scope_addon.atomic_write import atomic_path
+with atomic_path(Path("o.fbx")) as temporary:
+    temporary.write_text("half")
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+@posix
+def test_f11_nothing_is_left_and_fbx_files_are_the_same(tmp_path: Path) -> None:
+    """Exports left ``blender_XXXXXX`` in TMPDIR, a killed one ``.o.xxxx.fbx``; the same motion's .fbx differed."""
+    for name in ("results", "temporary"):
+        (tmp_path / name).mkdir()
+    results = tmp_path / "results"
+    walk(results)
+    python(KILLED, results)
+    assert len(os.listdir(results)) == 2
+    contents = []
+    for k in range(2):  # processes that hash texts in ways of their own
+        environment = {"TMPDIR": str(tmp_path / "temporary"), "PYTHONHASHSEED": str(k + 1)}
+        done = shell("SCOPE import walk.npz -o o.fbx --shape-keys baked", results, **environment)
+        assert done.returncode == 0, done.stderr
+        assert sorted(os.listdir(results)) == ["o.fbx", "walk.npz"]
+        assert os.listdir(tmp_path / "temporary") == []
+        contents.append((results / "o.fbx").read_bytes())
+    assert contents[0] == contents[1]
+
+
+# F12: arguments
+
+
+@posix
+def test_f12_a_calibration_without_an_end(tmp_path: Path, refused: Said) -> None:
+    """``--calibration /dev/zero`` took all memory, and a pipe was waited for."""
+    os.mkfifo(tmp_path / "pipe.json")
+    for path in ("/dev/zero", "pipe.json"):
+        said = refused("capture", str(SAMPLE), "--calibration", path, "-o", "a.npz")
+        assert f"{path} is a pipe or a device, not a regular file; choose a calibration" in said
+
+
+def test_f12_ten_thousand_heights(refused: Said) -> None:
+    """They were all read, and all shown in the message."""
+    said = refused("capture", "--height", ",".join(["170"] * 10_000), "-o", "a.npz", status=2)
+    assert "at most 100 heights, not 10000" in said
+    assert len(said) < 200
+
+
+# The rows without a number
+
+COMPILED = """
+from package.kernels import inner, outer
+assert outer(0.5) == inner(0.5) + inner(1.0)
+for kernel in (inner, outer):
+    (made,) = kernel.overloads.values()
+    found = [f for f in made.library._final_module.functions if not f.is_declaration]
+    print(sorted({(f.linkage.name, "outer" if "outer" in f.name else "inner") for f in found}))
+"""
+LOADED = """
+from package.kernels import inner, outer
+print(outer(0.5) == inner(0.5) + inner(1.0), *(sum(kernel.stats.cache_hits.values()) for kernel in (inner, outer)))
+"""
+
+
+def test_the_run_that_compiles_rounds_as_later_ones(tmp_path: Path) -> None:
+    """The capture that compiled differed by 8e-13: callers ran whichever copy of a callee was made or loaded first.
+
+    Copies of small kernels round alike, so that only their being separate can be seen here. One second of the sample
+    clip shows it in two minutes: see "bit for bit" in docs/command_line.md.
+    """
+    (make_package(tmp_path) / "kernels.py").write_text(LONG_CALLEE)
+    cache = str(tmp_path / "cache")
+    inner, outer = map(eval, python(COMPILED, tmp_path, NUMBA_CACHE_DIR=cache).stdout.splitlines())
+    assert inner == [("external", "inner")]
+    assert outer == [("external", "outer"), ("internal", "inner")]
+    assert python(LOADED, tmp_path, NUMBA_CACHE_DIR=cache).stdout == "True 1 1\n"
+
+
+FOLDER = "from scope.scope_addon.job.private_folder import private_folder; print(private_folder())"
+
+
+@linux
+@pytest.mark.parametrize("prepared", ["link", "open", "file"])
+def test_the_fallback_cache_is_the_users_own(tmp_path: Path, prepared: str) -> None:
+    """It was a predictable folder in the system's temporary one, and what lies in it is unpickled."""
+    caches, theirs = tmp_path / "caches", tmp_path / "theirs"
+    caches.mkdir()
+    theirs.mkdir()
+    if prepared == "link":
+        (caches / "scope-mocap").symlink_to(theirs)
+    elif prepared == "file":
+        (caches / "scope-mocap").touch()
+    else:
+        (caches / "scope-mocap").mkdir()
+        (caches / "scope-mocap").chmod(0o777)
+    done = python(FOLDER, tmp_path, XDG_CACHE_HOME=str(caches), TMPDIR=str(tmp_path))
+    found = Path(done.stdout.strip())
+    status = found.lstat()
+    assert (stat.S_IMODE(status.st_mode), status.st_uid, stat.S_ISDIR(status.st_mode)) == (0o700, os.geteuid(), True)
+    assert (found.parent == caches) == (prepared == "open")
+    assert list(theirs.iterdir()) == []
