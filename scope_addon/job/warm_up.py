@@ -7,6 +7,8 @@ processor or Python), it runs once in the background, after the extension has be
 
 from __future__ import annotations
 
+import gc
+
 import numpy as np
 
 from ...solver.compiled.code_cache import compiled_kernels
@@ -21,14 +23,19 @@ from ..edit.pins.corrections import Pin
 from .preview import load_rasterizer
 
 ROOT = ASSETS.parent
+_GARBAGE = 10_000, 20, 20  # objects between two searches, and searches between two thorough ones
 _SECONDS = 0.3  # of the sample clip: a few frames, so that every stage has its work
 
 
 def warm_up(progress: Progress) -> int:
     """Capture the beginning of the sample clip and correct it; return how many kernels had to be compiled.
 
+    From then on, this process looks for garbage less often: it took a twelfth of the time of compiling.
+
     :raises ScopeError: the sample cannot be captured.
     """
+    gc.freeze()
+    gc.set_threshold(*_GARBAGE)
     load_rasterizer()
     fill_silhouette(np.zeros((1, 1), np.bool_), np.zeros((1, 2)), np.zeros((0, 3), np.int32))  # of the preset best
     options = CaptureOptions(quality="fast", wanted=VideoRange(end_s=_SECONDS), threads=1)

@@ -63,7 +63,7 @@ def test_the_extension_says_where_live_captures_are(capsys, monkeypatch):
 @pytest.mark.usefixtures("networks")
 def test_ctrl_c_ends_the_capture_and_keeps_the_recording(tmp_path):
     target = tmp_path / "take.npz"
-    command = [sys.executable, "-m", "scope.scope_addon", "live", str(SAMPLE), "--json-port", "0", "--threads", "1"]
+    command = [sys.executable, "-m", "scope.scope_addon", "live", str(SAMPLE), "--json-port", "0"]
     with subprocess.Popen(
         [*command, "--record", str(target), "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
