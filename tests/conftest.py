@@ -43,6 +43,7 @@ FIRST = (
     "job/test_warm_up.py",
     "tools/test_build_body.py",
     "capture/tracking/test_people.py",
+    "fuzz/test_findings.py",
     "tools/test_convert_networks.py",
     "scene/rigs/test_rig_retarget.py",
     "scene/export/test_export.py",
