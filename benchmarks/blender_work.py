@@ -19,6 +19,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ..scope_addon.motion import Motion
 from ..scope_addon.scene.animation_data.actions import Channels
@@ -44,14 +45,14 @@ def longer(motion: Motion, count: int) -> Motion:
     return replace(motion, **per_frame | {"frames": numbers, "timestamps": numbers / motion.mocap_framerate})
 
 
-def moving_face(count: int) -> dict[str, np.ndarray]:
+def moving_face(count: int) -> dict[str, NDArray[Any]]:
     """Return a face whose 52 expressions all move in every frame, each by waves of its own."""
     phases = np.arange(count)[:, None] * np.linspace(0.05, 0.3, len(EXPRESSIONS))
     return {
         "expressions": (0.5 - 0.5 * np.cos(phases)).astype(np.float32),
         "expression_names": np.array(EXPRESSIONS),
         "expression_confidence": np.ones(count, np.float32),
-        "gaze": np.tile(np.float32([0.0, 0.0, 1.0]), (count, 2, 1)),
+        "gaze": np.tile(np.array([0.0, 0.0, 1.0], np.float32), (count, 2, 1)),
         "face_points": np.full((count, 3, 2), 50.0, np.float32),
         "face_landmarks": np.array([1, 33, 263]),
     }
