@@ -24,6 +24,7 @@ from ...solver.rotations import exp
 from ..frames import DATA
 from ..report import table
 from .accuracy import evaluate_clip
+from .depth_flips import BONES, FITS, depth_flips, flips_table, total
 from .held_out import feet_world, held_out_takes
 from .perception import PRESETS
 from .render_shots import MOTIONS, video_and_truth
@@ -35,6 +36,7 @@ SHOWN = {
     "floor_cm": "floor off by, cm",
     "foot_slide_cm": "foot slide cm",
     "size": "size / true",
+    "height_off": "height off by, %",
     "focal": "focal / true",
     "coverage": "coverage",
 }
@@ -59,18 +61,21 @@ def renders(quick: bool) -> dict[str, Any]:
         figures[quality] = {}
         for known in KNOWN:
             found = {name: evaluate_render(body, *files, quality, known) for name, files in clips.items()}
-            mean = mean_of([row for name, row in found.items() if name != "sample"])
-            figures[quality][known] = found | {"mean": mean}
+            shots = [row for name, row in found.items() if name != "sample"]
+            figures[quality][known] = found | {"mean": mean_of(shots)}
             rows = [[name, *(row.get(key) for key in SHOWN)] for name, row in figures[quality][known].items()]
             print(table((f"{quality}, {known}", *SHOWN.values()), rows), end="\n\n", flush=True)
+            flips = {fit: total(row["flips"][fit] for row in shots if "flips" in row) for fit in FITS}
+            figures[quality][known]["mean"]["flips"] = flips
+            print(flips_table(f"{quality}, {known}", flips), end="\n\n", flush=True)
     return figures
 
 
 def evaluate_render(body: Body, video: Path, truth: Path, quality: str, known: str) -> dict[str, Any]:
-    """Return the figures of the evaluation tool for one clip, ``size``, and the figures of ``against_world``.
+    """Return the figures of the evaluation tool for one clip, ``size`` and more, and those of ``against_world``.
 
     ``known``: one of ``KNOWN``. If nobody was found, only ``coverage``. ``size``: captured over true size, median of
-    the frames.
+    the frames. ``height``: captured over true stature. ``flips``: as of `depth_flips`.
     """
     with np.load(truth) as data:
         true = {key: data[key] for key in data.files}
@@ -83,7 +88,10 @@ def evaluate_render(body: Body, video: Path, truth: Path, quality: str, known: s
         motion, figures = evaluate_clip(body, video, truth, options)
     except NoPersonError:
         return {"coverage": 0.0}
-    return figures | {"size": 1 / figures["pa_scale"]} | against_world(body, motion, true)
+    joints = {n: true["joints_cam"][:, body.joint_names.index(n)].astype(float) for bone in BONES for n in bone}
+    figures |= {"size": 1 / figures["pa_scale"], "flips": depth_flips(body, motion, joints)}
+    stature = body.stature(motion.betas.astype(float)) / body.stature(true["betas"].astype(float))
+    return figures | {"height": stature, "height_off": 100 * abs(stature - 1)} | against_world(body, motion, true)
 
 
 def against_world(body: Body, motion: Motion, truth: dict[str, NDArray[Any]]) -> dict[str, float | None]:

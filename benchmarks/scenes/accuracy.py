@@ -22,6 +22,7 @@ from ...solver import Body, load_body
 from ...tools.render_sample.truth import project
 from ..evaluation.metrics import mpjpe, pa_mpjpe, relative_to
 from ..frames import DATA
+from ..perception.depth_flips import FITS, DepthFlips, depth_flips, flips_table, total
 from ..report import table
 from .people import LIMB_JOINTS
 from .scene import FOLDER
@@ -48,6 +49,7 @@ class Result:
     size: float  # captured over true stature; NaN for people that were not found
     frames: dict[str, NDArray[Any]] = field(default_factory=dict)  # (T,) what groups are made of
     person: dict[str, Any] = field(default_factory=dict)
+    flips: dict[str, DepthFlips] = field(default_factory=dict)  # as of `depth_flips`; empty for people not found
 
 
 def scenes(quick: bool) -> dict[str, Any]:
@@ -74,20 +76,33 @@ def scenes(quick: bool) -> dict[str, Any]:
 
 def _measure(split: str, clips: list[Path], quick: bool) -> dict[str, Any]:
     """Capture the clips of one split with every variant, print the tables and return the figures."""
-    body, found, by_variant = load_body("scope"), dict[str, dict[str, Estimate]](), dict[str, dict[str, Estimate]]()
+    body, by_variant = load_body("scope"), dict[str, list[Result]]()
     for name, options in VARIANTS[:1] if quick else VARIANTS:
-        results: list[Result] = []
+        results = by_variant[name] = []
         for truth in clips:
             video = truth.with_name(truth.name.replace("_truth.npz", ".mp4"))
             with np.load(truth) as data:
                 results += evaluate_scene(body, video, {key: data[key] for key in data.files}, **options)
             print(f"{video.stem}, {name}: {_mean(results[-1].mpjpe_root):.0f} mm", file=sys.stderr, flush=True)
-        rows = groups(results)
-        found, by_variant[name] = found or rows, rows["all"]
-    for head, rows in ((split, found), (f"{split}: variants", by_variant)):
-        columns = (f"{head}: people", "number", "MPJPE-root mm", "PA-MPJPE mm", "found", "size off, %")
+    return _tables(split, by_variant)
+
+
+def _tables(split: str, by_variant: dict[str, list[Result]]) -> dict[str, Any]:
+    """Print the tables of one split and return their figures, and those of every person."""
+    default, *others = by_variant.items()
+    found, variants = groups(default[1]), {name: groups(results)["all"] for name, results in by_variant.items()}
+    for head, rows in ((split, found), (f"{split}: variants", variants)):
+        columns: tuple[str, ...] = (f"{head}: people", "number", "MPJPE-root mm", "PA-MPJPE mm", "found", "size off, %")
         print(table(columns, [_row(name, row) for name, row in rows.items()]), end="\n\n", flush=True)
-    return {"groups": found, "variants": by_variant}
+    more = {name: more_than(default[1], results) for name, results in others}
+    columns = (f"{split}: MPJPE-root, more than the default, mm", "people", "mean")
+    print(table(columns, [(name, each.people, _shown(each)) for name, each in more.items()]), end="\n\n")
+    flips = {}
+    for name, results in by_variant.items():
+        flips[name] = {fit: total(r.flips[fit] for r in results if r.flips) for fit in FITS}
+        print(flips_table(f"{split}, {name}", flips[name]), end="\n\n", flush=True)
+    people = {name: [_figures(r) for r in results] for name, results in by_variant.items()}
+    return {"groups": found, "variants": variants, "more_than_default": more, "flips": flips, "people": people}
 
 
 def evaluate_scene(
@@ -132,6 +147,7 @@ def _result(body: Body, clip: str, motion: Motion | None, truth: Truth, k: int) 
         roots = [points[:, HIPS].mean(axis=1) for points in (captured, true[at])]
         result.mpjpe_root[at] = mpjpe(relative_to(captured, roots[0]), relative_to(true[at], roots[1]))
         result.size = body.stature(motion.betas.astype(float)) / person["stature_m"]
+        result.flips = depth_flips(body, motion, dict(zip(LIMB_JOINTS, np.moveaxis(true, 1, 0), strict=True)))
     return result
 
 
@@ -216,10 +232,24 @@ def _mean(values: NDArray[np.float64]) -> float:
     return float(finite.mean()) if len(finite) else np.nan
 
 
-def _row(name: str, row: dict[str, Estimate]) -> list[object]:
-    def shown(estimate: Estimate) -> str:
-        interval = f" ({estimate.low:.1f} to {estimate.high:.1f})" if estimate.people > 1 else ""
-        return f"{estimate.mean:.1f}{interval}"
+def more_than(reference: list[Result], results: list[Result]) -> Estimate:
+    """Return by how much MPJPE-root is larger than the reference's, over the frames of a person that both found."""
+    return mean_over_people([_mean(r.mpjpe_root - ref.mpjpe_root) for ref, r in zip(reference, results, strict=True)])
 
-    share = f"{100 * row['found'].mean:.0f} %"
-    return [name, row["found"].people, shown(row["mpjpe_root"]), shown(row["pa_mpjpe"]), share, shown(row["size_off"])]
+
+def _figures(result: Result) -> dict[str, Any]:
+    """Return what is known of one person, for the JSON file."""
+    visible = result.frames["hidden"] < len(LIMB_JOINTS)
+    errors = {"mpjpe_root": _mean(result.mpjpe_root[visible]), "pa_mpjpe": _mean(result.pa_mpjpe[visible])}
+    found = float(np.isfinite(result.mpjpe_root[visible]).mean()) if visible.any() else np.nan
+    return {"clip": result.clip, **errors, "found": found, "size": result.size, "flips": result.flips, **result.person}
+
+
+def _shown(estimate: Estimate) -> str:
+    interval = f" ({estimate.low:.1f} to {estimate.high:.1f})" if estimate.people > 1 else ""
+    return f"{estimate.mean:.1f}{interval}"
+
+
+def _row(name: str, row: dict[str, Estimate]) -> list[object]:
+    people, share = row["found"].people, f"{100 * row['found'].mean:.0f} %"
+    return [name, people, _shown(row["mpjpe_root"]), _shown(row["pa_mpjpe"]), share, _shown(row["size_off"])]
