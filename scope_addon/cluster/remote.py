@@ -64,7 +64,7 @@ def names_below(url: str, without: str = "") -> list[str]:
 
 
 def mirror_footage(url: str, out: str, folder: Path) -> Path:
-    """Make a folder with an empty file for each one below a URL, from which the clips can be told by their names.
+    """Make a folder with an empty file for each one below a URL, so that clips can be chosen by their names.
 
     :param out: URL or path of the results, which are no footage.
     :raises InputError: the store cannot be read.

@@ -28,7 +28,7 @@ WEIGHTS = Weights(
     shape=3.0,
 )
 ROBUST = Options(robust_keypoints2d=0.01, robust_keypoints3d=0.1, robust_orientation_field=1.0)
-# Where all frames of a clip are fitted together, each keypoint is also told by its neighbours in time: the image may
+# Where all frames of a clip are fitted together, each keypoint is also constrained by its neighbours in time: the image may
 # weigh more, and the lifted directions, whose errors last for many frames, less. Feet that rest stay on the floor by
 # this weight alone; with ten times as much, renders whose floor is wrong have errors larger by 4 mm.
 _CLIP_KEYPOINTS2D, _CLIP_DIRECTIONS, _CLIP_FLOOR = 2.0, 0.7, 3.0

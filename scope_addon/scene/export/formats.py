@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from ...errors import OutputError
 from ..animation_data import timing
 from . import bvh
+from .completeness import is_whole_blend, is_whole_crate
 from .fbx_file import correct_fbx
 from .glb_times import corrected_key_times
-from .whole_file import is_whole_blend, is_whole_crate
 
 
 def write_glb(path: Path, camera: bool = False, take: str = "Animation") -> None:
