@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Docstrings of public functions say what a caller cannot see: shapes of arrays, and errors.
 
-The source is parsed, not imported. A function's errors are those that it raises itself and those of the functions of its
-module, of private methods and, in the solver, of the checks in validation.py that it calls, unless it catches them. What
-a constructor takes and raises may be said by the docstring of its class.
+The source is parsed, not imported. A function's errors are those that it raises itself and those of the functions of
+its module, of private methods and, in the solver, of the checks in validation.py that it calls, unless it catches them.
+What a constructor takes and raises may be said by the docstring of its class.
 """
 
 import ast
