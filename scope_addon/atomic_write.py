@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Atomic writes: a file is written under a temporary name and renamed, so that it is complete or absent.
 
-A process that is killed leaves its temporary file, whose name tells the computer and the process. The next one that
-writes a file of that name there removes it.
+A process that is killed leaves its temporary file, whose name contains the computer and the process. The next process
+that writes a file of that name there removes it.
 """
 
 from __future__ import annotations

@@ -206,7 +206,7 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
     check_outputs(outputs, video, args.overlay, args.report)
     check_blender(outputs)
     check_memory_limit(with_scene=any(path.suffix.lower() not in MOTION_SUFFIXES for path in outputs))
-    rig = checked_rig(args, outputs)
+    rig = checked_rig(args, outputs, args.hands)
 
     body, options = body_and_options(args)
     # Imported here, so that --help and errors in the arguments are printed immediately.
@@ -261,7 +261,7 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
         raise UsageError(f"--jobs must be at least 1, not {args.jobs}")
     clips = [Path(args.out) / f"clip{suffix}" for suffix in formats]
     check_blender(clips)
-    checked_rig(args, clips)
+    checked_rig(args, clips, args.hands)
     _, options = body_and_options(args)
     check_networks(options)  # an unusable network is reported once, before the first clip
     extras = Extras(args.overlays, args.reports)

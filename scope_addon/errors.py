@@ -74,7 +74,7 @@ def exit_status(error: ScopeError) -> int:
 def internal_error_message(error: Exception) -> str:
     """Describe an error that Scope should not have, and what to do."""
     cause = " ".join(f"{type(error).__name__}: {error}".split())
-    return f"an internal error, {cause}; please report it (the environment variable SCOPE_TRACEBACK=1 tells where)"
+    return f"an internal error, {cause}; please report it (the environment variable SCOPE_TRACEBACK=1 shows where)"
 
 
 def system_error_message(error: OSError | MemoryError) -> str:

@@ -16,7 +16,7 @@ _ABANDONED_S = 24 * 3600.0  # age from which a temporary file is removed if its 
 
 
 def owner() -> str:
-    """Return the part of a temporary file's name that tells the computer and this process."""
+    """Return the part of a temporary file's name that identifies the computer and this process."""
     return f"{computer()}-{os.getpid()}"
 
 

@@ -29,7 +29,7 @@ class Person:
 
 @dataclass(frozen=True)
 class Truth:
-    """The people of a clip who have ground truth, and the camera's intrinsics (3, 3), where the data set tells them."""
+    """The people of a clip who have ground truth, and the camera's intrinsics (3, 3), where the data set has them."""
 
     people: list[Person]
     intrinsics: NDArray[np.float64] | None = None

@@ -18,6 +18,8 @@ _ONLINE_CAMERA = "OnlineHMR, table of EMDB-1 (there PHMR, offline, is PromptHMR-
 _ONLINE_WORLD = "OnlineHMR, table of EMDB-2 (there PHMR, offline, is PromptHMR-Vid)"
 _METRIC = "MetricHMSR, table of 3DPW"
 _SAM3D = "Yang et al., SAM 3D Body (arXiv:2602.15989), main table of accuracy, ViT-H"
+_HSMR = "Xia et al., HSMR, CVPR 2025 (arXiv:2503.21751), table 1, which does not state the protocol of Human3.6M"
+_VIBE_ISSUE = "issue 151 of github.com/mkocabas/VIBE, which quotes VIBE's paper and could not reproduce its figures"
 _GENMO = "GENMO, ICCV 2025, table of EMDB-2; the same in Human3R"
 
 
@@ -55,8 +57,16 @@ PUBLISHED: dict[str, list[Published]] = {
             "Goel et al., Humans in 4D, ICCV 2023 (arXiv:2305.20091), table of 3DPW and Human3.6M",
             {"mpjpe": 44.8, "pa_mpjpe": 33.6},
         ),
+        Published("PARE", _HSMR, {"mpjpe": 76.8, "pa_mpjpe": 50.6}),
+        Published("HybrIK", _HSMR, {"mpjpe": 54.4, "pa_mpjpe": 34.5}),
+        Published("CLIFF", _HSMR, {"mpjpe": 47.1, "pa_mpjpe": 32.7}),
+        Published("PLIKS", _HSMR, {"mpjpe": 47.0, "pa_mpjpe": 34.5}),
+        Published("HMR 2.0 (4DHumans)", _HSMR, {"mpjpe": 50.0, "pa_mpjpe": 32.4}),
+        Published("HSMR", _HSMR, {"mpjpe": 50.4, "pa_mpjpe": 32.9}),
     ],
     "3dhp": [
+        Published("SPIN", _VIBE_ISSUE, {"pck": 76.4}),
+        Published("VIBE", _VIBE_ISSUE, {"pck": 89.0, "mpjpe": 97.7, "pa_mpjpe": 63.4}),
         Published(
             "OriNet",
             "Luo et al., OriNet, BMVC 2018, its repository's table for the corrected test set",

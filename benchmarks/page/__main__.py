@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`./scripts/report [--quick] [OUT.html]`: run what this machine can run, and write one page about it."""
+"""`./scripts/report [--quick] [--recorded FOLDER] [OUT.html]`: run what this machine can run; write a page about it."""
 
 from __future__ import annotations
 
@@ -23,8 +23,9 @@ from ...solver.body import Body
 from ...solver.errors import ScopeError
 from ...solver.loaders.body_file import load_body
 from ..frames import ROOT
-from .commands import Outcome, clips, commands, run, run_capture
+from .commands import LONG, Outcome, clips, commands, run, run_capture
 from .content import outcome_section
+from .recorded import Run, read_run, write_run
 from .shots import strips
 
 FOLDER = ROOT / "build" / "report"
@@ -35,11 +36,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="report", description="One page about this machine.")
     parser.add_argument("out", nargs="?", type=Path, metavar="OUT.html", default=FOLDER / "report.html")
     parser.add_argument("--quick", action="store_true", help="a few minutes: fewer repetitions, fewer clips")
+    parser.add_argument("--recorded", type=Path, metavar="FOLDER", help="of an earlier run: write its page again")
     args = parser.parse_args()
     try:
         FOLDER.mkdir(parents=True, exist_ok=True)
         check_output(args.out, (".html",))
-        content = report_page(args.quick)
+        folder = args.recorded or FOLDER
+        content = report_page(folder, read_run(folder) if args.recorded else measure(args.quick))
         with atomic_path(args.out) as temporary:
             temporary.write_text(content, encoding="utf-8")
     except ScopeError as error:
@@ -52,30 +55,47 @@ def main() -> int:
     return 0
 
 
-def report_page(quick: bool) -> str:
-    """Run the commands and return the page."""
-    body, load = load_body("scope"), other_load()
+def measure(quick: bool) -> Run:
+    """Run the commands; return what they gave, which is kept in `FOLDER` too.
+
+    :raises SetupError: the first clip cannot be captured.
+    """
+    load = other_load()
     captured = [(name, video, run_capture(video, FOLDER / f"{name}.npz", say)) for name, video in clips(quick)]
     if captured[0][2].status:
         last = captured[0][2].said.strip().splitlines()[-1:] or ["it said nothing"]
         raise SetupError(f"{captured[0][2].command.text} failed ({last[0]}); mend that and run this again")
     measured = [run(command, FOLDER, say) for command in commands(quick)]
-    name, video, outcome = captured[0]
-    motion = Motion.load(FOLDER / f"{name}.npz")
+    seconds = sum(outcome.seconds for outcome in [*(each for _, _, each in captured), *measured])
+    time = datetime.now().astimezone().strftime("%Y-%m-%d %H:%M")
+    done = Run(captured, measured, time, facts(seconds, load))
+    write_run(FOLDER, done)
+    return done
+
+
+def report_page(folder: Path, done: Run) -> str:
+    """Return the page of a run.
+
+    :param folder: the run's, with the motion files of its clips.
+    """
+    body = load_body("scope")
+    name, video, _ = done.captured[0]
+    motion = Motion.load(folder / f"{name}.npz")
     rows = shown_rows([motion])
     pictures = overlay_pictures(video, [motion], body, rows)
     captions = [f"frame {motion.frames[rows[p.row]]}, {motion.timestamps[rows[p.row]]:.2f} s" for p in pictures]
-    everything = [each for _, _, each in captured] + measured
+    left_out = [each.text for each in LONG if each not in [outcome.command for outcome in done.measured]]
+    note = f"Left out of this run: {', '.join(left_out)}." if left_out else ""
     content = [
-        page.header(
-            "Scope on this machine", datetime.now().astimezone().strftime("%Y-%m-%d %H:%M"), facts(everything, load)
-        ),
+        page.header("Scope on this machine", done.time, done.facts),
         page.stage(len(rows), motion.image_size.tolist()),
         page.strip(pictures, captions),
         page.section("The capture above", *over_time([motion]), figures_table([motion], body)),
-        *(capture_section(name, video, each, body) for name, video, each in captured if each.status == 0),
-        *(outcome_section(each) for each in measured),
-        page.section("Commands", page.command_line("\n".join(each.command.text for each in everything))),
+        *(capture_section(folder, *each, body) for each in done.captured if each[2].status == 0),
+        *(outcome_section(each) for each in done.measured),
+        page.section(
+            "Commands", page.command_line("\n".join(each.command.text for each in done.everything)), note=note
+        ),
     ]
     return page.document("Scope on this machine", content, viewer_data([motion], body, rows, [page.person_color(0)]))
 
@@ -87,9 +107,10 @@ def other_load() -> str:
     return f"{os.getloadavg()[0]:.1f} processes on {os.cpu_count()} cores; more than a tenth of a core distorts times"
 
 
-def facts(outcomes: list[Outcome], load: str) -> dict[str, str]:
+def facts(seconds: float, load: str) -> dict[str, str]:
     """Return the facts at the head of the page.
 
+    :param seconds: of all commands.
     :param load: of the machine before the first command.
     """
     done = subprocess.run(
@@ -100,13 +121,13 @@ def facts(outcomes: list[Outcome], load: str) -> dict[str, str]:
         "Versions": versions(),
         "Revision": done.stdout.strip() or "not a checkout",
         "Load before": load,
-        "Measured in": f"{sum(each.seconds for each in outcomes) / 60:.0f} minutes",
+        "Measured in": f"{seconds / 60:.0f} minutes",
     }
 
 
-def capture_section(name: str, video: Path, outcome: Outcome, body: Body) -> page.Markup:
+def capture_section(folder: Path, name: str, video: Path, outcome: Outcome, body: Body) -> page.Markup:
     """Return the section of a captured clip: strips of footage, overlay and the view from the side, and figures."""
-    motion, report = Motion.load(FOLDER / f"{name}.npz"), outcome.figures
+    motion, report = Motion.load(folder / f"{name}.npz"), outcome.figures
     shown = {
         "Frames": f"{report['frames']} at {report['frame_rate'][0] / report['frame_rate'][1]:.6g} per second",
         "Preset": report["quality"],

@@ -44,18 +44,23 @@ class Outcome:
     status: int
 
 
+LONG = (  # what takes hours together, and is left out of a quick run
+    Command("Accuracy and speed of captures", "bench", ("perception",)),
+    Command("Rendered clips with exact truth", "bench", ("renders",)),
+    Command("Rendered scenes of many people", "bench", ("scenes",)),
+    Command("An optimizer in the manner of SMPLify", "bench", ("smplify",)),
+    Command("How well captured bodies cover the people", "bench", ("outline",)),
+    Command("Expressions and gaze on rendered faces", "bench", ("faces",)),
+)
+
+
 def commands(quick: bool) -> list[Command]:
     """Return the commands; those that need data which is not there say so themselves."""
-    brief = ("--quick",) if quick else ()
     listed = [
         Command("Accuracy and ratios of times against the record", "gate", ()),
-        Command("Speed of the solver", "bench", ("solver", *brief)),
+        Command("Speed of the solver", "bench", ("solver", *(("--quick",) if quick else ()))),
     ]
-    if not quick:
-        listed.append(Command("Accuracy and speed of captures", "bench", ("perception",)))
-        listed.append(Command("Rendered clips with exact truth", "bench", ("renders",)))
-        listed.append(Command("Rendered scenes of many people", "bench", ("scenes",)))
-    return listed
+    return listed if quick else [*listed, *LONG]
 
 
 def clips(quick: bool) -> list[tuple[str, Path]]:

@@ -7,7 +7,6 @@ import re
 from collections.abc import Sequence
 from html import escape
 from itertools import groupby
-from typing import Any
 
 import numpy as np
 
@@ -18,6 +17,10 @@ from ..perception.accuracy import SHOWN
 from .commands import Outcome
 
 BODIES = ((23, "SMPL"), (51, "SMPL+H"))  # number of joints, and whose skeleton has as many
+PAPER = (
+    "The curves of the solver's paper (figures 5 to 7) are not drawn beside these: they are not available as data, and "
+    "were not digitized."
+)
 _RULE = re.compile(r"\|(\s*:?-+:?\s*\|)+")
 
 
@@ -44,14 +47,35 @@ def with_headings(name: str) -> str:
     return " ".join(SHOWN[word][0] if word in SHOWN else word for word in name.split(" "))
 
 
-def plots(figures: dict[str, Any]) -> list[Markup]:
-    """Return plots of the figures of ``bench solver``: times and speedups of its experiments, and of whole clips."""
-    parts = []
-    for number, rows in sorted(figures.get("experiments", {}).items()):
-        parts += experiment_plots(str(number), rows)
+def plots(outcome: Outcome) -> list[Markup]:
+    """Return plots of a command's figures: of ``bench solver`` and of ``bench smplify``; of others none."""
+    figures, parts = outcome.figures, []
+    if experiments := figures.get("experiments"):
+        parts.append(Markup(f"<p>{escape(PAPER)}</p>\n"))
+        for number, rows in sorted(experiments.items()):
+            parts += experiment_plots(str(number), rows)
     if clip := figures.get("clip"):
         parts.append(clip_plot(clip))
+    if figures and outcome.command.arguments[:1] == ("smplify",):
+        parts.append(time_against_accuracy(figures))
     return parts
+
+
+def time_against_accuracy(figures: dict[str, dict[str, dict[str, float]]]) -> Markup:
+    """Return the plot of ``bench smplify``: each clip is a point of each method, its error by its time a frame."""
+    methods = dict.fromkeys(method for clip in figures.values() for method in clip)
+    curves = []
+    for n, method in enumerate(methods):
+        rows = sorted((clip[method]["ms"], clip[method]["mpjpe_root"]) for clip in figures.values() if method in clip)
+        x, y = np.array(rows, float).T
+        curves.append(Curve(x, y, page.person_color(n), method, with_points=True))
+    x = np.concatenate([curve.x for curve in curves])
+    y = np.concatenate([curve.y for curve in curves])
+    x_axis = Axis(float(x.min()) / 1.3, float(x.max()) * 1.3, logarithmic=True, unit="ms")
+    y_axis = Axis(0.0, 1.1 * float(y.max()))
+    title = "MPJPE-root in mm by milliseconds a frame, logarithmic; one point for each clip"
+    svg = line_plot(curves, x_axis, y_axis, label=title, timed=False)
+    return page.plot_figure(title, svg, {curve.name: curve.color for curve in curves})
 
 
 def clip_plot(rows: Sequence[dict[str, float]]) -> Markup:
@@ -102,7 +126,7 @@ def outcome_section(outcome: Outcome) -> Markup:
         outcome.command.title,
         page.command_line(outcome.command.text),
         *said,
-        *plots(outcome.figures),
+        *plots(outcome),
         *printed_parts(outcome.printed),
         note=f"It took {outcome.seconds:.0f} s{ended}.",
     )

@@ -54,6 +54,7 @@ def names_below(url: str, without: str = "") -> list[str]:
     """Return the names of all files below a URL, relative to it; names that would lead elsewhere are left out.
 
     :param without: URL of a folder to leave out.
+    :raises UsageError: the URL cannot be used.
     """
     file_system, root = _open(url)
     left_out = _open(without)[1] + "/" if without else ""
@@ -64,10 +65,11 @@ def names_below(url: str, without: str = "") -> list[str]:
 
 
 def mirror_footage(url: str, out: str, folder: Path) -> Path:
-    """Make a folder with an empty file for each one below a URL, from which the clips can be told by their names.
+    """Make a folder with an empty file for each one below a URL, so that clips can be chosen by their names.
 
     :param out: URL or path of the results, which are no footage.
     :raises InputError: the store cannot be read.
+    :raises UsageError: the URL cannot be used.
     """
     with store_errors(InputError, url):
         _touch(folder, names_below(url, out if is_url(out) else ""))
@@ -78,6 +80,7 @@ def mirror_results(url: str, folder: Path) -> Path:
     """Make a folder with an empty file for each result below a URL, and with the report of the previous batch.
 
     :raises OutputError: the store cannot be read.
+    :raises UsageError: the URL cannot be used.
     """
     with store_errors(OutputError, url):
         names = names_below(url)
@@ -97,7 +100,10 @@ def _touch(folder: Path, names: list[str]) -> None:
 
 
 def download(url: str, folder: Path) -> Path:
-    """Download a file, or a folder of images, into a folder, and return its path."""
+    """Download a file, or a folder of images, into a folder, and return its path.
+
+    :raises UsageError: the URL cannot be used.
+    """
     file_system, path = _open(url)
     target = folder / PurePosixPath(path).name
     if file_system.isdir(path):
@@ -113,6 +119,7 @@ def upload(file: Path, url: str) -> None:
     """Upload a file, and check its size there.
 
     :raises OSError: it has another size.
+    :raises UsageError: the URL cannot be used.
     """
     file_system, path = _open(url)
     file_system.makedirs(path.rpartition("/")[0], exist_ok=True)
@@ -123,13 +130,19 @@ def upload(file: Path, url: str) -> None:
 
 
 def read_text(url: str) -> str:
-    """Return the text of a file; empty if it does not exist."""
+    """Return the text of a file; empty if it does not exist.
+
+    :raises UsageError: the URL cannot be used.
+    """
     file_system, path = _open(url)
     return str(file_system.cat_file(path).decode()) if file_system.exists(path) else ""
 
 
 def is_folder(url: str) -> bool:
-    """Return whether there are files below a URL."""
+    """Return whether there are files below a URL.
+
+    :raises UsageError: the URL cannot be used.
+    """
     file_system, path = _open(url)
     return bool(file_system.isdir(path))
 
@@ -138,6 +151,7 @@ class RemoteStaging:
     """The attempts of a batch below a URL; see `Staging`.
 
     :raises OutputError: the store cannot be written.
+    :raises UsageError: the URL cannot be used.
     """
 
     def __init__(self, out: str) -> None:
@@ -158,6 +172,7 @@ class RemoteStaging:
         """Give the results of an attempt their final names; see `Staging.publish`. Their sizes are compared.
 
         :raises OutputError: the store cannot be written.
+        :raises UsageError: the URL cannot be used.
         """
         with store_errors(OutputError, self._out):
             file_system, root = _open(attempt)
@@ -174,6 +189,8 @@ class RemoteStaging:
         """Upload the batch's report.
 
         :raises OutputError: the store cannot be written.
+        :raises OSError: what was uploaded has another size.
+        :raises UsageError: the URL cannot be used.
         """
         with store_errors(OutputError, self._out):
             staged = f"{self.folder}/{REPORT_NAME}"

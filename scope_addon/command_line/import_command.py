@@ -36,7 +36,7 @@ def add_import(parser: argparse.ArgumentParser) -> None:
         " (default: .glb next to the motion)",
     )
     add_options(parser, Place.IMPORT)
-    parser.set_defaults(run=run_import, file_per_person=False, hands=False)
+    parser.set_defaults(run=run_import, file_per_person=False)
 
 
 def run_import(args: argparse.Namespace) -> dict[str, Any]:
@@ -55,8 +55,7 @@ def run_import(args: argparse.Namespace) -> dict[str, Any]:
     from ..smpl_import.convert import import_motion
 
     imported = import_motion(args.motion, values["body"], values["up_axis"], values["motion_rate"])
-    args.hands = imported.motion.joint_count > len(SKELETONS[24].joint_names)
-    rig = checked_rig(args, outputs)
+    rig = checked_rig(args, outputs, imported.motion.joint_count > len(SKELETONS[24].joint_names))
     written = write_outputs(outputs, [imported.motion], imported.body, args.motion, args, rig)
     for note in imported.notes:
         say(f"warning: {note}")

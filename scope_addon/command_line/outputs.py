@@ -82,9 +82,10 @@ def distinct_paths(outputs: list[Path]) -> list[Path]:
     return list(by_real_path.values())
 
 
-def checked_rig(args: argparse.Namespace, outputs: list[Path]) -> RigSource | None:
+def checked_rig(args: argparse.Namespace, outputs: list[Path], fingers: bool) -> RigSource | None:
     """Check the user's rig before the capture starts and return it; None without --retarget.
 
+    :param fingers: whether the motion has fingers.
     :raises ScopeError: the rig cannot be used, or the arguments contradict each other.
     """
     if args.retarget is None:
@@ -107,7 +108,7 @@ def checked_rig(args: argparse.Namespace, outputs: list[Path]) -> RigSource | No
     from .bounded_import import bounded_import
 
     with bounded_import(rig.path):
-        check_rig(rig, fingers=args.hands)
+        check_rig(rig, fingers=fingers)
     return rig
 
 

@@ -8,7 +8,7 @@ readings up to a frame decides how it is read,
     C_t(x) = cost_t(x) + min_y (C_{t−1}(y) + d(w_{t−1}(y), w_t(x)) + change · [x ≠ y]).
 
 The reference network answers some frames later, and its answer then counts in its own frame. Only the frame in which a
-person is found waits for it, because nothing else tells left from right there.
+person is found waits for it, because nothing else distinguishes left from right there.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class CausalLeftRight:
 
     def __call__(self, observation: Observation) -> Observation:
         """Return the observation with left and right as they are."""
-        if not observation.world_landmarks.any():  # without depth, only the whole clip tells
+        if not observation.world_landmarks.any():  # without depth, only the whole clip decides
             return observation
         if observation.acquired:
             self._frames.clear()

@@ -32,7 +32,7 @@ class NewestFrame:
     """A context in which `take` gives the newest frame.
 
     :param reconnect_s: pause before an interrupted source is opened again; 0: the capture ends there.
-    :param say: is told of interruptions, from the reading thread.
+    :param say: called with a sentence at each interruption, from the reading thread.
     :param received: gets every frame, from the reading thread, which it must not delay.
     """
 

@@ -90,7 +90,7 @@ class LiveProgress:
 
 @dataclass(frozen=True)
 class Listeners:
-    """Who is told what happens: ``say`` gets sentences, ``progress`` the state of the capture, from time to time."""
+    """Callbacks of a live capture: ``say`` gets sentences, ``progress`` the state of the capture, from time to time."""
 
     say: Callable[[str], None] = lambda _: None
     progress: Callable[[LiveProgress], None] = lambda _: None

@@ -62,7 +62,7 @@ def rig_source(
 
 
 def _check_content(path: Path, suffix: str) -> None:
-    """Check that a file is what its suffix says, and whole as far as that can be told."""
+    """Check that a file is what its suffix says, and complete as far as its structure shows."""
     with path.open("rb") as file:
         header = file.read(32)
     if suffix == ".fbx" and header.lstrip().startswith(b";"):

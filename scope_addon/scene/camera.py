@@ -176,6 +176,7 @@ def show_footage_again(camera: bpy.types.Object, motion: Motion, frames: NDArray
 
     :param frames: (T,) scene frame of each pose.
     :return: warnings as of ``show_footage``; none if the camera shows no footage, or its file is missing.
+    :raises VideoError: as of ``show_footage``.
     """
     former = next(iter(camera.data.background_images), None)
     shown = (former.clip if former.source == "MOVIE_CLIP" else former.image) if former else None

@@ -49,7 +49,10 @@ class SCOPE_OT_import_motion(ReportingOperator):
         return {"RUNNING_MODAL"}
 
     def work(self, context: bpy.types.Context) -> str:
-        """Read all files, then build them."""
+        """Read all files, then build them.
+
+        :raises UsageError: no file was chosen.
+        """
         from ..scene.animation_data.transaction import all_or_nothing
         from ..smpl_import.convert import import_motion
 

@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Pages to open in a browser, and the comparison of what it shows with the body model's own results.
 
-``compare_pages.py expect FOLDER`` writes a page about a made motion and ``expected.json``: what joints, vertices
-and silhouettes of this and of the captured sample are. ``compare_pages.py compare FOLDER`` compares what the browser
+``compare_pages.py expect FOLDER`` writes a page about a made motion, a run of ./scripts/report with made measurements,
+from which its page is written, and ``expected.json``: what joints, vertices and silhouettes of these and of the
+captured sample are. ``compare_pages.py compare FOLDER`` compares what the browser
 found: joints and vertices to 1 mm, silhouettes in the view through the capture's camera by their overlap.
 """
 
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +18,9 @@ from typing import Any
 
 import cv2
 import numpy as np
+from scope.benchmarks.page.commands import Command, Outcome
+from scope.benchmarks.page.recorded import Run, write_run
+from scope.benchmarks.report import experiment_lines, table
 from scope.scope_addon.capture.overlay.overlay_video import camera_vertices, draw_overlay
 from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.motion import Motion
@@ -24,7 +29,7 @@ from scope.solver.body import Body
 from scope.solver.loaders.body_file import load_body
 from scope.solver.rotations import exp
 
-CAPTURED, MADE = "captured.html", "made <b>&amp; 'two'.html"
+CAPTURED, MADE, REPORT = "captured.html", "made <b>&amp; 'two'.html", "report.html"
 ROWS, VERTICES = (40, 0, 77, 100), tuple(range(0, 12972, 300))
 LIMIT_MM, OVERLAP = 1.0, 0.9
 
@@ -49,7 +54,39 @@ def posed(motion: Motion, body: Body, row: int) -> tuple[np.ndarray, np.ndarray]
 def people_of(folder: Path) -> dict[str, list[Motion]]:
     """Return the motions of each page."""
     captured = Motion.load(folder / "captured.npz")
-    return {CAPTURED: [captured], MADE: made_people(captured)}
+    return {CAPTURED: [captured], MADE: made_people(captured), REPORT: [captured]}
+
+
+def made_run(report: dict[str, Any]) -> Run:
+    """Return a run of the report: the captured sample, made measurements with every kind of table and plot, a failure.
+
+    :param report: of the capture.
+    """
+    rows = [
+        {"K": K, "P": P, "N": 3 * (K + 1), "sparse": K + P, "dense": 3.0 * K * (K + P)}
+        for K in (23, 51)
+        for P in range(0, 11, 5)
+    ]
+    clip = [{"K": K, "frames": T, "linearize_ms": K / 100, "step_ms": K / 50} for K in (23, 51) for T in (75, 150, 600)]
+    methods = {"<dense> & slow": {"mpjpe_root": 120.0, "ms": 400.0}, "Scope": {"mpjpe_root": 60.0, "ms": 4.0}}
+    worse = table(("figure", "recorded", "now"), [("sample pa_mpjpe", 48.1, 60.0), ("<b>&amp;</b>", 1.0, None)])
+    return Run(
+        [("sample", SAMPLE, Outcome(Command(SAMPLE.name, "capture", (str(SAMPLE),)), "", "", report, 9.0, 0))],
+        [
+            Outcome(Command("Gate", "gate", ()), worse, "gate: pa_mpjpe is worse </script>", {}, 30.0, 1),
+            Outcome(
+                Command("Solver", "bench", ("solver", "--quick")),
+                experiment_lines(3, rows),
+                "",
+                {"experiments": {"3": rows}, "clip": clip},
+                60.0,
+                0,
+            ),
+            Outcome(Command("SMPLify", "bench", ("smplify",)), "", "", {"a": methods, "b": methods}, 60.0, 0),
+        ],
+        "2026-01-02 03:04",
+        {"Machine": "made", "Load before": "none"},
+    )
 
 
 def expect(folder: Path) -> None:
@@ -59,6 +96,9 @@ def expect(folder: Path) -> None:
     warnings = ["made.mp4 cuts to another scene at 2.0 s and at 3.5 s: </script><script>alert(1)</script>"]
     clip = CapturedClip(SAMPLE, of_page[MADE], body, report | {"people": 2, "warnings": warnings}, "made & 'two'")
     write_capture_page(folder / MADE, clip)
+    (folder / "run").mkdir(exist_ok=True)
+    shutil.copyfile(folder / "captured.npz", folder / "run" / "sample.npz")
+    write_run(folder / "run", made_run(report))
     wanted = {name: {"rows": ROWS, "people": len(people), "vertices": VERTICES} for name, people in of_page.items()}
     (folder / "expected.json").write_text(json.dumps(wanted))
 

@@ -64,7 +64,7 @@ def cached(compiled: Any) -> Any:
 
     A change of any source in its folder, or of the solver, makes it stale.
     """
-    if hasattr(compiled, "_cache"):  # not where numba is told not to compile at all
+    if hasattr(compiled, "_cache"):  # not where numba is configured not to compile at all
         compiled._cache = CodeCache(compiled.py_func)
     return compiled
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Docstrings of public functions say what a caller cannot see: shapes of arrays, and errors.
 
-The source is parsed, not imported. A function's errors are those that it raises itself; in the solver, also those of
-the functions of its module, of private methods and of the checks in validation.py that it calls. What a constructor
-takes and raises may be said by the docstring of its class.
+The source is parsed, not imported. A function's errors are those that it raises itself and those of the functions of
+its module, of private methods and, in the solver, of the checks in validation.py that it calls, unless it catches them.
+What a constructor takes and raises may be said by the docstring of its class.
 """
 
 import ast
@@ -112,46 +112,65 @@ def last_name(node: ast.expr) -> str:
     return node.id if isinstance(node, ast.Name) else node.attr if isinstance(node, ast.Attribute) else ""
 
 
+@cache
+def groups_of_errors() -> dict[str, set[str]]:
+    """What modules catch by the name of a tuple of errors at their top, such as ``_DAMAGED``."""
+    assigned = [node for tree in trees().values() for node in tree.body if isinstance(node, ast.Assign)]
+    tuples = [(node.targets[0], node.value.elts) for node in assigned if isinstance(node.value, ast.Tuple)]
+    return {name.id: set(map(last_name, kinds)) for name, kinds in tuples if isinstance(name, ast.Name)}
+
+
 def caught_by(handler: ast.ExceptHandler) -> set[str]:
     kinds = handler.type.elts if isinstance(handler.type, ast.Tuple) else [handler.type] if handler.type else []
-    return {last_name(kind) for kind in kinds}
+    names = {last_name(kind) for kind in kinds} or {"BaseException"}
+    return names.union(*(groups_of_errors().get(name, ()) for name in names))
+
+
+def is_caught(error: str, caught: frozenset[str]) -> bool:
+    return bool((with_bases(error) | {"Exception", "BaseException"}) & caught)
+
+
+Places = list[tuple[ast.Raise | ast.Call, frozenset[str]]]
 
 
 @cache
-def raised_directly(node: ast.AST, caught: frozenset[str] = frozenset()) -> set[str]:
-    """The names of the errors that statements below a node raise and do not catch."""
-    errors = set()
-    if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call):
-        name = last_name(node.exc.func)
-        errors = {name} if name[:1].isupper() and name not in INTERNAL and not with_bases(name) & caught else set()
+def raising_places(node: ast.AST, caught: frozenset[str] = frozenset()) -> Places:
+    """The statements that raise and the calls below a node, each with the errors that are caught around it."""
     if isinstance(node, ast.Try):
         inside = caught.union(*map(caught_by, node.handlers))
         rest = [*node.handlers, *node.orelse, *node.finalbody]
-        return set().union(
-            *(raised_directly(n, inside) for n in node.body), *(raised_directly(n, caught) for n in rest)
-        )
-    if isinstance(node, ast.expr):
-        return errors
-    return errors.union(*(raised_directly(child, caught) for child in ast.iter_child_nodes(node)))
+        parts = [*(raising_places(n, inside) for n in node.body), *(raising_places(n, caught) for n in rest)]
+    elif isinstance(node, ast.With):
+        calls = [item.context_expr for item in node.items if isinstance(item.context_expr, ast.Call)]
+        inside = caught.union(*(map(last_name, call.args) for call in calls if last_name(call.func) == "suppress"))
+        parts = [*(raising_places(n, caught) for n in node.items), *(raising_places(n, inside) for n in node.body)]
+    else:
+        parts = [raising_places(child, caught) for child in ast.iter_child_nodes(node)]
+    own: Places = [(node, caught)] if isinstance(node, ast.Raise | ast.Call) else []
+    return own + [place for part in parts for place in part]
 
 
 def raised(function: Function, seen: frozenset[str] = frozenset()) -> set[str]:
     """The names of the errors that a function raises, as described above."""
-    errors = set(raised_directly(function.node))
-    if not function.module.is_relative_to(SOLVER):
-        return errors
-    for node in ast.walk(function.node):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name | ast.Attribute):
-            called = last_name(node.func)
-            if called in seen:
-                continue
-            if isinstance(node.func, ast.Name):
-                others = [f for f in modules()[function.module] + modules()[CHECKS] if f.name == called]
-            else:
-                others = [f for f in modules()[function.module] if called[0] == "_" and f.name.endswith(f".{called}")]
-            for other in others:
-                errors |= raised(other, seen | {called})
+    errors = set()
+    for node, caught in raising_places(function.node):
+        found = set()
+        if isinstance(node, ast.Raise):
+            name = last_name(node.exc.func) if isinstance(node.exc, ast.Call) else ""
+            found = {name} if name[:1].isupper() and name not in INTERNAL else set()
+        elif (called := last_name(node.func)) and called not in seen:
+            found = found.union(*(raised(other, seen | {called}) for other in called_functions(function, node)))
+        errors |= {error for error in found if not is_caught(error, caught)}
     return errors
+
+
+def called_functions(function: Function, call: ast.Call) -> list[Function]:
+    """The functions of the same module, the private methods and the solver's checks that a call may mean."""
+    called, near = last_name(call.func), modules()[function.module]
+    if isinstance(call.func, ast.Attribute):
+        return [f for f in near if called[0] == "_" and f.name.endswith(f".{called}")]
+    checks = modules()[CHECKS] if function.module.is_relative_to(SOLVER) else []
+    return [f for f in near + checks if f.name == called]
 
 
 def test_the_parser_finds_shapes_and_errors() -> None:
@@ -164,6 +183,9 @@ def test_the_parser_finds_shapes_and_errors() -> None:
     assert raised(public["solver/validation:check_weight"]) == {"InvalidValueError"}
     assert raised(public["scope_addon/job/batch:Batch.__init__"]) == {"InputError", "OutputError"}
     assert raised(public["scope_addon/cli:main"]) == set()  # it prints what it catches
+    assert raised(public["scope_addon/cluster/remote:download"]) == {
+        "UsageError"
+    }  # of a private function that it calls
     assert sum(name.startswith("solver/") for name in public) > 100
     assert len(public) > 800
 

@@ -16,6 +16,7 @@ ROOT = Path(__file__).resolve().parents[2]
 TESTS = ROOT / "tests"
 PRODUCT = "scope_addon"  # left out of the path: tests/job/ holds the tests of scope_addon/job/
 OTHERS = ("solver", "tools", "benchmarks", "scripts")
+WITHOUT_TESTS = 219  # modules that no test file is named after, many tested through others; this number may only fall
 
 # Tests that belong to no single module, by path below tests/, and what they test.
 CROSS_CUTTING = {
@@ -32,6 +33,7 @@ CROSS_CUTTING = {
     "fuzz/test_kills.py": "commands, killed or refused a system call from outside",
     "fuzz/test_fuzz.py": "every reader of files and messages of others, on damaged ones",
     "scripts/test_flamenco.py": "the job type for Flamenco, a JavaScript file",
+    "test_read_only.py": "arguments of solving, editing and retargeting, which nothing may change",
     "test_required.py": "a helper of the tests",
 }
 
@@ -84,13 +86,15 @@ def test_no_listed_exception_is_stale():
         assert module_of(TESTS / name) is None, f"{name} is named after a module: take it off the list"
 
 
-def test_modules_without_tests_of_their_own_are_reported(record_property):
-    """Not a failure: some are tested through others. ``pytest --junitxml`` shows them."""
+def test_a_new_module_has_tests_of_its_own():
     tested = {module_of(path) for path in files_of_tests()}
     packages = {path.parent for path in tested if path is not None and path.name == "__init__.py"}
     without = [path for path in modules() if path not in tested and path.parent not in packages]
-    record_property("modules_without_tests", [str(path.relative_to(ROOT)) for path in without])
-    assert len(without) < len(modules())
+    names = "\n".join(str(path.relative_to(ROOT)) for path in without)
+    assert len(without) <= WITHOUT_TESTS, (
+        f"write tests for the new module among these, do not raise the number:\n{names}"
+    )
+    assert len(without) > WITHOUT_TESTS - 10, f"more modules have tests: set WITHOUT_TESTS to {len(without)}"
 
 
 @pytest.mark.parametrize(

@@ -105,7 +105,7 @@ def _fit_shape(prepared: PreparedTrack, root_cam: NDArray[np.floating[Any]] | No
     weights = replace(prepared.weights, shape=prepared.weights.shape * len(measurements))
     options = replace(ROBUST, stages=cold_stages(weights))
     priors = prepared.priors
-    if root_cam is not None and priors.shape_mean is None:  # the distance, unlike proportions, tells an unknown stature
+    if root_cam is not None and priors.shape_mean is None:  # distance determines an unknown stature, proportions do not
         priors = with_population(priors, prepared.body)
     return fit_clip(prepared.body, measurements, priors=priors, options=options)
 

@@ -28,9 +28,9 @@ WEIGHTS = Weights(
     shape=3.0,
 )
 ROBUST = Options(robust_keypoints2d=0.01, robust_keypoints3d=0.1, robust_orientation_field=1.0)
-# Where all frames of a clip are fitted together, each keypoint is also told by its neighbours in time: the image may
-# weigh more, and the lifted directions, whose errors last for many frames, less. Feet that rest stay on the floor by
-# this weight alone; with ten times as much, renders whose floor is wrong have errors larger by 4 mm.
+# Where all frames of a clip are fitted together, neighbours in time constrain each keypoint too: the image may weigh
+# more, and the lifted directions, whose errors last for many frames, less. Feet that rest stay on the floor by this
+# weight alone; with ten times as much, renders whose floor is wrong have errors larger by 4 mm.
 _CLIP_KEYPOINTS2D, _CLIP_DIRECTIONS, _CLIP_FLOOR = 2.0, 0.7, 3.0
 _RESTING_PLACE = 5e5  # 1/m²; with 1e5, feet still drift by 0.7 cm in the sample, with 1e6 other errors grow
 # Typical accelerations, rad/s², and of the root's position, m/s²: the root mean square at 30 frames per second of each

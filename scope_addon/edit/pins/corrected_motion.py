@@ -95,6 +95,7 @@ def uncorrected(motion: Motion) -> Motion:
 def with_corrections(motion: Motion, body: Body, corrections: tuple[Correction, ...]) -> Motion:
     """Return the motion with these corrections in place of those that it has.
 
+    :raises MotionFileError: the motion's corrections are damaged.
     :raises UsageError: a pin names a joint that the body does not have.
     """
     base = uncorrected(motion)
@@ -133,6 +134,7 @@ def corrected(clip: Clip, motion: Motion, body: Body) -> Clip:
     """Apply the motion's pins, contacts and upright line to another smoothing of it.
 
     :param clip: in the captured world, with its sides exchanged already.
+    :raises MotionFileError: the motion's corrections are damaged.
     """
     clip = _pinned(clip, motion, body)
     transform = upright_of(corrections_of(motion))
@@ -149,6 +151,8 @@ def before_smoothing(motion: Motion, body: Body) -> Motion:
     """Return the motion as it would have been captured with left and right as they are in the user's eyes.
 
     At the ends of an exchanged span, smoothing has mixed both sides: there, the raw motion is smoothed again.
+
+    :raises MotionFileError: the motion's corrections are damaged.
     """
     base = uncorrected(motion)
     exchanges = [c for c in corrections_of(motion) if isinstance(c, Exchange)]

@@ -58,8 +58,8 @@ def capture_live(request: LiveRequest, job_folder: Path, send: Send, commands: C
         saved = recording.save()
         warnings = save_footage(footage) if footage else []
     camera = recording.camera
-    told = {"camera": camera.source if camera else "", "fps": {"total": report["poses_per_second"]}}
-    send("result", motions=[path.name for path in saved], report={**told, "warnings": warnings})
+    facts = {"camera": camera.source if camera else "", "fps": {"total": report["poses_per_second"]}}
+    send("result", motions=[path.name for path in saved], report={**facts, "warnings": warnings})
 
 
 def save_footage(footage: Footage) -> list[str]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the parent tells a live capture while it runs: lines on the standard input."""
+"""Commands from the parent to a running live capture: lines on its standard input."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from ...errors import UsageError
 from ...options import Place
 from ..request import checked_values
 
-_KEY = '{"live": '  # begins the request, and tells it from that of a capture of footage
+_KEY = '{"live": '  # begins the request, unlike that of a capture of footage
 
 
 class LiveRequest:

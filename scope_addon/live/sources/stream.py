@@ -97,7 +97,7 @@ class StreamSource:
         import av
 
         options = {"protocol_whitelist": _PROTOCOLS, "format_whitelist": _FORMATS}
-        # Without FFmpeg's "nobuffer", which throws away what tells the format: the first key frame, too.
+        # Without FFmpeg's "nobuffer", which throws away packets that define the format: the first key frame, too.
         options |= {"flags": "low_delay", "probesize": "500000", "analyzeduration": "1000000"}
         if self._url.startswith("rtsp"):
             options["rtsp_transport"] = "tcp"

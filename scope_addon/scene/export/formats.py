@@ -21,15 +21,16 @@ from numpy.typing import NDArray
 from ...errors import OutputError
 from ..animation_data import timing
 from . import bvh
+from .completeness import is_whole_blend, is_whole_crate
 from .fbx_file import correct_fbx
 from .glb_times import corrected_key_times
-from .whole_file import is_whole_blend, is_whole_crate
 
 
 def write_glb(path: Path, camera: bool = False, take: str = "Animation") -> None:
     """Write the active scene as binary glTF: y up, metres, shape keys as morph targets, all motion in one animation.
 
     :param take: name of the animation.
+    :raises OutputError: Blender cannot write it.
     """
     enable_addon("io_scene_gltf2")
     scene = bpy.context.scene
@@ -70,6 +71,7 @@ def write_fbx(path: Path, camera: bool = False, take: str = "Take") -> None:
     """Write the active scene as FBX: y up, centimetres, objects at scale 1, no leaf bones, every frame keyed from 0 s.
 
     :param take: name of the animation.
+    :raises OutputError: Blender cannot write it.
     """
     enable_addon("io_scene_fbx")
     call_operator(
@@ -104,6 +106,7 @@ def write_usd(path: Path, camera: bool = False) -> None:
     """Write the active scene as a USD crate: z up, metres, skeleton, blend shapes, preview materials.
 
     :raises OSError: when the file is incomplete.
+    :raises OutputError: Blender cannot write it.
     """
     call_operator(
         bpy.ops.wm.usd_export,

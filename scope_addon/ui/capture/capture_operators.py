@@ -146,7 +146,7 @@ class SCOPE_OT_capture(JobOperator):
         outcome = self._advance()
         progress = ", ".join(job.progress.lines(iface_))
         shown, now_s = (job.progress.stage, progress, job.messages), time.monotonic()
-        if not self._pause_s:  # the first step after a drawing: its delay tells how long Blender drew
+        if not self._pause_s:  # the first step after a drawing: its delay is the drawing's
             delay_s = now_s - self._drawn_s
             self._pause_s = 5.0 * delay_s if delay_s > 1.5 * self.timer_s else DRAWN_EVERY_S
         is_due = shown[0] != self._shown[0] or now_s - self._drawn_s >= self._pause_s

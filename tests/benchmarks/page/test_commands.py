@@ -9,6 +9,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from scope.benchmarks.__main__ import ELSEWHERE
 from scope.benchmarks.page import commands
 from scope.benchmarks.page.commands import SCRIPTS, Command, run, run_capture
 
@@ -21,6 +22,12 @@ def test_every_command_is_a_script(quick):
         assert (ROOT / "scripts" / command.script).is_file()
         assert f"-m {SCRIPTS[command.script]}" in (ROOT / "scripts" / command.script).read_text()
         assert ("--quick" in command.arguments) == (quick and command.script == "bench")
+
+
+def test_a_full_run_measures_every_benchmark_but_those_of_blender_and_many_machines():
+    run = {command.arguments[0] for command in commands.commands(quick=False) if command.script == "bench"}
+    assert {"solver", *ELSEWHERE} - run == {"choices", "blender", "cluster"}
+    assert run <= {"solver", *ELSEWHERE}
 
 
 def test_figures_are_those_of_this_run_alone(tmp_path, monkeypatch):

@@ -9,7 +9,7 @@ import re
 import pytest
 from scope.benchmarks import report
 from scope.benchmarks.page.commands import Command, Outcome
-from scope.benchmarks.page.content import experiment_plots, outcome_section, printed_parts
+from scope.benchmarks.page.content import experiment_plots, outcome_section, printed_parts, time_against_accuracy
 
 
 def cells(markup: str) -> list[list[str]]:
@@ -42,6 +42,29 @@ def test_experiments_are_plotted_where_their_values_are():
 def test_keys_of_the_evaluation_get_their_headings():
     (table,) = printed_parts(report.table(("figure", "now"), [("sample pa_mpjpe", 48.1)]))
     assert cells(table)[1] == ["sample PA-MPJPE mm", "48.1"]
+
+
+def test_time_and_accuracy_of_a_method_are_a_point_for_each_clip():
+    figures = {
+        "cam1": {"dense": {"mpjpe_root": 100.0, "ms": 400.0}, "Scope": {"mpjpe_root": 50.0, "ms": 4.0}},
+        "cam2": {"dense": {"mpjpe_root": 50.0, "ms": 40.0}, "Scope": {"mpjpe_root": 25.0, "ms": 4.0}},
+    }
+    drawn = time_against_accuracy(figures)
+    (dense, scope) = re.findall(r'class="points" d="([^"]*)"', drawn)
+    low, high = math.log(4.0 / 1.3), math.log(400.0 * 1.3)
+
+    def at(ms: float) -> float:
+        return 1000 * (math.log(ms) - low) / (high - low)
+
+    def points(path: str) -> list[float]:
+        return [float(number) for number in re.findall(r"[\d.]+(?= |h)", path)]
+
+    height = 100 / 110  # the axis ends 10 % above the largest error
+    expected = [at(40), 100 - 50 * height, at(400), 100 - 100 * height]
+    assert points(dense) == pytest.approx(expected, abs=0.06)
+    assert points(scope) == pytest.approx([at(4), 100 - 25 * height, at(4), 100 - 50 * height], abs=0.06)
+    outcome = Outcome(Command("SMPLify", "bench", ("smplify",)), "", "", figures, 1.0, 0)
+    assert drawn in outcome_section(outcome)
 
 
 def test_a_command_that_failed_says_so():

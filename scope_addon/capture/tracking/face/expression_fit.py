@@ -83,6 +83,7 @@ def fitted(rows: NDArray[np.floating[Any]], times: NDArray[np.float64]) -> NDArr
 
     :param rows: (T, RECORD) see `face_record`.
     :param times: (T,) seconds.
+    :raises ModelFileError: the response of the landmarks is missing or damaged.
     """
     seen = np.flatnonzero(rows[:, 0] > 0)
     if not is_known(len(seen), float(np.diff(times, prepend=times[:1])[seen].sum())):

@@ -21,7 +21,7 @@ class MaskSchedule:
     """Adds masks to the observations of every n-th frame.
 
     When there are enough, n doubles: a clip of unknown length has hardly more masks than one of known length. The
-    tracker is told beforehand which frame is due (`upcoming_is_due`), since its own run of the network gives masks at
+    tracker knows beforehand which frame is due (`upcoming_is_due`), since its own run of the network gives masks at
     a quarter of the cost of another one; only people whom it was not following take that other run.
 
     :param network: None: no frame has masks.

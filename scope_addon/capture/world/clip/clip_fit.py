@@ -5,7 +5,7 @@
 
 with the terms E_f of single frames, their shape fixed, accelerations a, and velocities v of the soles and palms that
 rest with probability p (`solver.fit_motion`). A keypoint that jumps for one frame loses against its neighbours, a limb
-seen in one frame tells where it was in the next, feet that stand stay where they are (in a second fit, at the place
+that is hidden for some frames moves on smoothly, feet that stand stay where they are (in a second fit, at the place
 that the first one found), and no filter follows.
 Long clips are fitted in windows of consecutive frames. Where two windows overlap, their motions are blended.
 """

@@ -31,9 +31,9 @@ _STEPS = 8  # of a trial, after which a better pose costs less already
 _BONES = (True, False), (False, True), (True, True)  # whether the upper and the lower bone of a limb are mirrored
 
 
-@dataclass
+@dataclass(frozen=True)
 class _Motion:
-    """The best motion so far: states, and rotations (n, K+1, 3, 3) and joints (n, K+1, 3) of the parts."""
+    """A motion: states, and rotations (n, K+1, 3, 3) and joints (n, K+1, 3) of the parts."""
 
     states: list[State]
     R: NDArray[np.float64]
@@ -46,7 +46,7 @@ def search_limbs(body: Body, window: ClipWindow, found: MotionFit, prior: Motion
     :param found: the fit of all frames of the window.
     :param prior: what couples the frames that are fitted again.
     """
-    motion, improved = _Motion(list(found.states), found.R_world_part.copy(), found.t_world_part.copy()), False
+    motion = given = _Motion(list(found.states), found.R_world_part, found.t_world_part)
     times = window.times
     for names in LIMBS:
         first, second, last = (body.joint_names.index(name) for name in names)
@@ -59,8 +59,8 @@ def search_limbs(body: Body, window: ClipWindow, found: MotionFit, prior: Motion
                     continue
                 other = _mirrored(body, motion, window.center, rows, limb, upper, lower)
                 if _may_be_better(window, motion.states, other, limb, _some_deep(depths, rows)):
-                    improved |= _try(window, motion, rows, other, prior)
-    return motion.states if improved else None
+                    motion = _better(window, motion, rows, other, prior)
+    return None if motion is given else motion.states
 
 
 def _mirrored(
@@ -104,13 +104,13 @@ def _may_be_better(
     return float(np.mean(added)) < _MOST_COST and max(added) < _MOST_COST_OF_ONE
 
 
-def _try(window: ClipWindow, motion: _Motion, rows: slice, other: list[State], prior: MotionPrior) -> bool:
-    """Keep the mirrored limb in the motion if the frames around cost less with it."""
+def _better(window: ClipWindow, motion: _Motion, rows: slice, other: list[State], prior: MotionPrior) -> _Motion:
+    """Return the motion with the mirrored limb of ``other`` if the frames around cost less with it, or as it is."""
     around = slice(max(rows.start - _MARGIN, 0), min(rows.stop + _MARGIN, len(other)))
     now = window.fit(around, motion.states[around], prior, steps=_STEPS)
     then = window.fit(around, other[around], prior, steps=_STEPS)
     if not now.cost - then.cost > _LEAST_GAIN:
-        return False
-    motion.states[around] = then.states
-    motion.R[around], motion.joints[around] = then.R_world_part, then.t_world_part
-    return True
+        return motion
+    states, R, joints = list(motion.states), motion.R.copy(), motion.joints.copy()
+    states[around], R[around], joints[around] = then.states, then.R_world_part, then.t_world_part
+    return _Motion(states, R, joints)

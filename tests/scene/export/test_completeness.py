@@ -3,8 +3,8 @@
 
 import bpy
 import pytest
+from scope.scope_addon.scene.export.completeness import is_whole_blend, is_whole_crate
 from scope.scope_addon.scene.export.export import export_motions
-from scope.scope_addon.scene.export.whole_file import is_whole_blend, is_whole_crate
 
 CHECKS = {".blend": is_whole_blend, ".usdc": is_whole_crate}
 

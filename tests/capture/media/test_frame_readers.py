@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The decoder: upright images with square pixels, how long a video is shown, and skipping."""
+
+from __future__ import annotations
+
+import sys
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.media.frame_readers import open_reader, presented_duration_s, upright
+from scope.scope_addon.errors import VideoError
+
+from .made_video import with_time_table, write_video
+
+COUNT, FPS = 24, 12.0
+
+
+@pytest.fixture(scope="module")
+def video(tmp_path_factory):
+    """Frames that become lighter by 10 grey levels each."""
+    path = tmp_path_factory.mktemp("readers") / "grey.mp4"
+    return write_video(path, [np.full((32, 48, 3), 10 * k, np.uint8) for k in range(COUNT)], FPS)
+
+
+def test_images_are_turned_clockwise_after_their_pixels_have_become_square():
+    image = np.zeros((2, 4, 3), np.uint8)
+    image[0, :2] = 255  # top left
+    assert upright(Path("a"), image, 1.0, 0).tolist() == image.tolist()
+    turned = upright(Path("a"), image, 1.0, 90)
+    assert turned.shape == (4, 2, 3)
+    assert turned[:, :, 0].tolist() == [[0, 255], [0, 255], [0, 0], [0, 0]]  # top right
+    assert upright(Path("a"), image, 1.0, -90).tolist() == turned[::-1, ::-1].tolist()
+    assert upright(Path("a"), image, 1.0, 180).tolist() == image[::-1, ::-1].tolist()
+    assert upright(Path("a"), image, 2.0, 270).shape == (8, 2, 3)
+    assert upright(Path("a"), image, 0.5, 0).shape == (4, 4, 3)
+
+
+def test_the_duration_is_that_of_the_time_table(tmp_path, video):
+    assert presented_duration_s(video) == pytest.approx(COUNT / FPS)
+    slow = tmp_path / "slow.mp4"
+    slow.write_bytes(video.read_bytes())
+    with_time_table(slow, 100, [(COUNT, 50)])
+    assert presented_duration_s(slow) == pytest.approx(COUNT * 0.5)
+    slow.write_bytes(b"no video")
+    assert presented_duration_s(slow) is None
+
+
+@pytest.mark.parametrize("index", [0, 7, COUNT - 1])
+def test_the_frame_after_skipping_is_the_one_at_that_time(video, index):
+    reader = open_reader(video)
+    try:
+        assert reader.skip_to(index / FPS, Fraction(12)) == index
+        time, image = reader.read()
+        assert time == pytest.approx(index / FPS)
+        assert abs(float(image.mean()) - 10 * index) < 3  # lossy, and of the range of video
+    finally:
+        reader.close()
+
+
+def test_skipping_past_the_end_gives_the_number_of_frames(video):
+    reader = open_reader(video)
+    try:
+        assert reader.skip_to(100.0, Fraction(12)) == COUNT
+        assert reader.read() is None
+    finally:
+        reader.close()
+
+
+def test_without_the_decoder_a_video_is_refused_and_its_duration_unknown(video, monkeypatch):
+    monkeypatch.setitem(sys.modules, "av", None)
+    with pytest.raises(VideoError, match=r"grey\.mp4 is a video.*package 'av' that is not installed"):
+        open_reader(video)
+    assert presented_duration_s(video) is None

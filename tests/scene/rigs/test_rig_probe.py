@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How bones of a small armature move together, with and without constraints that its hierarchy does not show."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from scope.scope_addon.scene.rigs.rig_probe import at_rest, probe
+from scope.solver.errors import InputError
+
+HEADS = {  # of bones that point up by 0.2 m
+    "hips": (0, 0, 0.9),
+    "spine": (0, 0, 1.2),
+    "head": (0, 0, 1.5),
+    "prop": (0.5, 0, 1.0),
+}
+PARENTS = {"spine": "hips", "head": "spine"}
+PARTS = {"head": "head", "spine": "spine1", "hips": "pelvis", "prop": "left_hand"}
+
+
+@pytest.fixture
+def rig():
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    armature = bpy.data.armatures.new("rig")
+    obj = bpy.data.objects.new("rig", armature)
+    bpy.context.scene.collection.objects.link(obj)
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.mode_set(mode="EDIT")
+    for name, head in HEADS.items():
+        bone = armature.edit_bones.new(name)
+        bone.head, bone.tail = head, (head[0], head[1], head[2] + 0.2)
+    for name, parent in PARENTS.items():
+        armature.edit_bones[name].parent = armature.edit_bones[parent]
+    bpy.ops.object.mode_set(mode="OBJECT")
+    return obj
+
+
+def parents(skeleton) -> dict[str, str | None]:
+    return {
+        name: skeleton.names[parent] if parent >= 0 else None
+        for name, parent in zip(skeleton.names, skeleton.parents.tolist(), strict=True)
+    }
+
+
+def test_parents_come_before_their_children_and_places_are_those_at_rest(rig):
+    with at_rest(rig):
+        skeleton = probe(rig, PARTS)
+    assert parents(skeleton) == {"hips": None, "spine": "hips", "head": "spine", "prop": None}
+    assert skeleton.names.index("hips") < skeleton.names.index("spine") < skeleton.names.index("head")
+    np.testing.assert_allclose(skeleton.heads, [HEADS[name] for name in skeleton.names], atol=1e-6)
+    assert all(np.allclose(rig.pose.bones[name].matrix_basis, np.eye(4)) for name in HEADS)
+
+
+def test_a_bone_that_a_constraint_makes_follow_another_is_its_child(rig):
+    child_of = rig.pose.bones["prop"].constraints.new("CHILD_OF")
+    child_of.target, child_of.subtarget = rig, "spine"
+    child_of.inverse_matrix = (rig.matrix_world @ rig.pose.bones["spine"].matrix).inverted()
+    with at_rest(rig):
+        assert parents(probe(rig, PARTS))["prop"] == "spine"
+
+
+def test_a_bone_that_does_not_turn_is_named(rig):
+    limit = rig.pose.bones["head"].constraints.new("LIMIT_ROTATION")
+    limit.use_limit_x = limit.use_limit_y = limit.use_limit_z = True
+    with at_rest(rig), pytest.raises(InputError, match="'head' of 'rig' does not move when it is rotated"):
+        probe(rig, PARTS)
+
+
+def test_a_pelvis_that_cannot_be_moved_is_refused(rig):
+    limit = rig.pose.bones["hips"].constraints.new("LIMIT_LOCATION")
+    for axis in "xyz":
+        for side in ("min", "max"):
+            setattr(limit, f"use_{side}_{axis}", True)
+    limit.owner_space = "LOCAL"
+    with at_rest(rig), pytest.raises(InputError, match="'hips'"):
+        probe(rig, PARTS)
+
+
+def test_a_rig_without_size_is_refused(rig):
+    rig.scale = (0, 0, 0)
+    bpy.context.view_layer.update()
+    with at_rest(rig), pytest.raises(InputError, match="'rig' is scaled to 0"):
+        probe(rig, PARTS)
