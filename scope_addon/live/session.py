@@ -46,8 +46,8 @@ def start_at_once(function: Callable[..., Calibration], *args: object) -> Future
 def following_s(known_s: float) -> float:
     """Return the time constant with which a settled world follows its estimates.
 
-    With the weight 1 / t, the world is the mean of all estimates. These come from frames that were fitted to the floor
-    as it was: a bias b of theirs moves that mean by b ln(t), without end. From c = `CERTAIN_S` on, the weight is c / t²,
+    With the weight 1 / t, the world is the mean of all estimates. They come from frames that were fitted to the floor
+    as it was: a bias b of theirs moves that mean by b ln(t), without end. After c = `CERTAIN_S`, the weight is c / t²,
     and the world moves by b once more.
 
     :param known_s: for how long there have been estimates.
@@ -101,6 +101,8 @@ class LiveSession:
     def step(self, frame: Frame, observation: Observation | None) -> LivePose:
         """Return the pose in the next frame, in which the person was observed, or not."""
         observation = None if observation is None else self._left_right(observation)
+        if frame.timestamp_s - self._last_s > STANDS_S:  # the computer slept, or the source was interrupted
+            self._first_s += frame.timestamp_s - self._last_s
         fitted = self._fit_person(frame, observation) if observation is not None else None
         self._settle(frame.timestamp_s)
         self._last_s = frame.timestamp_s
@@ -158,7 +160,7 @@ class LiveSession:
             self._target, self._pending = self._pending.result(), None
         if self._pending is None:
             self._start_estimate(time_s)
-        step_s = max(time_s - self._last_s, 0.0) if np.isfinite(self._last_s) else 0.0
+        step_s = float(np.clip(time_s - self._last_s, 0.0, HOLD_S)) if np.isfinite(self._last_s) else 0.0
         early = 1 - np.exp(-step_s / SETTLING_S)
         late = early if not self.is_settled(time_s) else 1 - np.exp(-step_s / following_s(time_s - self._first_s))
         before = self._current

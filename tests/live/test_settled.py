@@ -16,6 +16,7 @@ from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker
 from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.live.people import LivePeople
+from scope.scope_addon.live.pose import Presence
 from scope.scope_addon.live.session import CALIBRATED_S, CERTAIN_S, SETTLING_S, following_s
 
 RATE = 15.0
@@ -37,11 +38,12 @@ def played(body, networks):
     for k, row in enumerate(order):
         poses.append(people.step(Frame(k, k / RATE, images[row]))[0])
         focal.append(people.sessions[0].camera.intrinsics[0, 0])
-    return poses, np.array(focal), 2 * np.array(order)
+    at = iter([*order, *order])
+    return poses, np.array(focal), 2 * np.array(order), people
 
 
 def test_the_estimates_settle_when_they_are_said_to_and_stay(played):
-    poses, focal, _ = played
+    poses, focal, _, _ = played
     settled = np.array([pose.is_settled for pose in poses])
     first = int(settled.argmax())
     assert settled[first:].all()
@@ -56,7 +58,7 @@ def test_the_estimates_settle_when_they_are_said_to_and_stay(played):
 
 
 def test_feet_that_stand_by_the_ground_truth_do_not_slide(played):
-    poses, _, frames = played
+    poses, _, frames, _ = played
     with np.load(SAMPLE.with_name("sample_truth.npz")) as truth:
         stands = truth["standing"][frames]
     settled = np.array([pose.is_settled for pose in poses])
@@ -70,6 +72,20 @@ def test_feet_that_stand_by_the_ground_truth_do_not_slide(played):
                 slides.append(np.linalg.norm(shown - np.median(shown, axis=0), axis=1).max())
     assert len(slides) >= 3
     assert np.mean(slides) < 0.02
+
+
+def test_after_an_hour_of_sleep_the_body_is_where_it_was(body, played):
+    """The clock leaps by an hour, and the first frame after it shows the same as the last one before."""
+    poses, _, _, people = played
+    last, size = poses[-1], (480, 640, 3)
+    awake = [people.step(Frame(200 + k, 3600 + (200 + k) / RATE, np.zeros(size, np.uint8)))[0] for k in range(12)]
+    assert all(pose.presence is Presence.SEEN and pose.is_settled for pose in awake)
+    T = np.array([pose.T_world_camera for pose in (last, *awake)])
+    assert np.abs(np.diff(T, axis=0)).max() < 0.002
+    joints = np.array([pose.joints for pose in awake])
+    assert np.linalg.norm(joints[0] - last.joints, axis=1).max() < 0.05
+    assert np.linalg.norm(np.diff(joints[:, 0], axis=0), axis=-1).max() < 0.03  # nor does it move abruptly then
+    np.testing.assert_allclose(awake[-1].betas, last.betas, atol=0.01)
 
 
 def test_a_world_that_has_settled_can_be_mended_and_cannot_walk():
