@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -62,14 +63,12 @@ def take() -> dict:
     action = person.animation_data.action
     curves = action.fcurves
     bone = 'pose.bones["left_hip"].rotation_quaternion'
-    packed = person["scope_motion"]
     return {
         "range": tuple(action.frame_range),
         "curves": len(curves),
         "keys": sum(len(curve.keyframe_points) for curve in curves),
         "left_hip": [round(point.co[1], 5) for point in curves.find(bone, index=1).keyframe_points],
-        "packed": {name: packed[name] for name in packed.keys() if isinstance(packed[name], str | int | float)},
-        "texts": {text.name: len(text.as_string()) for text in bpy.data.texts},
+        "packed": hashlib.sha256(person["scope_motion"]["motion"]).hexdigest(),
     }
 
 
@@ -78,7 +77,6 @@ def kept_take() -> Iterator[float]:
     bpy.ops.wm.save_as_mainfile(filepath=str(TAKE))
     before = take()
     assert before["keys"] > 24 * 2, before
-    assert before["texts"], "the captured motion is not in the file"
     bpy.ops.wm.open_mainfile(filepath=str(TAKE))
     yield 1.0
     after = take()
