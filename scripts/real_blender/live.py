@@ -7,6 +7,8 @@ Usage: ``blender --python live.py -- VIDEO OUT_FOLDER``
 from __future__ import annotations
 
 import json
+import os
+import signal
 import subprocess
 import sys
 import time
@@ -131,6 +133,19 @@ def interrupted(server: subprocess.Popen) -> Iterator[float]:
     picture("22_live_interrupted")
 
 
+def slept() -> Iterator[float]:
+    """Stop the process for eight seconds, as a computer that sleeps does: a sentence, and the body follows again."""
+    worker = state().job.worker
+    os.kill(worker.pid, signal.SIGSTOP)
+    yield 8.0
+    assert state().job.quiet_s > 0, "the panel does not say that nothing comes"
+    os.kill(worker.pid, signal.SIGCONT)
+    yield from until(lambda: state().job.status.notice, 15, "a sentence about the pause")
+    report["slept"] = state().job.status.notice
+    yield from until(lambda: not state().job.status.notice, 15, "the poses after it")
+    yield from moving()
+
+
 def cancelled(before: dict) -> Iterator[float]:
     """Press Escape over the panel."""
     worker = state().job.worker
@@ -221,6 +236,7 @@ def steps() -> Iterator[float]:
     server = camera()
     yield from until(lambda: not state().job.status.notice, 15, "the camera to come back")
     yield from moving()
+    yield from slept()
     yield from cancelled(before)
     yield from recorded()
     yield from kept_take()

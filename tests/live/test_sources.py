@@ -2,6 +2,7 @@
 """Files in real time, streams from a server made here, and what cannot be opened."""
 
 import sys
+import threading
 from itertools import islice
 
 import numpy as np
@@ -57,6 +58,16 @@ def test_a_stream_is_read_and_after_its_end_read_again(pictures):
     assert all(b.timestamp_s > a.timestamp_s for a, b in zip(taken, taken[1:], strict=False))
     assert said
     assert said[0].endswith("connecting again in 0.05 s")
+
+
+def test_the_end_of_a_capture_closes_the_connection(pictures):
+    """Before the reader itself is left: a recording is written only then."""
+    left, clock = threading.Event(), Clock()
+    with mjpeg_server(pictures, rounds=10_000, left=left) as address:
+        with NewestFrame(open_source(address), clock, reconnect_s=0.05) as reader:
+            assert reader.take() is not None
+            clock.stopped.set()
+            assert left.wait(30)
 
 
 def test_a_stream_s_rotation_and_pixel_aspect_are_applied(tmp_path):

@@ -50,8 +50,8 @@ def test_only_frames_in_which_both_are_valid_count(walking: Motion) -> None:
 
 def test_a_hand_that_is_elsewhere_and_twice_the_jitter(body: Body, walking: Motion) -> None:
     """All joints but the pelvis are off by 3 cm; dropped frames are far off, and do not count."""
-    off = walking.joints_cam + np.float32([0.03, 0, 0])
-    off[:, 0] -= np.float32([0.03, 0, 0])
+    off = walking.joints_cam + np.array([0.03, 0, 0], np.float32)
+    off[:, 0] -= np.array([0.03, 0, 0], np.float32)
     off[5] += np.arange(body.K + 1, dtype=np.float32)[:, None]
     found = compared(replace(walking, joints_cam=off, valid=walking.frames != 5), walking, body)
     assert found["frames"] == 11
