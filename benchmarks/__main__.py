@@ -29,7 +29,9 @@ ELSEWHERE = {  # imported where they are wanted: some need packages that others 
     "faces": (".perception.face_conditions", "faces_and_conditions"),
     "blender": (".blender", "blender"),
     "cluster": (".cluster", "cluster"),
+    "live": (".live.live", "live"),
 }
+LIVE_PARTS = ("rate", "offline", "world", "hour")
 
 
 def solver(quick: bool) -> dict[str, Any]:
@@ -91,12 +93,20 @@ def main() -> int:
     parser.add_argument("what", choices=["solver", *ELSEWHERE])
     parser.add_argument("--quick", action="store_true", help="fewer repetitions, the default preset alone")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures as JSON")
+    alone = parser.add_argument_group("live alone")
+    alone.add_argument("--part", action="append", choices=LIVE_PARTS, help="what to measure; default: rate and offline")
+    alone.add_argument(
+        "--minutes", type=float, default=60.0, help="of footage for the parts world and hour; default: 60"
+    )
     args = parser.parse_args()
+    if args.part and args.what != "live":
+        parser.error("--part is for live alone")
     if args.what == "solver":
         figures = solver(args.quick)
     else:
         module, function = ELSEWHERE[args.what]
-        figures = getattr(import_module(module, __package__), function)(args.quick)
+        more = {"parts": args.part or (), "minutes": args.minutes} if args.what == "live" else {}
+        figures = getattr(import_module(module, __package__), function)(args.quick, **more)
     if args.json:
         with atomic_path(args.json) as temporary:
             temporary.write_text(json.dumps(figures, indent=1))

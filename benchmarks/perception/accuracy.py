@@ -63,12 +63,17 @@ def evaluate_clip(body: Body, video: Path, truth: Path, options: CaptureOptions)
     :raises NoPersonError: when nobody was found.
     """
     motion = capture(video, body, options).motions[0]
+    return motion, evaluate_motion(motion, truth)
+
+
+def evaluate_motion(motion: Motion, truth: Path) -> dict[str, Any]:
+    """Return all figures of the evaluation tool for a motion."""
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # of means of no values, in the tool
         result = Path(folder) / "result.npz"
         motion.save(result)
         figures = _tool().evaluate(str(truth), str(result))
-    return motion, figures | {"flipped": max(figures[key] for key in FLIPS)}
+    return figures | {"flipped": max(figures[key] for key in FLIPS)}
 
 
 def evaluate_all(body: Body, options: Callable[[str], CaptureOptions]) -> dict[str, dict[str, Any]]:

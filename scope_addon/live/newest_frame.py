@@ -55,6 +55,7 @@ class NewestFrame:
         self._size: tuple[int, int] | None = None  # of the pictures that are given
         self._last_image: NDArray[Any] | None = None  # as it came
         self._changed_s, self._is_frozen = 0.0, False  # when it last differed from the one before
+        self._arrived_s = 0.0  # of the last one
         self.received = self.dropped = 0
         self._thread = threading.Thread(target=self._run, name="scope-live-source", daemon=True)
 
@@ -131,6 +132,9 @@ class NewestFrame:
                 self._began_s = 0.0 if self._source.ends else picture.timestamp_s
         index = self._first_index + picture.index
         time_s = max(picture.timestamp_s - self._began_s, self._last_s + 1e-3 if self.received else 0.0)
+        if self.received and not is_first:
+            self._say_pause(picture.arrived_s - self._arrived_s)
+        self._arrived_s = picture.arrived_s
         self._watch(picture)
         picture = replace(picture, index=index, timestamp_s=time_s, image_rgb=self._in_first_size(picture.image_rgb))
         self._received(picture)
@@ -140,6 +144,14 @@ class NewestFrame:
             self._newest = picture
             self._next_index, self._last_s = index + 1, time_s
             self._changed.notify_all()
+
+    def _say_pause(self, seconds: float) -> None:
+        """Say that nothing came for a while, if the source itself has not noticed: maybe the computer slept."""
+        if seconds > STALLED_S:
+            self._changed_s += seconds
+            self._say(
+                f"nothing came from {self._source.name} for {seconds:.0f} s, as when a computer sleeps; it goes on"
+            )
 
     def _watch(self, picture: Picture) -> None:
         """Say that a source shows the same picture again and again, as servers do that have lost their camera."""

@@ -29,6 +29,7 @@ CALIBRATED_S = 2.0  # after the person was first seen
 CALIBRATE_AT_S = (0.0, 0.3, 0.7, 1.2, CALIBRATED_S)
 FOLLOW_S, FOLLOWED_S = 1.0, 4.0  # between two estimates of the world afterwards, and how much each of them sees
 SETTLING_S, FOLLOWING_S = 0.3, 10.0  # time constants towards the estimates, the second at least
+CERTAIN_S = 60.0  # for which the world has been known when it has moved almost for the last time
 HOLD_S = 0.5  # for which the pose of a person who is not seen is held, rather than lost
 STANDS_S = 2.0  # for which somebody who stood on the floor and is not seen is still not below it
 
@@ -40,6 +41,18 @@ def start_at_once(function: Callable[..., Calibration], *args: object) -> Future
     future: Future[Calibration] = Future()
     future.set_result(function(*args))
     return future
+
+
+def following_s(known_s: float) -> float:
+    """Return the time constant with which a settled world follows its estimates.
+
+    With the weight 1 / t, the world is the mean of all estimates. They come from frames that were fitted to the floor
+    as it was: a bias b of theirs moves that mean by b ln(t), without end. After c = `CERTAIN_S`, the weight is c / t²,
+    and the world moves by b once more.
+
+    :param known_s: for how long there have been estimates.
+    """
+    return max(FOLLOWING_S, known_s, known_s**2 / CERTAIN_S)
 
 
 @dataclass(frozen=True)
@@ -88,6 +101,8 @@ class LiveSession:
     def step(self, frame: Frame, observation: Observation | None) -> LivePose:
         """Return the pose in the next frame, in which the person was observed, or not."""
         observation = None if observation is None else self._left_right(observation)
+        if frame.timestamp_s - self._last_s > STANDS_S:  # the computer slept, or the source was interrupted
+            self._first_s += frame.timestamp_s - self._last_s
         fitted = self._fit_person(frame, observation) if observation is not None else None
         self._settle(frame.timestamp_s)
         self._last_s = frame.timestamp_s
@@ -145,11 +160,9 @@ class LiveSession:
             self._target, self._pending = self._pending.result(), None
         if self._pending is None:
             self._start_estimate(time_s)
-        step_s = max(time_s - self._last_s, 0.0) if np.isfinite(self._last_s) else 0.0
+        step_s = float(np.clip(time_s - self._last_s, 0.0, HOLD_S)) if np.isfinite(self._last_s) else 0.0
         early = 1 - np.exp(-step_s / SETTLING_S)
-        # The longer the world has been known, the less a new estimate moves it.
-        following_s = max(FOLLOWING_S, time_s - self._first_s)
-        late = early if not self.is_settled(time_s) else 1 - np.exp(-step_s / following_s)
+        late = early if not self.is_settled(time_s) else 1 - np.exp(-step_s / following_s(time_s - self._first_s))
         before = self._current
         self._current = self._in_leaders_world(before.towards(self._target, float(early), float(late)))
         if self._current.camera is not before.camera:
@@ -176,7 +189,10 @@ class LiveSession:
         elif time_s >= self._next_follow_s and self._leader is None:
             self._next_follow_s = time_s + FOLLOW_S
             track, fitted = track_of(times, observations), self._fitted_track()
-            self._pending = self._start(self._calibrator.follow, self._target, track, fitted)
+            known, now = self._target, self._current
+            if self.is_settled(time_s) and now is not None:  # estimates that agree with the world as it is leave it so
+                known = replace(known, up=now.up, camera_position=now.camera_position)
+            self._pending = self._start(self._calibrator.follow, known, track, fitted)
 
     def _fitted_track(self) -> FittedTrack:
         assert self._current is not None

@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Close Blender, or let it crash, while it captures: ``closed.py -- VIDEO OUT_FOLDER quit|crash``."""
+"""Close Blender, or let it crash, while it captures: ``closed.py -- VIDEO OUT_FOLDER quit|crash [STREAM]``.
+
+With the address of a stream, it captures that live. The file closed_HOW in OUT_FOLDER says what it did, and the file
+ended_HOW when that ended (seconds of the system's monotonic clock).
+"""
 
 from __future__ import annotations
 
 import os
 import signal
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,15 +20,34 @@ sys.path.insert(0, str(Path(__file__).parent))
 from session import ARGUMENTS, FOOTAGE, OUT, addon, invoke, run, until, use
 
 
-def steps() -> Iterator[float]:
-    """Run the session; yield the seconds to wait before each next step."""
-    yield 0.5
+def footage() -> Iterator[float]:
+    """Capture the footage, up to the middle; return what it does."""
     bpy.context.scene.scope.quality = "FAST"
     bpy.ops.scope.choose_footage(filepath=FOOTAGE)
     use(bpy.ops.scope.capture, "INVOKE_DEFAULT")
     yield from until(lambda: addon().state.job is None or addon().state.job.progress.done > 5, 300, "the worker")
-    (OUT / f"closed_{ARGUMENTS[2]}").write_text("capturing" if addon().state.job else addon().state.message)
-    if ARGUMENTS[2] == "crash":
+    return "capturing" if addon().state.job else addon().state.message
+
+
+def stream(address: str) -> Iterator[float]:
+    """Capture a stream live, until the body follows; return what it does."""
+    bpy.context.preferences.system.use_online_access = True
+    settings = bpy.context.scene.scope_live
+    settings.source, settings.stream = "STREAM", address
+    use(bpy.ops.scope.live, "INVOKE_DEFAULT")
+    state = sys.modules[addon().__name__.replace("capture.capture_operators", "live.live_state")].state
+    yield from until(lambda: state.job is None or state.job.has_body, 300, "the first pose")
+    return "capturing" if state.job else state.message
+
+
+def steps() -> Iterator[float]:
+    """Run the session; yield the seconds to wait before each next step."""
+    how, *address = ARGUMENTS[2:]
+    yield 0.5
+    does = yield from (stream(*address) if address else footage())
+    (OUT / f"closed_{how}").write_text(does)
+    (OUT / f"ended_{how}").write_text(str(time.monotonic()))
+    if how == "crash":
         os.kill(os.getpid(), signal.SIGKILL)
     invoke(bpy.ops.wm.quit_blender)
     yield 60.0

@@ -7,6 +7,8 @@ Usage: ``blender --python live.py -- VIDEO OUT_FOLDER``
 from __future__ import annotations
 
 import json
+import os
+import signal
 import subprocess
 import sys
 import time
@@ -17,61 +19,24 @@ import bpy
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-from session import OUT, addon, inventory, invoke, key, picture, run, show_tab, until, use, viewport
+from live_session import (
+    ADDRESS,
+    GONE_S,
+    begin,
+    camera,
+    captures,
+    connection_closed,
+    gone,
+    moving,
+    report,
+    start,
+    state,
+)
+from live_takes import SAVED, captured_again, kept_take, recorded
+from session import FOOTAGE, OUT, inventory, invoke, key, picture, run, show_tab, until, use, viewport, workers
 
 OVER_PANEL = (1174, 300)
-ADDRESS, PORT = "http://127.0.0.1:8099/video", "8099"
-SAVED = OUT / "live.blend"
-MEASURED_S, RECORDED_S, GONE_S = 2.0, 5.0, 1.0
-report: dict = {}
-
-
-def module(name: str):
-    """Return a module of the extension's interface."""
-    return sys.modules[addon().__name__.replace("capture.capture_operators", name)]
-
-
-def state():
-    """Return the state of live captures."""
-    return module("live.live_state").state
-
-
-def camera() -> subprocess.Popen:
-    """Start the network camera."""
-    script = str(Path(__file__).with_name("mjpeg_camera.py"))
-    return subprocess.Popen([sys.executable, script, "/scope/pictures", PORT])
-
-
-def begin() -> None:
-    """Press Start."""
-    assert use(bpy.ops.scope.live, "INVOKE_DEFAULT") == {"RUNNING_MODAL"}, state().message
-
-
-def start() -> Iterator[float]:
-    """Press Start, and wait until the body follows."""
-    begin()
-    yield from until(lambda: state().job is None or state().job.has_body, 300, "the first pose")
-    assert state().job is not None, state().message
-
-
-def gone(worker, what: str) -> Iterator[float]:
-    """Check that a process ends within a second."""
-    began = time.monotonic()
-    yield from until(lambda: not worker.alive, GONE_S, f"the process to end after {what}")
-    report.setdefault("gone_s", {})[what] = round(time.monotonic() - began, 2)
-    assert not worker.job_folder.exists() or state().job is not None, f"{worker.job_folder} is left after {what}"
-
-
-def moving() -> Iterator[float]:
-    """Check that the body moves."""
-    seen = []
-    for _ in range(3):
-        yield from until(lambda: state().job.has_body, 5, "the body")
-        body = state().job._bodies[0].armature
-        seen.append(tuple(body.pose.bones["left_hip"].rotation_quaternion))
-        before = state().job.poses
-        yield from until(lambda before=before: state().job.poses > before, 5, "another pose")
-    assert len(set(seen)) == 3, seen
+MEASURED_S = 2.0
 
 
 def shares(values: list[float]) -> dict[str, float]:
@@ -116,11 +81,6 @@ def measured(seconds: float, what: str) -> Iterator[float]:
         "poses_shown_per_second": round((job.poses - poses) / (last - began), 1),
         "status": dict(vars(job.status)),
     }
-
-
-def captures() -> list[bpy.types.Collection]:
-    """Return the captures of the file."""
-    return [collection for collection in bpy.data.collections if "scope_capture" in collection]
 
 
 def prepared() -> Iterator[float]:
@@ -173,6 +133,19 @@ def interrupted(server: subprocess.Popen) -> Iterator[float]:
     picture("22_live_interrupted")
 
 
+def slept() -> Iterator[float]:
+    """Stop the process for eight seconds, as a computer that sleeps does: a sentence, and the body follows again."""
+    worker = state().job.worker
+    os.kill(worker.pid, signal.SIGSTOP)
+    yield 8.0
+    assert state().job.quiet_s > 0, "the panel does not say that nothing comes"
+    os.kill(worker.pid, signal.SIGCONT)
+    yield from until(lambda: state().job.status.notice, 15, "a sentence about the pause")
+    report["slept"] = state().job.status.notice
+    yield from until(lambda: not state().job.status.notice, 15, "the poses after it")
+    yield from moving()
+
+
 def cancelled(before: dict) -> Iterator[float]:
     """Press Escape over the panel."""
     worker = state().job.worker
@@ -183,48 +156,15 @@ def cancelled(before: dict) -> Iterator[float]:
     key("Shift_L")  # moves the mouse away, whose tooltip would cover the panel
 
 
-def plays() -> bool:
-    """Return whether the scene's animation plays."""
-    return bool(bpy.context.window_manager.windows[0].screen.is_animation_playing)
-
-
-def recorded() -> Iterator[float]:
-    """Save while live, record, stop, undo and redo."""
-    yield from start()
-    bpy.ops.wm.save_as_mainfile(filepath=str(SAVED))
-    assert b"secret" not in SAVED.read_bytes()
-    yield from moving()
-    settings = bpy.context.scene.scope_live
-    settings.countdown_s, settings.with_scene = 1, True
-    use(bpy.ops.scope.record_live)
-    assert not state().job.recording
-    yield from until(lambda: state().job.recording, 5, "the end of the countdown")
-    began = time.monotonic()
-    yield from until(plays, 2, "the scene to play")
-    yield RECORDED_S
-    picture("23_live_recording")
-    worker, recorded_s, began = state().job.worker, time.monotonic() - began, time.monotonic()
-    use(bpy.ops.scope.stop_live)
-    yield from until(lambda: not worker.alive, 30, "the recording")
-    report["recorded_and_gone_s"] = round(time.monotonic() - began, 2)
-    yield from until(lambda: state().job is None, 10, "the keys")
-    assert len(captures()) == 1, state().message
-    assert not plays()
-    person = next(o for o in captures()[0].all_objects if o.type == "ARMATURE")
-    assert "scope_motion" in person
-    assert person.pose.bones["head"].custom_shape is not None
-    first, last = person.animation_data.action.frame_range
-    report["recorded_s"] = (last - first) / bpy.context.scene.render.fps
-    assert 0.5 * recorded_s < report["recorded_s"] < recorded_s + 1.0, (report["recorded_s"], recorded_s)
-    yield 0.5
-    picture("24_live_recorded")
-    invoke(bpy.ops.ed.undo)
-    yield 0.5
-    assert not captures(), "one undo does not remove the recording"
-    invoke(bpy.ops.ed.redo)
-    yield 0.5
-    assert len(captures()) == 1, "redo does not bring it back"
-    use(bpy.ops.scope.smooth, strength=2.5)
+def closed(how: str) -> Iterator[float]:
+    """Close another Blender, or let it crash, while live: the camera is left within a second, and no worker runs."""
+    script = str(Path(__file__).with_name("closed.py"))
+    other = subprocess.Popen(["blender", "--python", script, "--", FOOTAGE, str(OUT), how, ADDRESS])
+    yield from until(lambda: other.poll() is not None, 400, "the other Blender to end")
+    assert (OUT / f"closed_{how}").read_text() == "capturing", (OUT / f"closed_{how}").read_text()
+    assert other.returncode == (-9 if how == "crash" else 0), other.returncode
+    yield from connection_closed(float((OUT / f"ended_{how}").read_text()), f"Blender's {how}")
+    yield from until(lambda: not workers(), 10, "the worker to end")
 
 
 def reopened() -> Iterator[float]:
@@ -296,9 +236,14 @@ def steps() -> Iterator[float]:
     server = camera()
     yield from until(lambda: not state().job.status.notice, 15, "the camera to come back")
     yield from moving()
+    yield from slept()
     yield from cancelled(before)
     yield from recorded()
+    yield from kept_take()
+    yield from captured_again()
     yield from stopped()
+    for how in ("quit", "crash"):
+        yield from closed(how)
     yield from reopened()
     yield from disabled()
     server.kill()

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A network camera on this computer: JPEG pictures at 30 per second, again and again.
 
-Usage: ``mjpeg_camera.py FOLDER PORT``
+Usage: ``mjpeg_camera.py FOLDER PORT CLIENTS``. A line is added to the file CLIENTS when a client comes, and when one
+has left: "came" or "left", and the time (seconds of the system's monotonic clock).
 """
 
 from __future__ import annotations
@@ -25,8 +26,13 @@ def enable_loopback() -> None:
         fcntl.ioctl(any_socket, _SET_FLAGS, struct.pack("16sh14x", b"lo", _UP_AND_RUNNING))
 
 
-def main(folder: str, port: str) -> None:
+def main(folder: str, port: str, clients: str) -> None:
     """Serve until the process is ended."""
+
+    def note(what: str) -> None:
+        with open(clients, "a") as file:
+            file.write(f"{what} {time.monotonic()}\n")
+
     pictures = [path.read_bytes() for path in sorted(Path(folder).glob("*.jpg"))]
 
     class Camera(BaseHTTPRequestHandler):
@@ -35,6 +41,7 @@ def main(folder: str, port: str) -> None:
             self.send_response(200)
             self.send_header("Content-Type", "multipart/x-mixed-replace; boundary=frame")
             self.end_headers()
+            note("came")
             began = time.monotonic()
             try:
                 for index, picture in enumerate(itertools.cycle(pictures)):
@@ -42,7 +49,7 @@ def main(folder: str, port: str) -> None:
                     self.wfile.write(head.encode() + picture + b"\r\n")
                     time.sleep(max(0.0, began + index / RATE - time.monotonic()))
             except OSError:
-                return
+                note("left")
 
         def log_message(self, *_: object) -> None:
             """Say nothing."""

@@ -103,6 +103,17 @@ def inventory() -> dict:
     return {kind: sorted(b.name for b in getattr(bpy.data, kind)) for kind in kinds}
 
 
+def workers() -> list[int]:
+    """Return the ids of capture processes, also those of a Blender that has ended."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            found += [int(path.parent.name)] if b"start_worker.py" in path.read_bytes() else []
+        except OSError:
+            continue  # it has just ended
+    return found
+
+
 def run(steps: Iterator[float]) -> None:
     """Run ``steps``, which yield seconds to wait, from Blender's timers, then quit."""
 

@@ -18,7 +18,7 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
-from session import FOOTAGE, OUT, addon, captured, inventory, invoke, picture, run, show_tab, until, use
+from session import FOOTAGE, OUT, addon, captured, inventory, invoke, picture, run, show_tab, until, use, workers
 
 SMALL = Path("/scope/small")  # a separate disk
 report: dict[str, str] = {}
@@ -32,17 +32,6 @@ def cache():
 def preferences() -> bpy.types.AddonPreferences:
     """Return the extension's preferences."""
     return next(a for a in bpy.context.preferences.addons if a.module.endswith(".scope")).preferences
-
-
-def workers() -> list[int]:
-    """Return the ids of capture processes, also those of a Blender that has ended."""
-    found = []
-    for path in Path("/proc").glob("[0-9]*/cmdline"):
-        try:
-            found += [int(path.parent.name)] if b"start_worker.py" in path.read_bytes() else []
-        except OSError:
-            continue  # it has just ended
-    return found
 
 
 def nothing_left(when: str) -> None:

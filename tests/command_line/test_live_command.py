@@ -13,8 +13,11 @@ import numpy as np
 import pytest
 from scope.scope_addon import installed
 from scope.scope_addon.cli import SAMPLE, main
+from scope.scope_addon.live.outputs.vmc import BONES
 from scope.scope_addon.live.smoothing import DELAY_S
 from scope.scope_addon.motion import Motion
+
+from ..live.outputs.test_vmc import parsed
 
 
 @pytest.mark.parametrize(
@@ -61,9 +64,13 @@ def test_the_extension_says_where_live_captures_are(capsys, monkeypatch):
 
 @pytest.mark.skipif(os.name == "nt", reason="SIGINT of POSIX")
 @pytest.mark.usefixtures("networks")
-def test_ctrl_c_ends_the_capture_and_keeps_the_recording(tmp_path):
+def test_ctrl_c_ends_a_capture_that_sends_its_poses_and_keeps_the_recording(tmp_path):
     target = tmp_path / "take.npz"
+    receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    receiver.bind(("127.0.0.1", 0))
+    receiver.settimeout(60)
     command = [sys.executable, "-m", "scope.scope_addon", "live", str(SAMPLE), "--json-port", "0"]
+    command += ["--vmc", f"127.0.0.1:{receiver.getsockname()[1]}"]
     with subprocess.Popen(
         [*command, "--record", str(target), "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
@@ -72,8 +79,14 @@ def test_ctrl_c_ends_the_capture_and_keeps_the_recording(tmp_path):
             client.settimeout(60)
             for _ in range(5):
                 lines.readline()
+            bones = {}
+            while len(bones) < len(BONES):
+                bones |= {v[0]: v[1:] for address, v in parsed(receiver.recv(65536)) if address == "/VMC/Ext/Bone/Pos"}
             process.send_signal(signal.SIGINT)
             out, _ = process.communicate(timeout=60)
+    receiver.close()
+    assert set(bones) == set(BONES)
+    assert 0.5 < bones["Hips"][1] < 1.3  # metres over the floor
     report = json.loads(out)
     assert (process.returncode, report["stopped"], report["outputs"]) == (0, True, [str(target)])
     given_too_late = report["poses"] - Motion.load(target).valid.sum()  # those of the frames during the last delay

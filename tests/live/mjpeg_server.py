@@ -9,9 +9,10 @@ import cv2
 
 
 @contextmanager
-def mjpeg_server(pictures, interval_s=0.03, rounds=1):
+def mjpeg_server(pictures, interval_s=0.03, rounds=1, left=None):
     """Serve RGB pictures to every client, ``rounds`` times; then the connection ends.
 
+    :param left: an event to set when a client has left.
     :return: context manager that gives the address.
     """
     jpegs = [cv2.imencode(".jpg", cv2.cvtColor(p, cv2.COLOR_RGB2BGR))[1].tobytes() for p in pictures]
@@ -28,8 +29,9 @@ def mjpeg_server(pictures, interval_s=0.03, rounds=1):
                     self.wfile.write(head.encode() + jpeg + b"\r\n")
                     if stopped.wait(interval_s):
                         return
-            except OSError:  # the client left
-                pass
+            except OSError:
+                if left is not None:
+                    left.set()
 
         def log_message(self, *_):
             pass

@@ -1,15 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Streams as servers give them: MPEG transport streams in pieces, and fragmented .mp4 from the middle on."""
+"""Streams as servers give them: MPEG transport streams in pieces, and fragmented .mp4 from the middle on.
+
+A transport stream consists of packets of 188 bytes. Seven of them make a datagram, or an RTP packet (RFC 2250), which
+RTSP sends over its own connection if it is asked to (RFC 2326, "interleaved").
+"""
 
 import io
-from contextlib import contextmanager
+import socket
+import struct
+from contextlib import contextmanager, suppress
 from fractions import Fraction
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
-from threading import Thread
+from socketserver import StreamRequestHandler, ThreadingTCPServer
+from threading import Event, Thread
 
 import av
 
+DATAGRAM = 7 * 188
 FRAGMENTED = {"movflags": "frag_every_frame+empty_moov+default_base_moof"}
 
 
@@ -22,15 +30,11 @@ def served(folder, name, data):
         def log_message(self, *_):
             pass
 
-    with ThreadingHTTPServer(("127.0.0.1", 0), partial(Handler, directory=str(folder))) as server:
-        server.daemon_threads = True
-        thread = Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02})
-        thread.start()
-        try:
-            yield f"http://127.0.0.1:{server.server_port}/{name}"
-        finally:
-            server.shutdown()
-            thread.join()
+    with (
+        ThreadingHTTPServer(("127.0.0.1", 0), partial(Handler, directory=str(folder))) as server,
+        _running(server) as port,
+    ):
+        yield f"http://127.0.0.1:{port}/{name}"
 
 
 def encoded(images, codec="mpeg2video", kind="mpegts", group=10, begins_s=0.0, rate=30):
@@ -59,3 +63,94 @@ def without_first(data, count, kind="mp4"):
                 packet.stream = stream
                 container.mux(packet)
     return target.getvalue()
+
+
+@contextmanager
+def _running(server):
+    """Run a server meanwhile."""
+    server.daemon_threads = True
+    thread = Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02})
+    thread.start()
+    try:
+        yield server.server_address[1]
+    finally:
+        server.shutdown()
+        thread.join()
+
+
+def datagrams(data):
+    """Return a transport stream in pieces for the network."""
+    return [data[at : at + DATAGRAM] for at in range(0, len(data), DATAGRAM)]
+
+
+@contextmanager
+def sent_by_udp(data, interval_s=0.002):
+    """Send a transport stream to a port of this computer, again and again; gives the address."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    stopped = Event()
+
+    def send():
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            while True:
+                for piece in datagrams(data):
+                    with suppress(OSError):  # nobody listens yet
+                        sender.sendto(piece, ("127.0.0.1", port))
+                    if stopped.wait(interval_s):
+                        return
+
+    thread = Thread(target=send)
+    thread.start()
+    try:
+        yield f"udp://127.0.0.1:{port}"
+    finally:
+        stopped.set()
+        thread.join()
+
+
+@contextmanager
+def served_as_hls(folder, parts, seconds):
+    """Serve transport streams as the segments of an HLS playlist; gives its address."""
+    lines = ["#EXTM3U", "#EXT-X-VERSION:3", f"#EXT-X-TARGETDURATION:{seconds}", "#EXT-X-MEDIA-SEQUENCE:0"]
+    for number, part in enumerate(parts):
+        (folder / f"part{number}.ts").write_bytes(part)
+        lines += [f"#EXTINF:{seconds:.3f},", f"part{number}.ts"]
+    playlist = "\n".join([*lines, "#EXT-X-ENDLIST", ""])
+    with served(folder, "list.m3u8", playlist.encode()) as address:
+        yield address
+
+
+@contextmanager
+def rtsp_server(data):
+    """Serve a transport stream by RTSP, once to each client; gives the address."""
+    sdp = "v=0\r\no=- 0 0 IN IP4 127.0.0.1\r\ns=test\r\nt=0 0\r\nm=video 0 RTP/AVP 33\r\na=control:track0\r\n"
+    replies = {
+        "OPTIONS": "Public: OPTIONS, DESCRIBE, SETUP, PLAY, TEARDOWN\r\n",
+        "DESCRIBE": f"Content-Type: application/sdp\r\nContent-Length: {len(sdp)}\r\n",
+        "SETUP": "Transport: RTP/AVP/TCP;unicast;interleaved=0-1\r\nSession: 1\r\n",
+        "PLAY": "Session: 1\r\nRange: npt=0.000-\r\n",
+        "TEARDOWN": "Session: 1\r\n",
+    }
+
+    class Handler(StreamRequestHandler):
+        def handle(self):
+            while line := self.rfile.readline():
+                method, head = line.split()[0].decode(), {}
+                while (line := self.rfile.readline().strip()) != b"":
+                    name, _, value = line.decode().partition(":")
+                    head[name.lower()] = value.strip()
+                reply = f"RTSP/1.0 200 OK\r\nCSeq: {head['cseq']}\r\n{replies[method]}\r\n"
+                self.wfile.write((reply + (sdp if method == "DESCRIBE" else "")).encode())
+                if method == "PLAY":
+                    with suppress(OSError):  # the client left
+                        self.play()
+                    return
+
+        def play(self):
+            for number, piece in enumerate(datagrams(data)):
+                rtp = struct.pack(">BBHII", 0x80, 33, number, 90 * number, 1) + piece
+                self.wfile.write(struct.pack(">cBH", b"$", 0, len(rtp)) + rtp)
+
+    with ThreadingTCPServer(("127.0.0.1", 0), Handler) as server, _running(server) as port:
+        yield f"rtsp://127.0.0.1:{port}/live"

@@ -124,3 +124,19 @@ def test_a_source_that_is_frozen_is_said_once_each_time():
     with NewestFrame(FakeSource(times, images=images, before=before), clock, 0.0, said.append) as reader:
         reader._thread.join(5)
     assert said == ["fake has shown the same picture for 5 s; check whether it is frozen"] * 2
+
+
+def test_a_computer_that_slept_says_so_and_shows_no_backlog():
+    """The clock leaps by an hour before the third picture, as where it counts the time asleep."""
+    said, taken, clock = [], [], FakeClock()
+
+    def before(index):
+        clock.time_s = 100.0 + index / 30 + 3600.0 * (index >= 2)
+
+    times = [k / 30 + 3600.0 * (k >= 2) for k in range(5)]
+    with NewestFrame(FakeSource(times, before=before), clock, 0.0, said.append, taken.append) as reader:
+        reader._thread.join(5)
+        newest = all_taken(reader)
+    assert said == ["nothing came from fake for 3600 s, as when a computer sleeps; it goes on"]
+    assert [picture.index for picture in newest] == [4]
+    assert [picture.timestamp_s for picture in taken] == pytest.approx(times)

@@ -2,6 +2,7 @@
 """Files in real time, streams from a server made here, and what cannot be opened."""
 
 import sys
+import threading
 from itertools import islice
 
 import numpy as np
@@ -16,7 +17,7 @@ from scope.scope_addon.live.sources import is_stream, open_source
 from ..capture.media.made_video import patch_track_header, write_video
 from .fake_source import FakeClock
 from .mjpeg_server import mjpeg_server
-from .stream_server import encoded, served, without_first
+from .stream_server import encoded, rtsp_server, sent_by_udp, served, served_as_hls, without_first
 
 
 def test_a_file_is_paced_by_its_timestamps():
@@ -24,6 +25,18 @@ def test_a_file_is_paced_by_its_timestamps():
     arrived = [(p.timestamp_s, p.arrived_s) for p in islice(open_source(str(SAMPLE)).pictures(clock), 6)]
     assert [time_s for time_s, _ in arrived] == pytest.approx(np.arange(6) / 30, abs=1e-3)
     assert [arrived_s - 100.0 for _, arrived_s in arrived] == pytest.approx(np.arange(6) / 30, abs=1e-3)
+
+
+def test_a_file_goes_on_where_it_was_when_the_computer_slept():
+    """Nothing that would have been shown meanwhile is made up for, which would be shown as fast as it can be read."""
+    clock, arrived = FakeClock(), []
+    for picture in islice(open_source(str(SAMPLE)).pictures(clock), 8):
+        arrived.append(picture.arrived_s - 100.0)
+        if picture.index == 3:
+            clock.time_s += 3600.0
+    expected = np.arange(8) / 30
+    expected[4:] += 3600.0 - 1 / 30  # the next picture was due a thirtieth of a second later
+    assert arrived == pytest.approx(expected, abs=1e-3)
 
 
 @pytest.fixture(scope="module")
@@ -45,6 +58,16 @@ def test_a_stream_is_read_and_after_its_end_read_again(pictures):
     assert all(b.timestamp_s > a.timestamp_s for a, b in zip(taken, taken[1:], strict=False))
     assert said
     assert said[0].endswith("connecting again in 0.05 s")
+
+
+def test_the_end_of_a_capture_closes_the_connection(pictures):
+    """Before the reader itself is left: a recording is written only then."""
+    left, clock = threading.Event(), Clock()
+    with mjpeg_server(pictures, rounds=10_000, left=left) as address:
+        with NewestFrame(open_source(address), clock, reconnect_s=0.05) as reader:
+            assert reader.take() is not None
+            clock.stopped.set()
+            assert left.wait(30)
 
 
 def test_a_stream_s_rotation_and_pixel_aspect_are_applied(tmp_path):
@@ -121,6 +144,40 @@ def test_a_server_s_timestamps_may_jump_and_its_rate_change(tmp_path):
     times = np.array([picture.timestamp_s for picture in taken])
     assert (np.diff(times) > 0).all()
     assert times[-1] <= passed_s + 36e-3
+
+
+def test_a_transport_stream_in_datagrams_is_read():
+    with sent_by_udp(encoded(moving(36))) as address:
+        shown = [which(picture.image_rgb) for picture in islice(open_source(address).pictures(Clock()), 12)]
+    assert max(off for _, off in shown) < 10
+    steps = np.diff([k for k, _ in shown]) % 36
+    assert (steps >= 1).all()
+    assert np.median(steps) == 1  # a datagram may be lost, also on this computer
+
+
+def test_the_segments_of_a_playlist_are_read(tmp_path):
+    parts = [encoded(moving(18)), encoded(moving(18, first=18), begins_s=0.6)]
+    with served_as_hls(tmp_path, parts, 1) as address:
+        shown = [which(picture.image_rgb) for picture in all_pictures(address)]
+    assert [k for k, _ in shown] == list(range(36))
+    assert max(off for _, off in shown) < 10
+
+
+def test_a_playlist_does_not_open_files_of_this_computer(tmp_path):
+    """Nor does it say whether they are there."""
+    secret = tmp_path / "secret.ts"
+    secret.write_bytes(encoded(moving(12)))
+    lines = ["#EXTM3U", "#EXT-X-TARGETDURATION:1", "#EXTINF:1.0,", secret.as_uri(), "#EXT-X-ENDLIST", ""]
+    with served(tmp_path, "list.m3u8", "\n".join(lines).encode()) as address:
+        with pytest.raises(VideoError, match="cannot be opened|was interrupted|carries no video"):
+            all_pictures(address)
+
+
+def test_an_rtsp_server_is_read_over_its_own_connection():
+    with rtsp_server(encoded(moving(36))) as address:
+        shown = [which(picture.image_rgb) for picture in islice(open_source(address).pictures(Clock()), 20)]
+    assert [k for k, _ in shown] == list(range(20))
+    assert max(off for _, off in shown) < 10
 
 
 def test_a_stream_that_changes_its_resolution_keeps_the_first_one(tmp_path):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The cameras of a Linux computer with their names and sizes, from sysfs and Video4Linux.
+"""The cameras of this computer with their names, and on Linux their sizes.
 
-Reading them does not switch a camera on. Other systems name their cameras only through libraries that this package
-does not have; there, the list is empty, and cameras are chosen by number.
+On Linux from sysfs and Video4Linux, elsewhere as FFmpeg lists them, by DirectShow or AVFoundation, where a camera's
+number is its place in this list. Reading them does not switch a camera on.
 """
 
 from __future__ import annotations
@@ -16,6 +16,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from ...live.system_cameras import camera_names
 
 NAMES, DEVICES = Path("/sys/class/video4linux"), Path("/dev")
 LONGEST_NAME = 60  # characters
@@ -50,7 +52,9 @@ def list_cameras(names: Path = NAMES, devices: Path = DEVICES, ioctl: Ioctl | No
     """
     if ioctl is None:
         if not sys.platform.startswith("linux"):
-            return []
+            return [
+                Camera(number, _shown(name)) for number, name in enumerate(camera_names(sys.platform)[:_MOST_CAMERAS])
+            ]
         import fcntl
 
         ioctl = fcntl.ioctl
@@ -117,6 +121,11 @@ def _sizes(node: int, code: int, ioctl: Ioctl) -> Iterator[tuple[int, int]]:
 
 
 def _printable(name: bytes) -> str:
-    """Return a device's text without what could disturb a list: control and formatting characters, great length."""
-    text = "".join(c for c in name.decode("utf-8", "replace") if c.isprintable())
+    """Return a device's text as `_shown`."""
+    return _shown(name.decode("utf-8", "replace"))
+
+
+def _shown(name: str) -> str:
+    """Return a text without what could disturb a list: control and formatting characters, great length."""
+    text = "".join(c for c in name if c.isprintable())
     return text.strip()[:LONGEST_NAME] or "camera"

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import VideoError
+from .. import system_cameras
 from ..clock import Clock
 from .source import DEFAULT_FPS, Picture
 
@@ -54,6 +55,9 @@ class CameraSource:
 
         :raises VideoError: it cannot be opened, or gives no more frames.
         """
+        if sys.platform in system_cameras.FORMATS and isinstance(self._device, int):
+            yield from self._system_pictures(clock)
+            return
         capture = self._open()
         try:
             index = 0
@@ -66,6 +70,19 @@ class CameraSource:
                 index += 1
         finally:
             capture.release()
+
+    def _system_pictures(self, clock: Clock) -> Iterator[Picture]:
+        """Yield the pictures of a camera of Windows or macOS.
+
+        :raises VideoError: it cannot be opened, or gives no more frames.
+        """
+        assert isinstance(self._device, int)
+        container = system_cameras.open_camera(self._device, CAMERA_SIZE, sys.platform)
+        index = -1
+        for index, image_rgb in enumerate(system_cameras.pictures(container)):
+            now_s = clock.now()
+            yield Picture(index, now_s, now_s, image_rgb)
+        raise VideoError(f"{self.name} {self._why_nothing_comes(has_begun=index >= 0)}")
 
     def _require_device(self) -> None:
         if sys.platform.startswith("linux") and not self._path.exists():

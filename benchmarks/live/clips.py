@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Footage that goes on: the sample clip played there and back, so that nothing jumps where a round ends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import cv2
+from numpy.typing import NDArray
+
+from ...scope_addon.atomic_write import atomic_path
+from ...scope_addon.capture.media.video import open_video
+from ...scope_addon.cli import SAMPLE
+from ...scope_addon.live.clock import Clock
+from ...scope_addon.live.sources import Picture
+from ..frames import CACHE
+from .observed import there_and_back
+
+FPS = 30
+
+
+def there_and_back_clip(seconds: float, size: tuple[int, int] | None = None) -> Path:
+    """Return the sample clip, there and back again for some seconds, as a video; cached in build/bench.
+
+    :param size: to which the pictures are enlarged; None: their own.
+    """
+    name = "sample" if size is None else f"sample_{size[0]}x{size[1]}"
+    target = CACHE / f"{name}_{seconds:g}s.mp4"
+    if target.exists():
+        return target
+    with open_video(SAMPLE) as video:
+        pictures = [frame.image_rgb for frame in video]
+    if size is not None:
+        pictures = [cv2.resize(picture, size, interpolation=cv2.INTER_CUBIC) for picture in pictures]
+    order = there_and_back(len(pictures))
+    CACHE.mkdir(parents=True, exist_ok=True)
+    with atomic_path(target) as temporary:
+        _write(temporary, [pictures[order[k % len(order)]] for k in range(round(seconds * FPS))])
+    return target
+
+
+def _write(path: Path, pictures: list[NDArray]) -> None:
+    with av.open(str(path), "w", format="mp4") as container:
+        stream = container.add_stream("libx264", rate=FPS, options={"crf": "18", "preset": "veryfast"})
+        stream.height, stream.width = pictures[0].shape[:2]
+        stream.pix_fmt = "yuv420p"
+        for picture in pictures:
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
+        container.mux(stream.encode())
+
+
+class RepeatedFile:
+    """A source that plays a video again and again, in real time, for some seconds."""
+
+    ends = True
+    focal_35mm: float | None = None
+
+    def __init__(self, path: Path, seconds: float) -> None:
+        self._path, self._seconds, self.name = path, seconds, path.name
+        self.fps = Fraction(FPS)
+
+    def pictures(self, clock: Clock) -> Iterator[Picture]:
+        """See `Source`."""
+        began_s, index = clock.now(), 0
+        while True:
+            with open_video(self._path) as video:
+                for frame in video:
+                    time_s = index / FPS
+                    if time_s >= self._seconds:
+                        return
+                    clock.sleep(began_s + time_s - clock.now())
+                    yield Picture(index, time_s, max(began_s + time_s, clock.now()), frame.image_rgb)
+                    index += 1

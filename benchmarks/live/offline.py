@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Live captures against the offline one of the same footage and preset: with every frame, and played in real time."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from ...scope_addon.capture.camera.intrinsics import choose_camera
+from ...scope_addon.capture.media.video import open_video
+from ...scope_addon.capture.options import CaptureOptions
+from ...scope_addon.capture.pipeline import capture
+from ...scope_addon.capture.tracking.tracker import PeopleTracker
+from ...scope_addon.live.outputs.recording import Recording
+from ...scope_addon.live.people import LivePeople
+from ...scope_addon.live.run import Listeners, LiveOptions, run_live
+from ...scope_addon.live.sources.file import FileSource
+from ...scope_addon.motion import Motion
+from ...solver import Body
+from ..gate import clips
+from ..perception.accuracy import evaluate_motion
+from .measures import compared, seen_from_the_world
+
+QUALITY = "fast"
+
+
+def against_offline(body: Body, quick: bool) -> dict[str, Any]:
+    """Measure, and return the figures by clip."""
+    figures = {}
+    for name, (video, truth) in reversed(clips().items()):
+        if quick and name not in ("sample", "cam1"):
+            continue
+        offline = capture(video, body, CaptureOptions(quality=QUALITY)).motions[0]
+        figures[name] = {"offline": _against_truth(offline, truth)}
+        for how, (motion, told) in {
+            "every_frame": (every_frame(body, video), {}),
+            "real_time": in_real_time(body, video),
+        }.items():
+            figures[name][how] = compared(motion, offline, body) | _against_truth(motion, truth) | told
+    return figures
+
+
+def every_frame(body: Body, video: Path) -> Motion:
+    """Return the recording of a live capture that takes as long for each frame as it needs."""
+    source = FileSource(video)
+    recording = Recording(Path(), body, source)
+    with open_video(video) as footage:
+        size = footage.width, footage.height
+        camera = choose_camera(*size, metadata_focal_mm=footage.focal_35mm)
+        people = LivePeople(body, PeopleTracker(QUALITY, os.cpu_count() or 1), camera, size)
+        recording.begin(people.sessions[0], size)
+        for frame in footage:
+            recording.send(people.step(frame)[0], 0.0)
+    assert recording.camera is not None
+    return recording.motion(recording.camera)
+
+
+def in_real_time(body: Body, video: Path) -> tuple[Motion, dict[str, Any]]:
+    """Return the recording of a video that is played in real time on this machine, and how many poses there were."""
+    source = FileSource(video)
+    recording, load = Recording(Path(), body, source), os.getloadavg()[0]
+    listeners = Listeners(camera=lambda people, size: recording.begin(people.sessions[0], size))
+    report = run_live(source, body, LiveOptions(quality=QUALITY), [recording], listeners)
+    assert recording.camera is not None
+    told = {"load": load, "poses": report["poses"], "dropped": report["dropped"], "latency_ms": report["latency_ms"]}
+    return recording.motion(recording.camera), told
+
+
+def _against_truth(motion: Motion, truth: Path) -> dict[str, float]:
+    """Return how far feet that stand by the truth slide in the world, and PA-MPJPE."""
+    found = evaluate_motion(seen_from_the_world(motion), truth)
+    return {"foot_slide_cm": found["foot_slide_cm"], "pa_mpjpe_mm": found["pa_mpjpe"]}

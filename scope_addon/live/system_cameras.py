@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Cameras of Windows and macOS, listed and opened by FFmpeg, so that a camera's number is its place in the list.
+
+OpenCV opens cameras by numbers of its own there, whose order no list tells. Not tried with cameras of these systems:
+FFmpeg's documentation of dshow and avfoundation is what this follows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import VideoError
+
+if TYPE_CHECKING:
+    from av.container import InputContainer
+    from av.device import DeviceInfo
+
+FORMATS = {"win32": "dshow", "darwin": "avfoundation"}  # of FFmpeg, by `sys.platform`
+# What a camera is asked for beside the size: some refuse a rate that they do not have, and others want one to be given.
+_WISHES: tuple[dict[str, str], ...] = ({"framerate": "30"}, {})
+
+
+def camera_names(platform: str) -> list[str]:
+    """Return the names of the cameras, in FFmpeg's order; none where it does not list them, as on Linux."""
+    return [_name(device) for device in _devices(platform)]
+
+
+def open_camera(number: int, size: tuple[int, int], platform: str) -> InputContainer:
+    """Open a camera of the list.
+
+    :param size: width and height that it is asked for, pixels; it gives another size if it does not have this one.
+    :raises VideoError: it does not exist, or cannot be opened.
+    """
+    import av
+
+    devices = _devices(platform)
+    if number >= len(devices):
+        names = ", ".join(f"{k}: {_name(device)}" for k, device in enumerate(devices))
+        raise VideoError(
+            f"camera {number} does not exist; "
+            + (f"choose one of {names}" if devices else "connect a camera, or choose a stream or a file")
+        )
+    device, problem = devices[number], ""
+    file = f"video={device.name}" if FORMATS[platform] == "dshow" else device.name
+    for wanted in ({"video_size": f"{size[0]}x{size[1]}"}, {}):
+        for wish in _WISHES:
+            try:
+                return cast("InputContainer", av.open(file, format=FORMATS[platform], options=wanted | wish, mode="r"))
+            except (av.error.FFmpegError, OSError, ValueError) as error:
+                problem = str(getattr(error, "strerror", None) or error).lower()
+    raise VideoError(
+        f"camera {number} ({_name(device)}) cannot be opened ({problem}); check that it is plugged"
+        " in, that no other program uses it, and that this one may use cameras"
+    )
+
+
+def pictures(container: InputContainer) -> Iterator[NDArray[np.uint8]]:
+    """Yield the (H, W, 3) RGB pictures of an open camera as they come, until it gives no more."""
+    import av
+
+    with container as opened, suppress(av.error.FFmpegError):
+        for frame in opened.decode(video=0):
+            yield cast(NDArray[np.uint8], frame.to_ndarray(format="rgb24"))
+
+
+def _name(device: DeviceInfo) -> str:
+    return "".join(c for c in device.description or device.name if c.isprintable())
+
+
+def _devices(platform: str) -> list[DeviceInfo]:
+    """Return the cameras that FFmpeg lists, without microphones and screens."""
+    import av
+
+    if platform not in FORMATS:
+        return []
+    found: list[DeviceInfo] = []
+    with suppress(av.error.FFmpegError, OSError, ValueError):
+        found = av.enumerate_input_devices(FORMATS[platform])
+    # dshow of older versions does not say what a device gives.
+    cameras = [device for device in found if not device.media_types or "video" in device.media_types]
+    return [device for device in cameras if not device.description.startswith("Capture screen")]

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shared code of the live captures in a Blender with a window: the network camera, and what runs."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+from session import OUT, addon, until, use
+
+ADDRESS, PORT = "http://127.0.0.1:8099/video", "8099"
+CLIENTS = OUT / "live_clients.txt"
+GONE_S = 1.0
+report: dict = {}
+
+
+def module(name: str):
+    """Return a module of the extension's interface."""
+    return sys.modules[addon().__name__.replace("capture.capture_operators", name)]
+
+
+def state():
+    """Return the state of live captures."""
+    return module("live.live_state").state
+
+
+def camera() -> subprocess.Popen:
+    """Start the network camera."""
+    script = str(Path(__file__).with_name("mjpeg_camera.py"))
+    CLIENTS.write_text("")
+    return subprocess.Popen([sys.executable, script, "/scope/pictures", PORT, str(CLIENTS)])
+
+
+def clients() -> list[tuple[str, float]]:
+    """Return what the camera says of its clients: "came" or "left", and when."""
+    return [(what, float(when)) for what, when in map(str.split, CLIENTS.read_text().splitlines())]
+
+
+def connection_closed(began: float, what: str) -> Iterator[float]:
+    """Check, by asking the camera, that nobody looked at it a second after something happened."""
+    yield from until(lambda: clients()[-1][0] == "left", 10, f"the connection to be closed after {what}")
+    report.setdefault("connection_closed_s", {})[what] = seconds = round(clients()[-1][1] - began, 2)
+    assert seconds < GONE_S, f"the connection was closed {seconds} s after {what}"
+
+
+def begin() -> None:
+    """Press Start."""
+    assert use(bpy.ops.scope.live, "INVOKE_DEFAULT") == {"RUNNING_MODAL"}, state().message
+
+
+def start() -> Iterator[float]:
+    """Press Start, and wait until the body follows."""
+    begin()
+    yield from until(lambda: state().job is None or state().job.has_body, 300, "the first pose")
+    assert state().job is not None, state().message
+
+
+def gone(worker, what: str) -> Iterator[float]:
+    """Check that a process ends within a second."""
+    began = time.monotonic()
+    yield from until(lambda: not worker.alive, GONE_S, f"the process to end after {what}")
+    report.setdefault("gone_s", {})[what] = round(time.monotonic() - began, 2)
+    assert not worker.job_folder.exists() or state().job is not None, f"{worker.job_folder} is left after {what}"
+
+
+def moving() -> Iterator[float]:
+    """Check that the body moves."""
+    seen = []
+    for _ in range(3):
+        yield from until(lambda: state().job.has_body, 5, "the body")
+        body = state().job._bodies[0].armature
+        seen.append(tuple(body.pose.bones["left_hip"].rotation_quaternion))
+        before = state().job.poses
+        yield from until(lambda before=before: state().job.poses > before, 5, "another pose")
+    assert len(set(seen)) == 3, seen
+
+
+def captures() -> list[bpy.types.Collection]:
+    """Return the captures of the file."""
+    return [collection for collection in bpy.data.collections if "scope_capture" in collection]
+
+
+def plays() -> bool:
+    """Return whether the scene's animation plays."""
+    return bool(bpy.context.window_manager.windows[0].screen.is_animation_playing)
