@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..solver.loaders.npz import read_npz
+from ..solver.loaders.regular_file import in_one_line
 from .atomic_write import atomic_path, reason
 from .errors import MotionFileError, OutputError
 
@@ -152,7 +153,9 @@ class Motion:
         except MotionFileError:
             raise
         except (TypeError, ValueError, OverflowError) as error:  # of numpy's conversions
-            raise MotionFileError(f"{path} holds a value of the wrong kind ({error}); capture again") from error
+            raise MotionFileError(
+                f"{path} holds a value of the wrong kind ({in_one_line(error)}); capture again"
+            ) from error
 
 
 # Only in files with corrections. The first rows say what was corrected, the others how the changed frames were before.

@@ -205,10 +205,9 @@ def _rate(arrays: Mapping[str, NDArray[Any]], path: Path) -> float | None:
     key = _first(arrays, _RATES)
     if key is None:
         return None
-    array = arrays[key]
-    rate = float(array.reshape(-1)[0]) if array.size == 1 and array.dtype.kind in "fiu" else np.nan
+    rate = _one_number(arrays[key], key, "a number of frames per second", path)
     if not 0 < rate <= _LARGEST_RATE:
-        raise MotionFileError(f"{path}: {key} must be a number of frames per second, but is {str(array)[:40]}")
+        raise MotionFileError(f"{path}: {key} must be a number of frames per second, but is {rate:g}")
     return rate
 
 
@@ -216,11 +215,16 @@ def _scale(arrays: Mapping[str, NDArray[Any]], path: Path) -> float:
     key = _first(arrays, _SCALE)
     if key is None:
         return 1.0
-    array = arrays[key]
-    scale = float(array.reshape(-1)[0]) if array.size == 1 and array.dtype.kind in "fiu" else np.nan
+    scale = _one_number(arrays[key], key, "a positive number", path)
     if not (np.isfinite(scale) and scale > 0):
-        raise MotionFileError(f"{path}: {key} must be a positive number, but is {str(array)[:40]}")
+        raise MotionFileError(f"{path}: {key} must be a positive number, but is {scale:g}")
     return scale
+
+
+def _one_number(array: NDArray[Any], name: str, wanted: str, path: Path) -> float:
+    if array.size != 1 or array.dtype.kind not in "fiu":
+        raise MotionFileError(f"{path}: {name} must be {wanted}, but has shape {array.shape} and holds {array.dtype}")
+    return float(array.reshape(-1)[0])
 
 
 def _text(array: NDArray[Any] | None) -> str:

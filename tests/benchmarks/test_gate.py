@@ -44,6 +44,24 @@ def test_the_status_is_that_of_the_figures(monkeypatch, capsys):
     assert f"worse than recorded: {name};" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(
+    ("variables", "status"),
+    [({}, 0), ({"CI": "1"}, 1), ({"CI": "1", "SCOPE_WITHOUT_SHARED": "1"}, 0), ({"SCOPE_WITHOUT_SHARED": "1"}, 0)],
+)
+def test_a_recorded_figure_that_is_not_measured_fails_in_ci(monkeypatch, capsys, variables, status):
+    for name in ("CI", "SCOPE_WITHOUT_SHARED"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in variables.items():
+        monkeypatch.setenv(name, value)
+    ratios = {name: figure.value for name, figure in read().items() if name.startswith("time of")}
+    monkeypatch.setattr("sys.argv", ["gate"])
+    monkeypatch.setattr(gate, "clips", dict)
+    monkeypatch.setattr(gate, "ratios", lambda *_: ratios)
+    assert gate.main() == status
+    said = capsys.readouterr().out
+    assert ("gate: recorded, but not measured: pose2sim flipped, " in said) == bool(status)
+
+
 def test_a_ratio_of_times_fails_only_if_it_is_worse_in_all_runs(monkeypatch):
     def least(*times):
         runs = iter(times)

@@ -11,6 +11,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from ..required import package
+
 _PARAMETERS, _SEQUENCE_PARAMETERS = (32, 33, 34), 33  # kinds of HEVC's units
 
 
@@ -24,7 +26,7 @@ def full_box(name: bytes, content: bytes, version: int = 0, flags: int = 0) -> b
 
 def coded(picture_rgb: np.ndarray) -> tuple[bytes, bytes]:
     """Return the decoder's configuration (hvcC box, ISO 14496-15) and the coded picture, by x265."""
-    av = pytest.importorskip("av")
+    av = package("av")
     try:
         encoder = av.CodecContext.create("libx265", "w")
     except ValueError as error:  # a build may lack the codec

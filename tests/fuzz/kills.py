@@ -164,12 +164,23 @@ def check_command(command: Command, action: str, calls: Iterable[int] | None = N
         return done, problems + place.problems_of_next_run(f"after all faults of {action}")
 
 
+def chosen(names: list[str]) -> list[tuple[Command, str]]:
+    """Return the commands and faults that are named; all commands if none is, and all faults if none is.
+
+    :raises SystemExit: there is no command and no fault of a name.
+    """
+    commands = [command for command in COMMANDS if command.name in names] or list(COMMANDS)
+    actions = [action for action in ACTIONS if action in names] or list(ACTIONS)
+    known = {*(command.name for command in COMMANDS), *ACTIONS}
+    if unknown := sorted(set(names) - known):
+        sys.exit(f"fuzz: no command or fault {', '.join(unknown)}; there are {', '.join(sorted(known))}")
+    return [(command, action) for command in commands for action in actions if action in command.actions]
+
+
 def main(names: list[str]) -> int:
     """Run all commands with all faults, or those named; return the exit status."""
     failed = False
-    for command, action in itertools.product(COMMANDS, ACTIONS):
-        if action not in command.actions or any(name not in (command.name, action) for name in names):
-            continue
+    for command, action in chosen(names):
         start = time.monotonic()
         count, problems = check_command(command, action)
         print(f"{command.name}, {action}: {count} faults in {time.monotonic() - start:.0f} s", flush=True)

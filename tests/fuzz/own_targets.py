@@ -9,6 +9,7 @@ import shutil
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 from scope.solver.names import EXPRESSIONS
@@ -59,6 +60,16 @@ def read_answer(path: Path) -> None:
 
     with path.open("rb") as stream, suppress(EOFError, ValueError):  # which its caller expects
         assert sum(array.nbytes for array in receive(stream, LARGEST_ARRAYS)["arrays"]) <= LARGEST_ARRAYS
+
+
+def run_network(path: Path) -> None:
+    """Open a user's network in its process, and run it on white; it may take 15 s to open and 2 s to run."""
+    from scope.scope_addon.capture.perception.adapters import graph, network_process
+    from scope.scope_addon.capture.perception.adapters.description import Description
+
+    with patch.multiple(network_process, DEFAULT_OPENING_S=15.0, RUN_S=2.0):
+        opened = graph.Graph(path, Description(), threads=1)
+        opened.run(np.full((opened.height, opened.width, 3), 255, np.uint8), graph.Normalization(std=(0.01,)))
 
 
 def read_expression_map(path: Path) -> None:

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from ..solver.loaders.conftest import dump_python2, make_tables
 from . import own_targets as own
 
 ASSETS = Path(__file__).resolve().parents[2] / "assets"
@@ -65,9 +66,18 @@ def _load_body(path: Path) -> None:
 
 
 def _load_motion(path: Path) -> None:
+    from scope.scope_addon.edit.pins.corrected_motion import corrections_of, uncorrected
     from scope.scope_addon.motion import Motion
 
-    Motion.load(path)
+    motion = Motion.load(path)
+    corrections_of(motion)
+    uncorrected(motion)
+
+
+def _import_smpl_motion(path: Path) -> None:
+    from scope.scope_addon.smpl_import.convert import import_motion
+
+    import_motion(path)
 
 
 def _read_calibration(path: Path) -> None:
@@ -146,22 +156,56 @@ def _exif(_: Path) -> list[bytes]:
 def _bodies(_: Path) -> list[bytes]:
     with np.load(ASSETS / "body" / "scope.npz") as file:
         arrays = {key: file[key] for key in file.files}
-    return [npz(arrays)]
+    return [npz(arrays), *(npz(_small_tables(family)) for family in ("smpl", "smplh", "smplx", "star"))]
+
+
+def _small_tables(family: str) -> dict[str, np.ndarray]:
+    """Return the arrays of a body of some 50 kB, so that damage often hits what describes them."""
+    tables = make_tables(family, vertices=60, betas=2)
+    return {key: value for key, value in tables.items() if key != "posedirs"}
 
 
 def _pickled_bodies(_: Path) -> list[bytes]:
-    arrays = {"v_template": np.zeros((4, 3)), "kintree_table": np.zeros((2, 2), int), "f": np.zeros((2, 3), np.uint32)}
-    return [pickle.dumps(arrays, protocol) for protocol in (0, 2, 4)]
+    tables = [_small_tables(family) for family in ("smpl", "smplh", "star")]
+    return [
+        *(pickle.dumps(arrays, protocol) for arrays in tables for protocol in (2, 4)),
+        *(dump_python2(tables[0], protocol) for protocol in (0, 2)),
+    ]
 
 
 def _motions(_: Path) -> list[bytes]:
+    from scope.scope_addon.edit.pins.corrected_motion import with_corrections
+    from scope.scope_addon.edit.pins.corrections import Contact, Exchange, Pin, Upright
     from scope.solver.loaders.body_file import load_body
 
     from ..made_motion import made_face, made_motion
 
-    poses, trans = np.zeros((3, 72)), np.zeros((3, 3))
+    poses, trans = np.zeros((6, 72)), np.zeros((6, 3))
     body = load_body("scope")
-    return [made_motion(body, poses, trans, face=face).to_bytes() for face in ({}, made_face(3))]
+    motions = [made_motion(body, poses, trans, face=face) for face in ({}, made_face(6))]
+    corrections = (Pin(2, "head", (320.0, 200.0)), Contact(1, 3, "left"), Exchange(4, 5), Upright.of(np.eye(4)))
+    return [motion.to_bytes() for motion in (*motions, with_corrections(motions[0], body, corrections))]
+
+
+def _smpl_motions(folder: Path) -> list[bytes]:
+    """Return motions as SMPL's, AMASS's older and newer, AIST++'s and SMPL fits' files name their arrays."""
+    joints = np.linspace(-0.6, 0.6, 5 * 55 * 3, dtype=np.float32).reshape(5, 55, 3)
+    place = np.ones((5, 3))
+
+    def flat(first: int, last: int) -> np.ndarray:
+        return joints[:, first:last].reshape(5, -1)
+
+    layouts: list[dict[str, Any]] = [
+        {"poses": flat(0, 24), "trans": place, "mocap_framerate": np.array(30.0), "gender": np.array("male")},
+        {"poses": flat(0, 52), "trans": place, "betas": np.zeros(16)},
+        {"root_orient": flat(0, 1), "pose_body": flat(1, 22), "pose_hand": flat(22, 52), "fps": np.array(120)},
+        {"smpl_poses": flat(0, 24), "smpl_trans": place, "smpl_scaling": np.array([2.0])},
+        {"global_orient": flat(0, 1), "body_pose": flat(1, 24), "transl": place},
+    ]
+    seeds = [npz(layout) for layout in layouts]
+    (folder / "seed.npz").write_bytes(seeds[0])
+    _import_smpl_motion(folder / "seed.npz")  # compiles what it needs, which takes longer than an input may
+    return seeds
 
 
 def npz(arrays: dict[str, Any]) -> bytes:
@@ -222,9 +266,11 @@ TARGETS = {
     "body": Target(_load_body, (".npz",), _bodies),
     "pickle": Target(_load_body, (".pkl",), _pickled_bodies),
     "motion": Target(_load_motion, (".npz",), _motions),
+    "smpl_motion": Target(_import_smpl_motion, (".npz",), _smpl_motions),
     "calibration": Target(_read_calibration, (".json",), _calibrations),
     "bone_map": Target(_load_bone_map, (".json",), _bone_maps),
     "network": Target(_check_network, (".onnx",), _networks),
+    "network_run": Target(own.run_network, (".onnx",), _networks),
     "rig": Target(_rig_source, (".glb", ".gltf", ".fbx"), _rigs),
     "reply": Target(own.read_reply, (".json",), own.replies),
     "request": Target(own.read_request, (".json",), own.requests),

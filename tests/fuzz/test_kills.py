@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from .kills import COMMANDS, check_command
+from .kills import COMMANDS, check_command, chosen
 from .system_calls import AVAILABLE, FULL, KILL, NO_MEMORY, traced
 
 pytestmark = pytest.mark.skipif(not AVAILABLE, reason="traces system calls of Linux on x86-64")
@@ -29,6 +29,15 @@ BY_NAME = {command.name: command for command in COMMANDS}
 )
 def test_files_are_old_or_whole_and_the_next_run_is_good(name: str, action: str, calls: tuple[int, ...]) -> None:
     assert check_command(BY_NAME[name], action, calls) == (len(calls), [])
+
+
+def test_several_commands_and_faults_can_be_named() -> None:
+    """Names of two commands chose neither, and nothing was run."""
+    assert [(c.name, a) for c, a in chosen(["live", "cache", KILL])] == [("live", KILL), ("cache", KILL)]
+    assert [(c.name, a) for c, a in chosen(["compile"])] == [("compile", KILL), ("compile", FULL)]
+    assert len(chosen([])) == sum(len(command.actions) for command in COMMANDS)
+    with pytest.raises(SystemExit, match="no command or fault lives; there are batch, "):
+        chosen(["lives"])
 
 
 PROGRAM = """

@@ -9,6 +9,8 @@ import tempfile
 import pytest
 from scope.scope_addon.job.private_folder import private_folder
 
+from ..required import package
+
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="with the folders of Linux")
 
 
@@ -62,7 +64,7 @@ def test_what_others_prepared_is_not_used(caches, monkeypatch, kind):
 
 
 def test_the_extensions_fallback_is_this_folder(caches):
-    pytest.importorskip("bpy")
+    package("bpy")
     from scope.scope_addon.ui.preferences import user_folder
 
     assert user_folder() == private_folder()

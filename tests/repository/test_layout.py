@@ -20,6 +20,7 @@ WITHOUT_TESTS = 219  # modules that no test file is named after, many tested thr
 
 # Tests that belong to no single module, by path below tests/, and what they test.
 CROSS_CUTTING = {
+    "repository/test_ci.py": "what the hosted CI runs, against .ci/run",
     "repository/test_code_size.py": "lines and parameters of functions, lines of files",
     "repository/test_docs.py": "the documentation against the program",
     "repository/test_docstrings.py": "docstrings of all public functions",

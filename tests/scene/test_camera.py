@@ -10,6 +10,8 @@ from scope.scope_addon.scene.build import NEW_SCENE, BuildOptions, build_scene
 from scope.scope_addon.scene.footage_strip import strips_of
 from scope.scope_addon.scene.match_rate import change_rate
 
+from ..required import package
+
 
 def projected_by_blender(camera: bpy.types.Object, points_world: np.ndarray) -> np.ndarray:
     """(N, 2) pixels from the top left, by the matrix Blender renders with."""
@@ -148,7 +150,7 @@ def test_footage_of_a_distorting_lens_is_shown_undistorted(body, make_motion, cl
 
 def distorted_by_opencv(points: np.ndarray, K: np.ndarray, dist: np.ndarray) -> np.ndarray:
     """(N, 2) pixels in the picture of points (N, 2) in that of a pinhole."""
-    cv2 = pytest.importorskip("cv2")
+    cv2 = package("cv2")
     rays = np.concatenate([points, np.ones((len(points), 1))], axis=1) @ np.linalg.inv(K).T
     return cv2.projectPoints(rays, np.zeros(3), np.zeros(3), K, dist)[0][:, 0]
 

@@ -74,7 +74,7 @@ def test_equals_tflite_on_noise(network: Network) -> None:
 
 @pytest.mark.parametrize("network", [n for n in NETWORKS if len(n.input_shape) == 4], ids=lambda n: n.name)
 def test_equals_tflite_on_real_crops(network: Network, shared: Path) -> None:
-    cv2 = pytest.importorskip("cv2")
+    cv2 = package("cv2")
     crops = []
     for clip, corner, size in (("squats_5fps", (200, 0), 720), ("gesture_square", (0, 0), 576)):
         video = cv2.VideoCapture(str(shared / "data" / "clips" / f"{clip}.mp4"))

@@ -14,6 +14,8 @@ from scope.tools.train_lifter.augment import Motions, PoseSampler, small_rotatio
 from scope.tools.train_lifter.dataset import Dataset, cameras, cut_short, lines_of_sight, pitches
 from scope.tools.train_lifter.detector_noise import Persistence
 
+from ..required import missing, package
+
 
 @pytest.fixture(scope="module")
 def motions(body):
@@ -184,8 +186,11 @@ def test_held_cameras_look_down_on_hips_below_them_and_less_so_from_afar():
 
 
 def test_the_exported_network_is_the_trained_one(tmp_path):
-    torch = pytest.importorskip("torch")
-    pytest.importorskip("onnx")
+    try:
+        import torch
+    except ImportError:
+        missing("torch is not installed, which trains the lifting network: pip install torch", "SCOPE_WITHOUT_TRAINING")
+    package("onnx")
     from scope.tools.train_lifter.export import export
     from scope.tools.train_lifter.network import LiftingNetwork
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.body import Body
+from ....solver.loaders.regular_file import in_one_line
 from ....solver.names import BODY_JOINTS
 from ....solver.rotations import exp, log
 from ...errors import MotionFileError
@@ -85,11 +86,13 @@ def uncorrected(motion: Motion) -> Motion:
         for name in _KEPT:
             before[name] = getattr(motion, name).copy()
             before[name][rows] = motion.corrections[f"uncorrected_{name}"]
-    except (KeyError, IndexError, ValueError) as error:
-        raise MotionFileError(f"the motion's corrections are damaged: {error}; capture the footage again") from error
-    if "uncorrected_world_from_camera" in motion.corrections:
-        before["world_from_camera"] = motion.corrections["uncorrected_world_from_camera"]
-    return replace(motion, **before, corrections={})
+        if "uncorrected_world_from_camera" in motion.corrections:
+            before["world_from_camera"] = motion.corrections["uncorrected_world_from_camera"]
+        return replace(motion, **before, corrections={})
+    except (LookupError, ValueError, TypeError, OverflowError, MotionFileError) as error:
+        raise MotionFileError(
+            f"the motion's corrections are damaged: {in_one_line(error)}; capture the footage again"
+        ) from error
 
 
 def with_corrections(motion: Motion, body: Body, corrections: tuple[Correction, ...]) -> Motion:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ....solver.loaders.regular_file import in_one_line
 from ...errors import MotionFileError, UsageError
 
 REACH_S = 0.4  # over which a correction fades out on both sides
@@ -189,8 +190,8 @@ def from_arrays(arrays: Mapping[str, NDArray[Any]]) -> tuple[Correction, ...]:
             *(Exchange(int(a), int(b), str(limbs)) for a, b, limbs in exchanges),
             *(Upright.of(np.asarray(T, float)) for T in column("upright", 4, 4)[:1]),
         )
-    except (ValueError, UsageError) as error:
-        raise MotionFileError(f"the motion's corrections are damaged: {error}") from error
+    except (ValueError, TypeError, OverflowError, UsageError) as error:
+        raise MotionFileError(f"the motion's corrections are damaged: {in_one_line(error)}") from error
 
 
 def _numbers(row: NDArray[np.float64]) -> Any:

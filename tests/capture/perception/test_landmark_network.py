@@ -16,6 +16,8 @@ from scope.scope_addon.capture.perception.sessions import landmark_network_name
 from scope.scope_addon.errors import UsageError
 from scope.solver.loaders.body_file import ASSETS
 
+from ...required import package
+
 SAMPLE = ASSETS / "sample"
 TRUTH_NAMES = {
     "LShoulder": "left_shoulder", "RShoulder": "right_shoulder", "LElbow": "left_elbow", "RElbow": "right_elbow",
@@ -121,7 +123,7 @@ def test_unknown_quality_lists_the_presets() -> None:
 
 def test_mask_covers_the_person_alone(network: LandmarkNetwork) -> None:
     """The true body of the sample clip's first frame, drawn into the region, covers what the network calls a person."""
-    cv2 = pytest.importorskip("cv2")
+    cv2 = package("cv2")
     with np.load(SAMPLE / "sample_truth.npz") as truth:
         joints, K = truth["joints_cam"][0], truth["intrinsics"]
     _, image = cv2.VideoCapture(str(SAMPLE / "sample.mp4")).read()

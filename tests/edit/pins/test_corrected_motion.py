@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.edit.clip import clip_from_motion
 from scope.scope_addon.edit.pins.corrected_motion import corrections_of, shot_of, uncorrected, with_corrections
-from scope.scope_addon.edit.pins.corrections import Contact, Exchange, Pin
+from scope.scope_addon.edit.pins.corrections import Contact, Exchange, Pin, Upright
 from scope.scope_addon.edit.pins.solve_pins import missed
 from scope.scope_addon.edit.smooth import smoothed
 from scope.scope_addon.edit.spans import swap_sides
@@ -79,3 +79,22 @@ def test_damaged_corrections_are_an_error():
     motion.corrections["uncorrected_rows"] = np.array([10_000])
     with pytest.raises(MotionFileError, match="corrections are damaged"):
         uncorrected(motion)
+
+
+@pytest.mark.parametrize("value", [np.array("text"), np.eye(3), np.full((90, 4, 4), "x")])
+def test_a_damaged_camera_before_the_corrections_is_an_error(value):
+    motion = with_corrections(MOTION, BODY, (Upright.of(np.eye(4)),))
+    motion.corrections["uncorrected_world_from_camera"] = value
+    with pytest.raises(MotionFileError, match="corrections are damaged"):
+        uncorrected(motion)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("pin_frames", np.array([np.inf])), ("pin_uv", np.full((1, 2), "x")), ("pin_reach", np.array(["x"]))],
+)
+def test_damaged_pins_are_an_error(name, value):
+    motion = with_corrections(MOTION, BODY, (pin(),))
+    motion.corrections[name] = value
+    with pytest.raises(MotionFileError, match="corrections are damaged"):
+        corrections_of(motion)

@@ -18,6 +18,7 @@ from scope.scope_addon.scene.export import formats
 from scope.scope_addon.scene.export.export import ExportOptions, captures, export, export_motions
 from scope.scope_addon.scene.export.output_paths import SUFFIXES
 
+from ...required import package
 from ..exported import JOINT_TOLERANCE, SKIN_TOLERANCE, corresponding, read_back
 
 SCENE_SUFFIXES = [s for s in SUFFIXES if s != ".npz"]
@@ -133,7 +134,7 @@ def test_fbx_objects_have_unit_scale_and_no_leaf_bones(body, make_motion, tmp_pa
 
 def test_fbx_is_in_centimetres_without_any_scaling(body, make_motion, tmp_path):
     """Read with Blender's parser. Unreal interprets lengths as centimetres, whatever unit the file states."""
-    parser = pytest.importorskip("io_scene_fbx.parse_fbx")
+    parser = package("io_scene_fbx.parse_fbx")
     path, motion = tmp_path / "walk.fbx", make_motion(body, 4)
     export_motions([motion], body, path, export_options=ExportOptions(camera=True))
     root, version = parser.parse(str(path))
@@ -350,7 +351,7 @@ def test_an_unknown_unit_of_bvh_is_an_error():
 @pytest.mark.parametrize("first_frame", [0.0, 1.0, 7.0])
 def test_fbx_and_glb_begin_at_zero_and_are_named_after_the_clip(body, make_motion, tmp_path, first_frame):
     """Read from the files themselves, because importers move and rename animation."""
-    parser = pytest.importorskip("io_scene_fbx.parse_fbx")
+    parser = package("io_scene_fbx.parse_fbx")
     built = build_scene(
         [make_motion(body, 5, rate=20.0)], body, None, replace(NEW_SCENE, name="A walk", start_frame=first_frame)
     )

@@ -14,6 +14,8 @@ from scope.tools.train_prior.export import HAND_DEVIATION, fixed, flat
 from scope.tools.train_prior.export import mirrored as mirrored_parameters
 from scope.tools.train_prior.rotation_statistics import balanced, mean_rotation
 
+from ...required import missing
+
 FIXTURE = Path(__file__).with_name("flow_by_torch.npz")
 
 
@@ -132,9 +134,12 @@ def test_built_in_prior_is_a_density_of_each_joint(prior, joint):
 
 @pytest.fixture(scope="module")
 def samples():
-    motions = Path(__file__).resolve().parents[2] / "build" / "mocap" / "motions.npz"
+    motions = Path(__file__).resolve().parents[3] / "build" / "mocap" / "motions.npz"
     if not motions.exists():
-        pytest.skip("build/mocap/motions.npz is not built: python -m scope.tools.mocap.fit_body makes it")
+        missing(
+            f"{motions} is not built: python -m scope.tools.mocap.fit_body makes it",
+            allowed_by="SCOPE_WITHOUT_TRAINING",
+        )
     return load_samples(motions, load_body("scope").joint_names)
 
 

@@ -15,6 +15,8 @@ from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.media.video_range import VideoRange, parse_range
 from scope.scope_addon.errors import VideoError
 
+from ....required import package
+
 W, H = 64, 48
 GREY = np.full((H, W, 3), 90, np.uint8)
 
@@ -28,7 +30,7 @@ def box(name: bytes, content: bytes) -> bytes:
 
 
 def avif(path: Path, image_rgb: np.ndarray) -> Path:
-    av = pytest.importorskip("av")
+    av = package("av")
     try:
         with av.open(str(path), "w", format="avif") as container:
             stream = container.add_stream("libsvtav1", rate=1)

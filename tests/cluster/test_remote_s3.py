@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A batch whose footage and results are on S3, as moto's server imitates it, with a worker killed on the way."""
+
+import json
+import os
+import signal
+import sys
+import threading
+
+import pytest
+from scope.scope_addon.cli import main
+from scope.scope_addon.job.batch import REPORT_NAME
+
+from ..job.processes import wait_for
+from ..required import package
+from .test_runner import PROGRAM, started, workers
+
+s3fs, server = package("s3fs"), package("moto.server")
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="sends signals to worker processes")
+
+
+@pytest.fixture
+def store(monkeypatch):
+    """An empty bucket, and variables by which this process and workers find it."""
+    serving = server.ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
+    serving.start()
+    host, port = serving.get_host_and_port()
+    values = {"ENDPOINT_URL": f"http://{host}:{port}", "ACCESS_KEY_ID": "key", "SECRET_ACCESS_KEY": "secret"}
+    for name, value in {**values, "DEFAULT_REGION": "us-east-1", "EC2_METADATA_DISABLED": "true"}.items():
+        monkeypatch.setenv(f"AWS_{name}", value)
+    s3fs.S3FileSystem.clear_instance_cache()
+    file_system = s3fs.S3FileSystem()
+    file_system.mkdir("studio")
+    yield file_system
+    s3fs.S3FileSystem.clear_instance_cache()
+    serving.stop()
+
+
+def test_clips_on_s3_are_captured_once_although_a_worker_is_killed(store, tmp_path):
+    for name, text in {"a": "a", "b": "broken", "c": "hangs", "below/d": "d"}.items():
+        store.pipe_file(f"studio/clips/{name}.mp4", text.encode())
+    program = [
+        sys.executable,
+        "-c",
+        PROGRAM.replace("clip.with_suffix(", f"pathlib.Path({str(tmp_path)!r}, clip.stem + "),
+    ]
+
+    def calls(name):
+        log = tmp_path / f"{name}.calls"
+        return [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
+
+    with started(n_workers=2, processes=True) as cluster:
+        argv = ["batch", "s3://studio/clips", "--out", "s3://studio/out", "--formats", "npz", "--recursive"]
+        argv += ["--scheduler", cluster.scheduler_address]
+        pids = set(workers(cluster).values())
+
+        def kill():
+            wait_for(lambda: calls("c"))
+            parent = calls("c")[0]["parent"]
+            assert parent in pids
+            os.kill(parent, signal.SIGKILL)
+
+        thread = threading.Thread(target=kill)
+        thread.start()
+        for counts in ({"done": 3, "skipped": 0}, {"done": 0, "skipped": 3}):
+            assert main(argv, program=program) == 1
+            thread.join()
+            store.invalidate_cache()
+            report = json.loads(store.cat_file(f"studio/out/{REPORT_NAME}"))
+            assert report["counts"] == {**counts, "no_person": 0, "failed": 1}
+            results = {"a.npz": "a", "below/d.npz": "d", "c.npz": "hangs"}
+            assert store.find("studio/out") == sorted(f"studio/out/{name}" for name in [*results, REPORT_NAME])
+            for name, text in results.items():
+                assert store.cat_file(f"studio/out/{name}").decode() == f"result of {text}"
+    assert {name: len(calls(name)) for name in "abcd"} == {"a": 1, "b": 2, "c": 2, "d": 1}
