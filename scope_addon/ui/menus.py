@@ -50,6 +50,7 @@ class SCOPE_MT_motion_capture(bpy.types.Menu):
         layout.operator("scope.foot_stands", text="Right Foot Stands").foot = "right"
         layout.operator("scope.exchange_sides", icon="MOD_MIRROR")
         layout.operator("scope.upright_line", icon="EMPTY_SINGLE_ARROW")
+        layout.operator("scope.floor_here", icon="GRID")
         layout.separator()
         layout.operator("scope.retarget", text="Retarget to Rig", icon="ARMATURE_DATA")
         layout.operator("scope.rename_take", icon="GREASEPENCIL")

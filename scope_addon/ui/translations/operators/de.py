@@ -18,6 +18,7 @@ OPERATORS = {
     "Edit Expression Map": "Mimikzuordnung bearbeiten",
     "Exchange Left and Right": "Links und rechts vertauschen",
     "Export Capture": "Erfassung exportieren",
+    "Floor Here": "Hier ist der Boden",
     "Foot Stands": "Fuß steht",
     "Footage to Sequencer": "Filmmaterial in den Sequenzer",
     "Go to Frame": "Zum Bild gehen",

@@ -18,6 +18,7 @@ OPERATORS = {
     "Edit Expression Map": "Editar mapa de expresiones",
     "Exchange Left and Right": "Intercambiar izquierda y derecha",
     "Export Capture": "Exportar captura",
+    "Floor Here": "El suelo está aquí",
     "Foot Stands": "Pie apoyado",
     "Footage to Sequencer": "Filmación al editor de video",
     "Go to Frame": "Ir al fotograma",

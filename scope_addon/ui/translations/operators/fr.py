@@ -18,6 +18,7 @@ OPERATORS = {
     "Edit Expression Map": "Éditer la table des expressions",
     "Exchange Left and Right": "Échanger gauche et droite",
     "Export Capture": "Exporter la capture",
+    "Floor Here": "Le sol est ici",
     "Foot Stands": "Pied posé",
     "Footage to Sequencer": "Métrage vers le séquenceur",
     "Go to Frame": "Aller à la frame",

@@ -18,6 +18,7 @@ OPERATORS = {
     "Edit Expression Map": "表情マップを編集",
     "Exchange Left and Right": "左右を入れ替え",
     "Export Capture": "キャプチャをエクスポート",
+    "Floor Here": "ここが床",
     "Foot Stands": "足を接地",
     "Footage to Sequencer": "フッテージをシーケンサーへ",
     "Go to Frame": "フレームに移動",

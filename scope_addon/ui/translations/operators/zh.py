@@ -18,6 +18,7 @@ OPERATORS = {
     "Edit Expression Map": "编辑表情映射",
     "Exchange Left and Right": "互换左右",
     "Export Capture": "导出捕捉",
+    "Floor Here": "地面在此",
     "Foot Stands": "脚站立",
     "Footage to Sequencer": "素材到序列编辑器",
     "Go to Frame": "转到帧",
