@@ -136,7 +136,7 @@ Correction = Pin | Contact | Exchange | Upright | Floor
 
 
 def world_of(corrections: Iterable[Correction]) -> NDArray[np.float64] | None:
-    """Return the transform (4, 4) of the captured world by the upright line and then the floor; None without them."""
+    """Return the transform (4, 4) of the captured world by the upright line, then the floor; None without them."""
     out: NDArray[np.float64] | None = None
     for c in sorted((c for c in corrections if isinstance(c, Upright | Floor)), key=lambda c: isinstance(c, Floor)):
         out = c.transform if out is None else c.transform @ out

@@ -87,7 +87,7 @@ def change_world(
 
 
 def without_kinds(corrections: tuple[Correction, ...], kinds: set[str]) -> tuple[Correction, ...]:
-    """Return the corrections without those that move the world: ``UPRIGHT``, ``FLOOR`` or both, as the list has them."""
+    """Return the corrections without those that move the world; the list calls them ``UPRIGHT`` and ``FLOOR``."""
     from ...edit.pins.corrections import Floor, Upright
 
     removed = tuple(cls for cls in (Upright, Floor) if cls.__name__.upper() in kinds)
