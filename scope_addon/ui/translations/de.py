@@ -276,6 +276,7 @@ TEXTS = {
     "Only the arms": "Nur die Arme",
     "Only the legs": "Nur die Beine",
     "Only the motion of the skeleton, one file per person": "Nur die Bewegung des Skeletts, eine Datei pro Person",
+    "Open the guide, which comes with Scope, in the web browser; the network is not used": "Die mitgelieferte Anleitung im Webbrowser öffnen; das Netz wird nicht benutzt",
     "Options": "Optionen",
     "Overlap": "Überlappend",
     "Part of the Video": "Teil des Videos",

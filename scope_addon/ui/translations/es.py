@@ -276,6 +276,7 @@ TEXTS = {
     "Only the arms": "Solo los brazos",
     "Only the legs": "Solo las piernas",
     "Only the motion of the skeleton, one file per person": "Solo el movimiento del esqueleto, un archivo por persona",
+    "Open the guide, which comes with Scope, in the web browser; the network is not used": "Abrir en el navegador web la guía incluida en Scope; no se usa la red",
     "Options": "Opciones",
     "Overlap": "Superpuesto",
     "Part of the Video": "Parte del video",

@@ -276,6 +276,7 @@ TEXTS = {
     "Only the arms": "Seulement les bras",
     "Only the legs": "Seulement les jambes",
     "Only the motion of the skeleton, one file per person": "Seulement le mouvement du squelette, un fichier par personne",
+    "Open the guide, which comes with Scope, in the web browser; the network is not used": "Ouvrir dans le navigateur web le guide fourni avec Scope ; le réseau n’est pas utilisé",
     "Options": "Options",
     "Overlap": "Superposer",
     "Part of the Video": "Partie de la vidéo",

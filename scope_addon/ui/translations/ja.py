@@ -276,6 +276,7 @@ TEXTS = {
     "Only the arms": "腕のみ",
     "Only the legs": "脚のみ",
     "Only the motion of the skeleton, one file per person": "スケルトンのモーションのみ。人物ごとに 1 ファイル",
+    "Open the guide, which comes with Scope, in the web browser; the network is not used": "Scope に付属のガイドをウェブブラウザーで開きます（ネットワークは使いません）",
     "Options": "オプション",
     "Overlap": "重ねる",
     "Part of the Video": "動画の一部",

@@ -276,6 +276,7 @@ TEXTS = {
     "Only the arms": "仅手臂",
     "Only the legs": "仅腿",
     "Only the motion of the skeleton, one file per person": "仅骨架的动作，每人一个文件",
+    "Open the guide, which comes with Scope, in the web browser; the network is not used": "在网页浏览器中打开 Scope 附带的指南；不使用网络",
     "Options": "选项",
     "Overlap": "重叠",
     "Part of the Video": "视频片段",
