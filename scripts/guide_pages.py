@@ -66,30 +66,41 @@ def _blocks(lines: list[str], resolve: Resolve) -> Iterator[str]:
     """Convert lines of Markdown, block by block."""
     k = 0
     while k < len(lines):
-        line, first = lines[k], k
-        k += 1
-        if _FENCE.match(line):
-            while k < len(lines) and not _FENCE.match(lines[k]):
-                k += 1
-            yield f"<pre>{html.escape(chr(10).join(lines[first + 1 : k]))}</pre>"
-            k += 1
-        elif heading := _HEADING.match(line):
-            level, text = len(heading[1]), heading[2]
-            yield f'<h{level} id="{anchor_of(text)}">{_inline(text, resolve)}</h{level}>'
-        elif line.startswith("|"):
-            while k < len(lines) and lines[k].startswith("|"):
-                k += 1
-            yield _table(lines[first:k], resolve)
-        elif _ITEM.match(line):
-            while k < len(lines) and (
-                _belongs(lines[k]) or (not lines[k] and k + 1 < len(lines) and _belongs(lines[k + 1]))
-            ):
-                k += 1
-            yield _list(lines[first:k], resolve)
-        elif line.strip():
-            while k < len(lines) and lines[k].strip() and not _starts_block(lines[k]):
-                k += 1
-            yield f"<p>{_inline(chr(10).join(lines[first:k]), resolve)}</p>"
+        first, k = k, _end_of_block(lines, k)
+        if lines[first].strip():
+            yield _block(lines[first:k], resolve)
+
+
+def _end_of_block(lines: list[str], k: int) -> int:
+    """Return the number of the line after the block that begins at line ``k``; an empty line is one of its own."""
+    first = lines[k]
+    if _FENCE.match(first):
+        return next((n + 1 for n in range(k + 1, len(lines)) if _FENCE.match(lines[n])), len(lines))
+    if _HEADING.match(first) or not first.strip():
+        return k + 1
+
+    def goes_on(n: int) -> bool:
+        if first.startswith("|"):
+            return lines[n].startswith("|")
+        if _ITEM.match(first):
+            return _belongs(lines[n]) or (not lines[n].strip() and n + 1 < len(lines) and _belongs(lines[n + 1]))
+        return bool(lines[n].strip()) and not _starts_block(lines[n])
+
+    return next((n for n in range(k + 1, len(lines)) if not goes_on(n)), len(lines))
+
+
+def _block(lines: list[str], resolve: Resolve) -> str:
+    """Convert the lines of one block."""
+    if _FENCE.match(lines[0]):
+        return f"<pre>{html.escape(chr(10).join(lines[1:-1]))}</pre>"
+    if heading := _HEADING.match(lines[0]):
+        level, text = len(heading[1]), heading[2]
+        return f'<h{level} id="{anchor_of(text)}">{_inline(text, resolve)}</h{level}>'
+    if lines[0].startswith("|"):
+        return _table(lines, resolve)
+    if _ITEM.match(lines[0]):
+        return _list(lines, resolve)
+    return f"<p>{_inline(chr(10).join(lines), resolve)}</p>"
 
 
 def _belongs(line: str) -> bool:

@@ -136,7 +136,7 @@ Correction = Pin | Contact | Exchange | Upright | Floor
 
 
 def world_of(corrections: Iterable[Correction]) -> NDArray[np.float64] | None:
-    """Return the transform (4, 4) of the captured world by the upright line, then the floor; None without them."""
+    """Return the transform (4, 4) of the captured world by the upright line, then the floor; None without both."""
     out: NDArray[np.float64] | None = None
     for c in sorted((c for c in corrections if isinstance(c, Upright | Floor)), key=lambda c: isinstance(c, Floor)):
         out = c.transform if out is None else c.transform @ out
@@ -156,8 +156,8 @@ def _check_span(first: int, last: int) -> None:
 def added(corrections: tuple[Correction, ...], new: Correction) -> tuple[Correction, ...]:
     """Return the corrections with a new one; a pin replaces the same joint's pin in the same frame.
 
-    The same exchange a second time undoes the first, so that neither remains. An upright line and a floor move the world
-    that those before have made, so that one of each remains.
+    The same exchange a second time undoes the first, so that neither remains. An upright line and a floor move the
+    world that those before have made, so that one of each remains.
     """
     if isinstance(new, Upright | Floor):
         return _moved_on(corrections, new)
