@@ -24,6 +24,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 from bill_of_materials import bill_of_materials
+from guide_pages import FILES as GUIDE
+from guide_pages import write_pages
 from shipped_kernels import add_kernels
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -42,16 +44,10 @@ BLENDERS = {"3.11": ("4.2.0", "5.1.0"), "3.13": ("5.1.0", None)}
 # imports none of them. numpy is always Blender's own.
 PACKAGES = ("numba", "llvmlite", "onnxruntime", "opencv-contrib-python-headless", "av")
 CONTENT = ("__init__.py", "LICENSE", "THIRD_PARTY.md", "solver", "scope_addon", "assets")
-GUIDE = ("docs/guide.md",)  # with its pictures in assets/guide
 # Clusters use the network, and live captures send poses to other programs, from the shell only: nothing in the
 # extension opens a socket.
 SENDERS = ("json_lines.py", "preview_page.py", "vmc.py")
-OF_OTHER_PAGES = ("live.jpg",)  # in assets/guide, but not in the guide
-LEFT_OUT = (
-    *("__pycache__", "*.pyc", ".*", "sample_truth.npz", "pictures", "examples", "cluster"),
-    *SENDERS,
-    *OF_OTHER_PAGES,
-)
+LEFT_OUT = (*("__pycache__", "*.pyc", ".*", "sample_truth.npz", "pictures", "examples", "cluster"), *SENDERS)
 BILL = "bill_of_materials.cdx.json"  # in the zip; a copy with the zip's name lies beside it
 GOAL_MB, LIMIT_MB = 200, 240
 _OLDEST = 315532800  # 1980-01-01, the first time that a zip can state
@@ -209,13 +205,14 @@ def stage(target: Target, wheels: list[Path], website: str = "") -> None:
     """Copy the shipped files and a target's wheels into the staging folder, with its manifest."""
     shutil.rmtree(STAGING, ignore_errors=True)
     (STAGING / "wheels").mkdir(parents=True)
-    for name in (*CONTENT, *GUIDE):
+    for name in CONTENT:
         source, goal = ROOT / name, STAGING / name
         if source.is_dir():
             shutil.copytree(source, goal, ignore=shutil.ignore_patterns(*LEFT_OUT))
         else:
             goal.parent.mkdir(exist_ok=True)
             shutil.copy2(source, goal)
+    write_pages(ROOT, STAGING)
     names = []
     for path in wheels:
         name = shipped_name(path.name, target.python)

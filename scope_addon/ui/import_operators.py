@@ -27,11 +27,12 @@ class SCOPE_OT_import_motion(ReportingOperator):
 
     bl_idname = "scope.import_motion"
     bl_label = "Import Motion"
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
 
     filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
     directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"})
-    filter_glob: StringProperty(default="*.npz", options={"HIDDEN"})
+    filter_glob: StringProperty(default="*.npz", options={"HIDDEN", "SKIP_SAVE"})
     up_axis: blender_property(option("up_axis"), {})
     motion_rate: blender_property(option("motion_rate"), {})
     body: blender_property(option("body"), {})

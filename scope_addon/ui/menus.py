@@ -50,6 +50,7 @@ class SCOPE_MT_motion_capture(bpy.types.Menu):
         layout.operator("scope.foot_stands", text="Right Foot Stands").foot = "right"
         layout.operator("scope.exchange_sides", icon="MOD_MIRROR")
         layout.operator("scope.upright_line", icon="EMPTY_SINGLE_ARROW")
+        layout.operator("scope.floor_here", icon="GRID")
         layout.separator()
         layout.operator("scope.retarget", text="Retarget to Rig", icon="ARMATURE_DATA")
         layout.operator("scope.rename_take", icon="GREASEPENCIL")
@@ -60,7 +61,7 @@ class SCOPE_MT_motion_capture(bpy.types.Menu):
 
 def draw_import_video(layout: bpy.types.UILayout, icon: str) -> None:
     """Draw the entry with the words people search for: its own count more than those of the menus that lead to it."""
-    layout.operator("scope.import_video", text="Motion from Video (Motion Capture)", icon=icon)
+    layout.operator("scope.import_video", text="Motion from Video (Motion Capture, Mocap)", icon=icon)
 
 
 def _draw_import(self: bpy.types.Menu, _context: bpy.types.Context) -> None:

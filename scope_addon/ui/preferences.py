@@ -64,6 +64,9 @@ class SCOPE_AP_preferences(bpy.types.AddonPreferences):
         keymap.draw(layout, context)
         row = layout.row()
         row.alignment = "RIGHT"
+        row.operator("scope.documentation", icon="HELP")
+        row = layout.row()
+        row.alignment = "RIGHT"
         size, folder = _size_text(_cache_size(cache().root)), cache().root
         row.label(text=iface_("{size} of captures in {folder}", size=size, folder=folder))
         row.operator("scope.clear_cache")
@@ -81,6 +84,25 @@ class SCOPE_OT_clear_cache(bpy.types.Operator):
         _measured.clear()
         self.report({"INFO"}, rpt_("Freed {size}", size=_size_text(freed)))
         return {"FINISHED"}
+
+
+class SCOPE_OT_documentation(bpy.types.Operator):
+    """Open the guide, which comes with Scope, in the web browser; the network is not used"""
+
+    bl_idname = "scope.documentation"
+    bl_label = "Documentation"
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Open it."""
+        bpy.ops.wm.url_open(url=guide().as_uri())
+        return {"FINISHED"}
+
+
+def guide() -> Path:
+    """Return the file of the guide: a page of the extension, or in a checkout the text from which that is made."""
+    docs = Path(__file__).resolve().parents[2] / "docs"
+    page = docs / "guide.html"
+    return page if page.is_file() else page.with_suffix(".md")
 
 
 def preferences() -> SCOPE_AP_preferences | None:
@@ -129,4 +151,4 @@ def _size_text(size: float) -> str:
     return f"{size:.1f} GB"
 
 
-CLASSES = (SCOPE_OT_clear_cache, SCOPE_AP_preferences)
+CLASSES = (SCOPE_OT_clear_cache, SCOPE_OT_documentation, SCOPE_AP_preferences)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import struct
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,12 +17,19 @@ import bpy
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-from session import FOOTAGE, OUT, captured, invoke, picture, press, run, show_tab, use, viewport
+from session import FOOTAGE, OUT, captured, invoke, key, picture, press, run, show_tab, until, use, viewport
 
 # On a screen of 1600 x 1000, of which a laptop of 1366 x 768 shows the first 768 pixels, with two captures in the list.
 FBX_BUTTON, RAW_BUTTON, FOLD = (1090, 453), (1085, 622), 768
 STILL, LOW = OUT / "still.npz", OUT / "low.npz"
 FRAMES, RATE = 120, 60.0
+SEARCHED = (  # words, the operator that they find first, and its format
+    ("motion capture", "import_video", ""),
+    ("mocap", "import_video", ""),
+    ("motion from video", "import_video", ""),
+    ("smpl motion", "import_motion", ""),
+    ("captured motion as bvh", "export", "BVH"),
+)
 report: dict[str, object] = {}
 
 
@@ -102,6 +110,43 @@ def curve() -> list[float]:
     action = bpy.data.objects["second"].animation_data.action
     found = next(each for each in action.fcurves if "left_elbow" in each.data_path)
     return [point.co[1] for point in found.keyframe_points]
+
+
+def shortcut() -> Iterator[float]:
+    """Press Shift Alt V over the viewport: compare with the footage, and back."""
+    for perspective in ("CAMERA", "PERSP"):
+        key("shift+alt+v")
+        yield from until(lambda wanted=perspective: space().region_3d.view_perspective == wanted, 10, perspective)
+        yield 0.5
+    report["shortcut"] = "there and back"
+
+
+def searched() -> Iterator[float]:
+    """Find the entries of File > Import and Export with Blender's search, and open the window of each."""
+    windows = bpy.context.window_manager.windows
+    for number, (words, operator, form) in enumerate(SEARCHED):
+        key("F3")
+        yield 1.0
+        subprocess.Popen(["xdotool", "type", "--delay", "60", words])
+        yield 2.5
+        if number < 3:
+            picture(f"33_search_{words.replace(' ', '_')}")
+        key("Return")
+        yield from until(lambda: len(windows) > 1, 10, f"the window of what is found with {words!r}")
+        yield 0.5
+        opened = windows[-1].screen.areas[0].spaces.active.active_operator
+        assert opened.bl_idname == f"SCOPE_OT_{operator}", (words, opened.bl_idname)
+        assert not form or opened.format == form, (words, opened.format)
+        with bpy.context.temp_override(window=windows[-1]):
+            bpy.ops.wm.window_close()
+        yield 0.5
+    for kind in ("import", "export"):
+        invoke(bpy.ops.wm.call_menu, name=f"TOPBAR_MT_file_{kind}")
+        yield 1.0
+        picture(f"34_file_{kind}")
+        key("Escape")
+        yield 0.5
+    report["searched"] = [words for words, _, _ in SEARCHED]
 
 
 def rigs() -> None:
@@ -198,7 +243,9 @@ def steps() -> Iterator[float]:
     show_tab()
     yield from two_captures()
     yield from compared()
+    yield from shortcut()
     yield from above_the_fold()
+    yield from searched()
     rigs()
     yield 0.5
     exported()

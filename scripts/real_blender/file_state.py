@@ -35,6 +35,9 @@ def state() -> State:
             "parent": obj.parent.name if obj.parent else None,
             "matrix": [round(x, 5) for row in _matrix(obj, view_layer.depsgraph) for x in row],
             "action": obj.animation_data.action.name if obj.animation_data and obj.animation_data.action else None,
+            "tracks": [[strip.name for strip in track.strips] for track in obj.animation_data.nla_tracks]
+            if obj.animation_data
+            else [],
             "collections": sorted(c.name for c in obj.users_collection),
             "selected": obj.select_get(),
             "hidden": (obj.hide_get(), obj.hide_viewport, obj.hide_render),

@@ -56,11 +56,14 @@ def without_a_video() -> None:
 
 
 def name_that_is_not_utf8() -> None:
-    """Capture a file with a name in Latin-1, at which OpenCV's functions crash."""
-    clip = OUT / os.fsdecode(b"caf\xe9.mp4")
-    shutil.copy("clips/walk.mp4", clip)
-    command("capture", str(clip), *FAST, "-o", "out/latin.npz", status=0)
-    assert (OUT / "latin.npz").stat().st_size > 1000
+    """Capture a video and an image with a name in Latin-1, at which OpenCV's functions crash."""
+    shutil.copy("clips/walk.mp4", OUT / os.fsdecode(b"caf\xe9.mp4"))
+    subprocess.run(["convert", "pictures/0030.jpg", "out/person.png"], check=True)
+    (OUT / "person.png").rename(OUT / os.fsdecode(b"caf\xe9.png"))
+    for suffix in ("mp4", "png"):
+        clip, motion = OUT / os.fsdecode(b"caf\xe9." + suffix.encode()), OUT / f"latin_{suffix}.npz"
+        command("capture", str(clip), *FAST, "-o", str(motion), status=0)
+        assert motion.stat().st_size > 1000
 
 
 def damaged_code() -> None:

@@ -23,6 +23,7 @@ from session import FOOTAGE, OUT, addon, inventory, invoke, key, picture, press,
 # Where the panel's buttons are on a screen of 1600 x 1000, in pixels from its top left.
 FAST_BUTTON, CAPTURE_BUTTON = (1086, 151), (1174, 183)
 OVER_PANEL = (1174, 300)
+ASKS_AFTER_S = 11.0
 report: dict = {"blender": bpy.app.version_string, "python": sys.version.split()[0], "exports": []}
 
 
@@ -48,6 +49,20 @@ def cancel() -> Iterator[float]:
         picture("4_question")
         key("Return", OVER_PANEL)
         yield 2.0
+
+
+def cancel_after_the_question() -> Iterator[float]:
+    """Press Escape over the panel: the capture goes on while it asks, and if Escape answers; Return ends it."""
+    yield from until(lambda: time.monotonic() - addon().state.started > ASKS_AFTER_S, 30, "a capture that asks")
+    for answer in ("Escape", "Return"):
+        key("Escape", OVER_PANEL)
+        yield 2.0
+        assert addon().state.job is not None, "Escape over the panel ended a long capture without a question"
+        picture("4_question")
+        key(answer, OVER_PANEL)
+        yield 2.0
+        assert (addon().state.job is not None) == (answer == "Escape"), f"{answer} did not answer the question"
+    report["question"] = "asked, declined, answered"
 
 
 def frame_covered() -> float:
@@ -111,7 +126,7 @@ def steps() -> Iterator[float]:
         "capturing": addon().state.job is not None,
         "playing": bpy.context.window_manager.windows[0].screen.is_animation_playing,
     }
-    yield from cancel()
+    yield from cancel_after_the_question()
     picture("4_cancelled")
     left = [] if inventory() == before else ["data in the file"]
     left += [str(folder)] if folder.exists() else []

@@ -234,6 +234,7 @@ def corrected(first: int, frame: int) -> Iterator[float]:
     assert listed() == []
     out_of_reach()
     upright_line()
+    yield from floor_here(frame)
 
 
 def upright_line() -> None:
@@ -245,6 +246,39 @@ def upright_line() -> None:
     use(bpy.ops.scope.remove_correction, index=0)
     assert keys() == before
     assert listed() == []
+
+
+def floor_here(frame: int) -> Iterator[float]:
+    """Say that the lower foot rests on the floor: it does, whatever the smoothing, until the correction is removed."""
+    scene, before = bpy.context.scene, keys()
+    scene.frame_set(frame)
+    camera = scene.camera.matrix_world.translation.z
+    use(bpy.ops.scope.floor_here)
+    assert [entry["kind"] for entry in listed()] == ["FLOOR"]
+    moved = scene.camera.matrix_world.translation.z - camera
+    yield 1.0
+    picture("pins_7_floor")
+    report["lowest_on_the_floor_cm"] = round(100 * lowest_skin(), 2)
+    assert abs(report["lowest_on_the_floor_cm"]) < 0.3, report
+    use(bpy.ops.scope.smooth, strength=2.5)
+    use(bpy.ops.scope.smooth, strength=1.0)
+    assert abs(100 * lowest_skin()) < 0.3, lowest_skin()
+    assert abs(scene.camera.matrix_world.translation.z - camera - moved) < 1e-5
+    use(bpy.ops.scope.remove_correction, index=0)
+    assert listed() == []
+    assert abs(scene.camera.matrix_world.translation.z - camera) < 1e-6
+    assert keys() == before
+
+
+def lowest_skin() -> float:
+    """Return the height of the body's lowest vertex in the current frame, metres."""
+    viewport()["window"].view_layer.update()
+    body = next(o for o in rig().users_collection[0].objects if o.type == "MESH" and o.find_armature() == rig())
+    posed = body.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    mesh = posed.to_mesh()
+    lowest = min((posed.matrix_world @ vertex.co).z for vertex in mesh.vertices)
+    posed.to_mesh_clear()
+    return lowest
 
 
 def out_of_reach() -> None:

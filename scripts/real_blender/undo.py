@@ -137,6 +137,9 @@ def edits() -> dict[str, Callable[[], object]]:
         "add an expression": lambda: use(scope.edit_expression_pair, action="ADD"),
         "mark as asset": lambda: use(scope.mark_asset, author="Ada"),
         "footage to sequencer": lambda: use(scope.footage_to_sequencer),
+        "rename take": lambda: use(scope.rename_take, name="renamed"),
+        "floor here": lambda: use(scope.floor_here),
+        "push to NLA": lambda: use(scope.push_to_nla),  # last, because it leaves no action to edit
     }
 
 

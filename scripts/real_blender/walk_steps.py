@@ -26,7 +26,7 @@ class Steps(FileSteps):
         super().__init__(chance, folder)
         self.footage = shutil.copy(footage, folder)  # the walk never writes beside the original
         self.kept = folder.parent / "walk_cache"  # of an earlier walk; a capture takes longer than a walk
-        names = sorted(dir(bpy.ops.scope))
+        names = sorted(set(dir(bpy.ops.scope)) - {"documentation"})  # which opens a browser
         self.operators = [*names, *("export",) * 3, *("import_motion",) * 2]  # which have most variants
 
     def prepare(self) -> None:

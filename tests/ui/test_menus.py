@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where a Blender user looks for motion capture: menus, shortcut, presets."""
 
+from pathlib import Path
+from types import SimpleNamespace
 from unittest.mock import MagicMock
 
 import bpy
 import pytest
 import scope
-from scope.scope_addon.ui import keymap, menus
+from scope.scope_addon.ui import export_operators, keymap, menus, preferences
 from scope.scope_addon.ui.presets import SCOPE_OT_add_capture_preset
+
+ROOT = Path(scope.__file__).resolve().parent
 
 
 def functions(menu):
@@ -29,7 +33,7 @@ def test_labels_have_the_words_that_people_search_for():
     layout = MagicMock()
     menus.draw_import_video(layout, "NONE")
     entry = layout.operator.call_args.kwargs["text"].lower()
-    assert all(word in entry for word in ("motion capture", "video"))
+    assert all(word in entry for word in ("motion capture", "mocap", "video"))
     assert "mocap" in menus.SCOPE_MT_export.bl_label.lower()
     assert len(bpy.types.SCOPE_OT_import_video.bl_label) < 20, "the button of the file browser cuts longer labels off"
 
@@ -50,6 +54,30 @@ def test_the_shortcut_exists_only_while_enabled():
         assert keymap._added == []
     finally:
         scope.register()
+
+
+@pytest.mark.parametrize(("operators", "says"), [(("usd_export",), False), ((), True)])
+def test_the_greyed_usd_button_says_why(monkeypatch, operators, says):
+    blender = SimpleNamespace(ops=SimpleNamespace(wm=SimpleNamespace(**dict.fromkeys(operators))))
+    monkeypatch.setattr(export_operators, "bpy", blender)
+    assert export_operators.is_available("USDC") != says
+    tooltip = export_operators.SCOPE_OT_export.description(None, SimpleNamespace(format="USDC"))
+    assert ("built without USD" in tooltip) == says
+    assert "Omniverse" in tooltip
+    assert "USD" not in export_operators.SCOPE_OT_export.description(None, SimpleNamespace(format="FBX"))
+
+
+def test_the_documentation_is_a_file_that_comes_with_scope(monkeypatch, tmp_path):
+    assert preferences.guide() == ROOT / "docs" / "guide.md"  # in a checkout
+    module = tmp_path / "scope_addon" / "ui" / "preferences.py"
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs" / "guide.html").touch()
+    monkeypatch.setattr(preferences, "__file__", str(module))
+    assert preferences.guide() == tmp_path / "docs" / "guide.html"
+    opened = MagicMock()
+    monkeypatch.setattr(preferences, "bpy", SimpleNamespace(ops=SimpleNamespace(wm=opened)))
+    assert preferences.SCOPE_OT_documentation.execute(None, None) == {"FINISHED"}
+    opened.url_open.assert_called_once_with(url=(tmp_path / "docs" / "guide.html").as_uri())
 
 
 def test_presets_store_settings_but_nothing_of_one_clip():

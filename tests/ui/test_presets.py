@@ -5,6 +5,7 @@ from pathlib import Path
 from unittest.mock import MagicMock
 
 import bpy
+import pytest
 from scope.scope_addon.ui import presets
 
 
@@ -19,6 +20,15 @@ def test_a_preset_brings_the_settings_back(monkeypatch, tmp_path):
     settings.quality, settings.people = "FAST", "LARGEST"
     exec(compile(stored.read_text(), stored, "exec"), {})
     assert (settings.quality, settings.people) == ("BEST", "ALL")
+
+
+@pytest.mark.parametrize("operator", ["import_motion", "export"])
+def test_settings_of_file_windows_can_be_stored_but_not_the_file(operator):
+    rna = getattr(bpy.ops.scope, operator).get_rna_type()
+    assert "PRESET" in getattr(bpy.types, f"SCOPE_OT_{operator}").bl_options
+    kept = {prop.identifier for prop in rna.properties if not (prop.is_skip_save or prop.is_hidden)} - {"rna_type"}
+    assert not kept & {"filepath", "directory", "files", "filter_glob", "format"}
+    assert kept >= ({"up_axis", "motion_rate", "body", "set_rate"} if operator == "import_motion" else {"camera"})
 
 
 def test_without_presets_blender_does_not_complain_of_missing_paths(monkeypatch, tmp_path):

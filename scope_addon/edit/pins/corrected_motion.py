@@ -21,7 +21,7 @@ from ...kinematics.smoothing import smooth_rotations
 from ...motion import Motion
 from ..clip import Clip, clip_from_motion
 from ..spans import swap_sides
-from .corrections import Contact, Correction, Exchange, Pin, from_arrays, to_arrays, upright_of
+from .corrections import Contact, Correction, Exchange, Pin, floor_height, from_arrays, to_arrays, world_of
 from .moved import moved_clip, moved_motion
 from .reach import pixel_of
 from .solve_pins import Shot, resolve
@@ -65,8 +65,8 @@ def distance_from_pin(motion: Motion, pin: Pin, place: NDArray[np.float64] | Non
 
 
 def pin_in_world(motion: Motion, pin: Pin) -> Pin:
-    """Return a pin in the world of the motion, which an upright line may have turned; one in the image is the same."""
-    transform = upright_of(corrections_of(motion))
+    """Return a pin in the world of the motion, which an upright line or a floor may have moved."""
+    transform = world_of(corrections_of(motion))
     if pin.position is None or transform is None:
         return pin
     x, y, z = transform[:3, :3] @ pin.position + transform[:3, 3]
@@ -123,7 +123,7 @@ def with_corrections(motion: Motion, body: Body, corrections: tuple[Correction, 
             joints = Clip(after.times[new], after.rotations[new], after.root[new]).joints(body, base.betas)
             values["joints_cam"][new] = (joints - T[:, None, :3, 3]) @ T[:, :3, :3]
     out = replace(wanted, **values)
-    transform = upright_of(corrections)
+    transform = world_of(corrections)
     if transform is not None:
         out, changed = moved_motion(out, body, transform), np.ones(len(base), bool)
     rows = np.flatnonzero(changed)
@@ -134,20 +134,25 @@ def with_corrections(motion: Motion, body: Body, corrections: tuple[Correction, 
 
 
 def corrected(clip: Clip, motion: Motion, body: Body) -> Clip:
-    """Apply the motion's pins, contacts and upright line to another smoothing of it.
+    """Apply the motion's pins, contacts, upright line and floor to another smoothing of it.
 
     :param clip: in the captured world, with its sides exchanged already.
     :raises MotionFileError: the motion's corrections are damaged.
     """
     clip = _pinned(clip, motion, body)
-    transform = upright_of(corrections_of(motion))
+    transform = world_of(corrections_of(motion))
     return clip if transform is None else moved_clip(clip, transform)
 
 
 def _pinned(clip: Clip, motion: Motion, body: Body) -> Clip:
     """Apply the pins and contacts, in the captured world."""
-    wanted = [c for c in corrections_of(motion) if isinstance(c, Pin | Contact)]
-    return resolve(clip, body, motion.betas, wanted, shot_of(uncorrected(motion))) if wanted else clip
+    corrections = corrections_of(motion)
+    wanted = [c for c in corrections if isinstance(c, Pin | Contact)]
+    if not wanted:
+        return clip
+    # An upright line turns the world about a point on the floor, so the floor's height is nearly the same before it.
+    shot, floor = shot_of(uncorrected(motion)), floor_height(corrections)
+    return resolve(clip, body, motion.betas, wanted, shot, floor=floor)
 
 
 def before_smoothing(motion: Motion, body: Body) -> Motion:

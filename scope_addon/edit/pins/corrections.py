@@ -19,6 +19,7 @@ from ...errors import MotionFileError, UsageError
 
 REACH_S = 0.4  # over which a correction fades out on both sides
 FEET = ("left", "right")
+_HIGHEST_M = 1e3
 
 
 @dataclass(frozen=True)
@@ -109,12 +110,43 @@ class Upright:
         return np.array(self.rows).reshape(4, 4)
 
 
-Correction = Pin | Contact | Exchange | Upright
+@dataclass(frozen=True)
+class Floor:
+    """The world, with the camera, is moved up or down so that a foot rests on the floor in one frame."""
+
+    frame: int
+    height: float  # metres above z = 0 of the world that the upright line has turned
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        :raises UsageError: the height is not a number of metres that a world has.
+        """
+        if not abs(self.height) < _HIGHEST_M:
+            raise UsageError(f"the floor in frame {self.frame} is {self.height} m high, which no capture has")
+
+    @property
+    def transform(self) -> NDArray[np.float64]:
+        """The transform (4, 4) from the upright world to the one whose floor is z = 0."""
+        out = np.eye(4)
+        out[2, 3] = -self.height
+        return out
 
 
-def upright_of(corrections: Iterable[Correction]) -> NDArray[np.float64] | None:
-    """Return the transform (4, 4) of the upright line; None without one."""
-    return next((c.transform for c in corrections if isinstance(c, Upright)), None)
+Correction = Pin | Contact | Exchange | Upright | Floor
+
+
+def world_of(corrections: Iterable[Correction]) -> NDArray[np.float64] | None:
+    """Return the transform (4, 4) of the captured world by the upright line, then the floor; None without both."""
+    out: NDArray[np.float64] | None = None
+    for c in sorted((c for c in corrections if isinstance(c, Upright | Floor)), key=lambda c: isinstance(c, Floor)):
+        out = c.transform if out is None else c.transform @ out
+    return out
+
+
+def floor_height(corrections: Iterable[Correction]) -> float:
+    """Return the floor's height in metres, 0 where it was not corrected."""
+    return next((c.height for c in corrections if isinstance(c, Floor)), 0.0)
 
 
 def _check_span(first: int, last: int) -> None:
@@ -125,13 +157,11 @@ def _check_span(first: int, last: int) -> None:
 def added(corrections: tuple[Correction, ...], new: Correction) -> tuple[Correction, ...]:
     """Return the corrections with a new one; a pin replaces the same joint's pin in the same frame.
 
-    The same exchange a second time undoes the first, so that neither remains. An upright line turns the world that the
-    one before has made, so that one remains, which is both.
+    The same exchange a second time undoes the first, so that neither remains. An upright line and a floor move the
+    world that those before have made, so that one of each remains.
     """
-    if isinstance(new, Upright):
-        before = upright_of(corrections)
-        both = new if before is None else Upright.of(new.transform @ before)
-        return (*(c for c in corrections if not isinstance(c, Upright)), both)
+    if isinstance(new, Upright | Floor):
+        return _moved_on(corrections, new)
     if isinstance(new, Exchange) and new in corrections:
         return tuple(c for c in corrections if c != new)
     if isinstance(new, Pin):
@@ -141,12 +171,27 @@ def added(corrections: tuple[Correction, ...], new: Correction) -> tuple[Correct
     return corrections if new in corrections else (*corrections, new)
 
 
+def _moved_on(corrections: tuple[Correction, ...], new: Upright | Floor) -> tuple[Correction, ...]:
+    """Add what moves the present world: W' = N W, kept as W' = F' U' of a floor and an upright line."""
+    floor = next((c for c in corrections if isinstance(c, Floor)), None)
+    upright = next((c for c in corrections if isinstance(c, Upright)), None)
+    if isinstance(new, Floor):
+        floor = Floor(new.frame, new.height + (floor.height if floor else 0.0))
+    else:
+        before = np.eye(4) if upright is None else upright.transform
+        lowered = np.eye(4) if floor is None else floor.transform
+        upright = Upright.of(np.linalg.inv(lowered) @ new.transform @ lowered @ before)
+    others = tuple(c for c in corrections if not isinstance(c, Upright | Floor))
+    return (*others, *(c for c in (upright, floor) if c is not None))
+
+
 def to_arrays(corrections: tuple[Correction, ...]) -> dict[str, NDArray[Any]]:
     """Return the arrays of a motion file; see docs/motion_file.md. Coordinates that a pin does not have are NaN."""
     pins = [c for c in corrections if isinstance(c, Pin)]
     contacts = [c for c in corrections if isinstance(c, Contact)]
     exchanges = [c for c in corrections if isinstance(c, Exchange)]
     upright = [c for c in corrections if isinstance(c, Upright)]
+    floors = [c for c in corrections if isinstance(c, Floor)]
     nan = float("nan")
     return {
         "pin_frames": np.array([p.frame for p in pins], np.int64),
@@ -159,6 +204,8 @@ def to_arrays(corrections: tuple[Correction, ...]) -> dict[str, NDArray[Any]]:
         "exchange_spans": np.array([(e.first, e.last) for e in exchanges], np.int64).reshape(-1, 2),
         "exchange_limbs": np.array([e.limbs for e in exchanges], np.str_),
         "upright": np.array([u.rows for u in upright], np.float64).reshape(-1, 4, 4),
+        "floor_frames": np.array([f.frame for f in floors], np.int64),
+        "floor_heights": np.array([f.height for f in floors], np.float64),
     }
 
 
@@ -176,6 +223,7 @@ def from_arrays(arrays: Mapping[str, NDArray[Any]]) -> tuple[Correction, ...]:
         return array
 
     spans = column("contact_spans", 2), column("exchange_spans", 2)
+    floors = column("floor_frames"), column("floor_heights")
     try:
         pins = zip(
             *(column("pin_frames"), column("pin_joints"), column("pin_uv", 2), column("pin_xyz", 3)),
@@ -189,6 +237,7 @@ def from_arrays(arrays: Mapping[str, NDArray[Any]]) -> tuple[Correction, ...]:
             *(Contact(int(a), int(b), str(foot)) for a, b, foot in contacts),
             *(Exchange(int(a), int(b), str(limbs)) for a, b, limbs in exchanges),
             *(Upright.of(np.asarray(T, float)) for T in column("upright", 4, 4)[:1]),
+            *(Floor(int(f), float(h)) for f, h in [*zip(*floors, strict=True)][:1]),
         )
     except (ValueError, TypeError, OverflowError, UsageError) as error:
         raise MotionFileError(f"the motion's corrections are damaged: {in_one_line(error)}") from error

@@ -83,11 +83,13 @@ def resolve(
     corrections: Iterable[Correction],
     shot: Shot,
     slack: float = SLACK_M,
+    floor: float = 0.0,
 ) -> Clip:
     """Correct a motion: exchanged sides first, then feet that stand, then pins.
 
     :param betas: (P,) shape coefficients.
     :param slack: metres by which the body may help a limb to reach a pin.
+    :param floor: its height z, metres.
     :return: a new clip; keys that no correction reaches are the same to the bit.
     :raises UsageError: a pin names a joint that the body does not have.
     """
@@ -97,12 +99,12 @@ def resolve(
         out = exchanged(out, body, exchange, shot)
     refit = PoseRefit(body, betas)
     for contact in (c for c in corrections if isinstance(c, Contact)):
-        track = _contact_track(refit, out, contact, shot)
+        track = _contact_track(refit, out, contact, shot, floor)
         if track is not None:
-            _Correction(refit, out, [track], slack).run()
+            _Correction(refit, out, [track], slack, floor).run()
     tracks = _pin_tracks(refit, out, [c for c in corrections if isinstance(c, Pin)], shot)
     for together in _clusters(out, tracks):
-        _Correction(refit, out, together, slack).run()
+        _Correction(refit, out, together, slack, floor).run()
     return out
 
 
@@ -130,15 +132,16 @@ def missed(clip: Clip, body: Body, betas: NDArray[np.floating[Any]], pin: Pin, s
 class _Correction:
     """The limbs of one cluster, treated in turns. Changes the clip that it is given."""
 
-    def __init__(self, refit: PoseRefit, clip: Clip, tracks: list[_Track], slack: float) -> None:
+    def __init__(self, refit: PoseRefit, clip: Clip, tracks: list[_Track], slack: float, floor: float) -> None:
         self._refit, self._clip, self._tracks, self._slack = refit, clip, tracks, slack
         self._spans = [_keys_within_reach(clip, track) for track in tracks]
         times = clip.times
         first, last = min(s[0] for s in self._spans), max(s[-1] for s in self._spans)
         around = np.flatnonzero((times >= times[first] - _AROUND_S) & (times <= times[last] + _AROUND_S))
         R, at, soles = refit.place(clip.rotations[around], clip.root[around])
-        self._floor = np.full(len(clip), FLOOR_M)  # what feet may not go below: where they were, if that is lower
-        self._floor[around] = np.minimum(FLOOR_M, refit.skin.heights(R, at, _UP).min(axis=1))
+        lowest = floor + FLOOR_M
+        self._floor = np.full(len(clip), lowest)  # what feet may not go below: where they were, if that is lower
+        self._floor[around] = np.minimum(lowest, refit.skin.heights(R, at, _UP).min(axis=1))
         self._limited: set[int] = set()  # tracks whose pins are where the limb can reach them
         self._standing = np.zeros((len(clip), soles.shape[1]))
         self._standing[around] = standing_probability(soles, _UP, times[around])
@@ -362,7 +365,7 @@ def _clusters(clip: Clip, tracks: list[_Track]) -> list[list[_Track]]:
     return [sorted(together, key=lambda t: limb_of(t.joints[0]) != "trunk") for _, _, together in groups]
 
 
-def _contact_track(refit: PoseRefit, clip: Clip, contact: Contact, shot: Shot) -> _Track | None:
+def _contact_track(refit: PoseRefit, clip: Clip, contact: Contact, shot: Shot, floor: float) -> _Track | None:
     """Return the track of a foot that stands: its sole stays at its median position, on the floor if that is near."""
     span = _keys_of_span(clip, contact.first, contact.last, shot)
     if not len(span):
@@ -370,7 +373,7 @@ def _contact_track(refit: PoseRefit, clip: Clip, contact: Contact, shot: Shot) -
     which = [k for k, name in enumerate(refit.sole_names) if name.startswith(f"sole/{contact.foot}")]
     soles = refit.place(clip.rotations[span], clip.root[span])[2][:, which]
     where = np.median(soles, axis=0)
-    lowest = float(where[:, 2].min())
+    lowest = float(where[:, 2].min()) - floor
     if abs(lowest) < _FLOOR_M:
         where[:, 2] -= lowest
     points = Points()

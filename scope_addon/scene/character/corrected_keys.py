@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from ....solver.body import Body
 from ...edit.clip import Clip, sample
 from ...edit.pins.corrected_motion import corrections_of, pin_in_world, shot_of, uncorrected
-from ...edit.pins.corrections import Pin, upright_of
+from ...edit.pins.corrections import Pin, world_of
+from ...edit.pins.floor_here import foot_height
 from ...edit.pins.moved import moved_clip
 from ...edit.pins.solve_pins import missed, resolve
 from ...edit.smooth import smoothed
@@ -37,6 +38,7 @@ def rewrite_changed_keys(
     motions: tuple[Motion, Motion],
     stored: object = None,
     pin: Pin | None = None,
+    rise: float = 0.0,
 ) -> UncorrectedKeys:
     """Change the keys from one motion to another, which differs from it in its corrections.
 
@@ -46,6 +48,7 @@ def rewrite_changed_keys(
     :param motions: before and after.
     :param stored: bytes of the ``UncorrectedKeys`` of the last change.
     :param pin: a new one, which is met even if edited keys differ from the motion.
+    :param rise: metres by which all keys are raised first, which is an edit of its own.
     :return: the keys that are now different from those without corrections.
     :raises UsageError: when a bone or its keys are missing.
     """
@@ -53,12 +56,15 @@ def rewrite_changed_keys(
     known = UncorrectedKeys.from_bytes(stored, len(channel_curves(armature, body)))
     restored = restore(armature, body, start, rate, known)
     clip, frames = read_clip(armature, body, rate)
+    if rise:
+        clip = Clip(clip.times, clip.rotations, clip.root + [0.0, 0.0, rise])
+        write_keys(armature, body, clip, frames, np.ones(len(frames), bool))
     strength = float(armature.get("scope_smoothing", 1.0))
     free, old, new = (
         _at(smoothed(body, m, strength), clip.times, _start(armature, rate))
         for m in (uncorrected(before), before, after)
     )
-    was, now = (upright_of(corrections_of(m)) for m in motions)
+    was, now = (world_of(corrections_of(m)) for m in motions)
     _check_root_motion(armature, was, now)
     old, new = (c if T is None else moved_clip(c, np.linalg.inv(T)) for c, T in ((old, was), (new, now)))
     again = np.zeros(len(frames), bool)  # rows that begin with the keys from before all corrections
@@ -105,6 +111,24 @@ def _meet_pin(armature: bpy.types.Object, body: Body, rate: float, motion: Motio
     shot = shot_of(motion, _start(armature, rate))
     if missed(whole, body, motion.betas, pin, shot) > (_MISSED_M if pin.pixel is None else _MISSED_PX):
         _write_change(armature, body, clip, frames, (whole, resolve(whole, body, motion.betas, [pin], shot, slack=0.0)))
+
+
+def heights_of_foot(
+    armature: bpy.types.Object, body: Body, rate: float, motion: Motion, place: tuple[int, str]
+) -> tuple[float, float]:
+    """Return how high a foot is in a frame, metres: in the motion, as smooth as the keys are, and in the edited keys.
+
+    :param rate: scene frames per second.
+    :param place: frame of the footage, and the foot as in `foot_height`.
+    """
+    frame, foot = place
+    captured = smoothed(body, motion, float(armature.get("scope_smoothing", 1.0)))
+    clip, frames = read_clip(armature, body, rate)
+    shown = clip_with_root_motion(armature, clip, frames), _start(armature, rate)
+    return (
+        foot_height(captured, body, motion.betas, shot_of(motion).time(frame), foot),
+        foot_height(shown[0], body, motion.betas, shot_of(motion, shown[1]).time(frame), foot),
+    )
 
 
 def captured_points(armature: bpy.types.Object, frame: float, points_world: NDArray[np.float64]) -> NDArray[np.float64]:

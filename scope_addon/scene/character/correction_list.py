@@ -65,7 +65,7 @@ def store_corrections(
 
 def _entry(armature: bpy.types.Object, motion: Motion, correction: Correction, rate: float) -> dict[str, Any]:
     """Describe a correction."""
-    from ...edit.pins.corrections import Contact, Pin, Upright
+    from ...edit.pins.corrections import Contact, Floor, Pin, Upright
     from .corrected_keys import scene_frame
 
     if isinstance(correction, Pin):
@@ -74,6 +74,8 @@ def _entry(armature: bpy.types.Object, motion: Motion, correction: Correction, r
         kind, text, span = "CONTACT", f"{correction.foot.title()} Foot Stands", (correction.first, correction.last)
     elif isinstance(correction, Upright):
         kind, text, span = "UPRIGHT", "Upright Line", (int(motion.frames[0]), int(motion.frames[-1]))
+    elif isinstance(correction, Floor):
+        kind, text, span = "FLOOR", "Floor", (correction.frame,) * 2
     else:
         what = {"both": "Left and Right", "arms": "Arms", "legs": "Legs"}[correction.limbs]
         kind, text, span = "EXCHANGE", f"{what} Exchanged", (correction.first, correction.last)

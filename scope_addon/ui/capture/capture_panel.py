@@ -44,7 +44,8 @@ class SCOPE_PT_capture(Tab, bpy.types.Panel):
     bl_order = 0
 
     def draw_header_preset(self, _context: bpy.types.Context) -> None:
-        """Draw the button of the presets in the header."""
+        """Draw the buttons of the guide and the presets in the header."""
+        self.layout.operator("scope.documentation", text="", icon="HELP", emboss=False)
         SCOPE_PT_capture_presets.draw_panel_header(self.layout)
 
     def draw(self, context: bpy.types.Context) -> None:

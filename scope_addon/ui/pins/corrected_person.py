@@ -25,12 +25,14 @@ def change_corrections(
     rate: float,
     change: Callable[[tuple[Correction, ...]], tuple[Correction, ...]],
     pin: Pin | None = None,
+    rise: float = 0.0,
 ) -> Motion:
     """Change the corrections of a captured person: of the motion, the keys and the list.
 
     :param rate: scene frames per second.
     :param change: returns the new corrections for the present ones.
     :param pin: the one that this adds, which is met even if edited keys differ from the motion.
+    :param rise: metres by which all keys are raised first, which is an edit of its own.
     :return: the corrected motion.
     :raises UsageError: the motion is no longer there, or keys are missing.
     """
@@ -41,7 +43,7 @@ def change_corrections(
     compiled_solver.load()
     before = motion_of(armature)
     after = with_corrections(before, body, change(corrections_of(before)))
-    keys = rewrite_changed_keys(armature, body, rate, (before, after), stored_keys(armature), pin)
+    keys = rewrite_changed_keys(armature, body, rate, (before, after), stored_keys(armature), pin, rise)
     set_motion_of(armature, after, keys.to_bytes() if len(keys.times) else b"")
     store_corrections(armature, after, rate, pinned_places(armature, body, rate, after))
     return after
@@ -52,17 +54,19 @@ def change_world(
     armature: bpy.types.Object,
     rate: float,
     change: Callable[[tuple[Correction, ...]], tuple[Correction, ...]],
+    rise: float = 0.0,
 ) -> None:
-    """Change the upright line of everybody that the same camera has captured, and turn the camera with them.
+    """Change the upright line or floor of everybody that the same camera has captured, and move the camera with them.
 
     :param rate: scene frames per second.
     :param change: returns the new corrections for the present ones, and changes the same of everybody.
+    :param rise: metres by which the keys of this person are raised first.
     :raises UsageError: the root motion is on an object, or keys are missing.
     """
     import numpy as np
 
     from ...edit.pins.corrected_motion import corrections_of
-    from ...edit.pins.corrections import upright_of
+    from ...edit.pins.corrections import world_of
     from ...scene.animation_data.transaction import all_or_nothing
     from ...scene.camera import same_camera
     from ...scene.character.upright_scene import turn_camera
@@ -72,21 +76,22 @@ def change_world(
     people = [obj for obj in near if obj != armature and "scope_source" in obj]
     together = [armature, *(obj for obj in people if same_camera(motion_of(obj), motion))]
     cameras = [obj for obj in near if obj.type == "CAMERA"][:1]
-    was = upright_of(corrections_of(motion))
-    now = upright_of(change(corrections_of(motion)))
+    was = world_of(corrections_of(motion))
+    now = world_of(change(corrections_of(motion)))
     turn = (np.eye(4) if now is None else now) @ np.linalg.inv(np.eye(4) if was is None else was)
     with all_or_nothing(scene, *together[1:], *cameras):
         for person in together:
-            change_corrections(person, body_of(person), rate, change)
+            change_corrections(person, body_of(person), rate, change, rise=rise if person == armature else 0.0)
         for camera in cameras:
             turn_camera(camera, armature, turn, to_captured=now is None)
 
 
-def without_upright(corrections: tuple[Correction, ...]) -> tuple[Correction, ...]:
-    """Return the corrections without the upright line."""
-    from ...edit.pins.corrections import Upright
+def without_kinds(corrections: tuple[Correction, ...], kinds: set[str]) -> tuple[Correction, ...]:
+    """Return the corrections without those that move the world; the list calls them ``UPRIGHT`` and ``FLOOR``."""
+    from ...edit.pins.corrections import Floor, Upright
 
-    return tuple(c for c in corrections if not isinstance(c, Upright))
+    removed = tuple(cls for cls in (Upright, Floor) if cls.__name__.upper() in kinds)
+    return tuple(c for c in corrections if not isinstance(c, removed))
 
 
 def pin_at(
@@ -101,7 +106,7 @@ def pin_at(
     import numpy as np
 
     from ...edit.pins.corrected_motion import corrections_of, shot_of
-    from ...edit.pins.corrections import Pin, upright_of
+    from ...edit.pins.corrections import Pin, world_of
     from ...scene.animation_data.timing import scene_rate
     from ...scene.character.corrected_keys import captured_points, source_frame
 
@@ -118,6 +123,6 @@ def pin_at(
     if len(at) == 2 and np.linalg.norm(at[1] - centre) < 0.02:
         u, v = shot_of(motion).project(frame, at[0])
         return Pin(frame, joint, pixel=(float(u), float(v)), reach=reach)
-    upright = upright_of(corrections_of(motion))
-    x, y, z = at[0] if upright is None else (np.linalg.inv(upright) @ [*at[0], 1.0])[:3]
+    world = world_of(corrections_of(motion))
+    x, y, z = at[0] if world is None else (np.linalg.inv(world) @ [*at[0], 1.0])[:3]
     return Pin(frame, joint, position=(float(x), float(y), float(z)), reach=reach)

@@ -12,7 +12,7 @@ from ...scene.character.correction_list import listed_corrections
 from ..captured_person import motion_of
 from ..edit.edit_base import EditOperator, SpanOperator
 from ..reporting import iface_, rpt_
-from .corrected_person import change_corrections, change_world, pin_at, without_upright
+from .corrected_person import change_corrections, change_world, pin_at, without_kinds
 
 if TYPE_CHECKING:
     from ....solver.body import Body
@@ -194,10 +194,10 @@ class SCOPE_OT_remove_correction(EditOperator):
         if self.index >= count:
             raise UsageError(f"there is no correction {self.index}; '{armature.name}' has {count}, counted from 0")
         kinds = [entry["kind"] for entry in listed_corrections(armature)]
-        if "UPRIGHT" in (kinds if self.index < 0 else [kinds[self.index]]):  # which others of the capture share
-            change_world(context.scene, armature, rate, without_upright)
-            kinds.remove("UPRIGHT")
-        if self.index < len(kinds):  # it is the last in the list
+        removed = set(kinds if self.index < 0 else kinds[self.index : self.index + 1])
+        if shared := removed & {"UPRIGHT", "FLOOR"}:  # which others of the capture have too
+            change_world(context.scene, armature, rate, lambda present: without_kinds(present, shared))
+        if removed - shared:
             change_corrections(
                 armature,
                 body,

@@ -10,11 +10,17 @@ from ..capture.capture_panel import Tab
 from ..captured_person import captured_armature, has_captured_person
 from .pin_tool import is_running
 
-_ICONS = {"PIN": "PINNED", "CONTACT": "SNAP_FACE", "EXCHANGE": "MOD_MIRROR", "UPRIGHT": "EMPTY_SINGLE_ARROW"}
+_ICONS = {
+    "PIN": "PINNED",
+    "CONTACT": "SNAP_FACE",
+    "EXCHANGE": "MOD_MIRROR",
+    "UPRIGHT": "EMPTY_SINGLE_ARROW",
+    "FLOOR": "GRID",
+}
 
 
 class SCOPE_PT_corrections(Tab, bpy.types.Panel):
-    """Pins, feet that stand, exchanged sides and the upright line of the selected person."""
+    """Pins, feet that stand, exchanged sides, the upright line and the floor of the selected person."""
 
     bl_idname = "SCOPE_PT_corrections"
     bl_label = "Corrections"
@@ -36,6 +42,7 @@ class SCOPE_PT_corrections(Tab, bpy.types.Panel):
             row.operator("scope.foot_stands", text=text).foot = foot
         layout.operator("scope.exchange_sides", icon="MOD_MIRROR")
         layout.operator("scope.upright_line", icon="EMPTY_SINGLE_ARROW")
+        layout.operator("scope.floor_here", icon="GRID")
         listed = listed_corrections(armature)
         if not listed:
             return

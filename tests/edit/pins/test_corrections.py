@@ -3,7 +3,16 @@
 
 import numpy as np
 import pytest
-from scope.scope_addon.edit.pins.corrections import Contact, Exchange, Pin, Upright, added, from_arrays, to_arrays
+from scope.scope_addon.edit.pins.corrections import (
+    Contact,
+    Exchange,
+    Floor,
+    Pin,
+    Upright,
+    added,
+    from_arrays,
+    to_arrays,
+)
 from scope.scope_addon.errors import MotionFileError, UsageError
 
 ALL = (
@@ -12,6 +21,7 @@ ALL = (
     Contact(4, 8, "left"),
     Exchange(2, 6, "legs"),
     Upright((1.0, 0, 0, 0.5, 0, 0, -1.0, 0, 0, 1.0, 0, 2.0, 0, 0, 0, 1.0)),
+    Floor(7, -0.125),
 )
 
 
@@ -32,6 +42,9 @@ def test_damaged_arrays_are_an_error():
         ("contact_feet", np.array(["none"])),
         ("upright", 2 * np.eye(4)[None]),
         ("upright", np.full((1, 4, 4), np.nan)),
+        ("floor_heights", np.array([np.inf])),
+        ("floor_heights", np.zeros(2)),
+        ("floor_frames", np.zeros((1, 2))),
     ):
         with pytest.raises(MotionFileError):
             from_arrays(arrays | {name: value})
@@ -68,4 +81,4 @@ def test_a_second_upright_line_turns_what_the_first_has_made():
 
 
 def test_the_same_exchange_again_undoes_the_first():
-    assert added(ALL, ALL[3]) == (*ALL[:3], ALL[4])
+    assert added(ALL, ALL[3]) == (*ALL[:3], *ALL[4:])

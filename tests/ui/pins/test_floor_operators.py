@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The floor, corrected through Blender's operator."""
+
+import bpy
+import numpy as np
+import pytest
+from scope.scope_addon.edit.pins.moved import moved_motion
+from scope.scope_addon.motion import Motion
+from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
+from scope.scope_addon.scene.build import BuildOptions, build_scene
+from scope.scope_addon.scene.character.correction_list import listed_corrections
+from scope.scope_addon.scene.packed_motion import pack_motion
+from scope.scope_addon.ui.captured_person import motion_of as stored_motion_of
+
+from ...edit.walking import BODY, NAMES, motion_of, walk
+from ...scene import made_rigs
+from ...scene.made_rigs import captured
+
+FRAME, FRAMES = 20, (5, 20, 50)
+RAISED = 0.25  # metres, of the captured world
+
+
+@pytest.fixture
+def rig(tmp_path):
+    """A walk captured in a world that is too high, with its body's mesh."""
+    T = np.eye(4)
+    T[2, 3] = RAISED
+    motion = moved_motion(motion_of(walk(2.0), noise=0.02), BODY, T)
+    armature = captured(motion)
+    motion.save(tmp_path / "person1.npz")
+    armature["scope_motion"], armature["scope_body_file"] = str(tmp_path / "person1.npz"), "scope"
+    scene = bpy.context.scene
+    scene.camera = next(o for o in scene.objects if o.type == "CAMERA")
+    scene.frame_set(FRAME)
+    return armature
+
+
+def lowest(armature, frame=FRAME):
+    """The lowest point of the body as Blender displays it."""
+    bpy.context.scene.frame_set(frame)
+    graph = bpy.context.evaluated_depsgraph_get()
+    mesh = next(o for o in bpy.context.scene.objects if o.type == "MESH" and o.parent == armature)
+    posed = mesh.evaluated_get(graph)
+    return min((posed.matrix_world @ v.co).z for v in posed.to_mesh().vertices)
+
+
+def from_camera(armature):
+    """(frames, joints, 3) where the scene's camera has the joints, in its own axes."""
+    found = []
+    for frame in FRAMES:
+        places = made_rigs.seen(armature, NAMES, [frame])[0]
+        inverse = np.array(bpy.context.scene.camera.matrix_world.inverted())
+        found.append(places @ inverse[:3, :3].T + inverse[:3, 3])
+    return np.array(found)
+
+
+def everything(armature):
+    """Keys of the armature, the camera's place, and the motion's arrays."""
+    camera = next(o for o in bpy.context.scene.objects if o.type == "CAMERA")
+    curves = {(c.data_path, c.array_index): read_keys(c) for c in fcurves(armature)}
+    motion = stored_motion_of(armature)
+    arrays = {n: getattr(motion, n) for n in ("poses", "trans", "poses_raw", "trans_raw", "world_from_camera")}
+    return curves | arrays | {"camera": np.array(camera.matrix_basis)}
+
+
+def kinds(armature):
+    return [entry["kind"] for entry in listed_corrections(armature)]
+
+
+def assert_same(after, before):
+    assert after.keys() == before.keys()
+    for name, values in before.items():
+        np.testing.assert_array_equal(after[name], values, err_msg=str(name))
+
+
+def test_person_and_camera_move_until_the_foot_is_on_the_floor(rig):
+    before = from_camera(rig)
+    assert lowest(rig) > RAISED - 0.05
+    bpy.ops.scope.floor_here()
+    assert abs(lowest(rig)) < 0.002
+    np.testing.assert_allclose(from_camera(rig), before, atol=1e-5)
+    assert [(e["kind"], e["first"], e["last"]) for e in listed_corrections(rig)] == [("FLOOR", FRAME, FRAME)]
+    for strength in (0.0, 2.5, 1.0):
+        bpy.ops.scope.smooth(strength=strength)
+        assert abs(lowest(rig)) < 0.03  # each smoothing has the foot a little elsewhere
+    assert abs(lowest(rig)) < 0.002
+
+
+def test_without_the_floor_everything_is_the_same_to_the_bit(rig):
+    before = everything(rig)
+    bpy.ops.scope.floor_here(foot="right")
+    bpy.context.scene.frame_set(40)
+    bpy.ops.scope.floor_here()
+    assert kinds(rig) == ["FLOOR"]
+    bpy.ops.scope.remove_correction(index=0)
+    assert kinds(rig) == []
+    assert_same(everything(rig), before)
+
+
+def test_a_floor_with_a_pin_and_an_upright_line_is_removed_alone_and_with_them(rig):
+    before = everything(rig)
+    bpy.ops.scope.set_upright(start=(300, 100), end=(320, 300))
+    bpy.ops.scope.floor_here()
+    target = made_rigs.seen(rig, ["left_wrist"], [FRAME])[0, 0] + [0.0, 0.1, 0.1]
+    bpy.ops.scope.add_pin(joint="left_wrist", location=target)
+    assert kinds(rig) == ["PIN", "UPRIGHT", "FLOOR"]
+    assert np.linalg.norm(made_rigs.seen(rig, ["left_wrist"], [FRAME])[0, 0] - target) < 0.01
+    assert abs(lowest(rig)) < 0.02
+    bpy.ops.scope.remove_correction(index=2)
+    assert kinds(rig) == ["PIN", "UPRIGHT"]
+    bpy.context.scene.frame_set(FRAME)
+    bpy.ops.scope.floor_here()
+    bpy.ops.scope.remove_correction(index=-1)
+    assert kinds(rig) == []
+    assert_same(everything(rig), before)
+
+
+def test_keys_that_were_put_on_the_floor_before_are_on_it_afterwards(rig):
+    bpy.ops.scope.refloor()
+    snapped = lowest(rig)
+    bpy.ops.scope.floor_here()
+    assert abs(snapped) < 0.1
+    assert abs(lowest(rig)) < 0.002
+    bpy.ops.scope.smooth(strength=1.0)  # discards the edit, and keeps the correction
+    assert abs(lowest(rig)) < 0.002
+
+
+def test_feet_under_the_floor_in_other_frames_are_said(rig, capfd):
+    high = max(range(10, 50), key=lambda frame: lowest(rig, frame))
+    bpy.context.scene.frame_set(high)
+    bpy.ops.scope.floor_here()
+    depth = -min(lowest(rig, frame) for frame in range(1, 62))
+    assert depth > 0.01
+    said = capfd.readouterr().out
+    assert f"a foot is up to {100 * depth:.0f} cm under it in" in said
+    assert "of 61 frames" in said
+
+
+def test_the_floor_of_one_person_is_that_of_everybody_of_the_capture():
+    bpy.context.scene.render.fps = 30
+    motions = [motion_of(walk(1.0)), motion_of(walk(1.0, speed=0.8))]
+    people = [p.armature for p in build_scene(motions, BODY, None, BuildOptions()).people]
+    for person, motion in zip(people, motions, strict=True):
+        pack_motion(person, motion.to_bytes())
+    before = [everything(person) for person in people]
+    bpy.context.scene.frame_set(10)
+    bpy.ops.scope.floor_here()
+    assert [kinds(person) for person in people] == [["FLOOR"]] * 2
+    heights = [stored_motion_of(person).corrections["floor_heights"] for person in people]
+    np.testing.assert_array_equal(*heights)
+    bpy.context.view_layer.objects.active = people[1]
+    bpy.ops.scope.remove_correction(index=0)
+    for person, expected in zip(people, before, strict=True):
+        assert_same(everything(person), expected)
+
+
+def test_refused_changes_nothing(rig):
+    before = everything(rig)
+    bpy.context.scene.frame_set(500)
+    with pytest.raises(RuntimeError, match="outside of the captured motion"):
+        bpy.ops.scope.floor_here()
+    bpy.context.scene.frame_set(FRAME)
+    assert_same(everything(rig), before)
+    bpy.ops.scope.root_motion(mode="OBJECT")
+    with pytest.raises(RuntimeError, match="In Bones"):
+        bpy.ops.scope.floor_here()
+    assert len(Motion.load(rig["scope_motion"])) == len(walk(2.0))
