@@ -18,7 +18,7 @@ SHORTEST_M, TALLEST_M = 0.5, 2.6  # statures outside are input errors
 MAX_DEVIATIONS = 4.5  # standard deviations of the population up to which the shapes of a body are realistic
 SHORTEST_CHILD_M = 0.8  # one year of age; below, growth extrapolated from that of six-year-olds makes legs too long
 STIFFNESS = 4.0  # κ of ``with_unknown_stature``
-UNKNOWN = 2.2  # c of `stature_sigma`
+UNKNOWN = 4.5  # c of `stature_sigma`; errors on renders have 1.03 times the deviations (benchmarks/NOTEBOOK.md)
 FIXED = 1e6  # information of a coefficient that does not vary
 _ROUNDS = 3
 
