@@ -16,7 +16,7 @@ for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
 
 from ..scope_addon.atomic_write import atomic_path  # noqa: E402
 from . import frames, report  # noqa: E402
-from .solver import clip_steps, peers, plots, startup, steps  # noqa: E402
+from .solver import clip_comparison, clip_steps, peers, plots, startup, steps  # noqa: E402
 
 OUT = frames.CACHE
 ELSEWHERE = {  # imported where they are wanted: some need packages that others do not
@@ -48,7 +48,10 @@ def solver(quick: bool) -> dict[str, Any]:
     figures["experiments"] = experiments
     figures["clip"] = clip_steps.clip_table(3 if quick else 10)
     figures["clip_gradients"] = clip_steps.against_gradients(1 if quick else 5)
-    for rows in (figures["clip"], figures["clip_gradients"]):
+    figures["clip_dense"] = clip_comparison.against_dense(3 if quick else 20)
+    figures["clip_frames"] = clip_comparison.against_frames(1 if quick else 5)
+    figures["clip_outlines"] = clip_comparison.with_outlines(3 if quick else 10)
+    for rows in (figures[key] for key in figures if key.startswith("clip")):
         print(report.rows_table(rows), end="\n\n", flush=True)
     figures |= _real_frames(quick)
     figures["peers"] = {} if quick else peers.run_all()

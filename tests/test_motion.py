@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scope.scope_addon.errors import MotionFileError, OutputError
-from scope.scope_addon.motion import FACE_KEYS, SIGMA_KEYS, Motion
+from scope.scope_addon.motion import FACE_KEYS, HEIGHT_SIGMA_KEY, SIGMA_KEYS, Motion
 
 from .made_motion import made_face
 
@@ -46,7 +46,7 @@ def test_a_saved_motion_loads_the_same(tmp_path):
     back = Motion.load(tmp_path / "a.npz")
     for name, value in vars(motion).items():
         got = getattr(back, name)
-        assert np.array_equal(got, value, equal_nan=name in SIGMA_KEYS), name
+        assert np.array_equal(got, value, equal_nan=name in (*SIGMA_KEYS, HEIGHT_SIGMA_KEY)), name
         assert getattr(got, "dtype", None) == getattr(value, "dtype", None), name
     assert [p.name for p in tmp_path.iterdir()] == ["a.npz"]
 
@@ -103,6 +103,7 @@ def test_files_of_earlier_versions_have_unknown_deviations(tmp_path):
     assert old.joint_sigma_m.shape == old.joint_sigma_depth_m.shape == old.joint_confidence.shape
     assert np.isnan(old.joint_sigma_m).all()
     assert np.isnan(old.joint_sigma_depth_m).all()
+    assert np.isnan(old.height_sigma_m)
 
 
 def test_an_unwritable_folder_is_an_output_error_and_keeps_the_earlier_file(tmp_path):

@@ -149,6 +149,13 @@ def _add_priors(tree, terms, stage, pose, blocks, H, g) -> None:  # type: ignore
                 H[at + r, at + c] += blocks.H_uu[i, r, c]
 
 
+def solve_cholesky(H: NDArray[np.float64], g: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return -H⁻¹ g."""
+    out = np.zeros(len(g))
+    _solve(np.linalg.cholesky(H), g, out)
+    return out
+
+
 @dataclass
 class Dense:
     """The dense step on a benchmark problem, with its buffers."""

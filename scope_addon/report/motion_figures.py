@@ -26,7 +26,7 @@ def motion_figures(motion: Motion, body: Body) -> dict[str, str]:
     review = sum(span.last - span.first + 1 for span in spans)
     return {
         "Frames seen": f"{int(seen.sum())} of {len(motion)}",
-        "Height": f"{100 * body.stature(motion.betas.astype(float)):.0f} cm",
+        "Height": height_text(body.stature(motion.betas.astype(float)), motion.height_sigma_m),
         "Path over the floor": f"{path.sum():.2f} m",
         "Highest speed": f"{highest_speed(pelvis[:, :2], motion.timestamps):.2f} m/s",
         "Pelvis height": f"{pelvis[:, 2].min():.2f} to {pelvis[:, 2].max():.2f} m",
@@ -38,6 +38,14 @@ def motion_figures(motion: Motion, body: Body) -> dict[str, str]:
         "Right foot in contact": f"{100 * contact[:, 2:].any(axis=1).mean():.0f} % of frames",
         "Frames to review": f"{review}",
     }
+
+
+def height_text(height_m: float, sigma_m: float) -> str:
+    """Return a stature in centimetres, with its standard deviation where that is known."""
+    if not np.isfinite(sigma_m):
+        return f"{100 * height_m:.0f} cm"
+    digits = 0 if sigma_m >= 0.01 else 1
+    return f"{100 * height_m:.{digits}f} ± {100 * sigma_m:.{digits}f} cm"
 
 
 def highest_speed(points: NDArray[np.float64], times: NDArray[np.float64]) -> float:

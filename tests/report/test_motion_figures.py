@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scope.scope_addon.report.motion_figures import highest_speed, motion_figures
+from scope.scope_addon.report.motion_figures import height_text, highest_speed, motion_figures
 
 from ..made_motion import made_motion
 
@@ -31,6 +31,12 @@ def test_a_walk_of_known_length_and_speed(body):
     assert figures["Right foot in contact"] == "0 % of frames"
     assert figures["Frames to review"] == "1"
     assert figures["Height"] == f"{100 * np.ptp(body.v_template[:, 1]):.0f} cm"
+
+
+def test_the_height_with_its_deviation():
+    assert height_text(1.7449, 0.0882) == "174 ± 9 cm"
+    assert height_text(1.7449, 0.005) == "174.5 ± 0.5 cm"
+    assert height_text(1.7449, np.nan) == "174 cm"
 
 
 def test_speed_of_very_short_motions():

@@ -119,10 +119,11 @@ class Measurer:
         return bool((away & (confidence > MIN_CONFIDENCE)).any())
 
     def joint_confidence(self, confidence: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
-        """Return how far landmarks, rather than priors, determine each joint's rotation.
+        """Return the mean confidence of the landmarks in which each joint's rotation is visible.
 
-        A joint's rotation is visible in the keypoints of its own part, away from the joint. If there are none, it is
-        visible in those of the nearest descendants. Without either, it depends on priors alone: 0.
+        These are the keypoints of its own part, away from the joint, and if there are none, those of the nearest
+        descendants. Without either, nothing in the image shows it: 0. It says whether landmarks were seen, not how
+        accurate the rotation is.
 
         :param confidence: (T, 33) of the landmarks.
         :return: (T, K+1) 0..1.

@@ -36,6 +36,7 @@ class FittedTrack:
     joint_confidence: NDArray[np.floating[Any]]  # (T, K+1) 0..1
     iterations: float  # mean per frame
     joint_sigma_m: NDArray[np.floating[Any]] | None = None  # (T, K+1, 2) of `joint_sigma`, NaN where not valid
+    height_sigma_m: float = float("nan")  # standard deviation of the stature of `betas`
 
 
 class FrameSequence:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ SHORTEST_M, TALLEST_M = 0.5, 2.6  # statures outside are input errors
 MAX_DEVIATIONS = 4.5  # standard deviations of the population up to which the shapes of a body are realistic
 SHORTEST_CHILD_M = 0.8  # one year of age; below, growth extrapolated from that of six-year-olds makes legs too long
 STIFFNESS = 4.0  # κ of ``with_unknown_stature``
+UNKNOWN = 4.5  # c of `stature_sigma`; errors on renders have 1.03 times the deviations (benchmarks/NOTEBOOK.md)
 FIXED = 1e6  # information of a coefficient that does not vary
 _ROUNDS = 3
 
@@ -54,6 +56,22 @@ def with_population(priors: Priors, body: Body) -> Priors:
     if growth_of(body) is None:
         return replace(priors, shape_information=None)
     return replace(priors, shape_information=np.diag(_population(body, is_child=False)))
+
+
+def stature_sigma(body: Body, betas: NDArray[np.floating[Any]], information: NDArray[Any], is_given: bool) -> float:
+    """Return the standard deviation of the stature h(β), metres: σ = c √(gᵀ Λ⁻¹ g), without c where it was given.
+
+    Frames repeat each other's errors, so Λ is the information of one of them. What keypoints say of the size through
+    proportions is also off by more than their noise, hence c = `UNKNOWN`. NaN for bodies of a single shape.
+
+    :param information: (P, P) Λ, priors included.
+    :param is_given: the priors are those of `with_stature`.
+    """
+    if body.P == 0:
+        return float("nan")
+    _, g = _shape_at(body, np.asarray(betas, float))
+    sigma = float(np.sqrt(g @ np.linalg.solve(information, g)))
+    return sigma if is_given else UNKNOWN * sigma
 
 
 def require_stature(body: Body, height_m: float) -> None:

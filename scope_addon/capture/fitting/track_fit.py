@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from ....solver import ClipFit, Fit, State, fit_clip
 from .frame_measurements import NEAREST_M
 from .frame_sequence import FittedTrack, FrameSequence, is_usable
-from .outline.shape_fit import fit_shape_to_outline, usable_masks
+from .outline.shape_fit import PRIOR_SHARE, fit_shape_to_outline, usable_masks
 from .prepared_track import PreparedTrack, Stance
-from .stature import with_population
+from .stature import stature_sigma, with_population
 from .weights import ROBUST, clip_weights, cold_stages
 
 SHAPE_FRAMES = 64  # from which the shape is estimated; more frames add little
@@ -35,15 +35,15 @@ def fit_track(prepared: PreparedTrack, progress: Callable[[str, int, int], None]
     :param progress: called with the stage's name, the frames done and the total; 0: unknown.
     """
     progress("finding the shape", 0, 0)
-    frames, track = FrameSequence(prepared, _fit_shape(prepared).beta), prepared.track
-    T = len(track)
+    shape, track = _fit_shape(prepared), prepared.track
+    frames, T = FrameSequence(prepared, shape.beta), len(track)
     for k in range(T):
         if track.seen[k]:
             frames.fit_next(k)
         frames.repeat_last(k)
         if k % PROGRESS_FRAMES == 0 or k == T - 1:
             progress("solving", k + 1, T)
-    return frames.fitted()
+    return replace(frames.fitted(), height_sigma_m=_height_sigma(prepared, shape))
 
 
 def fit_single_frame(prepared: PreparedTrack) -> Fit | None:
@@ -64,11 +64,14 @@ def ground(prepared: PreparedTrack, first: FittedTrack, stance: Stance) -> tuple
     :return: the measurements, and the states and the shape to start from.
     """
     prepared, betas, root_cam = prepared.rotated(stance.turn), first.betas, stance.root_cam
+    sigma = first.height_sigma_m
     if first.valid.any():
         new, old = (np.linalg.norm(at[first.valid], axis=1) for at in (root_cam, first.t_camera_root))
         if abs(np.log(np.median(new / np.maximum(old, NEAREST_M)))) > RESIZE:
-            betas = _fit_shape(prepared, root_cam).beta
-    return prepared.with_stance(stance, betas), replace(first, t_camera_root=root_cam, betas=betas)
+            shape = _fit_shape(prepared, root_cam)
+            betas, sigma = shape.beta, _height_sigma(prepared, shape)
+    start = replace(first, t_camera_root=root_cam, betas=betas, height_sigma_m=sigma)
+    return prepared.with_stance(stance, betas), start
 
 
 def fit_each_frame(
@@ -108,6 +111,13 @@ def _fit_shape(prepared: PreparedTrack, root_cam: NDArray[np.floating[Any]] | No
     if root_cam is not None and priors.shape_mean is None:  # distance determines an unknown stature, proportions do not
         priors = with_population(priors, prepared.body)
     return fit_clip(prepared.body, measurements, priors=priors, options=options)
+
+
+def _height_sigma(prepared: PreparedTrack, shape: ClipFit) -> float:
+    """Return the standard deviation of the stature of a shape of `_fit_shape`, metres."""
+    count = len(shape.frames) * (PRIOR_SHARE if usable_masks(prepared) else 1.0)
+    information = shape.beta_information / (count * prepared.weights.shape)
+    return stature_sigma(prepared.body, shape.beta, information, prepared.priors.shape_mean is not None)
 
 
 def _spread(indices: NDArray[np.intp], count: int) -> NDArray[np.intp]:

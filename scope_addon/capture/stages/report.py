@@ -125,6 +125,7 @@ def _about_person(body: Body, motion: Motion) -> dict[str, Any]:
             "last_frame": int(seen[-1]),
             "reprojection_px": float(motion.residual_px[motion.valid].mean()),
             "height_m": round(body.stature(motion.betas), 3),
+            "height_sigma_m": round(motion.height_sigma_m, 3) if np.isfinite(motion.height_sigma_m) else None,
         }
     )
 

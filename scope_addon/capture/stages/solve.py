@@ -109,7 +109,7 @@ def refine(
         return start, start
     finished = fit_clip(prepared, start, shot.path, progress) if shot.smoothing else start
     raw = to_single_precision(fit_each_frame(prepared, finished, progress))
-    raw = replace(raw, joint_sigma_m=finished.joint_sigma_m)
+    raw = replace(raw, joint_sigma_m=finished.joint_sigma_m, height_sigma_m=finished.height_sigma_m)
     return raw, to_single_precision(finished) if shot.smoothing else raw
 
 

@@ -81,6 +81,7 @@ def assemble_motion(
         source=shot.source,
         joint_sigma_m=None if sigma is None else np.sqrt((sigma[..., 0] ** 2 + 2.0 * sigma[..., 1] ** 2) / 3.0),
         joint_sigma_depth_m=None if sigma is None else sigma[..., 0],
+        height_sigma_m=person.fit.height_sigma_m,
         face=_face(track, placed.times, shot.smoothing),
     )
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keys of confidence and contact on the bones, and timeline markers at review spans.
+"""Keys of confidence, standard deviation and contact on the bones, and timeline markers at review spans.
 
-``confidence`` (0..1) says how far keypoints, rather than priors, determine the bone. ``contact`` (0..1) is the
+``confidence`` (0..1) is that of the keypoints in which the bone's rotation is visible. ``sigma_cm`` is the
+standard deviation of its joint's position (`docs/motion_file.md`), where it is known. ``contact`` (0..1) is the
 probability that the heel (on the ankle's bone) or the toes (on the foot's) are at rest on the floor; drivers and
 constraints can use it.
 """
@@ -17,11 +18,12 @@ from ...motion import Motion
 from ...review_spans import REASONS, find_review_spans
 from ..animation_data.actions import Channels, bone_property_path
 
-CONFIDENCE, CONTACT = "confidence", "contact"
+CONFIDENCE, CONTACT, SIGMA = "confidence", "contact", "sigma_cm"
 # The bones that carry the columns of ``Motion.foot_contact``.
 CONTACT_BONES = ("left_ankle", "left_foot", "right_ankle", "right_foot")
 _DESCRIPTIONS = {
-    CONFIDENCE: "How far the footage, rather than prior knowledge, determines this bone",
+    CONFIDENCE: "Confidence of the keypoints that show how this bone is turned",
+    SIGMA: "Standard deviation of the position of this bone's joint, in centimetres",
     CONTACT: "Probability that this end of the foot rests on the floor",
 }
 MARKER_NAMES = {"unseen": "not seen", "far": "check", "unsure": "unsure", "floor": "under floor"}
@@ -32,7 +34,7 @@ _GAP_S = 0.5  # spans closer than this share a marker
 def key_measurements(
     armature: bpy.types.Object, channels: Channels, body: Body, motion: Motion, frames: NDArray[np.float64]
 ) -> None:
-    """Key confidence and contact as custom properties of the bones, at scene frames (T,).
+    """Key confidence, standard deviation and contact as custom properties of the bones, at scene frames (T,).
 
     The curves are hidden in the graph editor, where they would obscure those of the rotations.
     """
@@ -40,13 +42,17 @@ def key_measurements(
     columns |= {
         (name, CONTACT): motion.foot_contact[:, i] for i, name in enumerate(CONTACT_BONES) if name in body.joint_names
     }
+    columns |= {(name, SIGMA): 100.0 * motion.joint_sigma_m[:, i] for i, name in enumerate(body.joint_names)}
     for (bone_name, name), values in columns.items():
-        bone = armature.pose.bones[bone_name]
-        bone[name] = float(values[0])
+        known = np.isfinite(values)  # deviations are unknown in frames that are filled in, and in some motions
+        if not known.any():
+            continue
+        bone, most = armature.pose.bones[bone_name], 1000.0 if name == SIGMA else 1.0
+        bone[name] = float(values[known][0])
         bone.id_properties_ui(name).update(
-            min=0.0, max=1.0, soft_min=0.0, soft_max=1.0, description=_DESCRIPTIONS[name]
+            min=0.0, max=most, soft_min=0.0, soft_max=most, description=_DESCRIPTIONS[name]
         )
-        for curve in channels.write(bone_property_path(bone_name, name), frames, values, group=name.title()):
+        for curve in channels.write(bone_property_path(bone_name, name), frames[known], values[known], group=name.title()):
             curve.hide = True
 
 

@@ -253,6 +253,11 @@ def _draw_figures(layout: bpy.types.UILayout, result: bpy.types.PropertyGroup) -
     if result.camera:
         error = iface_("Reprojection error {pixels:.1f} px", pixels=result.reprojection_px)
         column.label(text=error, icon="CON_CAMERASOLVER")
+        if result.sigma_cm > 0.0:
+            sigma = iface_("Joints ± {sigma:.1f} cm (standard deviation, median)", sigma=result.sigma_cm)
+            column.label(text=sigma, icon="EMPTY_ARROWS")
+        if result.heights:
+            column.label(text=iface_("Height {heights}", heights=result.heights), icon="USER")
         column.label(text=iface_("Lens: {lens}", lens=result.camera), icon="CAMERA_DATA")
     if result.execution:
         column.label(text=iface_("Networks on {processor}", processor=result.execution), icon="MEMORY")

@@ -40,6 +40,8 @@ class SCOPE_PG_result(bpy.types.PropertyGroup):
     frames: IntProperty()
     valid_frames: IntProperty()
     reprojection_px: FloatProperty()
+    sigma_cm: FloatProperty()  # standard deviation of the joints' positions, median; 0 where it is not known
+    heights: StringProperty()  # of the people, such as "1.74 m ± 0.09"
     frames_per_second: FloatProperty()
     footage_rate: FloatProperty()  # frames per second of the footage; 0 for a picture
     camera: StringProperty()

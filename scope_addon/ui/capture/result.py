@@ -30,6 +30,10 @@ def show_result(shown: bpy.types.PropertyGroup, footage: str, report: dict[str, 
     shown.valid_frames = int(sum(p.motion.valid.sum() for p in result.people))
     residuals = np.concatenate([p.motion.residual_px[p.motion.valid] for p in result.people])
     shown.reprojection_px = float(residuals.mean()) if residuals.size else 0.0
+    sigmas = np.concatenate([p.motion.joint_sigma_m.ravel() for p in result.people])
+    sigmas = sigmas[np.isfinite(sigmas)]
+    shown.sigma_cm = 100.0 * float(np.median(sigmas)) if sigmas.size else 0.0
+    shown.heights = ", ".join(_height(person) for person in report.get("per_person", ()) if "height_m" in person)
     shown.frames_per_second = float(report.get("fps", {}).get("total", 0.0))
     first = result.people[0].motion
     shown.footage_rate = first.mocap_framerate if len(first) > 1 else 0.0
@@ -57,6 +61,14 @@ def frame_warnings(motion: Motion, frames: NDArray[np.float64], under_floor: NDA
     for span in find_review_spans(motion, under_floor=under_floor):
         by_reason.setdefault(span.reason, []).append(span)
     return {reason: _text(spans, frames) for reason, spans in by_reason.items()}
+
+
+def _height(person: dict[str, Any]) -> str:
+    """Return a stature with its standard deviation, where that is known, from the report about a person."""
+    sigma_m = person.get("height_sigma_m")
+    if sigma_m is None:
+        return f"{person['height_m']:.2f} m"
+    return f"{person['height_m']:.2f} m ± {sigma_m:.{2 if sigma_m >= 0.01 else 3}f}"
 
 
 def _text(spans: list[Span], frames: NDArray[np.float64]) -> str:

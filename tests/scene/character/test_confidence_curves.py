@@ -34,6 +34,25 @@ def test_confidence_and_contact_follow_the_timeline(body, doubtful, blender):
     assert (ui["min"], ui["max"]) == (0.0, 1.0)
 
 
+def test_deviations_follow_the_timeline_where_they_are_known(body, doubtful, blender):
+    doubtful.joint_sigma_m[:] = np.random.default_rng(4).uniform(0.01, 0.2, doubtful.joint_sigma_m.shape)
+    doubtful.joint_sigma_m[~doubtful.valid] = np.nan
+    rig = build_scene([doubtful], body, options=NEW_SCENE).people[0].armature
+    for t in (0, 17, 59):
+        blender.go_to(t)
+        posed = rig.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones
+        shown = [posed[name]["sigma_cm"] for name in body.joint_names]
+        np.testing.assert_allclose(shown, 100.0 * doubtful.joint_sigma_m[t], rtol=1e-5)
+    (curve,) = [c for c in actions.fcurves(rig) if c.data_path == 'pose.bones["head"]["sigma_cm"]']
+    assert len(curve.keyframe_points) == doubtful.valid.sum()
+    assert curve.hide
+
+
+def test_unknown_deviations_are_no_property(body, doubtful):
+    rig = build_scene([doubtful], body).people[0].armature
+    assert "sigma_cm" not in rig.pose.bones["head"]
+
+
 def test_their_curves_are_hidden_in_the_graph_editor(body, doubtful):
     rig = build_scene([doubtful], body).people[0].armature
     hidden = {curve.data_path.rsplit("[", 1)[1] for curve in actions.fcurves(rig) if curve.hide}

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The standard deviation of a captured stature against the true statures of people drawn from the population."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.camera.intrinsics import choose_camera
+from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
+from scope.scope_addon.capture.fitting.prepared_track import prepare_track
+from scope.scope_addon.capture.fitting.track_fit import fit_track
+from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
+from scope.scope_addon.capture.tracking.track import Track
+from scope.solver import load_body
+from scope.solver.rotations import exp
+
+PEOPLE, FRAMES = 24, 4
+BODY, CAMERA = load_body("scope"), choose_camera(1080, 1920)
+
+
+def _track(rng: np.random.Generator, betas: np.ndarray) -> Track:
+    """A person of a shape, 4 m away, at arbitrary angles of view, by keypoints with 4 pixels of noise."""
+    flip, J = np.diag([1.0, -1.0, -1.0]), len(KEYPOINT_NAMES)
+    rotations = np.tile(np.eye(3), (FRAMES, BODY.K + 1, 1, 1))
+    rotations[:, 0] = flip @ exp(np.outer(rng.uniform(-1.0, 1.0) + 0.1 * np.arange(FRAMES), [0.0, 1.0, 0.0]))
+    R, t = BODY.forward_kinematics(rotations, np.tile([0.0, 0.0, 4.0], (FRAMES, 1)), betas)
+    at = BODY.keypoint_set("blazepose")
+    points = with_keypoint_offsets(BODY).keypoints(R, t, betas, [at[name] for name in KEYPOINT_NAMES])
+    pixels = points[..., :2] / points[..., 2:] * CAMERA.intrinsics[0, 0] + CAMERA.intrinsics[:2, 2]
+    hips = [KEYPOINT_NAMES.index(f"{side}_hip") for side in ("left", "right")]
+    landmarks = (points - points[:, hips].mean(axis=1, keepdims=True)) * BODY.stature() / BODY.stature(betas)
+    return Track(
+        frames=np.arange(FRAMES),
+        times=np.arange(FRAMES) / 30.0,
+        keypoints_px=pixels + rng.normal(0.0, 4.0, pixels.shape),
+        confidence=np.ones((FRAMES, J)),
+        world_landmarks=landmarks,
+        seen=np.ones(FRAMES, bool),
+        acquired=np.arange(FRAMES) == 0,
+    )
+
+
+def test_statures_are_off_by_their_deviations():
+    rng = np.random.default_rng(5)
+    deviations = []
+    for betas in rng.standard_normal((PEOPLE, BODY.P)):
+        found = fit_track(prepare_track(BODY, _track(rng, betas), CAMERA), lambda *_: None)
+        deviations.append((BODY.stature(found.betas) - BODY.stature(betas)) / found.height_sigma_m)
+    assert 0.6 < np.sqrt(np.mean(np.square(deviations))) < 1.4
+
+
+@pytest.mark.parametrize("height_m", [1.55, 1.85])
+def test_a_given_stature_is_known_to_half_a_centimetre(height_m):
+    track = _track(np.random.default_rng(0), np.zeros(BODY.P))
+    found = fit_track(prepare_track(BODY, track, CAMERA, height_m=height_m), lambda *_: None)
+    assert abs(BODY.stature(found.betas) - height_m) < 3 * found.height_sigma_m
+    assert 0.003 < found.height_sigma_m <= 0.0051
