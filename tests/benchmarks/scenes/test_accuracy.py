@@ -43,7 +43,11 @@ def motion(body, limbs_cam, valid=None):
     joints = np.zeros((T, body.K + 1, 3))
     joints[:, [body.joint_names.index(name) for name in LIMB_JOINTS]] = limbs_cam
     rows = np.ones(T, bool) if valid is None else valid
-    return SimpleNamespace(joints_cam=joints, valid=rows, frames=np.arange(T), intrinsics=K, betas=np.zeros(body.P))
+    alone = {"poses_raw": np.zeros((T, 3 * (body.K + 1))), "trans_raw": np.tile([0.0, 0.0, 4.0], (T, 1))}
+    camera = {"world_from_camera": np.tile(np.eye(4), (T, 1, 1)), "intrinsics": K, "mocap_framerate": 30.0}
+    return SimpleNamespace(
+        joints_cam=joints, valid=rows, frames=np.arange(T), betas=np.zeros(body.P), **alone, **camera
+    )
 
 
 def evaluate(body, truth, motions, monkeypatch):
@@ -121,3 +125,12 @@ def test_groups_are_of_frames_and_of_people(body, truth, monkeypatch):
     assert rows["stature below 1.5 m"]["mpjpe_root"].mean == pytest.approx(1.0)
     assert rows["all"]["found"].mean == 1.0
     assert "travelling camera" not in rows
+
+
+def test_variants_are_compared_where_both_found_the_person(body, truth, monkeypatch):
+    right, wrong = truth["limbs_cam"][0], truth["limbs_cam"][0].copy()
+    wrong[:, LIMB_JOINTS.index("left_wrist"), 2] += 0.12
+    default = evaluate(body, truth, [motion(body, right, np.arange(T) > 1)], monkeypatch)
+    other = evaluate(body, truth, [motion(body, wrong), motion(body, truth["limbs_cam"][1])], monkeypatch)
+    more = accuracy.more_than(default, other)
+    assert (more.people, more.mean) == (1, pytest.approx(10.0))
