@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`./scripts/report [--quick] [--recorded FOLDER] [OUT.html]`: run what this machine can run; write a page about it."""
+"""`./scripts/report [OPTIONS] [OUT.html]`: run what this machine can run, and write one page about it."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ from ...solver.loaders.body_file import load_body
 from ..frames import ROOT
 from .commands import LONG, Outcome, clips, commands, run, run_capture
 from .content import outcome_section
+from .curves import Curves, read_curves
 from .recorded import Run, read_run, write_run
 from .shots import strips
 
@@ -37,12 +38,14 @@ def main() -> int:
     parser.add_argument("out", nargs="?", type=Path, metavar="OUT.html", default=FOLDER / "report.html")
     parser.add_argument("--quick", action="store_true", help="a few minutes: fewer repetitions, fewer clips")
     parser.add_argument("--recorded", type=Path, metavar="FOLDER", help="of an earlier run: write its page again")
+    parser.add_argument("--curves", type=Path, metavar="CSV", help="digitized speedups of others, drawn beside ours")
     args = parser.parse_args()
     try:
         FOLDER.mkdir(parents=True, exist_ok=True)
         check_output(args.out, (".html",))
+        curves = read_curves(args.curves) if args.curves else {}
         folder = args.recorded or FOLDER
-        content = report_page(folder, read_run(folder) if args.recorded else measure(args.quick))
+        content = report_page(folder, read_run(folder) if args.recorded else measure(args.quick), curves)
         with atomic_path(args.out) as temporary:
             temporary.write_text(content, encoding="utf-8")
     except ScopeError as error:
@@ -73,10 +76,11 @@ def measure(quick: bool) -> Run:
     return done
 
 
-def report_page(folder: Path, done: Run) -> str:
+def report_page(folder: Path, done: Run, curves: Curves) -> str:
     """Return the page of a run.
 
     :param folder: the run's, with the motion files of its clips.
+    :param curves: digitized speedups of others.
     """
     body = load_body("scope")
     name, video, _ = done.captured[0]
@@ -92,7 +96,7 @@ def report_page(folder: Path, done: Run) -> str:
         page.strip(pictures, captions),
         page.section("The capture above", *over_time([motion]), figures_table([motion], body)),
         *(capture_section(folder, *each, body) for each in done.captured if each[2].status == 0),
-        *(outcome_section(each) for each in done.measured),
+        *(outcome_section(each, curves) for each in done.measured),
         page.section(
             "Commands", page.command_line("\n".join(each.command.text for each in done.everything)), note=note
         ),

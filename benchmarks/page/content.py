@@ -15,11 +15,12 @@ from ...scope_addon.report.page import Markup
 from ...scope_addon.report.plots import Axis, Curve, line_plot
 from ..perception.accuracy import SHOWN
 from .commands import Outcome
+from .curves import Curves
 
 BODIES = ((23, "SMPL"), (51, "SMPL+H"))  # number of joints, and whose skeleton has as many
 PAPER = (
     "The curves of the solver's paper (figures 5 to 7) are not drawn beside these: they are not available as data, and "
-    "were not digitized."
+    "were not digitized. Whoever has digitized them can give them as a table with --curves."
 )
 _RULE = re.compile(r"\|(\s*:?-+:?\s*\|)+")
 
@@ -47,13 +48,17 @@ def with_headings(name: str) -> str:
     return " ".join(SHOWN[word][0] if word in SHOWN else word for word in name.split(" "))
 
 
-def plots(outcome: Outcome) -> list[Markup]:
-    """Return plots of a command's figures: of ``bench solver`` and of ``bench smplify``; of others none."""
+def plots(outcome: Outcome, curves: Curves) -> list[Markup]:
+    """Return plots of a command's figures: of ``bench solver`` and of ``bench smplify``; of others none.
+
+    :param curves: digitized speedups of others, see `read_curves`.
+    """
     figures, parts = outcome.figures, []
     if experiments := figures.get("experiments"):
-        parts.append(Markup(f"<p>{escape(PAPER)}</p>\n"))
+        if not curves:
+            parts.append(Markup(f"<p>{escape(PAPER)}</p>\n"))
         for number, rows in sorted(experiments.items()):
-            parts += experiment_plots(str(number), rows)
+            parts += experiment_plots(str(number), rows, curves)
     if clip := figures.get("clip"):
         parts.append(clip_plot(clip))
     if figures and outcome.command.arguments[:1] == ("smplify",):
@@ -90,9 +95,13 @@ def clip_plot(rows: Sequence[dict[str, float]]) -> Markup:
     return plot("A whole clip as one problem: milliseconds a frame by its frames, logarithmic", curves)
 
 
-def experiment_plots(number: str, rows: Sequence[dict[str, float]]) -> list[Markup]:
-    """Return the plots of one experiment: microseconds of a step, and how much slower the dense step is."""
-    key = "P" if number == "3" else "N"
+def experiment_plots(number: str, rows: Sequence[dict[str, float]], digitized: Curves | None = None) -> list[Markup]:
+    """Return the plots of one experiment: microseconds of a step, and how much slower the dense step is.
+
+    :param number: such as 3, or 3_N600 with another number of terms.
+    :param digitized: speedups of others, see `read_curves`.
+    """
+    key = "P" if number.startswith("3") else "N"
     times, speedups = [], []
     for n, (K, body) in enumerate(BODIES):
         chosen = [row for row in rows if row["K"] == K]
@@ -101,6 +110,9 @@ def experiment_plots(number: str, rows: Sequence[dict[str, float]]) -> list[Mark
         times.append(Curve(x, sparse, page.person_color(2 * n), f"{body}, sparse", with_points=True))
         times.append(Curve(x, dense, page.person_color(2 * n + 1), f"{body}, dense", with_points=True))
         speedups.append(Curve(x, dense / sparse, page.person_color(2 * n), body, with_points=True))
+        if points := (digitized or {}).get((number, body)):
+            x, y = np.array(points, float).T
+            speedups.append(Curve(x, y, page.person_color(2 * n + 1), f"{body}, digitized", with_points=True))
     return [
         plot(f"Experiment {number}: µs of a step by {key}, logarithmic", times),
         plot(f"Experiment {number}: time of a dense step over a sparse one's, by {key}, logarithmic", speedups),
@@ -117,8 +129,11 @@ def plot(title: str, curves: Sequence[Curve]) -> Markup:
     return page.plot_figure(title, svg, {curve.name: curve.color for curve in curves})
 
 
-def outcome_section(outcome: Outcome) -> Markup:
-    """Return the section of one command: the command, how long it took, what it printed, and plots."""
+def outcome_section(outcome: Outcome, curves: Curves | None = None) -> Markup:
+    """Return the section of one command: the command, how long it took, what it printed, and plots.
+
+    :param curves: digitized speedups of others, see `read_curves`.
+    """
     ended = "" if outcome.status == 0 else f"; it ended with status {outcome.status}"
     last = outcome.said.strip().splitlines()
     said = [Markup(f"<p>{escape(last[-1])}</p>\n")] if last and (outcome.status or not outcome.printed.strip()) else []
@@ -126,7 +141,7 @@ def outcome_section(outcome: Outcome) -> Markup:
         outcome.command.title,
         page.command_line(outcome.command.text),
         *said,
-        *plots(outcome),
+        *plots(outcome, curves or {}),
         *printed_parts(outcome.printed),
         note=f"It took {outcome.seconds:.0f} s{ended}.",
     )

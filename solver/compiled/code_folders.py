@@ -127,7 +127,7 @@ def shipped_processor() -> str:
 
 @cache
 def can_run_shipped() -> bool:
-    """Whether this computer's processor has everything that shipped code needs, and numba is not configured to use less."""
+    """Whether the processor has everything that shipped code needs, and numba is not configured to use less."""
     if config.CPU_NAME not in (None, "", shipped_processor()) or not config.ENABLE_AVX:
         return False
     return bool(shipped_processor()) and all(_host_features().get(feature) for feature in LEVELS[_machine()][1])

@@ -105,13 +105,9 @@ def fit_motion(
         raise InvalidValueError(f"The overlap of windows must lie in 0..{window} s, but is {overlap} s.")
     check_type(motion, MotionPrior, "motion")
     check_weight(focal_weight, "focal_weight")
-    if shape is not None and focal:
-        raise InvalidValueError("The focal length can only be estimated together with the shape; leave `shape` out.")
     priors = default_priors(body) if priors is None else priors
     tree = make_tree(body)
-    if shape is not None:
-        shape = as_array(shape, (tree.shape,), "shape")
-        check_finite(shape, "shape")
+    shape = _checked_shape(shape, tree, focal)
     if init is None:
         init = _first_states(tree, frames, shape, priors, options)
     many = len(frames) >= _FRAMES_FOR_TWO_THREADS and (os.cpu_count() or 1) > 1
@@ -128,6 +124,16 @@ def _checked_times(times: ArrayLike, frames: int) -> Array:
     if not np.isfinite(clock).all() or (np.diff(clock) <= 0.0).any():
         raise InvalidValueError("The times of a motion's frames must be finite and increase from frame to frame.")
     return clock
+
+
+def _checked_shape(shape: ArrayLike | None, tree: Tree, focal: bool) -> Array | None:
+    if shape is None:
+        return None
+    if focal:
+        raise InvalidValueError("The focal length can only be estimated together with the shape; leave `shape` out.")
+    known = as_array(shape, (tree.shape,), "shape")
+    check_finite(known, "shape")
+    return known
 
 
 def _first_states(

@@ -270,6 +270,23 @@ def test_the_first_capture_of_the_command_line_page_is_run(folder, capfd):
     assert {code for row in entries for code in re.findall(r"`([^`]+)`", row[0])} == set(report)
 
 
+def session() -> list:
+    """(words) of the captures in the README's session, but that for a rig, which the reader has."""
+    readme = (ROOT / "README.md").read_text("utf-8")
+    lines = re.search(r"## A session in the shell\n\n```sh\n(.*?)```", readme, re.S)[1].splitlines()
+    words = [shlex.split(line.removeprefix("./scripts/"), comments=True) for line in lines]
+    return [pytest.param(w, id=shlex.join(w)) for w in words if w[0] == "capture" and "--retarget" not in w]
+
+
+@pytest.mark.parametrize("words", session())
+def test_the_captures_of_the_readme_are_run(words, folder):
+    (folder / "walk.mp4").symlink_to(SAMPLE)
+    assert main([*words, "--quality", "fast", "--end", "0.2", "--quiet"]) == 0
+    written = [word for before, word in zip(words, words[1:], strict=False) if before in ("-o", "--report")]
+    for name in written or ["walk.glb"]:
+        assert (folder / name).stat().st_size > 1000
+
+
 @pytest.mark.parametrize("code", blocks("python"))
 def test_every_python_block_runs(code, body, folder):
     seen = {"joints_cam": np.ones((3, body.K + 1, 3))}

@@ -18,7 +18,7 @@ def test_each_box_is_in_the_cluster_of_the_best_box_that_it_overlaps():
     low = rng.integers(0, 12, (40, 2))
     boxes = np.concatenate([low, low + rng.integers(1, 9, (40, 2))], axis=1).astype(float)
     clusters = [cluster.tolist() for cluster in overlap_clusters(boxes, 0.3)]
-    expected: list[list[int]] = []
+    expected = []
     for k in range(len(boxes)):
         for cluster in expected:
             if iou(boxes[cluster[0]], boxes[k]) > 0.3:

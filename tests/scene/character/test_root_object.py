@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The empty that carries an armature's root motion: where it stands, what it stores, and that it goes without trace."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix
+from scope.scope_addon.errors import UsageError
+from scope.scope_addon.scene.character.root_object import (
+    parent_to_root_object,
+    parent_transform,
+    remove_root_object,
+    removed_root_motion,
+    root_object,
+    topmost,
+)
+
+FRAMES = np.array([1.0, 11.0, 21.0])
+POSITIONS = np.array([[1.0, 2.0, 0.5], [2.0, 2.0, 0.5], [2.0, 4.0, 0.5]])
+ANGLES = np.array([0.0, 0.5, 1.5])
+
+
+@pytest.fixture(autouse=True)
+def empty_file():
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+
+
+def made(name: str, kind: str = "ARMATURE", parent: bpy.types.Object | None = None) -> bpy.types.Object:
+    obj = bpy.data.objects.new(name, bpy.data.armatures.new(name) if kind == "ARMATURE" else None)
+    bpy.context.scene.collection.objects.link(obj)
+    obj.parent = parent
+    return obj
+
+
+def place(obj: bpy.types.Object, frame: int) -> np.ndarray:
+    bpy.context.scene.frame_set(frame)
+    return np.array(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
+
+
+def expected(row: int) -> np.ndarray:
+    return np.array(Matrix.Translation(POSITIONS[row]) @ Matrix.Rotation(ANGLES[row], 4, "Z"))
+
+
+def test_the_armature_follows_the_trajectory_and_its_parent():
+    group = made("group", "EMPTY")
+    group.location = (0.0, 0.0, 10.0)
+    armature = made("hero", parent=group)
+    armature.location = (0.0, 0.3, 0.0)
+    empty = parent_to_root_object(armature, FRAMES, POSITIONS, ANGLES, below_parent=True)
+    assert root_object(armature) == empty
+    assert (empty.name, empty.parent) == ("hero_root", group)
+    for row, frame in enumerate((1, 11, 21)):
+        wanted = np.array(Matrix.Translation((0, 0, 10))) @ expected(row) @ np.array(Matrix.Translation((0, 0.3, 0)))
+        np.testing.assert_allclose(place(armature, frame), wanted, atol=1e-5)
+    np.testing.assert_allclose(np.array(parent_transform(armature)), place(empty, 21), atol=1e-5)
+    actions = len(bpy.data.actions)
+    remove_root_object(armature)
+    assert (root_object(armature), armature.parent) == (None, group)
+    assert "hero_root" not in bpy.data.objects
+    assert len(bpy.data.actions) == actions - 1
+
+
+@pytest.mark.parametrize("in_place", [False, True])
+def test_the_trajectory_is_read_back_between_its_keys_too(in_place):
+    armature = made("hero")
+    empty = parent_to_root_object(armature, FRAMES, POSITIONS, ANGLES, in_place=in_place)
+    positions, angles = removed_root_motion(armature, np.array([1.0, 6.0, 21.0]))
+    np.testing.assert_allclose(positions, [[1.0, 2.0, 0.5], [1.5, 2.0, 0.5], [2.0, 4.0, 0.5]], atol=1e-6)
+    np.testing.assert_allclose(angles, [0.0, 0.25, 1.5], atol=1e-6)
+    assert (empty.animation_data is None) == in_place
+    np.testing.assert_allclose(place(armature, 21), expected(0 if in_place else 2), atol=1e-5)
+
+
+def test_a_second_root_object_replaces_the_first():
+    armature = made("hero")
+    parent_to_root_object(armature, FRAMES, POSITIONS, ANGLES)
+    empty = parent_to_root_object(armature, FRAMES, POSITIONS + 1.0, ANGLES)
+    assert [obj.name for obj in bpy.data.objects if obj.type == "EMPTY"] == ["hero_root"]
+    assert (topmost(armature), root_object(armature)) == (armature, empty)
+    assert place(armature, 1)[:3, 3] == pytest.approx(POSITIONS[0] + 1.0)
+
+
+def test_another_armature_is_not_moved_along():
+    group = made("group", "EMPTY")
+    armature = made("hero", parent=group)
+    made("villain", parent=group)
+    with pytest.raises(UsageError, match="'hero' is parented to 'group', and 'villain' would move along"):
+        parent_to_root_object(armature, FRAMES, POSITIONS, ANGLES)
+    assert armature.parent == group
