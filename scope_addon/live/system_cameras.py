@@ -52,7 +52,7 @@ def open_camera(number: int, size: tuple[int, int], platform: str) -> InputConta
     for wanted in ({"video_size": f"{size[0]}x{size[1]}"}, {}):
         for wish in _WISHES:
             try:
-                return cast("InputContainer", av.open(file, format=FORMATS[platform], options=wanted | wish, mode="r"))
+                return av.open(file, format=FORMATS[platform], options=wanted | wish, mode="r")
             except (av.error.FFmpegError, OSError, ValueError) as error:
                 problem = str(getattr(error, "strerror", None) or error).lower()
     raise VideoError(
