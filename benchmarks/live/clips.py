@@ -9,6 +9,7 @@ from pathlib import Path
 
 import av
 import cv2
+import numpy as np
 from numpy.typing import NDArray
 
 from ...scope_addon.atomic_write import atomic_path
@@ -34,7 +35,7 @@ def there_and_back_clip(seconds: float, size: tuple[int, int] | None = None) -> 
     with open_video(SAMPLE) as video:
         pictures = [frame.image_rgb for frame in video]
     if size is not None:
-        pictures = [cv2.resize(picture, size, interpolation=cv2.INTER_CUBIC) for picture in pictures]
+        pictures = [cv2.resize(picture, size, interpolation=cv2.INTER_CUBIC).astype(np.uint8) for picture in pictures]
     order = there_and_back(len(pictures))
     CACHE.mkdir(parents=True, exist_ok=True)
     with atomic_path(target) as temporary:
@@ -42,7 +43,7 @@ def there_and_back_clip(seconds: float, size: tuple[int, int] | None = None) -> 
     return target
 
 
-def _write(path: Path, pictures: list[NDArray]) -> None:
+def _write(path: Path, pictures: list[NDArray[np.uint8]]) -> None:
     with av.open(str(path), "w", format="mp4") as container:
         stream = container.add_stream("libx264", rate=FPS, options={"crf": "18", "preset": "veryfast"})
         stream.height, stream.width = pictures[0].shape[:2]

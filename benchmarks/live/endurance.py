@@ -15,13 +15,14 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from ...scope_addon.capture.camera.intrinsics import choose_camera
 from ...scope_addon.capture.media.frame import Frame
 from ...scope_addon.capture.media.video import open_video
+from ...scope_addon.capture.tracking.tracker import PeopleTracker
 from ...scope_addon.cli import SAMPLE
 from ...scope_addon.live.outputs.json_lines import JsonServer
 from ...scope_addon.live.people import LivePeople
@@ -139,7 +140,7 @@ def observed(
         observing.step(pictures[order[k % len(order)]], time_s=k / FPS)
     tracker = Repeating(observing.found)
     size = pictures[0].shape[1], pictures[0].shape[0]
-    people = LivePeople(body, tracker, choose_camera(*size), size)
+    people = LivePeople(body, cast(PeopleTracker, tracker), choose_camera(*size), size)
     world, random, frame = World(body, say), np.random.default_rng(1), 0
     world.begin(people, size)
     began_s = time.process_time()

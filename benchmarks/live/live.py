@@ -20,6 +20,7 @@ MEASURES = {
     "foot_slide_cm": ("standing feet slide, cm", 2.0),
     "lowest_sole": ("lowest sole, mm", None),
     "pa_mpjpe_mm": ("PA-MPJPE, mm", None),
+    "frames": ("frames compared", None),
     "poses": ("poses", None),
     "dropped": ("frames dropped", None),
 }
@@ -53,7 +54,7 @@ def _rate(_body: Body, quick: bool, _minutes: float) -> dict[str, Any]:
 
 
 def _offline(body: Body, quick: bool, _minutes: float) -> dict[str, Any]:
-    found = against_offline(body, quick)
+    found = against_offline(body, quick, lambda text: print(text, flush=True))
     rows = [
         [f"{name}, {how.replace('_', ' ')}", *(of_clip[how].get(key) for key in MEASURES)]
         for name, of_clip in found.items()

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import VideoError
+from .clock import Clock
 
 if TYPE_CHECKING:
     from av.container import InputContainer
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 FORMATS = {"win32": "dshow", "darwin": "avfoundation"}  # of FFmpeg, by `sys.platform`
 # What a camera is asked for beside the size: some refuse a rate that they do not have, and others want one to be given.
 _WISHES: tuple[dict[str, str], ...] = ({"framerate": "30"}, {})
+_WAITING_S, _GONE_S = 0.002, 5.0  # for the next picture, and without one, after which a camera counts as gone
 
 
 def camera_names(platform: str) -> list[str]:
@@ -50,7 +52,7 @@ def open_camera(number: int, size: tuple[int, int], platform: str) -> InputConta
     for wanted in ({"video_size": f"{size[0]}x{size[1]}"}, {}):
         for wish in _WISHES:
             try:
-                return cast("InputContainer", av.open(file, format=FORMATS[platform], options=wanted | wish, mode="r"))
+                return av.open(file, format=FORMATS[platform], options=wanted | wish, mode="r")
             except (av.error.FFmpegError, OSError, ValueError) as error:
                 problem = str(getattr(error, "strerror", None) or error).lower()
     raise VideoError(
@@ -59,13 +61,22 @@ def open_camera(number: int, size: tuple[int, int], platform: str) -> InputConta
     )
 
 
-def pictures(container: InputContainer) -> Iterator[NDArray[np.uint8]]:
+def pictures(container: InputContainer, clock: Clock) -> Iterator[NDArray[np.uint8]]:
     """Yield the (H, W, 3) RGB pictures of an open camera as they come, until it gives no more."""
     import av
 
-    with container as opened, suppress(av.error.FFmpegError):
-        for frame in opened.decode(video=0):
-            yield cast(NDArray[np.uint8], frame.to_ndarray(format="rgb24"))
+    with container as opened:
+        seen_s, is_open = clock.now(), True
+        while is_open and clock.now() - seen_s < _GONE_S:
+            try:
+                for frame in opened.decode(video=0):
+                    seen_s = clock.now()
+                    yield cast(NDArray[np.uint8], frame.to_ndarray(format="rgb24"))
+                is_open = False
+            except av.error.BlockingIOError:  # avfoundation does not wait for the next picture
+                clock.sleep(_WAITING_S)
+            except av.error.FFmpegError:
+                is_open = False
 
 
 def _name(device: DeviceInfo) -> str:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Close Blender, or let it crash, while it captures: ``closed.py -- VIDEO OUT_FOLDER quit|crash [STREAM]``.
 
-With the address of a stream, it captures that live. The file closed_HOW in OUT_FOLDER says what it did, and the file
-ended_HOW when that ended (seconds of the system's monotonic clock).
+With the address of a stream, it captures that live. The file closed_HOW in OUT_FOLDER says what it did, and live_HOW
+if that was live.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from __future__ import annotations
 import os
 import signal
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -45,8 +44,7 @@ def steps() -> Iterator[float]:
     how, *address = ARGUMENTS[2:]
     yield 0.5
     does = yield from (stream(*address) if address else footage())
-    (OUT / f"closed_{how}").write_text(does)
-    (OUT / f"ended_{how}").write_text(str(time.monotonic()))
+    (OUT / f"{'live' if address else 'closed'}_{how}").write_text(does)
     if how == "crash":
         os.kill(os.getpid(), signal.SIGKILL)
     invoke(bpy.ops.wm.quit_blender)

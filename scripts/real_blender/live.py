@@ -161,9 +161,11 @@ def closed(how: str) -> Iterator[float]:
     script = str(Path(__file__).with_name("closed.py"))
     other = subprocess.Popen(["blender", "--python", script, "--", FOOTAGE, str(OUT), how, ADDRESS])
     yield from until(lambda: other.poll() is not None, 400, "the other Blender to end")
-    assert (OUT / f"closed_{how}").read_text() == "capturing", (OUT / f"closed_{how}").read_text()
+    ended = time.monotonic()
+    does = (OUT / f"live_{how}").read_text()
+    assert does == "capturing", does
     assert other.returncode == (-9 if how == "crash" else 0), other.returncode
-    yield from connection_closed(float((OUT / f"ended_{how}").read_text()), f"Blender's {how}")
+    yield from connection_closed(ended, f"Blender's {how}")
     yield from until(lambda: not workers(), 10, "the worker to end")
 
 

@@ -68,22 +68,22 @@ def test_ctrl_c_ends_a_capture_that_sends_its_poses_and_keeps_the_recording(tmp_
     target = tmp_path / "take.npz"
     receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     receiver.bind(("127.0.0.1", 0))
-    receiver.settimeout(60)
+    receiver.settimeout(300)
     command = [sys.executable, "-m", "scope.scope_addon", "live", str(SAMPLE), "--json-port", "0"]
     command += ["--vmc", f"127.0.0.1:{receiver.getsockname()[1]}"]
     with subprocess.Popen(
         [*command, "--record", str(target), "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
         port = int(process.stderr.readline().rsplit(" ", 1)[1])
-        with socket.create_connection(("127.0.0.1", port), timeout=60) as client, client.makefile("rb") as lines:
-            client.settimeout(60)
+        with socket.create_connection(("127.0.0.1", port), timeout=300) as client, client.makefile("rb") as lines:
+            client.settimeout(300)
             for _ in range(5):
                 lines.readline()
             bones = {}
             while len(bones) < len(BONES):
                 bones |= {v[0]: v[1:] for address, v in parsed(receiver.recv(65536)) if address == "/VMC/Ext/Bone/Pos"}
             process.send_signal(signal.SIGINT)
-            out, _ = process.communicate(timeout=60)
+            out, _ = process.communicate(timeout=300)
     receiver.close()
     assert set(bones) == set(BONES)
     assert 0.5 < bones["Hips"][1] < 1.3  # metres over the floor

@@ -47,8 +47,15 @@ def system(request, monkeypatch):
         asked.append((format, file, options))
         if "framerate" in options:
             raise OSError("Selected framerate is not supported")
-        frames = [av.VideoFrame.from_ndarray(BLUE, format="rgb24")] * 2
-        return nullcontext(SimpleNamespace(decode=lambda video: iter(frames)))
+        pieces = [1, 1]
+
+        def decode(video):
+            for _ in range(pieces.pop()):
+                yield av.VideoFrame.from_ndarray(BLUE, format="rgb24")
+            if pieces:
+                raise av.error.BlockingIOError(11, "Resource temporarily unavailable")  # there is no picture yet
+
+        return nullcontext(SimpleNamespace(decode=decode))
 
     monkeypatch.setattr("sys.platform", request.param)
     listed = {OPENED[request.param][0]: SYSTEMS[request.param]}
@@ -98,3 +105,11 @@ def test_a_system_that_lists_nothing_has_no_cameras(monkeypatch):
     monkeypatch.setattr(av, "enumerate_input_devices", fail)
     assert system_cameras.camera_names("win32") == []
     assert system_cameras.camera_names("linux") == []
+
+
+@pytest.mark.parametrize("platform", sorted(SYSTEMS))
+def test_where_nothing_is_listed_opencv_opens_the_number(platform, monkeypatch):
+    monkeypatch.setattr("sys.platform", platform)
+    monkeypatch.setattr(av, "enumerate_input_devices", lambda _: [])
+    with pytest.raises(VideoError, match="camera 7 cannot be opened; check that it is plugged in"):
+        next(iter(open_source("7").pictures(Clock())))

@@ -55,7 +55,7 @@ class CameraSource:
 
         :raises VideoError: it cannot be opened, or gives no more frames.
         """
-        if sys.platform in system_cameras.FORMATS and isinstance(self._device, int):
+        if isinstance(self._device, int) and system_cameras.camera_names(sys.platform):
             yield from self._system_pictures(clock)
             return
         capture = self._open()
@@ -79,7 +79,7 @@ class CameraSource:
         assert isinstance(self._device, int)
         container = system_cameras.open_camera(self._device, CAMERA_SIZE, sys.platform)
         index = -1
-        for index, image_rgb in enumerate(system_cameras.pictures(container)):
+        for index, image_rgb in enumerate(system_cameras.pictures(container, clock)):
             now_s = clock.now()
             yield Picture(index, now_s, now_s, image_rgb)
         raise VideoError(f"{self.name} {self._why_nothing_comes(has_begun=index >= 0)}")
