@@ -409,6 +409,8 @@ KILLED = """
 import os, signal
 from pathlib import Path
 from scope.scope_addon.atomic_write import atomic_path
+from scope.scope_addon.command_line.blender_folder import load_blender
+load_blender()
 with atomic_path(Path("o.fbx")) as temporary:
     temporary.write_text("half")
     os.kill(os.getpid(), signal.SIGKILL)
@@ -417,13 +419,15 @@ with atomic_path(Path("o.fbx")) as temporary:
 
 @posix
 def test_f11_nothing_is_left_and_fbx_files_are_the_same(tmp_path: Path) -> None:
-    """Exports left ``blender_XXXXXX`` in TMPDIR, a killed one ``.o.xxxx.fbx``; the same motion's .fbx differed."""
+    """Exports left ``blender_XXXXXX`` in TMPDIR, a killed one also ``.o.xxxx.fbx``; the same motion's .fbx differed."""
     for name in ("results", "temporary"):
         (tmp_path / name).mkdir()
     results = tmp_path / "results"
     walk(results)
-    python(KILLED, results)
+    python(KILLED, results, TMPDIR=str(tmp_path / "temporary"))
     assert len(os.listdir(results)) == 2
+    (left,) = (tmp_path / "temporary").iterdir()
+    assert [path.name[:8] for path in left.iterdir()] == ["blender_"]
     contents = []
     for k in range(2):  # processes that hash texts in ways of their own
         environment = {"TMPDIR": str(tmp_path / "temporary"), "PYTHONHASHSEED": str(k + 1)}
