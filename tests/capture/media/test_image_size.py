@@ -6,6 +6,7 @@ import subprocess
 import sys
 import zlib
 from pathlib import Path
+from typing import Any
 
 import av
 import cv2
@@ -187,7 +188,12 @@ def test_a_list_of_other_files_is_no_footage(tmp_path: Path, text: str) -> None:
 def test_runs_of_the_detector_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The longest picture that is accepted, 20:1, in which nobody is found, so that everywhere is searched."""
     corners = list[tuple[int, int]]()
-    monkeypatch.setattr(PersonDetector, "_detect_in", lambda _, *given: corners.append(given[-1]) or [])
+
+    def detect_in(_: PersonDetector, *given: Any) -> list[Any]:
+        corners.append(given[-1])
+        return []
+
+    monkeypatch.setattr(PersonDetector, "_detect_in", detect_in)
     cv2.imwrite(str(tmp_path / "long.png"), np.zeros((500, 25, 3), np.uint8))
     assert main(["capture", str(tmp_path / "long.png"), "-o", str(tmp_path / "a.npz")]) == NO_PERSON
     assert 200 < len(corners) <= MOST_DETECTOR_RUNS
