@@ -86,7 +86,7 @@ def verdict(record: dict[str, Figure], found: dict[str, float]) -> tuple[list[tu
 def not_measured(record: dict[str, Figure], found: dict[str, float]) -> list[str]:
     """Return the recorded figures that were not measured although they should be: in CI, all of them.
 
-    A developer without the clips, or a CI that cannot have them and says so by ``SCOPE_WITHOUT_SHARED``, checks the rest.
+    A developer without the clips, or a CI that sets ``SCOPE_WITHOUT_SHARED`` as it cannot have them, checks the rest.
     """
     if not os.environ.get("CI") or os.environ.get("SCOPE_WITHOUT_SHARED"):
         return []

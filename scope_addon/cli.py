@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 import os
 import shlex
-import shutil
 import sys
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
@@ -20,6 +19,7 @@ from typing import Any, NoReturn, TextIO
 from ..solver.errors import ScopeError
 from ..solver.loaders.body_file import ASSETS
 from .command_line.arguments import add_options, body_and_options, non_default_arguments, path_argument
+from .command_line.blender_folder import remove_blender_folder
 from .command_line.cluster_runner import dask_runner, folder_argument, local_folders
 from .command_line.import_command import add_import
 from .command_line.live_command import add_live
@@ -300,13 +300,6 @@ def run() -> NoReturn:
         remove_blender_folder()
         os._exit(status)
     sys.exit(status)
-
-
-def remove_blender_folder() -> None:
-    """Remove the temporary folder of Blender's module, which it only removes itself at a normal exit."""
-    folder = Path(sys.modules["bpy"].app.tempdir)
-    if folder.name.startswith("blender_"):  # not a folder that the user has chosen
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 if __name__ == "__main__":

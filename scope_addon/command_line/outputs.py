@@ -18,6 +18,7 @@ from ..installed import check_installed
 from ..motion import Motion
 from ..options import option
 from ..scene.export.output_paths import check_output, person_paths
+from .blender_folder import load_blender
 from .terminal import say
 
 if TYPE_CHECKING:
@@ -104,6 +105,7 @@ def checked_rig(args: argparse.Namespace, outputs: list[Path], fingers: bool) ->
     for path in scene_files:
         if path.exists() and path.samefile(rig.path):
             raise UsageError(f"{path} is the rig's own file; choose another name")
+    load_blender()
     from ..scene.rigs.rig_file import check_rig
     from .bounded_import import bounded_import
 
@@ -133,6 +135,7 @@ def write_outputs(
             motion.save(target)
         written += targets
     if scene_files:
+        load_blender()
         from ..scene.build import NEW_SCENE
         from ..scene.export.export import ExportOptions, export_motions
 

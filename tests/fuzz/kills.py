@@ -76,7 +76,7 @@ class Workplace:
 
     def state(self) -> object:
         """Return what the next run finds, apart from random names and the contents of leftovers."""
-        left = {re.sub(r"[-.][^/.]*-[^/.]*", "-*", name) for name in self.leftovers()}
+        left = {re.sub(r"[-.][^/.]*-[^/.]*|(?<=blender_)\w+", "-*", name) for name in self.leftovers()}
         return frozenset(left), frozenset(name for name in self._whole if self._is_old(name))
 
     def problems_of_next_run(self, after: str) -> list[str]:
@@ -136,8 +136,9 @@ class Workplace:
 
 
 def _may_be_empty(path: Path) -> bool:
-    """Whether this is a folder of ours that stays, or one of Blender's, whose name tells no owner."""
-    return path.name in KEPT_FOLDERS or path.name.startswith("blender_") or "thumbnails" in path.parts
+    """Whether this is a folder of ours that stays, or one of a killed Blender, in whose panel a capture was started."""
+    of_blender = path.name.startswith("blender_") and path.parent.name == "tmp"  # a shell's are in a folder of ours
+    return path.name in KEPT_FOLDERS or of_blender or "thumbnails" in path.parts
 
 
 def check_command(command: Command, action: str, calls: Iterable[int] | None = None) -> tuple[int, list[str]]:
@@ -149,9 +150,9 @@ def check_command(command: Command, action: str, calls: Iterable[int] | None = N
     with tempfile.TemporaryDirectory(prefix="scope-faults-") as folder:
         place = Workplace(Path(folder), command)
         count = place.prepare()
-        chosen = itertools.count(1) if calls is None else (n if n > 0 else count + 1 + n for n in calls)
+        numbers = itertools.count(1) if calls is None else (n if n > 0 else count + 1 + n for n in calls)
         done, problems, seen = 0, [], set[object]()
-        for n in chosen:
+        for n in numbers:
             try:
                 if not place.fault(n, action):
                     break

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import zlib
 from pathlib import Path
+from typing import Any
 
 import av
 import cv2
@@ -14,10 +15,13 @@ import pytest
 from scope.scope_addon.capture.media import frame_readers
 from scope.scope_addon.capture.media.frame_readers import PyavReader, presented_duration_s
 from scope.scope_addon.capture.media.video import open_video
-from scope.scope_addon.errors import VideoError
+from scope.scope_addon.capture.perception.person_detector import PersonDetector
+from scope.scope_addon.cli import main
+from scope.scope_addon.errors import NO_PERSON, VideoError
 
 from .made_video import patch_track_header, write_video
 
+MOST_DETECTOR_RUNS = 600  # of one image; of 16:9 there are 48
 READ = """
 import resource, sys
 resource.setrlimit(resource.RLIMIT_AS, (3 << 30, 3 << 30))
@@ -179,3 +183,17 @@ def test_a_list_of_other_files_is_no_footage(tmp_path: Path, text: str) -> None:
     assert presented_duration_s(path) is None
     with pytest.raises(VideoError, match=r"list\.mp4 is not a video or image that can be decoded"):
         PyavReader(path)
+
+
+def test_runs_of_the_detector_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The longest picture that is accepted, 20:1, in which nobody is found, so that everywhere is searched."""
+    corners = list[tuple[int, int]]()
+
+    def detect_in(_: PersonDetector, *given: Any) -> list[Any]:
+        corners.append(given[-1])
+        return []
+
+    monkeypatch.setattr(PersonDetector, "_detect_in", detect_in)
+    cv2.imwrite(str(tmp_path / "long.png"), np.zeros((500, 25, 3), np.uint8))
+    assert main(["capture", str(tmp_path / "long.png"), "-o", str(tmp_path / "a.npz")]) == NO_PERSON
+    assert 200 < len(corners) <= MOST_DETECTOR_RUNS

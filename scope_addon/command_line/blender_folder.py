@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The temporary folder of Blender's module: in a shell, inside a folder whose name tells the process that owns it.
+
+Blender makes a folder ``blender_XXXXXX`` when its module is loaded, and removes it at a normal exit alone.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from ...solver.processes import is_abandoned, owner
+from ..job.private_folder import is_private
+
+_START = "scope-blender-"
+_VARIABLES = ("TMPDIR", "TEMP", "TMP")  # by which Blender finds the system's temporary folder, on Windows the others
+
+
+def load_blender() -> None:
+    """Load Blender's module, if it is not loaded, and remove folders that killed processes have left."""
+    if "bpy" in sys.modules:
+        return
+    with _temporary_folder():
+        importlib.import_module("bpy")
+
+
+def remove_blender_folder() -> None:
+    """Remove the temporary folder of Blender's module, before an exit without Blender's exit handlers."""
+    folder = Path(sys.modules["bpy"].app.tempdir)
+    if folder.name.startswith("blender_"):  # not a folder that the user has chosen
+        shutil.rmtree(folder.parent if folder.parent.name.startswith(_START) else folder, ignore_errors=True)
+
+
+@contextmanager
+def _temporary_folder() -> Iterator[None]:
+    """Have the system's temporary folder be a new one with the owner's name; as it is where none can be made."""
+    before = {name: os.environ.get(name) for name in _VARIABLES}
+    with suppress(OSError):
+        _remove_abandoned(Path(tempfile.gettempdir()))
+        os.environ.update(dict.fromkeys(_VARIABLES, tempfile.mkdtemp(prefix=f"{_START}{owner()}-")))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+def _remove_abandoned(system_folder: Path) -> None:
+    """Remove folders of ours whose process does not run any more."""
+    for folder in system_folder.glob(f"{_START}*-*-*"):
+        with suppress(OSError):
+            if is_private(folder) and is_abandoned(folder, folder.name.removeprefix(_START)):
+                shutil.rmtree(folder, ignore_errors=True)
