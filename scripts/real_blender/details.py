@@ -26,7 +26,7 @@ FRAMES, RATE = 120, 60.0
 SEARCHED = (  # words, the operator that they find first, if it is ours, and its format
     ("motion capture", "", ""),  # Blender's own files of that name come first
     ("mocap", "import_video", ""),
-    ("motion from video", "import_video", ""),
+    ("video", "import_video", ""),
     ("smpl motion", "import_motion", ""),
     ("captured motion as bvh", "export", "BVH"),
 )
