@@ -23,10 +23,10 @@ from session import FOOTAGE, OUT, captured, invoke, key, picture, press, run, sh
 FBX_BUTTON, RAW_BUTTON, FOLD = (1090, 453), (1085, 622), 768
 STILL, LOW = OUT / "still.npz", OUT / "low.npz"
 FRAMES, RATE = 120, 60.0
-SEARCHED = (  # words, the operator that they find first, and its format
-    ("motion capture", "import_video", ""),
+SEARCHED = (  # words, the operator that they find first, if it is ours, and its format
+    ("motion capture", "", ""),  # Blender's own files of that name come first
     ("mocap", "import_video", ""),
-    ("motion from video", "import_video", ""),
+    ("video", "import_video", ""),
     ("smpl motion", "import_motion", ""),
     ("captured motion as bvh", "export", "BVH"),
 )
@@ -125,12 +125,21 @@ def searched() -> Iterator[float]:
     """Find the entries of File > Import and Export with Blender's search, and open the window of each."""
     windows = bpy.context.window_manager.windows
     for number, (words, operator, form) in enumerate(SEARCHED):
+        before = popup()
         key("F3")
-        yield 1.0
+        yield from until(lambda empty=before: popup() != empty, 20, "the search")
+        before = popup()
         subprocess.Popen(["xdotool", "type", "--delay", "60", words])
-        yield 2.5
+        yield from until(lambda empty=before: popup() != empty, 20, "what is found")
+        while popup() != before:  # until all of the words are in it
+            before = popup()
+            yield 1.5
         if number < 3:
             picture(f"33_search_{words.replace(' ', '_')}")
+        if not operator:
+            key("Escape")
+            yield 1.0
+            continue
         key("Return")
         yield from until(lambda: len(windows) > 1, 10, f"the window of what is found with {words!r}")
         yield 0.5
@@ -147,6 +156,12 @@ def searched() -> Iterator[float]:
         key("Escape")
         yield 0.5
     report["searched"] = [words for words, _, _ in SEARCHED]
+
+
+def popup() -> bytes:
+    """Return the pixels where Blender's search is, with the mouse in the middle of the viewport."""
+    command = ["import", "-window", "root", "-crop", "500x230+510+390", "-depth", "8", "rgb:-"]
+    return subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout
 
 
 def rigs() -> None:

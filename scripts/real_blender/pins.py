@@ -250,6 +250,7 @@ def upright_line() -> None:
 
 def floor_here(frame: int) -> Iterator[float]:
     """Say that the lower foot rests on the floor: it does, whatever the smoothing, until the correction is removed."""
+    use(bpy.ops.scope.smooth, strength=1.0)  # writes keys as below
     scene, before = bpy.context.scene, keys()
     scene.frame_set(frame)
     camera = scene.camera.matrix_world.translation.z
