@@ -52,7 +52,9 @@ def key_measurements(
         bone.id_properties_ui(name).update(
             min=0.0, max=most, soft_min=0.0, soft_max=most, description=_DESCRIPTIONS[name]
         )
-        for curve in channels.write(bone_property_path(bone_name, name), frames[known], values[known], group=name.title()):
+        for curve in channels.write(
+            bone_property_path(bone_name, name), frames[known], values[known], group=name.title()
+        ):
             curve.hide = True
 
 
