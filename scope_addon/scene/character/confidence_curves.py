@@ -42,7 +42,8 @@ def key_measurements(
     columns |= {
         (name, CONTACT): motion.foot_contact[:, i] for i, name in enumerate(CONTACT_BONES) if name in body.joint_names
     }
-    columns |= {(name, SIGMA): 100.0 * motion.joint_sigma_m[:, i] for i, name in enumerate(body.joint_names)}
+    sigma_cm = 100.0 * np.asarray(motion.joint_sigma_m, float)
+    columns |= {(name, SIGMA): sigma_cm[:, i] for i, name in enumerate(body.joint_names)}
     for (bone_name, name), values in columns.items():
         known = np.isfinite(values)  # deviations are unknown in frames that are filled in, and in some motions
         if not known.any():
