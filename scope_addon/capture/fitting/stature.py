@@ -64,6 +64,7 @@ def stature_sigma(body: Body, betas: NDArray[np.floating[Any]], information: NDA
     Frames repeat each other's errors, so Λ is the information of one of them. Proportions tell the size only as far as
     they go together in the population, hence s = `UNKNOWN_M`. NaN for bodies of a single shape.
 
+    :param betas: (P,) the shape.
     :param information: (P, P) Λ, priors included.
     :param is_given: the priors are those of `with_stature`.
     """
