@@ -106,9 +106,7 @@ def against_gradients(rounds: int, frames: int = 300) -> list[dict[str, float]]:
     return rows
 
 
-def in_turns(
-    rounds: int, *runs: Callable[[], object], clock: Callable[[], float] = time.process_time
-) -> list[float]:
+def in_turns(rounds: int, *runs: Callable[[], object], clock: Callable[[], float] = time.process_time) -> list[float]:
     """Return the least time of each run in milliseconds, taken in turns; the first, which may compile, does not count.
 
     :param clock: the processor's time by default, which other load changes little.

@@ -100,6 +100,7 @@ def test_errors_are_as_large_as_the_joints_deviations_say(sample):
     assert 0.7 < np.sqrt(np.mean((depth / along) ** 2)) < 1.5
     assert 0.7 < np.sqrt(np.mean((rest / across) ** 2)) < 1.4
     assert np.isfinite(m.joint_sigma_m).all(1).tolist() == m.valid.tolist()
+    assert 0.09 < m.height_sigma_m < 0.13  # metres; proportions hardly tell the size
 
 
 def test_the_motion_states_the_gender_of_its_body(body):

@@ -119,7 +119,7 @@ class HandMeasurer:
         return bones
 
     def joint_confidence(self, hands: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
-        """Return (T, K+1), the confidence of the hand of each wrist and finger joint, of hands (T, 2, 21, 6); else 0."""
+        """Return (T, K+1), the confidence of the hand of each wrist and finger joint, of hands (T, 2, 21, 6)."""
         out = np.zeros((len(hands), self._body.K + 1))
         for side, joints in enumerate(self.fingers):
             for joint in (self.wrists[side], *joints):

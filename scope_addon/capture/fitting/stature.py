@@ -18,7 +18,7 @@ SHORTEST_M, TALLEST_M = 0.5, 2.6  # statures outside are input errors
 MAX_DEVIATIONS = 4.5  # standard deviations of the population up to which the shapes of a body are realistic
 SHORTEST_CHILD_M = 0.8  # one year of age; below, growth extrapolated from that of six-year-olds makes legs too long
 STIFFNESS = 4.0  # κ of ``with_unknown_stature``
-UNKNOWN = 4.5  # c of `stature_sigma`; errors on renders have 1.03 times the deviations (benchmarks/NOTEBOOK.md)
+UNKNOWN_M = 0.1  # s of `stature_sigma`, about the deviation of adults (benchmarks/NOTEBOOK.md)
 FIXED = 1e6  # information of a coefficient that does not vary
 _ROUNDS = 3
 
@@ -59,19 +59,20 @@ def with_population(priors: Priors, body: Body) -> Priors:
 
 
 def stature_sigma(body: Body, betas: NDArray[np.floating[Any]], information: NDArray[Any], is_given: bool) -> float:
-    """Return the standard deviation of the stature h(β), metres: σ = c √(gᵀ Λ⁻¹ g), without c where it was given.
+    """Return the standard deviation of the stature h(β), metres: σ² = gᵀ Λ⁻¹ g + s², with s = 0 where it was given.
 
-    Frames repeat each other's errors, so Λ is the information of one of them. What keypoints say of the size through
-    proportions is also off by more than their noise, hence c = `UNKNOWN`. NaN for bodies of a single shape.
+    Frames repeat each other's errors, so Λ is the information of one of them. Proportions tell the size only as far as
+    they go together in the population, hence s = `UNKNOWN_M`. NaN for bodies of a single shape.
 
+    :param betas: (P,) the shape.
     :param information: (P, P) Λ, priors included.
     :param is_given: the priors are those of `with_stature`.
     """
     if body.P == 0:
         return float("nan")
     _, g = _shape_at(body, np.asarray(betas, float))
-    sigma = float(np.sqrt(g @ np.linalg.solve(information, g)))
-    return sigma if is_given else UNKNOWN * sigma
+    variance = float(g @ np.linalg.solve(information, g))
+    return float(np.sqrt(variance if is_given else variance + UNKNOWN_M**2))
 
 
 def require_stature(body: Body, height_m: float) -> None:

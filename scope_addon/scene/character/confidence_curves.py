@@ -42,7 +42,8 @@ def key_measurements(
     columns |= {
         (name, CONTACT): motion.foot_contact[:, i] for i, name in enumerate(CONTACT_BONES) if name in body.joint_names
     }
-    columns |= {(name, SIGMA): 100.0 * motion.joint_sigma_m[:, i] for i, name in enumerate(body.joint_names)}
+    sigma_cm = 100.0 * np.asarray(motion.joint_sigma_m, float)
+    columns |= {(name, SIGMA): sigma_cm[:, i] for i, name in enumerate(body.joint_names)}
     for (bone_name, name), values in columns.items():
         known = np.isfinite(values)  # deviations are unknown in frames that are filled in, and in some motions
         if not known.any():
@@ -52,7 +53,9 @@ def key_measurements(
         bone.id_properties_ui(name).update(
             min=0.0, max=most, soft_min=0.0, soft_max=most, description=_DESCRIPTIONS[name]
         )
-        for curve in channels.write(bone_property_path(bone_name, name), frames[known], values[known], group=name.title()):
+        for curve in channels.write(
+            bone_property_path(bone_name, name), frames[known], values[known], group=name.title()
+        ):
             curve.hide = True
 
 

@@ -30,7 +30,7 @@ def show_result(shown: bpy.types.PropertyGroup, footage: str, report: dict[str, 
     shown.valid_frames = int(sum(p.motion.valid.sum() for p in result.people))
     residuals = np.concatenate([p.motion.residual_px[p.motion.valid] for p in result.people])
     shown.reprojection_px = float(residuals.mean()) if residuals.size else 0.0
-    sigmas = np.concatenate([p.motion.joint_sigma_m.ravel() for p in result.people])
+    sigmas = np.concatenate([np.ravel(np.asarray(p.motion.joint_sigma_m, float)) for p in result.people])
     sigmas = sigmas[np.isfinite(sigmas)]
     shown.sigma_cm = 100.0 * float(np.median(sigmas)) if sigmas.size else 0.0
     shown.heights = ", ".join(_height(person) for person in report.get("per_person", ()) if "height_m" in person)
