@@ -8,15 +8,18 @@ import socket
 import subprocess
 import sys
 from importlib.machinery import PathFinder
+from itertools import islice
 
 import numpy as np
 import pytest
 from scope.scope_addon import installed
+from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.cli import SAMPLE, main
 from scope.scope_addon.live.outputs.vmc import BONES
 from scope.scope_addon.live.smoothing import DELAY_S
 from scope.scope_addon.motion import Motion
 
+from ..live.mjpeg_server import mjpeg_server
 from ..live.outputs.test_vmc import parsed
 
 
@@ -69,21 +72,22 @@ def test_ctrl_c_ends_a_capture_that_sends_its_poses_and_keeps_the_recording(tmp_
     receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     receiver.bind(("127.0.0.1", 0))
     receiver.settimeout(300)
-    command = [sys.executable, "-m", "scope.scope_addon", "live", str(SAMPLE), "--json-port", "0"]
-    command += ["--vmc", f"127.0.0.1:{receiver.getsockname()[1]}"]
-    with subprocess.Popen(
-        [*command, "--record", str(target), "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        port = int(process.stderr.readline().rsplit(" ", 1)[1])
-        with socket.create_connection(("127.0.0.1", port), timeout=300) as client, client.makefile("rb") as lines:
-            client.settimeout(300)
-            for _ in range(5):
-                lines.readline()
-            bones = {}
-            while len(bones) < len(BONES):
-                bones |= {v[0]: v[1:] for address, v in parsed(receiver.recv(65536)) if address == "/VMC/Ext/Bone/Pos"}
-            process.send_signal(signal.SIGINT)
-            out, _ = process.communicate(timeout=300)
+    with open_video(SAMPLE) as video:
+        pictures = [frame.image_rgb for frame in islice(video, 0, 60, 2)]
+    with mjpeg_server(pictures, interval_s=0.05, rounds=10_000) as address:  # a file would end on a busy computer
+        command = [sys.executable, "-m", "scope.scope_addon", "live", address, "--json-port", "0", "--json"]
+        command += ["--vmc", f"127.0.0.1:{receiver.getsockname()[1]}", "--record", str(target)]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+            port = int(process.stderr.readline().rsplit(" ", 1)[1])
+            with socket.create_connection(("127.0.0.1", port), timeout=300) as client, client.makefile("rb") as lines:
+                for _ in range(5):
+                    lines.readline()
+                bones = {}
+                while len(bones) < len(BONES):
+                    messages = parsed(receiver.recv(65536))
+                    bones |= {values[0]: values[1:] for name, values in messages if name == "/VMC/Ext/Bone/Pos"}
+                process.send_signal(signal.SIGINT)
+                out, _ = process.communicate(timeout=300)
     receiver.close()
     assert set(bones) == set(BONES)
     assert 0.5 < bones["Hips"][1] < 1.3  # metres over the floor
