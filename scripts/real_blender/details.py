@@ -23,12 +23,12 @@ from session import FOOTAGE, OUT, captured, invoke, key, picture, press, run, sh
 FBX_BUTTON, RAW_BUTTON, FOLD = (1090, 453), (1085, 622), 768
 STILL, LOW = OUT / "still.npz", OUT / "low.npz"
 FRAMES, RATE = 120, 60.0
-SEARCHED = (  # words, the operator that they find first, if it is ours, and its format
-    ("motion capture", "", ""),  # Blender's own files of that name come first
-    ("mocap", "import_video", ""),
-    ("video", "import_video", ""),
-    ("smpl motion", "import_motion", ""),
-    ("captured motion as bvh", "export", "BVH"),
+SEARCHED = (  # words, how many of Blender's own entries they find first, the operator after these, and its format
+    ("motion capture", 2, "import_video", ""),
+    ("mocap", 0, "import_video", ""),
+    ("video", 1, "import_video", ""),
+    ("smpl motion", 0, "import_motion", ""),
+    ("captured motion as bvh", 0, "export", "BVH"),
 )
 report: dict[str, object] = {}
 
@@ -124,7 +124,7 @@ def shortcut() -> Iterator[float]:
 def searched() -> Iterator[float]:
     """Find the entries of File > Import and Export with Blender's search, and open the window of each."""
     windows = bpy.context.window_manager.windows
-    for number, (words, operator, form) in enumerate(SEARCHED):
+    for number, (words, others, operator, form) in enumerate(SEARCHED):
         before = popup()
         key("F3")
         yield from until(lambda empty=before: popup() != empty, 20, "the search")
@@ -136,10 +136,9 @@ def searched() -> Iterator[float]:
             yield 1.5
         if number < 3:
             picture(f"33_search_{words.replace(' ', '_')}")
-        if not operator:
-            key("Escape")
-            yield 1.0
-            continue
+        for _ in range(others):
+            key("Down")
+            yield 0.3
         key("Return")
         yield from until(lambda: len(windows) > 1, 10, f"the window of what is found with {words!r}")
         yield 0.5
@@ -155,7 +154,7 @@ def searched() -> Iterator[float]:
         picture(f"34_file_{kind}")
         key("Escape")
         yield 0.5
-    report["searched"] = [words for words, _, _ in SEARCHED]
+    report["searched"] = [words for words, *_ in SEARCHED]
 
 
 def popup() -> bytes:
