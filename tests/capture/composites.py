@@ -62,3 +62,12 @@ def distant_view(image: np.ndarray) -> np.ndarray:
     small = cv2.resize(image, None, fx=1 / 8, fy=1 / 8, interpolation=cv2.INTER_AREA)
     height, width = small.shape[:2]
     return cv2.copyMakeBorder(small, 200, 520 - height, 400, 880 - width, cv2.BORDER_REPLICATE)
+
+
+def beside(large: np.ndarray, small: np.ndarray) -> np.ndarray:
+    """The large image of 576 × 576 pixels, and right of it, at (800, 200), the small one with a height of 180."""
+    height, width = small.shape[:2]
+    there = cv2.resize(small, (round(180 * width / height), 180), interpolation=cv2.INTER_AREA)
+    image = cv2.copyMakeBorder(large, 0, 0, 0, 600, cv2.BORDER_REPLICATE)
+    image[200:380, 800 : 800 + there.shape[1]] = there
+    return image

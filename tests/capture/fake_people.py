@@ -89,6 +89,9 @@ class FakeDetector:
     def detect_small(self, image: np.ndarray) -> list[Detection]:
         return []
 
+    def detect_in_parts(self, image: np.ndarray) -> list[Detection]:
+        return []
+
 
 class FakeLandmarks:
     def __init__(self, people: list[Person], is_reliable: bool = False) -> None:

@@ -18,6 +18,7 @@ SEARCH_LOST_S = 4 * FRAME_S  # the same while a lost person is remembered, and f
 OPENING_S = 2.0  # of the clip: a person who is visible from the start may be the most prominent one over the clip
 SMALL_SHARE = 0.39  # of the picture's longer side
 SMALL_SEARCH_S = 1.0  # between two searches for small people, each of which takes as long as some twenty plain ones
+PARTS_SEARCH_S = 64 * FRAME_S  # at most, between two searches beside people, each of which takes six or more plain ones
 SMALL_SIDE = 0.4  # of the picture's shorter side: a smaller region holds somebody whom a plain detection may miss
 EAGER_S = 15 * FRAME_S  # for which a lost person is looked for in every frame
 
@@ -36,7 +37,8 @@ class SearchSchedule:
 
     def forget(self) -> None:
         """Forget when the last searches were."""
-        self._search_s = self._close_search_s = self._small_search_s = -math.inf
+        self._search_s = self._close_search_s = self._small_search_s = self._parts_search_s = -math.inf
+        self._parts_beside, self._parts_interval_s = 0, SEARCH_LOST_S  # see `begin_parts`
 
     def is_due(
         self, image_rgb: NDArray[np.uint8], live: Sequence[TrackedTarget], lost: Sequence[TrackedTarget]
@@ -83,6 +85,24 @@ class SearchSchedule:
         if live or not due or not _are_small(image_rgb, lost):
             return False
         self._small_search_s = self._clock.time_s
+        return True
+
+    def begin_parts(self, live: Sequence[TrackedTarget]) -> bool:
+        """Return whether to look for people beside larger ones in this frame, and if so, note it.
+
+        Only where fewer people are tracked than are wanted, and more and more rarely until their number changes:
+        somebody whom a close search missed is mostly there from the start.
+
+        :param live: the people who are tracked.
+        """
+        if len(live) != self._parts_beside:
+            self._parts_beside, self._parts_interval_s = len(live), SEARCH_LOST_S
+        if self._largest_only or not 0 < len(live) < self._wanted:
+            return False
+        if not self._clock.has_passed(self._parts_interval_s, self._clock.time_s - self._parts_search_s):
+            return False
+        self._parts_search_s = self._clock.time_s
+        self._parts_interval_s = min(2 * self._parts_interval_s, PARTS_SEARCH_S)
         return True
 
     def _interval_s(

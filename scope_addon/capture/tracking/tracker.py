@@ -211,6 +211,8 @@ class PeopleTracker:
         """Start a tracklet for everybody who is detected and not tracked yet; small people only if nobody else is."""
         closely = self._schedule.begin(image_rgb, self._live, self._lost)
         self._start_detected(image_rgb, self._networks.detector.detect(image_rgb, closely=closely), SURE_SCORE)
+        if self._schedule.begin_parts(self._live):
+            self._start_detected(image_rgb, self._networks.detector.detect_in_parts(image_rgb), SURE_SCORE)
         if self._schedule.begin_small(image_rgb, self._live, self._lost):
             self._start_detected(image_rgb, self._networks.detector.detect_small(image_rgb), math.inf)
 

@@ -14,6 +14,7 @@ from scope.scope_addon.capture.perception.person_detector import (
     letterbox,
     make_anchors,
     merge_overlapping,
+    parts,
     small_squares,
     squares,
 )
@@ -21,7 +22,7 @@ from scope.scope_addon.capture.perception.sessions import network_path, open_ses
 from scope.scope_addon.errors import SetupError, UsageError
 from scope.solver.errors import ModelFileError
 
-from ..composites import distant_view
+from ..composites import beside, distant_view
 
 
 @pytest.fixture(scope="module")
@@ -72,12 +73,15 @@ def test_squares_cover_an_oblong_image() -> None:
 
 
 @pytest.mark.parametrize(("height", "width"), [(480, 640), (1920, 1080), (31, 29), (1, 500)])
-def test_every_small_person_is_entirely_in_a_small_square(height: int, width: int) -> None:
-    corners = np.array(small_squares(height, width))
+@pytest.mark.parametrize(("within", "share"), [(small_squares, 0.4 / 3), (parts, 0.2)])
+def test_every_small_person_is_entirely_in_a_square(
+    height: int, width: int, within: Callable[[int, int], list[tuple[int, int, int]]], share: float
+) -> None:
+    corners = np.array(within(height, width))
     left, top, side = corners.T
     assert min(left.min(), top.min()) == 0
     assert [(left + side).max(), (top + side).max()] == [width, height]
-    person = int(0.4 * min(height, width) / 3)
+    person = int(share * min(height, width) - 1)  # corners of squares are whole pixels
     for x in range(0, width - person, 7):
         for y in range(0, height - person, 7):
             around = (left <= x) & (x + person <= left + side) & (top <= y) & (y + person <= top + side)
@@ -95,6 +99,22 @@ def test_a_small_person_is_found_in_the_small_squares_alone(
     expected = (person.points_px[:2] + 0.5) / 8 - 0.5 + [400, 200]
     assert np.abs(small.points_px[:2] - expected).max() < 0.05 * person.region.side_px / 8
     assert detector.detect_small(np.full((90, 160, 3), 128, np.uint8)) == []
+
+
+def test_a_small_person_beside_a_larger_one_is_found_in_the_parts_alone(
+    detector: PersonDetector, first_frame: Callable[[str], np.ndarray]
+) -> None:
+    large, small = first_frame("clips/gesture_square"), first_frame("clips/squats_5fps")
+    (person,) = detector.detect(small)
+    image = beside(large, small)
+    (other,) = detector.detect(image, closely=True)
+    assert other.points_px[0, 0] < 576
+    scale = 180 / small.shape[0]
+    expected = (person.points_px[:2] + 0.5) * scale - 0.5 + [800, 200]
+    off = [np.abs(found.points_px[:2] - expected).max() for found in detector.detect_in_parts(image)]
+    assert min(off) < 0.05 * person.region.side_px * scale
+    assert len(off) == 2
+    assert detector.detect_in_parts(np.full((90, 160, 3), 128, np.uint8)) == []
 
 
 def test_finds_the_squatting_person(detector: PersonDetector, first_frame: Callable[[str], np.ndarray]) -> None:

@@ -246,6 +246,35 @@ def test_small_people_are_looked_for_once_a_second_and_only_where_there_is_nobod
     assert (np.diff(after) == 30).all()
 
 
+@pytest.mark.parametrize("wanted", [None, 1, 2])
+def test_people_beside_larger_ones_are_looked_for_more_and_more_rarely_and_only_while_somebody_is_missing(
+    monkeypatch: pytest.MonkeyPatch, wanted: int | None
+) -> None:
+    people = [Person(standing(300), BLUE), Person(lambda t: (900, 200) if 130 <= t < 170 else None, RED)]
+    looked: list[int] = []
+
+    class Detector(FakeDetector):
+        def detect_in_parts(self, image: np.ndarray) -> list[Detection]:
+            looked.append(t)
+            return []
+
+    monkeypatch.setattr(tracking_networks, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people))
+    monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_: Detector(people))
+    tracker = PeopleTracker("best", 1, wanted)
+    for t, image in enumerate(pictures(people, 400)):
+        tracker.step(image, time_s=t / FPS)
+    if wanted != 2:
+        assert looked == []
+        return
+    assert [t for t in looked if t < 130] == [0, 8, 24, 56, 120]
+    after = np.array([t for t in looked if t >= 130])
+    assert 170 <= after[0] <= 172  # as soon as the second person is lost
+    pauses = np.diff(after)
+    assert pauses[0] <= 9  # a quarter of a second
+    assert (np.diff(pauses) >= 0).all()
+    assert (pauses[-2:] == 64).all()
+
+
 def test_a_small_person_next_to_the_most_prominent_one_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     people = [Person(lambda t: (300, 200), BLUE), Person(lambda t: (900, 200), RED, size_px=40)]
     networks = FakeLandmarks(people)

@@ -12,7 +12,7 @@ from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker
 from scope.solver.errors import ShapeError
 
-from ..composites import distant_view
+from ..composites import beside, distant_view
 
 Frames = Callable[..., Iterator[np.ndarray]]
 
@@ -97,6 +97,17 @@ def test_a_small_person_is_tracked_where_there_is_nobody_else(tracker: PeopleTra
         assert entry[0] == 0
         off = entry[1].keypoints_px - ((expected[1].keypoints_px + 0.5) / 8 - 0.5 + [400, 200])
         assert np.linalg.norm(off, axis=1).mean() < 0.03 * entry[1].region.side_px
+
+
+def test_a_small_person_beside_a_larger_one_is_tracked_where_two_are_wanted(frames: Frames) -> None:
+    large, small = ([*frames(f"clips/{clip}", stop=4)] for clip in ("gesture_square", "squats_5fps"))
+    tracker = PeopleTracker("fast", threads=2, people=2)
+    for near, distant in zip(large, small, strict=True):
+        found = dict(tracker.step(beside(near, distant)))
+        assert sorted(found) == [0, 1]
+        assert found[0].region.center_px[0] < 576
+        x, y = found[1].keypoints_px.T
+        assert ((x > 800) & (x < 902) & (y > 200) & (y < 380)).mean() > 0.9  # where the small image is
 
 
 def test_masks_come_with_the_frame_for_which_they_were_requested(tracker: PeopleTracker, frames: Frames) -> None:

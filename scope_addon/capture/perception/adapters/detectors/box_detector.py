@@ -72,6 +72,13 @@ class BoxDetector:
         """
         return []
 
+    def detect_in_parts(self, image_rgb: NDArray[np.uint8]) -> list[Detection]:
+        """Return nothing, as `detect_small`.
+
+        :param image_rgb: (H, W, 3) uint8.
+        """
+        return []
+
     def _boxes(self, outputs: list[NDArray[Any]]) -> Boxes:
         try:
             boxes = self._decode(outputs, self._graph, self._description)
