@@ -6,7 +6,8 @@ before. Let R_k(t) be the camera's rotation at time t in the axes of window k's 
 
     G_k = G_{k−1} R_{k−1}(t) R_k(t)ᵀ
 
-takes the axes of window k to those of the clip's first frame; the mean of the common frames is used.
+takes the axes of window k to those of the clip's first frame; the mean of the common frames is used. In these frames
+the rotation goes over evenly from one window to the other, because what is left of their difference would be a jump.
 """
 
 from __future__ import annotations
@@ -110,6 +111,7 @@ def joined_backgrounds(parts: Sequence[BackgroundRecord], firsts: Sequence[int])
     edges, bars, rows = list(whole.edge_frames), whole.bars, len(whole.times)
     for before, part, first in zip(parts, parts[1:], firsts[1:], strict=False):
         G = G @ _link(before, part, first)
+        rotations[-1] = _faded(rotations[-1], known[-1], G @ part.R_first_camera[:first], part.known[:first])
         times.append(part.times[first:])
         known.append(part.known[first:])
         rotations.append(np.where(part.known[first:, None, None], G @ part.R_first_camera[first:], np.eye(3)))
@@ -122,6 +124,25 @@ def joined_backgrounds(parts: Sequence[BackgroundRecord], firsts: Sequence[int])
     return BackgroundRecord(
         np.concatenate(times), np.concatenate(rotations), np.concatenate(known), shares, edges, bars
     )
+
+
+def _faded(
+    R: NDArray[np.float64], known: NDArray[np.bool_], R_after: NDArray[np.float64], known_after: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Return rotations (T, 3, 3) whose last n frames go over to those of the next window.
+
+    :param known: (T,).
+    :param R_after: (n, 3, 3) in the same axes.
+    :param known_after: (n,).
+    """
+    n = len(R_after)
+    if not n or n > len(R):
+        return R
+    out, rows = R.copy(), np.flatnonzero(known[-n:] & known_after)
+    before = R[len(R) - n + rows]
+    share = (rows[:, None] + 1) / (n + 1)
+    out[len(R) - n + rows] = before @ exp(share * log(np.swapaxes(before, 1, 2) @ R_after[rows]))
+    return out
 
 
 def _link(before: BackgroundRecord, part: BackgroundRecord, first: int) -> NDArray[np.float64]:

@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scope.scope_addon.capture.camera.background_record import BackgroundRecord, joined_backgrounds
 from scope.scope_addon.capture.camera.heading_drift import FrameEdges
 from scope.scope_addon.capture.camera.line_segments import Segments
-from scope.solver.rotations import exp
+from scope.solver.rotations import exp, log
 
 TIMES = np.arange(90) / 30
 TRUTH = exp(np.stack([0.1 * np.sin(2 * TIMES), 0.3 * TIMES, 0.05 * TIMES], axis=1))
@@ -28,6 +30,19 @@ def test_windows_are_joined_to_the_rotation_of_the_clip() -> None:
     assert np.array_equal(whole.times, TIMES)
     assert whole.known.sum() == 18
     assert np.allclose(whole.R_first_camera[whole.known], TRUTH[whole.known], atol=1e-9)
+
+
+def test_windows_that_disagree_go_over_into_each_other_without_a_jump() -> None:
+    """The second window has drifted: by half a degree a second, which is 0.25 degrees over the common frames."""
+    first, second = followed(0, 60, 1), followed(45, 90, 1)
+    drift = exp(np.radians(0.5) * np.stack([np.zeros(45), TIMES[:45], np.zeros(45)], axis=1))
+    second = replace(second, R_first_camera=second.R_first_camera @ drift)
+    whole = joined_backgrounds([first, second], [0, 15])
+    steps = np.swapaxes(whole.R_first_camera[:-1], 1, 2) @ whole.R_first_camera[1:]
+    true_steps = np.swapaxes(TRUTH[:-1], 1, 2) @ TRUTH[1:]
+    errors_deg = np.degrees(np.linalg.norm(log(np.swapaxes(true_steps, 1, 2) @ steps), axis=-1))
+    assert errors_deg.max() < 0.04  # of the drift, 0.017 in every frame, and of the difference that is left
+    assert np.array_equal(whole.R_first_camera[:45], TRUTH[:45])
 
 
 def test_a_window_without_common_frames_continues_in_the_last_direction_that_is_known() -> None:
