@@ -93,7 +93,8 @@ class Video:
         """Iterate over the frames of the range from a time on, which is sought where that saves decoding.
 
         Their indices may differ from those of the whole iteration by a constant, where the frame rate varies. Whether
-        they are the same images depends on the file: one that does not mark its keyframes well gives others at first.
+        images and times are the same depends on the file: one that does not mark its keyframes well gives other images
+        at first, and one without times, such as a bare stream, other times. The caller has to compare.
 
         :param start_s: within the range; it must have no frame rate of its own.
         """

@@ -44,7 +44,6 @@ FILES = {
     "open groups.mkv": ("libx264", "yuv420p", EVEN, {"g": "16", "x264-params": "open-gop=1:bframes=3:threads=1"}),
     "one keyframe.mp4": ("libx264", "yuv420p", EVEN, {"g": "10000"}),
     "uneven.mkv": ("libx264", "yuv420p", UNEVEN, {"g": "60"}),
-    "raw.h264": ("libx264", "yuv420p", EVEN, {"g": "50"}),
     "vp9.webm": ("libvpx-vp9", "yuv420p", EVEN, {"g": "30", "cpu-used": "8", "deadline": "realtime"}),
 }
 
