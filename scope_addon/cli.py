@@ -36,6 +36,13 @@ from .command_line.outputs import (
 )
 from .command_line.signals import interrupted, stopped_by_signals
 from .command_line.terminal import ProgressBar, open_standard_streams, say, stdout_for_report
+from .command_line.windows import (
+    WINDOW_SECONDS,
+    add_window_arguments,
+    add_window_seconds,
+    window_report,
+    with_window_seconds,
+)
 from .errors import (
     FAILED,
     OutputError,
@@ -110,6 +117,7 @@ def _add_capture_files(capture: argparse.ArgumentParser) -> None:
     # Passed by a batch to its processes.
     capture.add_argument(STOP_WITH_STDIN, action="store_true", help=argparse.SUPPRESS)
     capture.add_argument(SHOWN_COMMAND, default="", help=argparse.SUPPRESS)
+    add_window_arguments(capture)
 
 
 def _add_batch_files(batch: argparse.ArgumentParser) -> None:
@@ -137,6 +145,7 @@ def _add_batch_files(batch: argparse.ArgumentParser) -> None:
         "counts the clips of each worker",
     )
     batch.add_argument("--again", action="store_true", help="capture every clip again, including finished ones")
+    add_window_seconds(batch)
 
 
 def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) -> int:
@@ -209,6 +218,7 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
     rig = checked_rig(args, outputs, args.hands)
 
     body, options = body_and_options(args)
+    options = with_window_seconds(options, args)
     # Imported here, so that --help and errors in the arguments are printed immediately.
     from .capture.overlay.overlay_video import write_overlay
     from .capture.pipeline import capture
@@ -216,8 +226,10 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
 
     with ExitStack() as stack:
         progress = stack.enter_context(ProgressBar(sys.stderr, show=sys.stderr.isatty() and not args.quiet))
+        if found := window_report(args, video, options, progress):
+            return found
         unfinished = stack.enter_context(unfinished_capture(lasting_folder(), video))
-        result = capture(video, body, options, progress, unfinished=unfinished)
+        result = capture(video, body, options, progress, unfinished=unfinished, windows=args.windows_folder)
         progress("writing", 0, 0)
         with interrupted("some results may have been written already, each of them complete"):
             written = write_outputs(outputs, result.motions, body, video, args, rig)
@@ -271,7 +283,10 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
         if args.scheduler is not None:
             runner = dask_runner(args, None if args.program == list(PROGRAM) else args.program)
             stack.callback(runner.close)
-        batch = Batch(folder, out, args.program, non_default_arguments(args), formats, extras)
+        given = non_default_arguments(args)
+        if args.window_seconds is not None:
+            given[WINDOW_SECONDS] = f"{args.window_seconds:g}"
+        batch = Batch(folder, out, args.program, given, formats, extras)
         progress = stack.enter_context(ProgressBar(sys.stderr, show=sys.stderr.isatty() and not args.quiet))
         stack.enter_context(interrupted("finished clips are kept; run the same command again to continue"))
         report = batch.run(

@@ -24,6 +24,7 @@ from .perception.execution import Execution
 from .perception.sessions import landmark_network_name
 from .tracking.tracker import MOST_PEOPLE
 
+WINDOW_S = 120.0
 _DEFAULT = {option.name: option.default for option in OPTIONS}
 
 
@@ -49,6 +50,7 @@ class CaptureOptions:
     detector: Path | None = _DEFAULT["detector"]  # the user's own networks, ONNX files; see `adapters`
     keypoints: Path | None = _DEFAULT["keypoints"]
     ablation: Ablation = NO_ABLATION  # for experiments
+    window_s: float = WINDOW_S  # of which clips at least twice as long are observed one after another
 
 
 def capture_options(values: Mapping[str, Any]) -> CaptureOptions:

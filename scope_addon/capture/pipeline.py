@@ -14,7 +14,8 @@ from .media.video import Video, open_video
 from .options import CaptureOptions, check_options
 from .perception.kept.kept_estimates import KeptEstimates
 from .stages.clock import Progress, StageClock
-from .stages.observe import Footage, Listeners, Watch, observe
+from .stages.footage import Footage, Listeners, Watch
+from .stages.observe import observe
 from .stages.repair import repair
 from .stages.report import make_report
 from .stages.solve import solve
@@ -37,11 +38,14 @@ def capture(
     progress: Progress = lambda *_: None,
     watch: Watch = lambda *_: None,
     unfinished: Path | None = None,
+    windows: Path | None = None,
 ) -> Capture:
     """Capture the people of a video or still image, the most prominent one first.
 
     :param unfinished: folder in which estimates are kept while this lasts, and found if an earlier capture was killed;
         the caller removes it. None: nothing is kept.
+    :param windows: folder with windows of a long clip that `observe_windows` has written; those that are missing are
+        observed now.
     :raises UsageError: an option has an impossible value, contradicts another one or does not suit the body.
     :raises VideoError: the footage cannot be used.
     :raises NoPersonError: nobody was found.
@@ -50,7 +54,8 @@ def capture(
     check_options(body, options)
     clock = StageClock()
     with open_video(Path(path), options.wanted) as video:
-        footage, tracks = observe(video, body, options, clock, Listeners(progress, watch), KeptEstimates(unfinished))
+        kept = KeptEstimates(unfinished)
+        footage, tracks = observe(video, body, options, clock, Listeners(progress, watch), kept, windows)
     with clock.stage("solver"):
         tracks = [repair(track, footage.camera, options.ablation) for track in tracks]
         solved = solve(_shot(video, body, options, footage), tracks, progress, options.heights_m)

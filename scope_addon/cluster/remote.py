@@ -168,9 +168,13 @@ class RemoteStaging:
         """Return the URL of an attempt's folder."""
         return f"{self.folder}/{number}"
 
-    def publish(self, attempt: str, outputs: list[str], content: dict[str, Any]) -> bool:
+    def windows(self, number: int) -> None:
+        """Return that clips are not divided; see `Staging.windows`."""
+
+    def publish(self, attempt: str, outputs: list[str], content: dict[str, Any], folder: Path | None = None) -> bool:
         """Give the results of an attempt their final names; see `Staging.publish`. Their sizes are compared.
 
+        :param folder: is not used, because clips are not divided.
         :raises OutputError: the store cannot be written.
         :raises UsageError: the URL cannot be used.
         """

@@ -21,9 +21,10 @@ from ...solver.errors import ScopeError
 from ..errors import ClusterError, internal_error_message, system_error_message
 from ..footage import is_url
 from ..job.batch import ROOT
-from ..job.clips.task import ClipTask, Entry
+from ..job.clips.task import COUNT, DIVIDED, ClipTask, Entry
 from ..job.request import program_version
 from . import worker as worker_side
+from .division import Divisions, described, is_part
 from .remote import RemoteStaging
 from .staging import Staging
 from .workers import Workers
@@ -69,7 +70,8 @@ class DaskRunner:
         self._attempts: dict[str, _Attempt] = {}  # by Dask's key
         self._done: queue.SimpleQueue[str] = queue.SimpleQueue()  # keys
         self._waiting: deque[ClipTask] = deque()
-        self._lost: Counter[str] = Counter()  # attempts of a clip
+        self._lost: Counter[tuple[str, str]] = Counter()  # attempts of a clip, or of a part of it
+        self._divisions = Divisions()
         self._count = 0
         self._looked = -_POLLING_INTERVAL_S
         self._told_to_wait = False
@@ -170,7 +172,8 @@ class DaskRunner:
         assert self._staging is not None
         folder = self._staging.attempt(self._count)
         footage = f"{self._folder.rstrip('/')}/{task.file}"
-        remote = task._replace(footage=footage, out=folder, final=self._out)
+        divides = not (task.windows or task.windows_folder or is_url(self._folder) or is_url(self._out))
+        remote = task._replace(footage=footage, out=folder, final=self._out, windows=COUNT if divides else task.windows)
         arguments = (self._program, self._jobs, program_version(ROOT))
         self._submit(task, address, folder, worker_side.capture_on_worker, remote, *arguments)
         self._workers.records[address].running += 1
@@ -218,6 +221,10 @@ class DaskRunner:
         if entry["status"] == worker_side.LOST:
             return self._give_up(key, entry["message"])
         content = entry.pop("content", {})
+        if entry["status"] == DIVIDED:
+            return self._divide(key, attempt, task, entry)
+        if is_part(task):
+            return self._collect(key, attempt, task, entry, content)
         try:
             if entry["status"] == "done" and not self._staging.publish(attempt.folder, entry["outputs"], content):
                 return self._give_up(key, f"the results of {task.file} are not what the worker has written")
@@ -225,9 +232,46 @@ class DaskRunner:
             text = system_error_message(error) if isinstance(error, OSError) else str(error)
             entry = {"file": task.file, "name": task.name, "status": "failed", "message": text}
         self._forget(key)
-        entry["worker"] = attempt.worker
-        self._workers.finished(attempt.worker, entry)
-        return {task.name: entry}
+        return self._ended(task, attempt.worker, entry)
+
+    def _ended(self, task: ClipTask, address: str, entry: Entry) -> dict[str, Entry]:
+        """Count a clip that has its outcome, and return its entry."""
+        observed, about = self._divisions.close(task)
+        self._workers.finished(address, entry, observed)
+        return {task.name: entry | {"worker": address} | about}
+
+    def _divide(self, key: str, attempt: _Attempt, task: ClipTask, entry: Entry) -> dict[str, Entry]:
+        """Let the workers observe the windows of a long clip."""
+        assert self._staging is not None
+        folder = self._staging.windows(self._count)
+        self._forget(key)
+        self._workers.observed(attempt.worker, 0, entry)
+        try:
+            assert folder is not None
+            parts = self._divisions.begin(task, entry, folder, self._workers.slots(self._jobs))
+        except OSError as error:
+            return self._ended(task, attempt.worker, _failure(task, system_error_message(error)))
+        self._workers.event(attempt.worker, f"{task.file} is divided into {entry['windows']} windows")
+        self._waiting.extendleft(reversed(parts))
+        return {}
+
+    def _collect(
+        self, key: str, attempt: _Attempt, task: ClipTask, entry: Entry, content: dict[str, Any]
+    ) -> dict[str, Entry]:
+        """Keep the windows that were observed; what fails here is observed again by the task that joins them."""
+        assert self._staging is not None
+        done = entry["status"] == "done"
+        try:
+            folder = self._divisions.folder(task)
+            if done and not self._staging.publish(attempt.folder, entry["outputs"], content, folder):
+                return self._give_up(key, f"the windows of {task.file} are not what the worker has written")
+        except (ScopeError, OSError):
+            done = False
+        self._forget(key)
+        if done:
+            self._workers.observed(attempt.worker, len(entry["outputs"]), entry)
+        self._waiting.extendleft(self._divisions.ended(task, attempt.worker, entry if done else None))
+        return {}
 
     def _failed(self, key: str, attempt: _Attempt, error: Exception) -> dict[str, Entry]:
         """Handle an exception that is not Scope's own: a lost worker, or an installation that does not fit."""
@@ -238,10 +282,11 @@ class DaskRunner:
             return {}
         if type(error).__name__ in ("KilledWorker", "TimeoutError", "FutureCancelledError", "CommClosedError"):
             return self._give_up(key, text)
-        entry = {"file": attempt.task.file, "name": attempt.task.name, "status": "failed", "worker": attempt.worker}
         self._forget(key)
-        self._workers.finished(attempt.worker, entry)
-        return {attempt.task.name: entry | {"message": internal_error_message(error)}}
+        if is_part(attempt.task):
+            self._waiting.extendleft(self._divisions.ended(attempt.task, attempt.worker, None))
+            return {}
+        return self._ended(attempt.task, attempt.worker, _failure(attempt.task, internal_error_message(error)))
 
     def _give_up(self, key: str, why: str, *, blame: bool = True) -> dict[str, Entry]:
         """Let another worker capture the clip, or return its entry if too many were lost.
@@ -253,15 +298,19 @@ class DaskRunner:
         task = attempt.task
         if task is None:
             return {}
-        self._workers.event(attempt.worker, f"{task.file} is captured again: {why}", tell=True)
+        self._workers.event(attempt.worker, f"{described(task)} is captured again: {why}", tell=True)
         self._workers.records[attempt.worker].attempts_lost += 1
-        self._lost[task.name] += blame
-        if self._lost[task.name] < ATTEMPTS:
+        part = task.name, task.windows
+        self._lost[part] += blame
+        if self._lost[part] < ATTEMPTS:
             self._waiting.appendleft(task)
             return {}
+        if is_part(task):
+            self._waiting.extendleft(self._divisions.ended(task, attempt.worker, None))
+            return {}
         message = f"{ATTEMPTS} workers were lost while they captured it; does it need more memory than they have?"
-        entry = {"file": task.file, "name": task.name, "status": "failed", "message": message}
-        return {task.name: entry | {"worker": attempt.worker}}
+        _, about = self._divisions.close(task)
+        return {task.name: _failure(task, message) | {"worker": attempt.worker} | about}
 
     def _forget(self, key: str) -> None:
         """Forget an attempt; what a worker still does for it is in vain."""
@@ -276,3 +325,7 @@ class DaskRunner:
         if futures and self._client.status == "running":
             with suppress(OSError, TimeoutError):  # the scheduler is lost, and forgets them by itself
                 self._client.cancel(futures, force=True)
+
+
+def _failure(task: ClipTask, message: str) -> Entry:
+    return {"file": task.file, "name": task.name, "status": "failed", "message": message}

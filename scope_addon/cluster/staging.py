@@ -47,10 +47,15 @@ class Staging:
         """Return the path of an attempt's folder, which the worker makes."""
         return str(self.folder / str(number))
 
-    def publish(self, attempt: str, outputs: list[str], content: dict[str, Any]) -> bool:
+    def windows(self, number: int) -> Path | None:
+        """Return the path of a folder for the windows of a clip; None where clips are not divided."""
+        return self.folder / f"windows{number}"
+
+    def publish(self, attempt: str, outputs: list[str], content: dict[str, Any], folder: Path | None = None) -> bool:
         """Give the results of an attempt their final names, and return True; False if one is not what was captured.
 
-        :param outputs: the results, relative to the attempt's folder and to the output folder.
+        :param folder: to which they go, if not to the output folder.
+        :param outputs: the results, relative to the attempt's folder and to that one.
         :param content: their ``sha256`` and ``bytes``, as the worker has computed them.
         :raises OSError: a result cannot be renamed.
         :raises OutputError: a final name is that of a folder or device.
@@ -61,7 +66,7 @@ class Staging:
         except (OSError, KeyError):
             return False
         for name in outputs:
-            _rename(Path(attempt, name), self._out / name)
+            _rename(Path(attempt, name), (folder or self._out) / name)
         return True
 
     def write_report(self, file: Path) -> None:

@@ -25,6 +25,7 @@ class WorkerRecord:
     clips: int = 0
     failed: int = 0
     attempts_lost: int = 0
+    windows: int = 0
     frames: int = 0
     busy_s: float = 0.0
 
@@ -38,6 +39,7 @@ class WorkerRecord:
             "clips": self.clips,
             "failed": self.failed,
             "attempts_lost": self.attempts_lost,
+            "windows": self.windows,
             "frames": self.frames,
             "busy_s": round(self.busy_s, 1),
             "frames_per_s": round(self.frames / self.busy_s, 1) if self.busy_s else 0.0,
@@ -95,15 +97,29 @@ class Workers:
         states = {record.state for record in self.records.values()} - {LOST}
         return states == {REFUSED}
 
-    def finished(self, address: str, entry: Entry) -> None:
-        """Count a clip."""
+    def slots(self, jobs: int) -> int:
+        """Return how many clips the ready workers can have at a time."""
+        return sum(min(jobs, r.threads) for r in self.records.values() if r.state == READY)
+
+    def observed(self, address: str, windows: int, entry: Entry) -> None:
+        """Count a part of a clip."""
+        record = self.records[address]
+        record.windows += windows
+        record.busy_s += entry.get("seconds", 0.0)
+        record.frames += int(entry.get("report", {}).get("frames", 0))
+
+    def finished(self, address: str, entry: Entry, observed_before: int = 0) -> None:
+        """Count a clip.
+
+        :param observed_before: frames of it that were counted as parts.
+        """
         record = self.records[address]
         record.clips += 1
         record.failed += entry["status"] == "failed"
         if entry["status"] != "skipped":  # whose seconds are those of an earlier batch
             record.busy_s += entry.get("seconds", 0.0)
         if entry["status"] == "done":
-            record.frames += int(entry["report"].get("frames", 0))
+            record.frames += max(0, int(entry["report"].get("frames", 0)) - observed_before)
 
     def report(self) -> dict[str, Any]:
         """Return the table, the throughput of the whole cluster, and the log."""

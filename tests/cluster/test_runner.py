@@ -67,13 +67,13 @@ def calls(clip):
     return [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
 
 
-def run(cluster, folder, *options):
+def run(cluster, folder, *options, program=PROGRAM):
     """Run the command with a cluster or a scheduler file, and return its status and its report."""
     out = folder.parent / "out"
     argv = ["batch", str(folder), "--out", str(out), "--formats", "npz,glb", "--recursive", *options]
     status = main(
         [*argv, "--scheduler", str(getattr(cluster, "scheduler_address", cluster))],
-        program=[sys.executable, "-c", PROGRAM],
+        program=[sys.executable, "-c", program],
     )
     report = json.loads((out / REPORT_NAME).read_text()) if (out / REPORT_NAME).exists() else None
     return status, report

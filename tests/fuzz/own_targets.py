@@ -96,6 +96,19 @@ def find_estimates(path: Path) -> None:
         assert values is None or np.isfinite(values).all()
 
 
+def load_window(path: Path) -> None:
+    from scope.scope_addon.capture.stages.windows import window_file
+    from scope.scope_addon.capture.stages.windows.plan import Window
+
+    folder = path.with_name("windows")
+    folder.mkdir(exist_ok=True)
+    shutil.copy(path, folder / window_file.window_name(1))
+    record = window_file.load_window(folder, Window(1, 1.0, 2.0, 4.0), (64, 48))
+    if record is not None:
+        rows = [row for tracklet in record.tracklets.values() for row in tracklet.rows]
+        assert 0 <= min(rows, default=0) <= max(rows, default=0) < max(len(record), 1)
+
+
 def find_capture(path: Path) -> None:
     from scope.scope_addon.job.cache import REPORT, Cache
 
@@ -179,6 +192,24 @@ def built_in_maps() -> Path:
 
 def descriptions(_: Path) -> list[bytes]:
     return [json.dumps({"type": "simcc", "input_size": [192, 256], "mean": [1, 2, 3], "keypoints": "coco17"}).encode()]
+
+
+def windows(folder: Path) -> list[bytes]:
+    from scope.scope_addon.capture.camera.background_record import BackgroundRecord
+    from scope.scope_addon.capture.perception.region import Region
+    from scope.scope_addon.capture.stages.windows.plan import Window
+    from scope.scope_addon.capture.stages.windows.window_file import save_window
+    from scope.scope_addon.capture.stages.windows.window_record import WindowRecord
+    from scope.scope_addon.capture.tracking.track import Tracklet
+
+    times = 1.0 + np.arange(6) / 2
+    background = BackgroundRecord(times, np.tile(np.eye(3), (6, 1, 1)), np.ones(6, bool), [1.0])
+    values, centers = [np.ones((33, 6), np.float32)] * 6, [np.ones(2)] * 6
+    people = {0: Tracklet(list(range(6)), values, centers, [9.0] * 6)}
+    regions = {0: Region((1.0, 2.0), 9.0, 0.0)}
+    sums, indices = np.ones(6, np.uint32), np.arange(6)
+    record = WindowRecord(Window(1, 1.0, 2.0, 4.0), indices, times, sums, 2, 5, people, regions, [], background)
+    return [save_window(folder, record, (64, 48)).read_bytes()]
 
 
 def estimates(folder: Path) -> list[bytes]:

@@ -279,6 +279,7 @@ TARGETS = {
     "expression_map": Target(own.read_expression_map, (".json",), own.expression_maps),
     "description": Target(own.read_description, (".json",), own.descriptions),
     "estimates": Target(own.find_estimates, (".npz",), own.estimates),
+    "window": Target(own.load_window, (".npz",), own.windows),
     "cached_report": Target(own.find_capture, (".json",), own.cached_reports),
     "batch_report": Target(own.read_batch_report, (".json",), own.batch_reports),
 }

@@ -14,19 +14,17 @@ Sources: Fischler and Bolles 1981 (random sample consensus), Kabsch 1976 (rotati
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import accumulate
 from typing import Any, cast
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ....solver.rotations import exp, log
-from ...kinematics.smoothing import fill_rotation_gaps
+from ....solver.rotations import log
 from ..perception.region import inside, surroundings
+from .background_record import SAMPLES_HZ, STATIC_DEG, BackgroundRecord, CameraMotion
 from .bars import find_bars
-from .heading_drift import EDGE_INTERVAL_S, EDGE_SIDE_PX, FrameEdges, remove_heading_drift
+from .heading_drift import EDGE_INTERVAL_S, EDGE_SIDE_PX, FrameEdges
 from .intrinsics import Camera
 from .line_segments import Lines, Segments, find_segments
 
@@ -36,27 +34,6 @@ MIN_CORNERS = 24
 KEY_SHARE = 0.5  # of a key frame's corners; with fewer left, the next key frame begins
 INLIER_PX = 1.2  # in the working image
 MIN_INLIER_SHARE = 0.35  # of corners; a crowd or water that fills the picture gives no rotation
-SAMPLES_HZ = 12.0  # hands tremble at up to 10 Hz, but by less than is visible here
-TRAVELLING_SHARE = 0.8  # mean share of inliers below which the camera travels: near corners pass by
-STATIC_DEG = 0.35  # largest rotation during a clip of a camera on a tripod
-
-
-@dataclass(frozen=True)
-class CameraMotion:
-    """The camera's rotation during T frames."""
-
-    R_first_camera: NDArray[np.float64]  # (T, 3, 3) the camera's axes in those of the first frame
-    known: NDArray[np.bool_]  # (T,) frames in which it was estimated; elsewhere it is interpolated
-
-    @property
-    def is_static(self) -> bool:
-        """Whether the camera is static, as far as can be determined."""
-        return not self.known.any() or self.largest_turn_deg < STATIC_DEG
-
-    @property
-    def largest_turn_deg(self) -> float:
-        """The largest angle between any frame and the first one, in degrees."""
-        return float(np.degrees(np.linalg.norm(log(self.R_first_camera), axis=-1).max()))
 
 
 class BackgroundTracker:
@@ -88,7 +65,12 @@ class BackgroundTracker:
         self.bars: list[NDArray[np.float64]] = []  # in that frame
 
     def add(
-        self, image_rgb: NDArray[np.uint8], time_s: float, people: Sequence[NDArray[Any]], is_cut: bool = False
+        self,
+        image_rgb: NDArray[np.uint8],
+        time_s: float,
+        people: Sequence[NDArray[Any]],
+        is_cut: bool = False,
+        is_sampled: bool = False,
     ) -> None:
         """Process the next frame.
 
@@ -96,13 +78,14 @@ class BackgroundTracker:
         :param time_s: when it is shown.
         :param people: (n, 2) points of each person in pixels: the background is outside their bounding boxes.
         :param is_cut: whether another scene begins, for which the camera's rotation is assumed unchanged.
+        :param is_sampled: whether the rotation is to be estimated in this frame even if the last estimate is recent.
         """
         self._times.append(time_s)
         row = len(self._times) - 1
         if people and not self._edge_frames:
             self.bars = find_bars(image_rgb)
             self._edge_frames.append(FrameEdges(row, find_segments(image_rgb, people, bars=self.bars)))
-        if time_s - self._last_used < 0.98 / SAMPLES_HZ and not is_cut:
+        if time_s - self._last_used < 0.98 / SAMPLES_HZ and not (is_cut or is_sampled):
             self._rotations.append(None)
             return
         self._last_used = time_s
@@ -128,32 +111,16 @@ class BackgroundTracker:
             self._R_first_key = self._R_first_key @ self._R_key_last
             self._begin_key(image, boxes)
 
-    def motion(self, camera: Camera) -> CameraMotion:
-        """Return the rotation in all frames so far; frames that were skipped are interpolated on an arc.
-
-        :param camera: the intrinsics as they are known now. A small rotation moves the image by f times its angle, so
-            the angles shrink as the focal length grows; rotations about the optical axis do not change.
-        """
+    def record(self) -> BackgroundRecord:
+        """Return what is known of the frames so far."""
         known = np.array([R is not None for R in self._rotations], bool)
         R = np.array([np.eye(3) if R is None else R for R in self._rotations]).reshape(-1, 3, 3)
-        if known.sum() < 2:
-            return CameraMotion(np.tile(np.eye(3), (len(R), 1, 1)), np.zeros(len(R), bool))
-        ratio = self._camera.intrinsics[0, 0] / camera.intrinsics[0, 0]
-        if ratio != 1.0:
-            seen = R[known]
-            steps = exp(log(np.swapaxes(seen[:-1], 1, 2) @ seen[1:]) * [ratio, ratio, 1.0])
-            R[known] = np.array(list(accumulate(steps, np.matmul, initial=seen[0])))
         times = np.array(self._times)
-        filled = fill_rotation_gaps(R[:, None], known, times)[:, 0]
-        a, b = np.flatnonzero(known)[-2:]
-        after = np.arange(b + 1, len(R))
-        if len(after) and times[-1] - times[b] < 1.5 / SAMPLES_HZ:  # extrapolate at constant angular velocity
-            rate = log(R[a].T @ R[b]) / (times[b] - times[a])
-            filled[after] = R[b] @ exp((times[after] - times[b])[:, None] * rate)
-        R = filled[0].T @ filled
-        if self._inlier_shares and np.mean(self._inlier_shares) < TRAVELLING_SHARE:
-            R = remove_heading_drift(R, times, self._edge_frames, camera, self._full_size)
-        return CameraMotion(R, known)
+        return BackgroundRecord(times, R, known, list(self._inlier_shares), list(self._edge_frames), self.bars)
+
+    def motion(self, camera: Camera) -> CameraMotion:
+        """Return the rotation in all frames so far; see `BackgroundRecord.motion`."""
+        return self.record().motion(self._camera, camera, self._full_size)
 
     @property
     def has_searched_edges(self) -> bool:
@@ -167,10 +134,7 @@ class BackgroundTracker:
 
     def lines(self, motion: CameraMotion, camera: Camera) -> Lines:
         """Return the lines of `segments` in the first frame's axes."""
-        lines = self.segments.lines(camera)
-        if motion.is_static or not self._edge_frames:
-            return lines
-        return lines.rotated(motion.R_first_camera[self._edge_frames[0].row])
+        return self.record().lines(motion, camera)
 
     def _is_edge_frame(self, R_first_camera: NDArray[np.float64]) -> bool:
         """Return whether to detect edges in the last frame: at intervals, once the camera (3, 3) has rotated."""

@@ -9,7 +9,7 @@ of the threads.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures import wait as wait_for
 from types import TracebackType
@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.compiled.code_cache import compiled_kernels
+from ..camera.background_record import BackgroundRecord
 from ..camera.bars import longer_content_side
 from ..camera.camera_rotation import BackgroundTracker
 from ..camera.intrinsics import Camera, assumed_camera
@@ -27,6 +28,7 @@ from .focal_fits import FocalFits
 from .focal_length import camera_by_edges, camera_by_fits
 from .live_body import LiveBody
 
+KERNELS = 85  # that fitting a clip compiles
 _POLLING_INTERVAL_S = 0.2
 _THREADS = 2  # background and edges; the solver has its own thread, because compiling it must not delay either
 
@@ -37,7 +39,7 @@ class BackgroundEstimators:
     def __init__(self, camera: Camera, width: int, height: int, live: LiveBody, fits: FocalFits) -> None:
         self.tracker = BackgroundTracker(camera, width, height)
         self._given_camera, self._size, self._fits = camera, (width, height), fits
-        self._pool = ThreadPoolExecutor(_THREADS, "scope-background")
+        self.pool = ThreadPoolExecutor(_THREADS, "scope-background")
         self._solver = ThreadPoolExecutor(1, "scope-solver")
         self._pending: Future[None] | None = None
         self._largest: tuple[float, Observation] | None = None  # time and largest person of the pending frame
@@ -51,7 +53,7 @@ class BackgroundEstimators:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         # Do not wait: the solver may be compiling, and only those who need it then should wait for it.
-        for pool in (self._pool, self._solver):
+        for pool in (self.pool, self._solver):
             pool.shutdown(wait=False, cancel_futures=kind is not None)
 
     def add(self, frame: Frame, people: list[Observation], largest: Observation | None, is_cut: bool = False) -> None:
@@ -62,7 +64,7 @@ class BackgroundEstimators:
         """
         self.wait()
         points = [o.keypoints_px for o in people]
-        self._pending = self._pool.submit(self.tracker.add, frame.image_rgb, frame.timestamp_s, points, is_cut)
+        self._pending = self.pool.submit(self.tracker.add, frame.image_rgb, frame.timestamp_s, points, is_cut)
         if largest is not None:
             self._largest = frame.timestamp_s, largest
 
@@ -74,7 +76,7 @@ class BackgroundEstimators:
             return
         if self._by_edges is None:
             self._longer_px = longer_content_side(self.tracker.bars, *self._size)
-            self._by_edges = self._pool.submit(camera_by_edges, self.tracker.segments, *self._size, self._longer_px)
+            self._by_edges = self.pool.submit(camera_by_edges, self.tracker.segments, *self._size, self._longer_px)
         if self._largest is not None and self._fits.is_due(self._largest[0]):
             self._costs.append(self._solver.submit(self._fits.costs, self._largest[1], self._assumed()))
         self._largest = None
@@ -97,3 +99,24 @@ class BackgroundEstimators:
 
     def _assumed(self) -> Camera:
         return assumed_camera(*self._size, self._longer_px)
+
+
+def camera_of_clip(
+    given: Camera,
+    size: tuple[int, int],
+    record: BackgroundRecord,
+    people: Iterable[tuple[float, Observation]],
+    fits: FocalFits,
+) -> Camera:
+    """Return the camera of a clip that was observed before; an assumed focal length is replaced by the estimate.
+
+    :param size: of the image, width and height in pixels.
+    :param people: time and largest person of the frames from the first of the record's ``edge_frames`` on.
+    """
+    if given.focal_deviation == 0.0 or not record.edge_frames:
+        return given
+    longer_px = longer_content_side(record.bars, *size)
+    assumed = assumed_camera(*size, longer_px)
+    due = (observation for time_s, observation in people if fits.is_due(time_s))
+    costs = [costs for each in due if (costs := fits.costs(each, assumed)) is not None]
+    return camera_by_fits(camera_by_edges(record.segments, *size, longer_px), assumed, costs, longer_px)

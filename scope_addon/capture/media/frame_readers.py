@@ -249,7 +249,7 @@ class PyavReader:
             frame = next(self._frames, None)
             time = 0.0 if frame is None else self._time(frame)
             index = round(time * fps)
-            if frame is not None and time < seconds and abs(time - index / fps) < 0.5 / fps:
+            if frame is not None and frame.pts is not None and time < seconds and abs(time - index / fps) < 0.5 / fps:
                 return self._skip(itertools.chain([frame], self._frames), index, seconds, fps)
             self._seek(0.0)
         return self._skip(self._frames, 0, seconds, fps)

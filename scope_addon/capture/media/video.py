@@ -89,6 +89,17 @@ class Video:
         with closing(decoder):
             yield from decoder
 
+    def frames_from(self, start_s: float) -> Iterator[Frame]:
+        """Iterate over the frames of the range from a time on, which is sought where that saves decoding.
+
+        Their indices may differ from those of the whole iteration by a constant, where the frame rate varies. Whether
+        images and times are the same depends on the file: one that does not mark its keyframes well gives other images
+        at first, and one without times, such as a bare stream, other times. The caller has to compare.
+
+        :param start_s: within the range; it must have no frame rate of its own.
+        """
+        return iter(replace(self, wanted=replace(self.wanted, start_s=start_s)))
+
     def close(self) -> None:
         """Stop the decoding threads of this video; a running iteration ends."""
         while self._decoders:

@@ -16,7 +16,7 @@ from ..media.video import Video
 from ..options import CaptureOptions
 from .clock import at_times
 from .floor_warnings import floor_warnings
-from .observe import Footage
+from .footage import Footage
 from .solve import Solved
 
 CLOSED = 0.5  # weight of a blink above which an eye is closed

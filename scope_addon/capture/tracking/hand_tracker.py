@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -62,6 +63,12 @@ class HandTracker:
         self._palms = PalmDetector(threads, folder, execution)
         self._hands: dict[_Key, _Hand] = {}
         self._time_s = 0.0
+
+    def another(self) -> HandTracker:
+        """Return a tracker with the same networks that has seen nothing."""
+        tracker = copy.copy(self)
+        tracker._hands, tracker._time_s = {}, 0.0
+        return tracker
 
     def step(
         self, image_rgb: NDArray[np.uint8], observations: Sequence[tuple[int, Observation]], time_s: float | None = None

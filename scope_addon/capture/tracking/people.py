@@ -55,34 +55,45 @@ class PeopleBuilder:
         return len(self._frames)
 
     def build(self, most: int) -> list[Track]:
-        """Return the tracks of at most ``most`` people, the most prominent (size times frames) first.
+        """Return the tracks of at most ``most`` people; see `build_tracks`."""
+        return build_tracks(self._frames, self._times, list(self._tracklets.values()), most)
 
-        Each track has a row per frame. The list is empty if nobody was seen in enough frames to be plausible.
-        """
-        if not self._tracklets:
-            return []
-        tracklets = list(self._tracklets.values())
-        for tracklet in tracklets:
-            tracklet.truncate(frames_before_flicker(tracklet, self._times))
-            tracklet.truncate(frames_before_merger(tracklet, tracklets, self._times))
-        people = [[tracklets[k] for k in chain] for chain in link(tracklets, self._times)]
-        people.sort(key=_prominence, reverse=True)
-        counted = self._plausible(people)[:most]
-        least = MIN_PROMINENCE * _prominence(counted[0]) if counted else 0.0
-        return [make_track(self._frames, self._times, person) for person in counted if _prominence(person) >= least]
 
-    def _plausible(self, people: list[list[Tracklet]]) -> list[list[Tracklet]]:
-        """Select the people who were seen in enough frames, and for long enough without interruption.
+def build_tracks(
+    frames: Sequence[int], times: Sequence[float], tracklets: Sequence[Tracklet], most: int
+) -> list[Track]:
+    """Return the tracks of at most ``most`` people, the most prominent (size times frames) first.
 
-        At a low frame rate somebody may be elsewhere in every frame: where nobody was followed from frame to frame,
-        one frame is enough.
-        """
-        frequent = [person for person in people if sum(len(t.rows) for t in person) >= MIN_SHARE * len(self)]
-        longest = [max(self._times[t.rows[-1]] - self._times[t.rows[0]] for t in person) for person in frequent]
-        least = min(MIN_INTERVAL_S, 0.5 * (self._times[-1] - self._times[0]))
-        if max(longest, default=0.0) < least and np.median(np.diff(self._times)) >= MIN_INTERVAL_S:
-            least = 0.0
-        return [person for person, s in zip(frequent, longest, strict=True) if s >= least]
+    Each track has a row per frame. The list is empty if nobody was seen in enough frames to be plausible.
+
+    :param frames: source frame index of each frame.
+    :param times: their times in seconds, with a long gap at a cut.
+    :param tracklets: in the order in which they begin; they are truncated.
+    """
+    if not tracklets:
+        return []
+    for tracklet in tracklets:
+        tracklet.truncate(frames_before_flicker(tracklet, times))
+        tracklet.truncate(frames_before_merger(tracklet, tracklets, times))
+    people = [[tracklets[k] for k in chain] for chain in link(tracklets, times)]
+    people.sort(key=_prominence, reverse=True)
+    counted = _plausible(people, times)[:most]
+    least = MIN_PROMINENCE * _prominence(counted[0]) if counted else 0.0
+    return [make_track(frames, times, person) for person in counted if _prominence(person) >= least]
+
+
+def _plausible(people: list[list[Tracklet]], times: Sequence[float]) -> list[list[Tracklet]]:
+    """Select the people who were seen in enough frames, and for long enough without interruption.
+
+    At a low frame rate somebody may be elsewhere in every frame: where nobody was followed from frame to frame, one
+    frame is enough.
+    """
+    frequent = [person for person in people if sum(len(t.rows) for t in person) >= MIN_SHARE * len(times)]
+    longest = [max(times[t.rows[-1]] - times[t.rows[0]] for t in person) for person in frequent]
+    least = min(MIN_INTERVAL_S, 0.5 * (times[-1] - times[0]))
+    if max(longest, default=0.0) < least and np.median(np.diff(times)) >= MIN_INTERVAL_S:
+        least = 0.0
+    return [person for person, s in zip(frequent, longest, strict=True) if s >= least]
 
 
 def frames_before_merger(tracklet: Tracklet, others: Sequence[Tracklet], times: Sequence[float]) -> int:

@@ -8,7 +8,9 @@ whole clip which tracklets are the same person.
 
 from __future__ import annotations
 
+import copy
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -84,9 +86,21 @@ class PeopleTracker:
         self._max_live = 2 if people is None else min(people + 1, MOST_PEOPLE)
         self.reset()
 
+    def another(self, regions: Sequence[Region] = ()) -> PeopleTracker:
+        """Return a tracker with the same networks that has seen nothing.
+
+        :param regions: in which people are known to be in its first frame; they are followed before it searches.
+        """
+        tracker = copy.copy(self)
+        tracker._estimator = LandmarkEstimator(self._networks)
+        tracker.reset()
+        tracker._given = list(regions)
+        return tracker
+
     def reset(self) -> None:
         """Start again: the next frame begins with a detection, and tracklet numbers with 0."""
         self._tracklets = 0
+        self._given: list[Region] = []
         self._clock = FrameClock()
         self._schedule = SearchSchedule(self._clock, self._people)
         self.forget()
@@ -129,6 +143,7 @@ class PeopleTracker:
         self._clock.advance(time_s)
         self._estimator.advance(upcoming_with_masks)
         self._update_live(image_rgb, upcoming_rgb)
+        self._start_given(image_rgb)
         self._estimator.begin_upcoming(upcoming_rgb, self._live)
         self._redetect(image_rgb)
         if self._schedule.is_due(image_rgb, self._live, self._lost):
@@ -167,6 +182,13 @@ class PeopleTracker:
             if target not in kept and target not in self._lost:
                 self._lose(target)
         self._live = sorted(kept, key=lambda f: f.tracklet)
+
+    def _start_given(self, image_rgb: NDArray[np.uint8]) -> None:
+        """Start a tracklet for everybody in the given regions, also for those who would lose against others."""
+        regions, self._given = self._given, []
+        for estimate in self._estimator.estimate(image_rgb, regions) if regions else ():
+            if estimate is not None and not any(is_same_body(estimate, f.estimate) for f in self._live):
+                self._live.append(self._start(estimate))
 
     def _novelty(self, target: TrackedTarget) -> float:
         """Return a value that falls from NOVELTY_INNOVATION to 0 while a person becomes established."""

@@ -19,6 +19,9 @@ from ...footage import PICTURE_SUFFIXES
 from .find import OVERLAY
 
 SHOWN_COMMAND, STOP_WITH_STDIN = "--shown-command", "--stop-with-stdin"  # options that only a batch passes
+WINDOWS, WINDOWS_FOLDER = "--windows", "--windows-folder"  # likewise, only on a cluster
+COUNT = "count"  # value of WINDOWS: capture the clip, or only say into how many windows it can be divided
+DIVIDED = "divided"  # status of a clip that has several
 REPORT = ".report"  # between a clip's name and the suffix of its page
 
 Entry = dict[str, Any]  # the outcome of a clip, as the report has it
@@ -71,6 +74,9 @@ class ClipTask(NamedTuple):
     :param basis: see `CaptureSettings.basis`.
     :param previous: entry of the previous report, if its files still exist.
     :param final: folder to which the results are moved later; empty if they stay in ``out``.
+    :param windows: `COUNT`, or a range ``FIRST:END`` of windows that are to be observed; empty: the clip is captured.
+    :param windows_folder: of a clip that is captured, with windows that were observed before.
+    :param key: of the clip, if it is known.
     """
 
     name: str
@@ -81,6 +87,9 @@ class ClipTask(NamedTuple):
     settings: CaptureSettings
     previous: Entry | None = None
     final: str = ""
+    windows: str = ""
+    windows_folder: str = ""
+    key: str = ""
 
 
 def capture_clip(
@@ -99,7 +108,7 @@ def capture_clip(
     footage, out = Path(task.footage), Path(task.out)
     entry: Entry = {"file": task.file, "name": task.name}
     try:
-        entry["key"] = _key(task.basis, footage)
+        entry["key"] = task.key or _key(task.basis, footage)
     except OSError as error:
         return entry | {"status": "failed", "message": f"{footage} cannot be read: {error.strerror}"}
     if task.previous and task.previous.get("key") == entry["key"]:
@@ -107,7 +116,7 @@ def capture_clip(
     target = out / task.name
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        arguments = [*program, *_arguments(footage, target, task.settings, threads)]
+        arguments = [*program, *_arguments(footage, target, task.settings, threads), *_window_arguments(task)]
         if task.final:  # a page about the capture shows its command
             shown = _arguments(footage, Path(task.final) / task.name, task.settings, threads)
             arguments += [SHOWN_COMMAND, shlex.join([*program, *(each for each in shown if each != STOP_WITH_STDIN)])]
@@ -117,12 +126,19 @@ def capture_clip(
     entry["seconds"] = round(time.monotonic() - start, 2)
     report = _last_object(stdout)
     if status == 0 and report is not None:
-        outputs = [Path(p).relative_to(out).as_posix() for p in report.pop("outputs")]
-        return entry | {"status": "done", "outputs": outputs, "report": report}
+        return entry | _outcome(report, out)
     if status == NO_PERSON:
         return entry | {"status": "no_person", "outputs": [], "message": _error_message(stderr)}
     message = _error_message(stderr) or f"the process ended with status {status}"
     return entry | {"status": "failed", "message": message}
+
+
+def _outcome(report: dict[str, Any], out: Path) -> Entry:
+    """Return what the report of a process that has ended well adds to the clip's entry."""
+    if report.get("windows"):
+        return {"status": DIVIDED, "windows": report["windows"]}
+    outputs = [Path(p).relative_to(out).as_posix() for p in report.pop("outputs")]
+    return {"status": "done", "outputs": outputs, "report": report}
 
 
 def _arguments(footage: Path, target: Path, settings: CaptureSettings, threads: int | None) -> list[str]:
@@ -139,6 +155,13 @@ def _arguments(footage: Path, target: Path, settings: CaptureSettings, threads: 
     for option, value in (given | settings.options).items():
         arguments.append(option if value is None else f"{option}={value}")  # one argument: a value may begin with -
     return arguments
+
+
+def _window_arguments(task: ClipTask) -> list[str]:
+    """Return the arguments for a part of a long clip, or for one whose parts were observed before."""
+    folder = task.windows_folder or (task.out if task.windows not in ("", COUNT) else "")
+    given = {WINDOWS: task.windows, WINDOWS_FOLDER: folder}
+    return [f"{option}={value}" for option, value in given.items() if value]
 
 
 def _key(basis: str, footage: Path) -> str:

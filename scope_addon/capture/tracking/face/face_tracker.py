@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -51,6 +52,12 @@ class FaceTracker:
         self._network = FaceNetwork(threads, folder, execution)
         self._faces: dict[int, _Face] = {}
         self._time_s: float | None = None
+
+    def another(self) -> FaceTracker:
+        """Return a tracker with the same networks that has seen nothing."""
+        tracker = copy.copy(self)
+        tracker._faces, tracker._time_s = {}, None
+        return tracker
 
     def step(
         self, image_rgb: NDArray[np.uint8], observations: Sequence[tuple[int, Observation]], time_s: float

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is known of the background of a clip, or of a window of it, once its frames were followed.
+
+Windows that were followed apart overlap: the frames before a window's first one are also the last ones of the window
+before. Let R_k(t) be the camera's rotation at time t in the axes of window k's first frame. In the common frames,
+
+    G_k = G_{k−1} R_{k−1}(t) R_k(t)ᵀ
+
+takes the axes of window k to those of the clip's first frame; the mean of the common frames is used. In these frames
+the rotation goes over evenly from one window to the other, because what is left of their difference would be a jump.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from itertools import accumulate
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....solver.rotations import exp, log
+from ...kinematics.smoothing import fill_rotation_gaps
+from .heading_drift import FrameEdges, remove_heading_drift
+from .intrinsics import Camera
+from .line_segments import Lines, Segments
+
+SAMPLES_HZ = 12.0  # hands tremble at up to 10 Hz, but by less than is visible here
+TRAVELLING_SHARE = 0.8  # mean share of inliers below which the camera travels: near corners pass by
+STATIC_DEG = 0.35  # largest rotation during a clip of a camera on a tripod
+
+
+@dataclass(frozen=True)
+class CameraMotion:
+    """The camera's rotation during T frames."""
+
+    R_first_camera: NDArray[np.float64]  # (T, 3, 3) the camera's axes in those of the first frame
+    known: NDArray[np.bool_]  # (T,) frames in which it was estimated; elsewhere it is interpolated
+
+    @property
+    def is_static(self) -> bool:
+        """Whether the camera is static, as far as can be determined."""
+        return not self.known.any() or self.largest_turn_deg < STATIC_DEG
+
+    @property
+    def largest_turn_deg(self) -> float:
+        """The largest angle between any frame and the first one, in degrees."""
+        return float(np.degrees(np.linalg.norm(log(self.R_first_camera), axis=-1).max()))
+
+
+@dataclass(frozen=True)
+class BackgroundRecord:
+    """The background of T frames; its edges were found in a few of them, first in one in which somebody is seen."""
+
+    times: NDArray[np.float64]  # (T,) seconds
+    R_first_camera: NDArray[np.float64]  # (T, 3, 3) as followed; identity where not known
+    known: NDArray[np.bool_]  # (T,)
+    inlier_shares: list[float]  # of the corners, in the frames that were followed
+    edge_frames: list[FrameEdges] = field(default_factory=list)
+    bars: list[NDArray[np.float64]] = field(default_factory=list)  # in the first of the edge frames
+
+    def motion(self, followed_with: Camera, camera: Camera, image_size: tuple[int, int]) -> CameraMotion:
+        """Return the rotation in all frames; frames that were skipped are interpolated on an arc.
+
+        :param followed_with: the intrinsics that were assumed while the background was followed.
+        :param camera: the intrinsics as they are known now. A small rotation moves the image by f times its angle, so
+            the angles shrink as the focal length grows; rotations about the optical axis do not change.
+        :param image_size: (width, height) in pixels.
+        """
+        known, R, times = self.known, self.R_first_camera.copy(), self.times
+        if known.sum() < 2:
+            return CameraMotion(np.tile(np.eye(3), (len(R), 1, 1)), np.zeros(len(R), bool))
+        ratio = followed_with.intrinsics[0, 0] / camera.intrinsics[0, 0]
+        if ratio != 1.0:
+            seen = R[known]
+            steps = exp(log(np.swapaxes(seen[:-1], 1, 2) @ seen[1:]) * [ratio, ratio, 1.0])
+            R[known] = np.array(list(accumulate(steps, np.matmul, initial=seen[0])))
+        filled = fill_rotation_gaps(R[:, None], known, times)[:, 0]
+        a, b = np.flatnonzero(known)[-2:]
+        after = np.arange(b + 1, len(R))
+        if len(after) and times[-1] - times[b] < 1.5 / SAMPLES_HZ:  # extrapolate at constant angular velocity
+            rate = log(R[a].T @ R[b]) / (times[b] - times[a])
+            filled[after] = R[b] @ exp((times[after] - times[b])[:, None] * rate)
+        R = filled[0].T @ filled
+        if self.inlier_shares and np.mean(self.inlier_shares) < TRAVELLING_SHARE:
+            R = remove_heading_drift(R, times, self.edge_frames, camera, image_size)
+        return CameraMotion(R, known)
+
+    @property
+    def segments(self) -> Segments:
+        """Straight edges of the background, in the first frame in which somebody is seen."""
+        return self.edge_frames[0].segments if self.edge_frames else Segments.none()
+
+    def lines(self, motion: CameraMotion, camera: Camera) -> Lines:
+        """Return the lines of `segments` in the first frame's axes."""
+        lines = self.segments.lines(camera)
+        if motion.is_static or not self.edge_frames:
+            return lines
+        return lines.rotated(motion.R_first_camera[self.edge_frames[0].row])
+
+
+def joined_backgrounds(parts: Sequence[BackgroundRecord], firsts: Sequence[int]) -> BackgroundRecord:
+    """Join the backgrounds of a clip's windows, in order.
+
+    :param parts: at least one.
+    :param firsts: of each window, how many of its frames are also the last ones of the window before.
+    """
+    whole, G = parts[0], np.eye(3)
+    rotations, known = [whole.R_first_camera], [whole.known]
+    times, shares = [whole.times], list(whole.inlier_shares)
+    edges, bars, rows = list(whole.edge_frames), whole.bars, len(whole.times)
+    for before, part, first in zip(parts, parts[1:], firsts[1:], strict=False):
+        G = G @ _link(before, part, first)
+        rotations[-1] = _faded(rotations[-1], known[-1], G @ part.R_first_camera[:first], part.known[:first])
+        times.append(part.times[first:])
+        known.append(part.known[first:])
+        rotations.append(np.where(part.known[first:, None, None], G @ part.R_first_camera[first:], np.eye(3)))
+        shares += part.inlier_shares
+        if not edges:
+            bars = part.bars
+        counted = [edge for edge in part.edge_frames if edge.row >= first or not edges]
+        edges += [replace(edge, row=edge.row + rows - first) for edge in counted]
+        rows += len(part.times) - first
+    return BackgroundRecord(
+        np.concatenate(times), np.concatenate(rotations), np.concatenate(known), shares, edges, bars
+    )
+
+
+def _faded(
+    R: NDArray[np.float64], known: NDArray[np.bool_], R_after: NDArray[np.float64], known_after: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Return rotations (T, 3, 3) whose last n frames go over to those of the next window.
+
+    :param known: (T,).
+    :param R_after: (n, 3, 3) in the same axes.
+    :param known_after: (n,).
+    """
+    n = len(R_after)
+    if not n or n > len(R):
+        return R
+    out, rows = R.copy(), np.flatnonzero(known[-n:] & known_after)
+    before = R[len(R) - n + rows]
+    share = (rows[:, None] + 1) / (n + 1)
+    out[len(R) - n + rows] = before @ exp(share * log(np.swapaxes(before, 1, 2) @ R_after[rows]))
+    return out
+
+
+def _link(before: BackgroundRecord, part: BackgroundRecord, first: int) -> NDArray[np.float64]:
+    """Return the rotation (3, 3) from the axes of one window to those of the window before.
+
+    Where no frame is known in both, the camera is taken to have kept the last direction that is known.
+    """
+    start = len(before.times) - first
+    both = np.flatnonzero(before.known[start:] & part.known[:first])
+    if len(both):
+        total = np.einsum("kij,klj->il", before.R_first_camera[start + both], part.R_first_camera[both])
+    else:
+        seen = np.flatnonzero(before.known)
+        total = before.R_first_camera[seen[-1]] if len(seen) else np.eye(3)
+    U, _, Vt = np.linalg.svd(total)
+    U[:, -1] *= np.sign(np.linalg.det(U @ Vt))
+    link: NDArray[np.float64] = U @ Vt
+    return link

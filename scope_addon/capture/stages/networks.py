@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The networks of a capture, opened as its options say."""
+
+from __future__ import annotations
+
+import os
+
+from ...options.capture import LARGEST
+from ..options import CaptureOptions, most_people
+from ..perception.execution import Execution
+from ..perception.kept.kept_estimates import KeptEstimates
+from ..tracking.face.face_tracker import FaceTracker
+from ..tracking.hand_tracker import HandTracker
+from ..tracking.tracker import PeopleTracker
+from .frame_observer import Trackers
+
+
+def network_threads(options: CaptureOptions, execution: Execution) -> int:
+    """Use at most as many threads as there are cores, since more would only wait for each other."""
+    cores = os.cpu_count() or 1
+    if options.threads > cores:
+        execution.warnings.append(f"{options.threads} threads were requested, but there are only {cores} cores")
+    return min(options.threads or cores, cores)
+
+
+def open_trackers(
+    options: CaptureOptions, threads: int, execution: Execution, kept: KeptEstimates | None = None
+) -> Trackers:
+    """Open the networks for people, and for what is captured only on request.
+
+    :param kept: estimates of the landmark networks on disk.
+    """
+    people = PeopleTracker(
+        options.quality,
+        threads,
+        None if options.people == LARGEST else most_people(options.people),
+        detector=options.detector,
+        keypoints=options.keypoints,
+        execution=execution,
+        kept=kept,
+    )
+    hands = HandTracker(threads, execution=execution) if options.hands else None
+    # The face's small layers take twice the processor time in two threads, which mostly wait for each other.
+    return Trackers(people, hands, FaceTracker(1, execution=execution) if options.face else None)

@@ -1,0 +1,240 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Observation of a long clip, window by window.
+
+In one piece, all windows are observed in one pass. Some or all of them may also have been observed before, by other
+processes, which each began to decode at their own window. The result is the same, because
+
+- what is observed in a window depends on its frames alone;
+- a window whose first frames are not those of the window before, image by image, is observed again with the clip
+  decoded from its beginning;
+- a window whose trackers have lost somebody at the seam is observed again with trackers that are given the regions of
+  the window before. Whether that is so depends on the shared frames alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+
+from ...camera.camera_rotation import BackgroundTracker
+from ...fitting.background_estimators import KERNELS, BackgroundEstimators, camera_of_clip
+from ...fitting.focal_fits import FocalFits
+from ...fitting.live_body import LiveBody
+from ...media.frame import Frame
+from ...media.video import Video
+from ...options import CaptureOptions, most_people
+from ...perception.execution import Execution
+from ...perception.kept.kept_estimates import KeptEstimates
+from ...perception.observation import Observation
+from ...perception.region import Region
+from ...tracking.landmarks.mask_schedule import MaskSchedule
+from ...tracking.track import Track
+from ..clock import COMPILING, Progress, StageClock
+from ..footage import Footage, Listeners, given_camera, no_frames_error
+from ..frame_observer import FrameObserver, Trackers
+from ..networks import network_threads, open_trackers
+from .joined_windows import JoinedWindows
+from .plan import Window
+from .window_file import load_window, save_window
+from .window_record import WindowRecord
+from .window_run import WindowRun
+from .window_sequence import frame_pairs, run_windows
+
+_FINDING = "finding the person"  # a stage
+
+
+class LongClip:
+    """A clip with several windows.
+
+    :param windows: all of them.
+    :param pool: in which the background is followed.
+    :param kept: estimates of the landmark networks on disk.
+    """
+
+    def __init__(
+        self,
+        video: Video,
+        windows: Sequence[Window],
+        options: CaptureOptions,
+        clock: StageClock,
+        pool: ThreadPoolExecutor,
+        kept: KeptEstimates | None = None,
+    ) -> None:
+        self._video, self._windows, self._options, self._clock, self._kept = video, windows, options, clock, kept
+        self._camera, self._pool = given_camera(video, options), pool
+        self._execution = Execution(options.provider)
+        self._threads = network_threads(options, self._execution)
+        self._trackers: Trackers | None = None
+        self._joined = JoinedWindows()
+
+    def observe(
+        self,
+        background: BackgroundEstimators,
+        fits: FocalFits,
+        live: LiveBody,
+        listeners: Listeners,
+        folder: Path | None = None,
+    ) -> tuple[Footage, list[Track]]:
+        """Observe all windows, and join them.
+
+        :param background: which loads the solver.
+        :param fits: for the focal length.
+        :param folder: with the files of windows that were observed before.
+        :raises VideoError: there is no frame.
+        """
+        if folder is None:
+            self._observe_all(live, listeners)
+        else:
+            self._gather(folder, listeners.progress)
+        if not len(self._joined):
+            raise no_frames_error(self._video)
+        background.wait_for_solver(lambda done: listeners.progress(COMPILING, min(done, KERNELS), KERNELS))
+        with self._clock.stage("solver"):
+            return self._footage(fits), self._joined.tracks(most_people(self._options.people))
+
+    def save(self, numbers: range, folder: Path, progress: Progress) -> tuple[list[Path], int]:
+        """Observe some successive windows, and write each to a file of a folder.
+
+        :return: the files, and the number of frames in the windows.
+        """
+        windows = [self._windows[k] for k in numbers]
+        files: list[Path] = []
+        frames = 0
+
+        def seam(ended: WindowRun, following: WindowRun | None) -> WindowRun | None:
+            nonlocal frames
+            record = self._record(ended)
+            frames += len(record) - record.first
+            files.append(save_window(folder, record, (self._video.width, self._video.height)))
+            progress(_FINDING, frames, 0)
+            return following
+
+        run_windows(
+            windows,
+            self._begin,
+            frame_pairs(self._frames(windows[0]), self._clock),
+            seam,
+            lambda frame, largest: progress(_FINDING, frames, 0),
+        )
+        return files, frames
+
+    def _observe_all(self, live: LiveBody, listeners: Listeners) -> None:
+        """Observe all windows in one pass."""
+        done, expected = 0, self._video.expected_frames
+
+        def seam(ended: WindowRun, following: WindowRun | None) -> WindowRun | None:
+            self._joined.add(ended.record())
+            regions = self._joined.missed(following.record()) if following is not None else []
+            if following is None or not regions:
+                return following
+            return self._warmed_up(following, regions)
+
+        def watch(frame: Frame, largest: Observation | None) -> None:
+            nonlocal done
+            done += 1
+            listeners.watch(frame, largest, live)
+            listeners.progress(_FINDING, done, max(expected, done))
+
+        run_windows(
+            self._windows,
+            self._begin,
+            frame_pairs(iter(self._video), self._clock),
+            seam,
+            watch,
+        )
+
+    def _warmed_up(self, run: WindowRun, regions: list[Region]) -> WindowRun:
+        """Return another run of a window, with people in given regions, up to the frame that the first one reached."""
+        for exact in (False, True):
+            other = self._begin(run.window, regions)
+            images = self._frames(run.window, exact)
+            for frame, upcoming in frame_pairs(images, self._clock):
+                if run.window.has_begun(frame.timestamp_s):
+                    break
+                other.add(frame, upcoming)
+            if np.array_equal(other.record().checksums, run.record().checksums):
+                break
+        return other
+
+    def _gather(self, folder: Path, progress: Progress) -> None:
+        """Join windows from their files; those that are missing, or do not fit, are observed here."""
+        size = self._video.width, self._video.height
+        for window in self._windows:
+            record = load_window(folder, window, size) or self._single(window)
+            if not self._joined.accepts(record):
+                record = self._single(window, exact=True)
+            if len(record) > record.first and (regions := self._joined.missed(record)):
+                record = self._single(window, regions)
+                if not self._joined.accepts(record):
+                    record = self._single(window, regions, exact=True)
+            self._joined.add(record)
+            progress(_FINDING, len(self._joined), max(self._video.expected_frames, len(self._joined)))
+
+    def _single(
+        self,
+        window: Window,
+        regions: Sequence[Region] = (),
+        exact: bool = False,
+    ) -> WindowRecord:
+        """Observe one window alone.
+
+        :param regions: in which people are in its first frame.
+        :param exact: whether to decode from the beginning of the clip.
+        """
+        run = self._begin(window, regions)
+        for frame, upcoming in frame_pairs(self._frames(window, exact), self._clock):
+            if window.has_ended(frame.timestamp_s):
+                break
+            run.add(frame, upcoming)
+        return self._record(run)
+
+    def _frames(self, window: Window, exact: bool = False) -> Iterator[Frame]:
+        """Yield the frames from a window's anchor on.
+
+        :param exact: whether to decode from the beginning of the clip, as is always done where frames are left out.
+        """
+        video = self._video
+        if window.number == 0:
+            yield from video
+        elif exact or video.wanted.fps is not None:
+            yield from (frame for frame in video if window.warms_up(frame.timestamp_s))
+        else:
+            yield from video.frames_from(window.anchor_s)
+
+    def _begin(self, window: Window, regions: Sequence[Region] = ()) -> WindowRun:
+        """Return a run of a window with trackers that have seen nothing."""
+        if self._trackers is None:
+            self._trackers = open_trackers(self._options, self._threads, self._execution, self._kept)
+        people, hands, faces = self._trackers
+        own = Trackers(people.another(regions), hands and hands.another(), faces and faces.another())
+        network = people.mask_network if self._options.ablation.outline else None
+        masks = MaskSchedule(network, self._video.expected_frames)
+        following = self._windows[window.number + 1] if window.number + 1 < len(self._windows) else None
+        return WindowRun(
+            window,
+            following,
+            FrameObserver(own, masks, self._clock),
+            BackgroundTracker(self._camera, self._video.width, self._video.height),
+            self._pool,
+            self._clock,
+        )
+
+    def _record(self, run: WindowRun) -> WindowRecord:
+        warnings = self._execution.warnings + self._video.warnings
+        return run.record(self._execution.describe(self._threads), warnings)
+
+    def _footage(self, fits: FocalFits) -> Footage:
+        """Return what is known of the joined windows apart from the people."""
+        joined, camera, size = self._joined, self._camera, (self._video.width, self._video.height)
+        execution = self._execution.describe(self._threads) if self._trackers else joined.execution
+        warnings = self._execution.warnings + self._video.warnings
+        warnings += [text for text in joined.warnings if text not in warnings]
+        record = joined.background()
+        people = joined.largest_people(record.edge_frames[0].row) if record.edge_frames else iter(())
+        found = camera_of_clip(camera, size, record, people, fits)
+        motion = record.motion(camera, found, size)
+        lines = record.lines(motion, found)
+        return Footage(np.array(joined.timestamps), found, motion, lines, joined.cuts_s(), execution, warnings)

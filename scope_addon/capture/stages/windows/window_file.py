@@ -1,0 +1,274 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What was observed in a window as a file, for the process that joins the windows: plain arrays, no Python objects.
+
+A file may come from another machine, so whatever is read from it is checked. One that is missing, damaged or of another
+window counts for nothing: the window is observed again.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .....solver.errors import InputError, ScopeError
+from .....solver.loaders.archive import read_members
+from ....atomic_write import atomic_path
+from ...camera.background_record import BackgroundRecord
+from ...camera.heading_drift import FrameEdges
+from ...camera.line_segments import Segments
+from ...perception.face.face_record import RECORD
+from ...perception.landmark_network import KEYPOINT_COUNT
+from ...perception.observation import PersonMask
+from ...perception.region import Region
+from ...tracking.appearance import SIZE as APPEARANCE_SIZE
+from ...tracking.track import Tracklet
+from .plan import Window
+from .window_record import WindowRecord, known_reference
+
+MASK_SIDE = 256
+MOST_TEXT = 100_000
+# Name: type and shape. The first length of several arrays is the same where the letter is: frames (N), tracklets (M),
+# their rows (R), references (Q), masks (K), regions (S), edge frames (E), edges (L).
+_ARRAYS: dict[str, tuple[type[Any], str, tuple[int, ...]]] = {
+    "geometry": (np.float64, "6", ()),  # number, anchor, begin and end of the window, width and height of the image
+    "rows": (np.int64, "2", ()),  # first, anchor
+    "indices": (np.int64, "N", ()),
+    "timestamps": (np.float64, "N", ()),
+    "checksums": (np.uint32, "N", ()),
+    "cut_rows": (np.int64, "C", ()),
+    "R_first_camera": (np.float64, "N", (3, 3)),
+    "known": (np.bool_, "N", ()),
+    "inlier_shares": (np.float64, "I", ()),
+    "bars": (np.float64, "B", (4,)),
+    "edge_rows": (np.int64, "E", (2,)),  # row and number of the edges
+    "edge_ends": (np.float64, "L", (2, 2)),
+    "edge_lengths": (np.float64, "L", ()),
+    "anchor_regions": (np.float64, "S", (5,)),  # tracklet, centre, side, rotation
+    "tracklets": (np.int64, "M", (2,)),  # number, number of rows
+    "appearance": (np.float64, "M", (APPEARANCE_SIZE,)),
+    "tracklet_rows": (np.int64, "R", ()),
+    "values": (np.float32, "R", (KEYPOINT_COUNT, 6)),
+    "centers": (np.float64, "R", (2,)),
+    "sides": (np.float64, "R", ()),
+    "hands": (np.float32, "H", (2, 21, 6)),  # R or 0 of them
+    "faces": (np.float32, "F", (RECORD,)),  # likewise
+    "references": (np.int64, "Q", (3,)),  # tracklet, row, whether the network found a body
+    "reference_landmarks": (np.float64, "Q", (KEYPOINT_COUNT, 3)),
+    "masks": (np.int64, "K", (2,)),  # tracklet, row
+    "mask_regions": (np.float64, "K", (4,)),
+    "mask_probability": (np.float16, "K", (MASK_SIDE, MASK_SIDE)),
+    "text": (np.uint8, "T", ()),
+}
+Arrays = dict[str, NDArray[Any]]
+
+
+def window_name(number: int) -> str:
+    """Return the name of a window's file."""
+    return f"window{number:05d}.npz"
+
+
+def save_window(folder: Path, record: WindowRecord, size: tuple[int, int]) -> Path:
+    """Write a window's file, and return its path.
+
+    :param size: of the image, width and height in pixels.
+    :raises OSError: it cannot be written.
+    """
+    path = folder / window_name(record.window.number)
+    window, background = record.window, record.background
+    segments = [edge.segments for edge in background.edge_frames]
+    text = json.dumps({"execution": record.execution, "warnings": list(record.warnings)}).encode()
+    arrays = {
+        "geometry": [window.number, window.anchor_s, window.begin_s, window.end_s, *size],
+        "rows": [record.first, record.anchor],
+        "indices": record.indices,
+        "timestamps": record.timestamps,
+        "checksums": record.checksums,
+        "cut_rows": record.cut_rows,
+        "R_first_camera": background.R_first_camera,
+        "known": background.known,
+        "inlier_shares": background.inlier_shares,
+        "bars": background.bars,
+        "edge_rows": [(edge.row, len(edge.segments.lengths)) for edge in background.edge_frames],
+        "edge_ends": _joined([each.ends_px for each in segments]),
+        "edge_lengths": _joined([each.lengths for each in segments]),
+        "anchor_regions": [(number, *_region_row(r)) for number, r in record.anchor_regions.items()],
+        "text": np.frombuffer(text, np.uint8),
+        **_people_arrays(record.tracklets),
+    }
+    with atomic_path(path) as temporary, temporary.open("wb") as file:
+        np.savez(file, **{name: _as_declared(name, value) for name, value in arrays.items()})
+    return path
+
+
+def load_window(folder: Path, window: Window, size: tuple[int, int]) -> WindowRecord | None:
+    """Read a window's file; None if it is missing, damaged, or of another window.
+
+    :param size: of the image, width and height in pixels.
+    """
+    path = folder / window_name(window.number)
+    try:
+        if not path.is_file():  # opening a pipe would wait for a writer
+            return None
+        arrays = read_members(path, tuple(_ARRAYS), "")[0]
+        _check(arrays)
+        expected = [window.number, window.anchor_s, window.begin_s, window.end_s, *size]
+        return _record(arrays, window, size) if arrays["geometry"].tolist() == expected else None
+    except (ScopeError, OSError):
+        return None
+
+
+def _people_arrays(tracklets: dict[int, Tracklet]) -> dict[str, Any]:
+    people = list(tracklets.values())
+    references = [(n, row, call.result()) for n, t in tracklets.items() for row, call in t.references]
+    nothing = np.zeros((KEYPOINT_COUNT, 3))
+    masks = [(n, row, mask) for n, t in tracklets.items() for row, mask in t.masks]
+    return {
+        "tracklets": [(number, len(tracklet.rows)) for number, tracklet in tracklets.items()],
+        "appearance": [tracklet.appearance for tracklet in people],
+        "tracklet_rows": _joined([tracklet.rows for tracklet in people]),
+        "values": _joined([tracklet.values for tracklet in people]),
+        "centers": _joined([tracklet.centers_px for tracklet in people]),
+        "sides": _joined([tracklet.sides_px for tracklet in people]),
+        "hands": _joined([tracklet.hands for tracklet in people]),
+        "faces": _joined([tracklet.faces for tracklet in people]),
+        "references": [(n, row, found is not None) for n, row, found in references],
+        "reference_landmarks": [nothing if found is None else found for _, _, found in references],
+        "masks": [(n, row) for n, row, _ in masks],
+        "mask_regions": [_region_row(mask.region) for _, _, mask in masks],
+        "mask_probability": [mask.probability for _, _, mask in masks],
+    }
+
+
+def _joined(parts: list[Any]) -> Any:
+    """Return the arrays one after another; an empty list if all are empty."""
+    full = [np.asarray(part) for part in parts if len(part)]
+    return np.concatenate(full) if full else []
+
+
+def _region_row(region: Region) -> tuple[float, ...]:
+    return (*region.center_px, region.side_px, region.rotation)
+
+
+def _as_declared(name: str, value: Any) -> NDArray[Any]:
+    dtype, _, shape = _ARRAYS[name]
+    array = np.asarray(value, dtype)
+    return array if array.size else np.zeros((0, *shape), dtype)
+
+
+def _check(arrays: Arrays) -> None:
+    """Check types, shapes and numbers.
+
+    :raises InputError: something does not fit.
+    """
+    lengths: dict[str, int] = {}
+    for name, (dtype, letter, shape) in _ARRAYS.items():
+        array = arrays.get(name)
+        if array is None or array.dtype != dtype or array.ndim != 1 + len(shape) or array.shape[1:] != shape:
+            raise InputError(f"{name} is missing or has another form")
+        expected = int(letter) if letter.isdigit() else lengths.setdefault(letter, len(array))
+        may_be_infinite = name == "geometry"
+        if len(array) != expected or (array.dtype.kind == "f" and not may_be_infinite and not np.isfinite(array).all()):
+            raise InputError(f"{name} has another length, or numbers that are not finite")
+    _require(lengths["H"] in (0, lengths["R"]) and lengths["F"] in (0, lengths["R"]), "hands and faces")
+    frames, (first, anchor) = lengths["N"], arrays["rows"].tolist()
+    _require(0 <= first <= frames and first <= anchor <= frames, "rows")
+    for name, column in (("cut_rows", ...), ("edge_rows", 0), ("tracklet_rows", ...), ("references", 1), ("masks", 1)):
+        rows = arrays[name][..., column] if isinstance(column, int) else arrays[name]
+        _require(bool(((rows >= 0) & (rows < frames)).all()), name)
+    _require(bool((np.diff(arrays["timestamps"]) > 0).all()), "timestamps")
+    _require(bool((arrays["cut_rows"] >= first).all()), "cut_rows")
+    numbers, counts = arrays["tracklets"].T
+    _require(bool((counts >= 0).all()) and len(set(numbers.tolist())) == len(numbers), "tracklets")
+    _require(_sums_to(counts, lengths["R"]) and _sums_to(arrays["edge_rows"][:, 1], lengths["L"]), "counts")
+    for rows in np.split(arrays["tracklet_rows"], np.cumsum(counts)[:-1]):
+        _require(bool((np.diff(rows) > 0).all()), "tracklet_rows")
+    _require(bool(np.isin(arrays["references"][:, 0], numbers).all()), "references")
+    _require(bool(np.isin(arrays["masks"][:, 0], numbers).all()), "masks")
+    sides = (arrays["sides"], arrays["mask_regions"][:, 2], arrays["anchor_regions"][:, 3])
+    _require(all(bool((side > 0).all()) for side in sides), "sides")
+    _require(lengths["T"] <= MOST_TEXT, "text")
+
+
+def _sums_to(counts: NDArray[np.int64], total: int) -> bool:
+    return bool(((counts >= 0) & (counts <= total)).all()) and int(counts.sum()) == total
+
+
+def _require(holds: bool, name: str) -> None:
+    if not holds:
+        raise InputError(f"{name} does not fit the other arrays")
+
+
+def _record(arrays: Arrays, window: Window, size: tuple[int, int]) -> WindowRecord:
+    first, anchor = arrays["rows"].tolist()
+    execution, warnings = _text(arrays["text"])
+    counts = np.cumsum(arrays["edge_rows"][:, 1])[:-1]
+    edges = zip(np.split(arrays["edge_ends"], counts), np.split(arrays["edge_lengths"], counts), strict=True)
+    background = BackgroundRecord(
+        arrays["timestamps"],
+        arrays["R_first_camera"],
+        arrays["known"],
+        arrays["inlier_shares"].tolist(),
+        [FrameEdges(int(row), Segments(*each)) for (row, _), each in zip(arrays["edge_rows"], edges, strict=False)],
+        list(arrays["bars"]),
+    )
+    return WindowRecord(
+        window,
+        arrays["indices"],
+        arrays["timestamps"],
+        arrays["checksums"],
+        first,
+        anchor,
+        _tracklets(arrays, size),
+        {int(n): _region(row) for n, *row in arrays["anchor_regions"].tolist()},
+        arrays["cut_rows"].tolist(),
+        background,
+        execution,
+        warnings,
+    )
+
+
+def _tracklets(arrays: Arrays, size: tuple[int, int]) -> dict[int, Tracklet]:
+    tracklets: dict[int, Tracklet] = {}
+    begin = 0
+    for (number, count), appearance in zip(arrays["tracklets"].tolist(), arrays["appearance"], strict=True):
+        rows = slice(begin, begin + count)
+        tracklets[number] = Tracklet(
+            arrays["tracklet_rows"][rows].tolist(),
+            list(arrays["values"][rows]),
+            list(arrays["centers"][rows]),
+            arrays["sides"][rows].tolist(),
+            appearance,
+            hands=list(arrays["hands"][rows]),
+            faces=list(arrays["faces"][rows]),
+        )
+        begin += count
+    for (number, row, found), landmarks in zip(
+        arrays["references"].tolist(), arrays["reference_landmarks"], strict=True
+    ):
+        tracklets[number].references.append((row, known_reference(landmarks if found else None)))
+    for (number, row), region, mask in zip(
+        arrays["masks"].tolist(), arrays["mask_regions"].tolist(), arrays["mask_probability"], strict=True
+    ):
+        tracklets[number].masks.append((row, PersonMask(_region(region), mask, size)))
+    return tracklets
+
+
+def _region(row: list[float]) -> Region:
+    x, y, side_px, rotation = row
+    return Region((x, y), side_px, rotation)
+
+
+def _text(encoded: NDArray[np.uint8]) -> tuple[str, tuple[str, ...]]:
+    """Return execution and warnings.
+
+    :raises InputError: they are no text.
+    """
+    try:
+        read = json.loads(encoded.tobytes())
+        return str(read["execution"]), tuple(str(text) for text in read["warnings"])
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        raise InputError(f"the text of a window cannot be read: {error}") from error

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Decoding from the middle of a video gives the very images that decoding from its beginning gives."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.media.frame import Frame
+from scope.scope_addon.capture.media.video import open_video
+from scope.scope_addon.capture.media.video_range import VideoRange
+
+from ...required import package
+
+av = package("av")
+FPS, SECONDS, STARTS_S = 4, 45, (3.0, 33.25)
+
+
+def write(path: Path, codec: str, form: str, times: list[float], options: dict[str, str]) -> Path:
+    """Write a disc that moves over noise; ``times`` in seconds, ``form``: of the pixels."""
+    noise = np.random.default_rng(0).integers(0, 255, (48, 64, 3), np.uint8)
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream(codec, rate=FPS, options=options)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, form
+        stream.codec_context.thread_count = 1
+        stream.time_base = stream.codec_context.time_base = Fraction(1, 1000)
+        for k, time_s in enumerate(times):
+            image = noise.copy()
+            image[k % 40 : k % 40 + 8, k % 56 : k % 56 + 8] = 255
+            frame = av.VideoFrame.from_ndarray(image, format="rgb24").reformat(format=form)
+            frame.pts, frame.time_base = round(1000 * time_s), Fraction(1, 1000)
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
+    return path
+
+
+EVEN = [k / FPS for k in range(SECONDS * FPS)]
+UNEVEN = [(k + 0.4 * (k % 3 == 1) + 0.02 * k) / FPS for k in range(SECONDS * FPS)]
+FILES = {
+    "few keyframes.mp4": ("mpeg4", "yuv420p", EVEN, {"g": "60", "bf": "2"}),
+    "h264.mp4": ("libx264", "yuv420p", EVEN, {"g": "40", "bf": "3"}),
+    "open groups.mkv": ("libx264", "yuv420p", EVEN, {"g": "16", "x264-params": "open-gop=1:bframes=3:threads=1"}),
+    "one keyframe.mp4": ("libx264", "yuv420p", EVEN, {"g": "10000"}),
+    "uneven.mkv": ("libx264", "yuv420p", UNEVEN, {"g": "60"}),
+    "vp9.webm": ("libvpx-vp9", "yuv420p", EVEN, {"g": "30", "cpu-used": "8", "deadline": "realtime"}),
+}
+
+
+def same(a: Frame, b: Frame) -> bool:
+    return a.timestamp_s == b.timestamp_s and np.array_equal(a.image_rgb, b.image_rgb)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_frames_from_the_middle_are_those_of_the_whole(tmp_path: Path, name: str) -> None:
+    try:
+        path = write(tmp_path / name, *FILES[name])
+    except (ValueError, av.error.FFmpegError):
+        pytest.skip("this build of PyAV cannot write such a file")
+    with open_video(path) as video:
+        whole = list(video)
+        assert len(whole) > 0.95 * SECONDS * FPS
+        for start_s in STARTS_S:
+            found = list(video.frames_from(start_s))
+            expected = [frame for frame in whole if frame.timestamp_s >= start_s - 1e-6]
+            assert len(found) == len(expected) > 0
+            assert all(same(a, b) for a, b in zip(found, expected, strict=True))
+            assert len({b.index - a.index for a, b in zip(found, expected, strict=True)}) == 1
+
+
+def test_the_end_of_the_range_is_kept(tmp_path: Path) -> None:
+    path = write(tmp_path / "clip.mp4", "mpeg4", "yuv420p", EVEN, {"g": "30"})
+    with open_video(path, VideoRange(5.0, 40.0)) as video:
+        found = [frame.timestamp_s for frame in video.frames_from(30.0)]
+    assert (found[0], found[-1]) == pytest.approx((30.0, 40.0))

@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A long clip in one piece and in windows, with synthetic people of known places."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from scope.scope_addon.capture.media.frame import Frame
+from scope.scope_addon.capture.media.video import Video, open_video
+from scope.scope_addon.capture.options import CaptureOptions
+from scope.scope_addon.capture.stages.clock import StageClock
+from scope.scope_addon.capture.stages.footage import Listeners
+from scope.scope_addon.capture.stages.windows import joined_windows
+from scope.scope_addon.capture.stages.windows.long_clip import LongClip
+from scope.scope_addon.capture.stages.windows.observe_part import count_windows, observe_windows
+from scope.scope_addon.capture.stages.windows.plan import plan_windows
+from scope.scope_addon.capture.tracking.landmarks import tracking_networks
+from scope.scope_addon.capture.tracking.track import Track
+
+from ...fake_people import FakeDetector, FakeLandmarks, Person, pictures
+
+RED, BLUE = (220, 30, 30), (30, 30, 220)
+FPS, FRAMES, WINDOW_S = 30, 210, 2.0  # three windows: frames 0 to 59, 60 to 119, and the rest
+SMALL = Person(lambda t: (150 + 0.5 * t, 130), RED, size_px=45)
+# Present when the second window's trackers begin, and so large that they would not care about the other one.
+LARGE = Person(lambda t: (430, 130) if 20 <= t < 75 else None, BLUE, size_px=115)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("clip")
+    for t, image in enumerate(pictures([SMALL, LARGE], FRAMES, (600, 260))):
+        cv2.imwrite(str(folder / f"frame{t:04d}.png"), cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
+    return folder
+
+
+@pytest.fixture
+def windows_of(monkeypatch: pytest.MonkeyPatch, folder: Path) -> Callable[..., list[Track]]:
+    """``windows_of(options, parts=None)``: the tracks of the clip, or those joined from a folder of windows."""
+    people = [SMALL, LARGE]
+    monkeypatch.setattr(tracking_networks, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people, "heavy" in name))
+    monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_: FakeDetector(people))
+
+    def observed(options: CaptureOptions, parts: Path | None = None) -> list[Track]:
+        with open_video(folder) as video, ThreadPoolExecutor(2) as pool:
+            clip = LongClip(video, plan_windows(video, options.window_s), options, StageClock(), pool)
+            background: Any = SimpleNamespace(wait_for_solver=lambda progress: None)
+            fits: Any = SimpleNamespace(is_due=lambda time_s: False)
+            live: Any = None
+            listeners = Listeners(lambda *_: None, lambda *_: None)
+            return clip.observe(background, fits, live, listeners, parts)[1]
+
+    return observed
+
+
+def options(people: int | str = "largest") -> CaptureOptions:
+    return CaptureOptions(quality="fast", threads=1, people=people, window_s=WINDOW_S)
+
+
+def assert_same(a: list[Track], b: list[Track]) -> None:
+    assert len(a) == len(b)
+    for one, other in zip(a, b, strict=True):
+        for name in ("frames", "times", "seen", "keypoints_px", "confidence", "world_landmarks", "acquired"):
+            assert np.array_equal(getattr(one, name), getattr(other, name)), name
+        assert np.array_equal(one.reference_rows, other.reference_rows)
+        assert np.array_equal(one.reference_landmarks, other.reference_landmarks)
+
+
+def places(track: Track) -> np.ndarray:
+    return track.keypoints_px[:, [23, 24]].mean(axis=1)
+
+
+@pytest.mark.parametrize("people", ["largest", 1, 2])
+def test_windows_of_several_processes_are_the_clip_in_one_piece(
+    windows_of: Callable[..., list[Track]], folder: Path, tmp_path: Path, people: int | str
+) -> None:
+    given = options(people)
+    assert count_windows(folder, given) == 3
+    frames = [observe_windows(folder, given, numbers, tmp_path)[1] for numbers in (range(2, 3), range(2))]
+    assert frames == [90, 120]
+    assert_same(windows_of(given, tmp_path), windows_of(given))
+
+
+def test_the_same_person_is_followed_across_a_seam_where_somebody_larger_stands(
+    windows_of: Callable[..., list[Track]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (track,) = windows_of(options())
+    truth = np.array([SMALL.center_px(t) for t in range(FRAMES)])
+    assert track.seen.all()
+    assert track.acquired.sum() == 1
+    assert np.abs(places(track) - truth).max() < 5
+    monkeypatch.setattr(joined_windows, "missed_people", lambda before, after: False)
+    (track,) = windows_of(options())
+    assert not track.seen[61:74].any()  # what the rule prevents
+
+
+def test_windows_that_are_missing_or_damaged_are_observed_by_the_process_that_joins(
+    windows_of: Callable[..., list[Track]], folder: Path, tmp_path: Path
+) -> None:
+    given = options()
+    files, _ = observe_windows(folder, given, range(3), tmp_path)
+    files[0].unlink()
+    files[2].write_bytes(files[2].read_bytes()[:-100])
+    assert_same(windows_of(given, tmp_path), windows_of(given))
+
+
+def test_a_window_that_was_decoded_to_other_images_is_observed_again(
+    windows_of: Callable[..., list[Track]], folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As of a file that does not mark its keyframes well: a decoder that begins in its middle gives a grey image."""
+    sought = Video.frames_from
+
+    def damaged(video: Video, start_s: float) -> Iterator[Frame]:
+        for k, frame in enumerate(sought(video, start_s)):
+            lost = np.full_like(frame.image_rgb, 90)
+            lost[0, 0] = frame.image_rgb[0, 0]
+            yield Frame(frame.index + 5, frame.timestamp_s, lost) if k < 8 else frame
+
+    whole = windows_of(options())
+    with monkeypatch.context() as patch:
+        patch.setattr(Video, "frames_from", damaged)
+        observe_windows(folder, options(), range(1, 2), tmp_path)
+        assert_same(windows_of(options(), tmp_path), whole)
+
+
+def test_indices_that_a_decoder_counts_from_elsewhere_are_those_of_the_clip(
+    windows_of: Callable[..., list[Track]], folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where the frame rate varies, and the index of a frame can only be estimated from its time."""
+    sought = Video.frames_from
+
+    def shifted(video: Video, start_s: float) -> Iterator[Frame]:
+        return (Frame(frame.index + 5, frame.timestamp_s, frame.image_rgb) for frame in sought(video, start_s))
+
+    whole = windows_of(options())
+    with monkeypatch.context() as patch:
+        patch.setattr(Video, "frames_from", shifted)
+        observe_windows(folder, options(), range(1, 3), tmp_path)
+        assert_same(windows_of(options(), tmp_path), whole)

@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The file of a window holds everything, and one that is damaged or of another window counts for nothing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.camera.background_record import BackgroundRecord
+from scope.scope_addon.capture.camera.heading_drift import FrameEdges
+from scope.scope_addon.capture.camera.line_segments import Segments
+from scope.scope_addon.capture.perception.face.face_record import RECORD
+from scope.scope_addon.capture.perception.observation import PersonMask
+from scope.scope_addon.capture.perception.region import Region
+from scope.scope_addon.capture.stages.windows.plan import Window
+from scope.scope_addon.capture.stages.windows.window_file import load_window, save_window
+from scope.scope_addon.capture.stages.windows.window_record import WindowRecord, known_reference
+from scope.scope_addon.capture.tracking.track import Tracklet
+
+SIZE, FRAMES = (640, 480), 12
+WINDOW = Window(3, 7.5, 8.0, 12.0)
+
+
+def record(seed: int = 0) -> WindowRecord:
+    rng = np.random.default_rng(seed)
+    edges = [FrameEdges(0, Segments(rng.random((4, 2, 2)), rng.random(4))), FrameEdges(5, Segments.none())]
+    times = 7.5 + np.arange(FRAMES) / 4
+    background = BackgroundRecord(
+        times, rng.random((FRAMES, 3, 3)), rng.random(FRAMES) > 0.5, [0.9, 0.8], edges, [rng.random(4)]
+    )
+    region = Region((100.0, 90.0), 80.0, 0.1)
+    people = {}
+    for number, rows in {0: range(FRAMES), 4: range(3, 9)}.items():
+        n = len(rows)
+        people[number] = Tracklet(
+            list(rows),
+            list(rng.random((n, 33, 6), np.float32)),
+            list(rng.random((n, 2))),
+            (1 + rng.random(n)).tolist(),
+            rng.random(36),
+            [(rows[1], known_reference(rng.random((33, 3)))), (rows[2], known_reference(None))],
+            list(rng.random((n, 2, 21, 6), np.float32)),
+            [(rows[0], PersonMask(region, rng.random((256, 256)).astype(np.float16), SIZE))],
+            list(rng.random((n, RECORD), np.float32)),
+        )
+    sums = rng.integers(0, 2**32, FRAMES, np.uint32)
+    cuts, indices = [4], np.arange(FRAMES) + 30
+    return WindowRecord(WINDOW, indices, times, sums, 2, 9, people, {0: region}, cuts, background, "CPU", ("dark",))
+
+
+def plain(value: Any) -> Any:
+    """The content of a record, for comparison."""
+    if hasattr(value, "result"):
+        return plain(value.result())
+    if isinstance(value, np.ndarray):
+        return value.dtype.str, value.shape, value.tobytes()
+    if isinstance(value, dict):
+        return {key: plain(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(each) for each in value]
+    return plain(vars(value)) if hasattr(value, "__dict__") else value
+
+
+def test_everything_is_read_as_it_was_written(tmp_path: Path) -> None:
+    made = record()
+    save_window(tmp_path, made, SIZE)
+    read = load_window(tmp_path, WINDOW, SIZE)
+    assert read is not None
+    assert plain(read) == plain(made)
+
+
+def test_a_window_without_people_is_read(tmp_path: Path) -> None:
+    empty = replace(record(), tracklets={}, anchor_regions={}, cut_rows=[], warnings=())
+    save_window(tmp_path, empty, SIZE)
+    read = load_window(tmp_path, WINDOW, SIZE)
+    assert read is not None
+    assert read.tracklets == {}
+
+
+def test_the_file_of_another_window_or_video_counts_for_nothing(tmp_path: Path) -> None:
+    assert load_window(tmp_path, WINDOW, SIZE) is None
+    save_window(tmp_path, record(), SIZE)
+    assert load_window(tmp_path, WINDOW, (480, 640)) is None
+    assert load_window(tmp_path, replace(WINDOW, end_s=11.0), SIZE) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "index", "value"),
+    [
+        ("values", (0, 0, 0), np.nan),
+        ("tracklet_rows", 0, FRAMES),
+        ("tracklet_rows", 0, -1),
+        ("tracklet_rows", 1, 0),
+        ("tracklets", (0, 1), 2**62),
+        ("tracklets", (1, 0), 0),
+        ("edge_rows", (0, 1), -3),
+        ("references", (0, 0), 7),
+        ("masks", (0, 1), 99),
+        ("mask_regions", (0, 2), 0.0),
+        ("timestamps", 4, 0.0),
+        ("rows", 0, FRAMES + 1),
+        ("cut_rows", 0, 0),
+        ("text", 0, 255),
+    ],
+)
+def test_numbers_that_do_not_fit_make_a_file_worthless(tmp_path: Path, name: str, index: Any, value: Any) -> None:
+    path = save_window(tmp_path, record(), SIZE)
+    arrays = dict(np.load(path))
+    arrays[name][index] = value
+    np.savez(path, **arrays)
+    assert load_window(tmp_path, WINDOW, SIZE) is None
+
+
+@pytest.mark.parametrize("name", ["values", "faces", "known", "text"])
+def test_an_array_that_is_missing_or_holds_objects_makes_a_file_worthless(tmp_path: Path, name: str) -> None:
+    path = save_window(tmp_path, record(), SIZE)
+    arrays = dict(np.load(path))
+    for other in (None, np.array([{}], object), arrays[name][:-1], arrays[name].astype(complex)):
+        np.savez(path, **{k: v for k, v in (arrays | {name: other}).items() if v is not None})
+        assert load_window(tmp_path, WINDOW, SIZE) is None
+
+
+def test_damaged_bytes_never_raise(tmp_path: Path) -> None:
+    path = save_window(tmp_path, record(), SIZE)
+    whole, rng = path.read_bytes(), np.random.default_rng(1)
+    for _ in range(60):
+        data = bytearray(whole)
+        for at in rng.integers(0, len(data), 8):
+            data[at] = rng.integers(256)
+        path.write_bytes(data[: rng.integers(1, len(data))] if rng.random() < 0.3 else data)
+        load_window(tmp_path, WINDOW, SIZE)

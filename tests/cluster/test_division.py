@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Long clips that several workers observe: every window once in the result, whatever becomes of workers."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scope.scope_addon.cli import PROGRAM, SAMPLE, main
+from scope.scope_addon.cluster.division import MOST_WINDOWS, Divisions, window_ranges
+from scope.scope_addon.job.clips.task import CaptureSettings, ClipTask
+
+from ..job.processes import runs, wait_for
+from ..required import package
+from .test_runner import calls, files, run, started
+
+distributed = package("distributed")
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="sends signals to worker processes")
+
+# Replaces the capture. A clip has as many windows as its text says, each of three frames. The first process of the
+# window in the file beside it runs until its standard input ends.
+CLIP = """
+import json, os, pathlib, sys
+clip = pathlib.Path(sys.argv[2])
+given = dict(each.split("=", 1) for each in sys.argv if each.startswith("--windows"))
+with open(clip.with_suffix(".calls"), "a") as log:
+    log.write(json.dumps({"pid": os.getpid(), "parent": os.getppid(), "windows": given.get("--windows", "")}) + "\\n")
+windows, count = given.get("--windows", ""), int(clip.read_text())
+if windows == "count" and count > 1:
+    print(json.dumps({"windows": count})); sys.exit()
+if ":" in windows:
+    first, end = map(int, windows.split(":"))
+    hung, failing = clip.with_suffix(".hangs"), clip.with_suffix(".fails")
+    if hung.exists() and first <= int(hung.read_text()) < end:
+        hung.unlink()
+        sys.stdin.read(); sys.exit(130)
+    if failing.exists() and first <= int(failing.read_text()) < end:
+        print("scope: it cannot be decoded", file=sys.stderr); sys.exit(1)
+    outputs = [pathlib.Path(given["--windows-folder"], f"window{k:05d}.npz") for k in range(first, end)]
+    for k, path in enumerate(outputs):
+        path.write_text(f"{first + k} ")
+    print(json.dumps({"frames": 3 * len(outputs), "outputs": [str(p) for p in outputs], "warnings": []})); sys.exit()
+folder = given.get("--windows-folder")
+found = "".join(p.read_text() for p in sorted(pathlib.Path(folder).iterdir())) if folder else "whole"
+outputs = [sys.argv[i + 1] for i, a in enumerate(sys.argv) if a == "-o"]
+for path in outputs:
+    pathlib.Path(path).write_text(found)
+print(json.dumps({"frames": 3 * count, "outputs": outputs, "warnings": []}))
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    clips = tmp_path / "clips"
+    clips.mkdir()
+    return clips
+
+
+def result(folder: Path, name: str) -> str:
+    return (folder.parent / "out" / f"{name}.npz").read_text()
+
+
+def test_windows_become_tasks_of_at_most_some_windows() -> None:
+    assert window_ranges(3, 1) == ["0:2", "2:3"]
+    assert window_ranges(30, 4) == ["0:4", "4:8", "8:12", "12:16", "16:20", "20:24", "24:28", "28:30"]
+    assert all(int(e) - int(b) <= MOST_WINDOWS for b, e in (r.split(":") for r in window_ranges(1000, 2)))
+
+
+def test_the_last_part_of_a_clip_is_followed_by_its_capture(tmp_path: Path) -> None:
+    task = ClipTask("a", "a.mp4", "a.mp4", "out", "basis", CaptureSettings({}, (".npz",)))
+    divisions = Divisions()
+    parts = divisions.begin(task, {"windows": 3, "key": "abc"}, tmp_path / "windows0", 2)
+    assert [part.windows for part in parts] == ["0:1", "1:2", "2:3"]
+    entry = {"report": {"frames": 100}, "seconds": 2.0}
+    assert divisions.ended(parts[1], "tcp://a", entry) == []
+    assert divisions.ended(parts[0], "tcp://b", None) == []
+    (last,) = divisions.ended(parts[2], "tcp://a", entry)
+    assert (last.windows, last.windows_folder, last.key) == ("", str(tmp_path / "windows0"), "abc")
+    assert divisions.close(last) == (200, {"windows": 3, "window_seconds": 4.0, "window_workers": ["tcp://a"]})
+    assert not (tmp_path / "windows0").exists()
+    assert divisions.close(last) == (0, {})
+
+
+def test_a_long_clip_is_captured_in_windows_and_counted_once(folder: Path) -> None:
+    (folder / "a.mp4").write_text("7")
+    (folder / "b.mp4").write_text("1")
+    with started(n_workers=2, processes=True) as cluster:
+        status, report = run(cluster, folder, program=CLIP)
+        assert status == 0
+        assert result(folder, "a") == "0 1 2 3 4 5 6 "
+        assert result(folder, "b") == "whole"
+        assert files(folder) == ["a.glb", "a.npz", "b.glb", "b.npz", "scope-batch.json"]  # and no window
+        long, short = report["files"]
+        assert (long["windows"], "windows" in short) == (7, False)
+        rows = report["workers"]
+        assert sum(row["windows"] for row in rows) == 7
+        assert sum(row["frames"] for row in rows) == report["throughput"]["frames"] == 24
+        assert sum(row["clips"] for row in rows) == 2
+        status, report = run(cluster, folder, program=CLIP)
+    assert report["counts"]["skipped"] == 2
+
+
+def test_the_windows_of_a_killed_worker_are_observed_by_another(folder: Path) -> None:
+    clip = folder / "a.mp4"
+    clip.write_text("6")
+    clip.with_suffix(".hangs").write_text("4")
+
+    def kill() -> None:
+        wait_for(lambda: calls(clip) and not clip.with_suffix(".hangs").exists())
+        (hung,) = [c for c in calls(clip) if ":" in c["windows"] and 4 in range(*map(int, c["windows"].split(":")))]
+        os.kill(hung["parent"], signal.SIGKILL)
+        wait_for(lambda: not runs(hung["pid"]))
+
+    with started(n_workers=2, processes=True) as cluster:
+        thread = threading.Thread(target=kill)
+        thread.start()
+        status, report = run(cluster, folder, program=CLIP)
+        thread.join()
+    assert status == 0
+    assert result(folder, "a") == "0 1 2 3 4 5 "
+    assert sum(row["attempts_lost"] for row in report["workers"]) == 1
+    assert sum(row["frames"] for row in report["workers"]) == 18
+    again = [call["windows"] for call in calls(clip) if ":" in call["windows"]]
+    assert len(again) == len(set(again)) + 1  # nothing else was repeated
+    assert any("a.mp4 (windows" in event["event"] for event in report["log"])
+
+
+def test_a_part_that_fails_is_left_to_the_capture_of_the_clip(folder: Path) -> None:
+    clip = folder / "a.mp4"
+    clip.write_text("4")
+    clip.with_suffix(".fails").write_text("1")
+    with started(n_workers=2, processes=True) as cluster:
+        status, report = run(cluster, folder, program=CLIP)
+    assert status == 0
+    assert result(folder, "a") == "0 2 3 "  # which then observes the missing window itself
+    assert sum(row["frames"] for row in report["workers"]) == 12
+
+
+def test_real_windows_of_two_workers_give_the_result_in_one_piece(folder: Path, networks: Path) -> None:
+    (folder / "clip.mp4").write_bytes(SAMPLE.read_bytes())
+    options = ["--quality", "fast", "--end", "1.6", "--window-seconds", "0.5", "--formats", "npz"]
+    whole = folder.parent / "whole.npz"
+    capture = ["capture", str(SAMPLE), "-o", str(whole), *options[:-2], "--threads", "1"]
+    assert main(capture) == 0
+    with started(n_workers=2, processes=True) as cluster:
+        argv = ["batch", str(folder), "--out", str(folder.parent / "out"), *options]
+        assert main([*argv, "--scheduler", cluster.scheduler_address], program=PROGRAM) == 0
+    with np.load(whole) as one, np.load(folder.parent / "out" / "clip.npz") as other:
+        assert set(one.files) == set(other.files)
+        different = [name for name in one.files if not np.array_equal(one[name], other[name])]
+    assert set(different) <= {"source", "report"}
