@@ -42,8 +42,10 @@ def _temporary_folder() -> Iterator[None]:
     """Have the system's temporary folder be a new one with the owner's name; as it is where none can be made."""
     before = {name: os.environ.get(name) for name in _VARIABLES}
     with suppress(OSError):
-        _remove_abandoned(Path(tempfile.gettempdir()))
-        os.environ.update(dict.fromkeys(_VARIABLES, tempfile.mkdtemp(prefix=f"{_START}{owner()}-")))
+        system = _system_folder()
+        _remove_abandoned(system)
+        made = tempfile.mkdtemp(prefix=f"{_START}{owner()}-", dir=system)
+        os.environ.update(dict.fromkeys(_VARIABLES, made))
     try:
         yield
     finally:
@@ -52,6 +54,12 @@ def _temporary_folder() -> Iterator[None]:
                 os.environ.pop(name, None)
             else:
                 os.environ[name] = value
+
+
+def _system_folder() -> Path:
+    """Return the system's temporary folder; `tempfile.gettempdir` would try it with a file, which a kill leaves."""
+    given = [Path(os.environ[name]) for name in _VARIABLES if os.environ.get(name)]
+    return next((folder for folder in given if folder.is_dir()), Path("/tmp"))
 
 
 def _remove_abandoned(system_folder: Path) -> None:
