@@ -127,7 +127,7 @@ def interrupted(server: subprocess.Popen) -> Iterator[float]:
     """Kill the camera, see what the panel says, and start it again."""
     server.kill()
     server.wait()
-    yield from until(lambda: state().job.status.notice, 10, "a sentence about the interruption")
+    yield from until(lambda: state().job.status.notice, 30, "a sentence about the interruption")
     yield 0.5
     report["interrupted"] = state().job.status.notice
     picture("22_live_interrupted")
