@@ -78,7 +78,8 @@ def test_command_line_and_worker_have_the_same_defaults():
 
 def test_the_typed_fields_of_the_pipeline_are_the_declared_options():
     fields = {field.name for field in dataclasses.fields(CaptureOptions)}
-    assert fields == {each.name for each in options_at(Place.CAPTURE)} | {"wanted"}  # wanted: start, end and fps
+    # wanted: start, end and fps; window_s: of long clips, which the parts of one on several machines have in common
+    assert fields == {each.name for each in options_at(Place.CAPTURE)} | {"wanted", "window_s"}
     for each in options_at(Place.CAPTURE | Place.WORKER):
         assert getattr(CaptureOptions(), each.name) == each.default
 
