@@ -4,8 +4,7 @@
 They keep clear of what crashes Blender 4.3 without Scope: linking from the file that is open; removing the library of
 the scene that the window shows (``bpy.data.libraries.remove`` leaves the window without a scene); deleting a movie clip
 that the viewport shows as a camera's background, after which, at once or after undo, drawing reads the clip's freed
-textures; deleting linked objects of a scene that the window showed before, which drawing reads when it frees unused
-batches; scenes that share their objects (``scene.new(type="LINK_COPY")``) with undo, and then showing another scene.
+textures; scenes that share their objects (``scene.new(type="LINK_COPY")``) with undo, and then showing another scene.
 """
 
 from __future__ import annotations
@@ -118,8 +117,8 @@ class FileSteps:
         """Delete a collection with everything in it."""
         return self.on(
             "collections",
-            "delete hierarchy",  # of this file
-            lambda block: block.library or bpy.data.batch_remove([*block.all_objects, block]),
+            "delete hierarchy",
+            lambda block: bpy.data.batch_remove([*block.all_objects, block]),
         )
 
     def step_delete_selected(self) -> Step:

@@ -24,6 +24,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import walk_steps
 from file_state import State, differences, identities, state
 from session import ARGUMENTS, OUT, show_tab
+from walk_file_steps import Step
 
 SEED, COUNT = int(ARGUMENTS[2]), int(ARGUMENTS[3])
 PAUSE_S = 0.02
@@ -36,6 +37,33 @@ def everything() -> State:
     scene = bpy.context.window_manager.windows[0].scene
     scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)  # evaluates what steps have left
     return state() | identities()
+
+
+def objects() -> set[int]:
+    """Return which objects there are."""
+    return {obj.session_uid for obj in bpy.data.objects}
+
+
+def update_hidden_scenes() -> None:
+    """Rebuild the dependency graphs of the scenes that the window does not show, as Blender does only for that one.
+
+    They point to objects that were removed meanwhile. Blender 4.3 reads these when it frees unused drawing data, and
+    crashes, also in a script without Scope.
+    """
+    shown = bpy.context.window_manager.windows[0].scene
+    for scene in bpy.data.scenes:
+        if scene != shown:
+            for layer in scene.view_layers:
+                layer.update()
+
+
+def pause_after(step: Step, present: set[int]) -> float:
+    """Return for how long to wait after a step before which these objects were present."""
+    if step.text.startswith(("open(", "new file(")):
+        return OPENED_PAUSE_S
+    if not step.text.startswith("scope.") and present - objects():  # Scope's operators must do without
+        update_hidden_scenes()
+    return PAUSE_S
 
 
 class Walk:
@@ -68,7 +96,7 @@ class Walk:
         self.last = f"{self.taken} {step.text}"
         self.log.write(f"{time.monotonic() - self.began:.1f} s: {self.last}")
         self.log.flush()
-        before = everything() if step.checked else {}
+        before, present = everything() if step.checked else {}, objects()
         try:
             outcome = str(step.take())
         except RuntimeError as error:  # reported by an operator
@@ -88,8 +116,7 @@ class Walk:
         self.log.flush()
         key = step.text.split("(")[0] + (" refused" if outcome.startswith("refused") else "")
         self.outcomes[key] = self.outcomes.get(key, 0) + 1
-        opened = step.text.startswith(("open(", "new file("))
-        return OPENED_PAUSE_S if opened else PAUSE_S
+        return pause_after(step, present)
 
     def check_printed(self) -> None:
         """Read what Blender has printed since the last step: handlers, timers and panels print their tracebacks."""

@@ -18,6 +18,7 @@ from ...edit.clip import Clip
 from ...edit.root_motion import floor_trajectory, relative_to_trajectory, with_trajectory
 from ...errors import UsageError
 from ..animation_data.actions import Channels, fcurves, read_keys
+from ..animation_data.removal import remove_blocks
 from ..animation_data.retime import Retiming
 from .keys import read_clip, write_clip
 
@@ -238,6 +239,6 @@ def _copy_parenting(obj: bpy.types.Object, other: bpy.types.Object) -> None:
 
 def _remove(empty: bpy.types.Object) -> None:
     action = empty.animation_data.action if empty.animation_data else None
-    bpy.data.objects.remove(empty)
+    remove_blocks([empty])
     if action is not None and action.users == 0:
         bpy.data.actions.remove(action)

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import bpy
 
+from ..animation_data.removal import remove_blocks
+
 KINDS = ("objects", "meshes", "armatures", "collections", "materials")
 
 
@@ -41,5 +43,5 @@ def remove(blocks: set[tuple[str, int]]) -> None:
     """Remove those of the datablocks that still exist."""
     if not blocks:
         return
-    bpy.data.batch_remove([block for kind, uid in blocks if (block := found(kind, "", uid)) is not None])
+    remove_blocks([block for kind, uid in blocks if (block := found(kind, "", uid)) is not None])
     bpy.context.view_layer.update()  # it would still list removed objects
