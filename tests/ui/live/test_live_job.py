@@ -13,6 +13,7 @@ from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.errors import OfflineError, UsageError, VideoError
 from scope.scope_addon.job.live.process import LiveProcess
 from scope.scope_addon.job.messages import WorkerFailedError
+from scope.scope_addon.scene.animation_data.actions import fcurves
 from scope.scope_addon.ui.live import live_job
 from scope.scope_addon.ui.live.live_job import LiveJob, live_request
 
@@ -125,7 +126,7 @@ def test_a_recorded_take_is_kept_by_the_blend_file(live, tmp_path):
     def take():
         person = next(obj for obj in bpy.context.scene.scope.capture.all_objects if obj.type == "ARMATURE")
         bpy.context.view_layer.objects.active = person
-        curves = person.animation_data.action.fcurves
+        curves = fcurves(person)
         keys = {(c.data_path, c.array_index): [tuple(point.co) for point in c.keyframe_points] for c in curves}
         return keys, person["scope_motion"]["motion"]
 
