@@ -30,14 +30,15 @@ def live(tmp_path, monkeypatch, standing):
     ``finish()``, which sends the motion ``standing``.
     """
     standing.save(tmp_path / "standing.npz")
-    script, jobs = tmp_path / "fake_live.py", []
-    monkeypatch.setattr(live_job, "START_SCRIPT", script)
+    jobs = []
     monkeypatch.setattr(live_job, "LiveProcess", lambda r, folder, _, *rest: LiveProcess(r, folder, None, *rest))
     (tmp_path / "walk.mp4").touch()
     settings = bpy.context.scene.scope_live
     settings.source, settings.file = "FILE", str(tmp_path / "walk.mp4")
 
     def start(body):
+        script = tmp_path / f"fake_live_{len(jobs)}.py"  # one each: a process may not have read its own yet
+        monkeypatch.setattr(live_job, "START_SCRIPT", script)
         script.write_text(
             textwrap.dedent(f"""
                 import json, math, os, shutil, sys, time
