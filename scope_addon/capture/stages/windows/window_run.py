@@ -58,8 +58,9 @@ class WindowRun:
 
         :param upcoming: the frame after it, also if that is in the next window; None at the end of the clip.
         """
-        now = self._upcoming or self._light(frame)
-        self._upcoming = None if upcoming is None else self._light(upcoming)
+        with self._clock.stage("decode"):  # as for a short clip
+            now = self._upcoming or self._light(frame)
+            self._upcoming = None if upcoming is None else self._light(upcoming)
         time_s, row = frame.timestamp_s, len(self._times)
         is_own = self.window.has_begun(time_s)
         observations, is_cut = self._observer.step(now, self._upcoming, with_masks=is_own)
