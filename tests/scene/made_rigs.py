@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 from scope.scope_addon.scene.build import BuildOptions, build_scene
+from scope.scope_addon.scene.packed_motion import pack_motion
 
 from ..edit.walking import BODY, RATE, motion_of, walk
 
@@ -133,6 +134,18 @@ def captured(motion, body=BODY):
     scene = bpy.context.scene
     scene.render.fps, scene.render.fps_base = int(RATE), 1.0
     return build_scene([motion], body, None, BuildOptions(start_frame=1.0)).people[0].armature
+
+
+def captured_together():
+    """Return the armatures of two people whom one camera has captured, each with its motion, at frame 10."""
+    scene = bpy.context.scene
+    scene.render.fps = 30
+    motions = [motion_of(walk(1.0)), motion_of(walk(1.0, speed=0.8))]
+    people = [p.armature for p in build_scene(motions, BODY, None, BuildOptions()).people]
+    for person, motion in zip(people, motions, strict=True):
+        pack_motion(person, motion.to_bytes())
+    scene.frame_set(10)
+    return people
 
 
 def truth(motion=None, body=BODY):

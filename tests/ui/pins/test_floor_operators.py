@@ -7,14 +7,12 @@ import pytest
 from scope.scope_addon.edit.pins.moved import moved_motion
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
-from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.character.correction_list import listed_corrections
-from scope.scope_addon.scene.packed_motion import pack_motion
 from scope.scope_addon.ui.captured_person import motion_of as stored_motion_of
 
 from ...edit.walking import BODY, NAMES, motion_of, walk
 from ...scene import made_rigs
-from ...scene.made_rigs import captured
+from ...scene.made_rigs import captured, captured_together
 
 FRAME, FRAMES = 20, (5, 20, 50)
 RAISED = 0.25  # metres, of the captured world
@@ -137,13 +135,8 @@ def test_feet_under_the_floor_in_other_frames_are_said(rig, capfd):
 
 
 def test_the_floor_of_one_person_is_that_of_everybody_of_the_capture():
-    bpy.context.scene.render.fps = 30
-    motions = [motion_of(walk(1.0)), motion_of(walk(1.0, speed=0.8))]
-    people = [p.armature for p in build_scene(motions, BODY, None, BuildOptions()).people]
-    for person, motion in zip(people, motions, strict=True):
-        pack_motion(person, motion.to_bytes())
+    people = captured_together()
     before = [everything(person) for person in people]
-    bpy.context.scene.frame_set(10)
     bpy.ops.scope.floor_here()
     assert [kinds(person) for person in people] == [["FLOOR"]] * 2
     heights = [stored_motion_of(person).corrections["floor_heights"] for person in people]

@@ -10,16 +10,14 @@ from scope.scope_addon.edit.pins.corrected_motion import shot_of
 from scope.scope_addon.edit.pins.moved import moved_motion
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
-from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.character.correction_list import listed_corrections
-from scope.scope_addon.scene.packed_motion import pack_motion
 from scope.scope_addon.ui.captured_person import motion_of as stored_motion_of
 from scope.solver.rotations import exp
 
 from ...edit.walking import BODY, NAMES, motion_of, walk
 from ...made_motion import level_camera
 from ...scene import made_rigs
-from ...scene.made_rigs import captured
+from ...scene.made_rigs import captured, captured_together
 
 POST = ((0.4, 1.0, 0.2), (0.4, 1.0, 1.9))
 FRAMES = (5, 25, 50)
@@ -159,13 +157,8 @@ def test_a_camera_that_was_moved_by_hand_keeps_that(rig):
 
 
 def test_the_line_of_one_person_is_that_of_everybody_of_the_capture():
-    bpy.context.scene.render.fps = 30
-    motions = [motion_of(walk(1.0)), motion_of(walk(1.0, speed=0.8))]
-    people = [p.armature for p in build_scene(motions, BODY, None, BuildOptions()).people]
-    for person, motion in zip(people, motions, strict=True):
-        pack_motion(person, motion.to_bytes())
+    people = captured_together()
     before = [everything(person) for person in people]
-    bpy.context.scene.frame_set(10)
     bpy.ops.scope.set_upright(start=(300, 100), end=(320, 300))
     assert [kinds(person) for person in people] == [["UPRIGHT"]] * 2
     bpy.context.view_layer.objects.active = people[1]
