@@ -29,6 +29,7 @@ from .frame_observer import FrameObserver, LitFrame, largest_of
 from .networks import network_threads, open_trackers
 from .windows.long_clip import LongClip
 from .windows.plan import plan_windows
+from .windows.window_sequence import frame_pairs
 
 
 def observe(
@@ -107,12 +108,7 @@ class _Frames:
         """Process all frames; each is decoded while the networks run on the previous one."""
         expected, exposure = video.expected_frames, AutoExposure()
         frames = (LitFrame(frame, exposure.brighten(frame.image_rgb)) for frame in video)
-        with self._clock.stage("decode"):
-            upcoming = next(frames, None)
-        while upcoming is not None:
-            now = upcoming
-            with self._clock.stage("decode"):
-                upcoming = next(frames, None)
+        for now, upcoming in frame_pairs(frames, self._clock):
             largest = self._process(now, upcoming)
             listeners.watch(now.frame, largest, live)
             listeners.progress("finding the person", len(self.people), max(expected, len(self.people)))
