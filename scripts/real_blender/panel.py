@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import sys
 import time
 from collections.abc import Iterator
@@ -52,7 +53,11 @@ def cancel() -> Iterator[float]:
 
 
 def cancel_after_the_question() -> Iterator[float]:
-    """Press Escape over the panel: the capture goes on while it asks, and if Escape answers; Return ends it."""
+    """Press Escape over the panel: the capture goes on while it asks, and if Escape answers; Return ends it.
+
+    The worker stands still until it is stopped: on a fast machine the capture would end before the second answer.
+    """
+    os.kill(addon().state.job.worker.pid, signal.SIGSTOP)
     operator, asked = addon().SCOPE_OT_cancel, []
     invoke_itself = operator.invoke
 
@@ -68,6 +73,8 @@ def cancel_after_the_question() -> Iterator[float]:
         yield 2.0
         assert addon().state.job is not None, "Escape over the panel ended a long capture without a question"
         picture("4_question")
+        if answer == "Return":
+            os.kill(addon().state.job.worker.pid, signal.SIGCONT)
         key(answer, OVER_PANEL)
         yield 2.0
         if answer == "Escape":
