@@ -28,8 +28,8 @@ from .smoothing import PoseFilter
 CALIBRATED_S = 2.0  # after the person was first seen
 CALIBRATE_AT_S = (0.0, 0.3, 0.7, 1.2, CALIBRATED_S)
 FOLLOW_S, FOLLOWED_S = 1.0, 4.0  # between two estimates of the world afterwards, and how much each of them sees
-SETTLING_S, FOLLOWING_S = 0.15, 10.0  # time constants towards the estimates, see `Approach`; the second at least
-SETTLED_S = 1.5  # after the last of the first estimates, when 0.3 % of what it changed are left
+SETTLING_S, FOLLOWING_S = 0.1, 10.0  # time constants towards the estimates, see `Approach`; the second at least
+SETTLED_S = 1.5  # after the last of the first estimates, when these have long been reached
 CERTAIN_S = 60.0  # for which the world has been known when it has moved almost for the last time
 HOLD_S = 0.5  # for which the pose of a person who is not seen is held, rather than lost
 STANDS_S = 2.0  # for which somebody who stood on the floor and is not seen is still not below it
