@@ -16,7 +16,10 @@ def calibration(height_m=1.2, tilt=0.0, focal_px=1000.0, beta=0.0):
     return Calibration(camera, np.full(3, beta), up, np.array([0.0, 0.0, height_m]))
 
 
-def course(step_s, seconds, world_s=SETTLING_S, before=calibration(1.0), after=calibration(1.1)):
+BEFORE, AFTER = calibration(1.0), calibration(1.1)
+
+
+def course(step_s, seconds, world_s=SETTLING_S, before=BEFORE, after=AFTER):
     """The calibrations of an approach that has long been at one estimate, from when another one comes."""
     approach = Approach(before, SETTLING_S)
     return [approach.step(after, step_s, world_s) for _ in range(round(seconds / step_s))]
@@ -43,7 +46,7 @@ def test_the_world_does_not_start_abruptly():
 def test_everything_has_arrived_when_it_is_said_to_at_any_rate():
     after = calibration(1.1, 0.1, 1200.0, 2.0)
     for rate in (2, 30):
-        last = course(1 / rate, SETTLED_S, before=calibration(1.0), after=after)[-1]
+        last = course(1 / rate, SETTLED_S, after=after)[-1]
         assert last.camera_position[2] == pytest.approx(1.1, abs=1e-4)
         assert last.up @ after.up == pytest.approx(1.0, abs=1e-6)
         assert last.betas == pytest.approx(after.betas, abs=1e-3)
@@ -51,6 +54,6 @@ def test_everything_has_arrived_when_it_is_said_to_at_any_rate():
 
 def test_a_settled_world_follows_slowly_while_the_shape_does_not():
     world_s = following_s(CALIBRATED_S + SETTLED_S)
-    last = course(1 / 30, 1.0, world_s, calibration(1.0), calibration(1.1, beta=2.0))[-1]
+    last = course(1 / 30, 1.0, world_s, after=calibration(1.1, beta=2.0))[-1]
     assert 1.005 < last.camera_position[2] < 1.01  # about a tenth of it in a second, less the delay of the other stages
     assert last.betas == pytest.approx(2.0, abs=0.01)

@@ -73,7 +73,7 @@ class StreamSource:
         """Yield what can be decoded, from the first key frame on.
 
         Frames before it continue pictures that never came, and some decoders show them on grey. A packet that was
-        damaged on its way costs its own frame only, whether it cannot be decoded or the decoder has guessed parts of it.
+        damaged on its way costs its own frame only, whether it cannot be decoded or only in part.
 
         :raises VideoError: nothing could be decoded for a while.
         """
