@@ -209,9 +209,7 @@ class LiveSession:
 
     def is_settled(self, time_s: float) -> bool:
         """Whether the estimates of the first seconds have been reached at this time."""
-        return bool(
-            self._calibrations == len(CALIBRATE_AT_S) and time_s - self._first_s > CALIBRATED_S + SETTLED_S
-        )
+        return bool(self._calibrations == len(CALIBRATE_AT_S) and time_s - self._first_s > CALIBRATED_S + SETTLED_S)
 
     @property
     def camera(self) -> Camera | None:
