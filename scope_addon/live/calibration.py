@@ -31,6 +31,7 @@ from ..capture.world.world_frame import find_world, floor_height
 from ..kinematics.axes import transform_points, world_from_level_camera
 from ..kinematics.contact_points import SOLES
 
+STAGES = 3  # of the approach to an estimate
 SAME_FOCAL = 0.02  # relative difference of focal lengths, for which the lines of the background point alike
 SAME_HEIGHT_M, SAME_UP_COS = 0.015, np.cos(np.radians(1.0))  # of two estimates of one floor
 
@@ -73,6 +74,30 @@ def _between(camera: Camera, target: Camera, share: float) -> Camera:
     intrinsics = camera.intrinsics.copy()
     intrinsics[[0, 1], [0, 1]] *= ratio**share
     return replace(target, intrinsics=intrinsics)
+
+
+class Approach:
+    """A calibration that approaches estimates; its velocity and acceleration continue where a new estimate comes.
+
+    Calibrations x_k follow each other, x_k' = (x_{k-1} - x_k) / s, with the estimate before the first of them.
+
+    :param settling_s: s.
+    """
+
+    def __init__(self, start: Calibration, settling_s: float) -> None:
+        self._stages, self._settling_s = [start] * STAGES, settling_s
+
+    def step(self, target: Calibration, step_s: float, world_s: float) -> Calibration:
+        """Let time pass, and return the calibration.
+
+        :param target: the newest estimate.
+        :param step_s: seconds since the step before.
+        :param world_s: s of the first stage's world, at least that of all others.
+        """
+        share, share_of_world = (float(1 - np.exp(-step_s / s)) for s in (self._settling_s, world_s))
+        for k, stage in enumerate(self._stages):
+            self._stages[k] = target = stage.towards(target, share, share_of_world if k == 0 else share)
+        return target
 
 
 class Calibrator:

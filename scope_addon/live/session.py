@@ -17,7 +17,7 @@ from ..capture.camera.intrinsics import Camera
 from ..capture.fitting.frame_sequence import FittedTrack
 from ..capture.media.frame import Frame
 from ..capture.perception.observation import Observation
-from .calibration import Calibration, Calibrator, track_of
+from .calibration import Approach, Calibration, Calibrator, track_of
 from .causal_fit import CausalFit, FittedFrame
 from .feet.hold import FootHold
 from .feet.support import Support
@@ -28,7 +28,8 @@ from .smoothing import PoseFilter
 CALIBRATED_S = 2.0  # after the person was first seen
 CALIBRATE_AT_S = (0.0, 0.3, 0.7, 1.2, CALIBRATED_S)
 FOLLOW_S, FOLLOWED_S = 1.0, 4.0  # between two estimates of the world afterwards, and how much each of them sees
-SETTLING_S, FOLLOWING_S = 0.3, 10.0  # time constants towards the estimates, the second at least
+SETTLING_S, FOLLOWING_S = 0.1, 10.0  # time constants towards the estimates, see `Approach`; the second at least
+SETTLED_S = 1.5  # after the last of the first estimates, when these have long been reached
 CERTAIN_S = 60.0  # for which the world has been known when it has moved almost for the last time
 HOLD_S = 0.5  # for which the pose of a person who is not seen is held, rather than lost
 STANDS_S = 2.0  # for which somebody who stood on the floor and is not seen is still not below it
@@ -91,6 +92,7 @@ class LiveSession:
         self._fit: CausalFit | None = None
         self._current: Calibration | None = None
         self._target: Calibration | None = None
+        self._approach: Approach | None = None
         self._pending: Future[Calibration] | None = None
         self._seen: deque[_Seen] = deque()
         self._first_s = self._last_seen_s = self._last_s = -np.inf
@@ -125,7 +127,7 @@ class LiveSession:
                 self._calibrator = Calibrator(self._body, known, self._size, self._height_m)
             self._calibrator.look_at(frame.image_rgb, observation)
             self._target = self._calibrator.estimate([time_s], [observation])
-            self._current = self._in_leaders_world(self._target)
+            self._current, self._approach = self._in_leaders_world(self._target), Approach(self._target, SETTLING_S)
             self._fit = CausalFit(self._body, observation, self._current.camera, self._height_m)
             self._fit.set_shape(self._current.betas)
             self._first_s, self._calibrations = time_s, 1
@@ -154,17 +156,16 @@ class LiveSession:
 
     def _settle(self, time_s: float) -> None:
         """Start estimates that are due, take those that are done, and approach the newest one."""
-        if self._fit is None or self._current is None or self._target is None:
+        if self._fit is None or self._current is None or self._target is None or self._approach is None:
             return
         if self._pending is not None and self._pending.done():
             self._target, self._pending = self._pending.result(), None
         if self._pending is None:
             self._start_estimate(time_s)
         step_s = float(np.clip(time_s - self._last_s, 0.0, HOLD_S)) if np.isfinite(self._last_s) else 0.0
-        early = 1 - np.exp(-step_s / SETTLING_S)
-        late = early if not self.is_settled(time_s) else 1 - np.exp(-step_s / following_s(time_s - self._first_s))
+        world_s = following_s(time_s - self._first_s) if self.is_settled(time_s) else SETTLING_S
         before = self._current
-        self._current = self._in_leaders_world(before.towards(self._target, float(early), float(late)))
+        self._current = self._in_leaders_world(self._approach.step(self._target, step_s, world_s))
         if self._current.camera is not before.camera:
             self._fit.set_camera(self._current.camera)
         if not np.array_equal(self._current.betas, before.betas):
@@ -208,9 +209,7 @@ class LiveSession:
 
     def is_settled(self, time_s: float) -> bool:
         """Whether the estimates of the first seconds have been reached at this time."""
-        return bool(
-            self._calibrations == len(CALIBRATE_AT_S) and time_s - self._first_s > CALIBRATED_S + 5 * SETTLING_S
-        )
+        return bool(self._calibrations == len(CALIBRATE_AT_S) and time_s - self._first_s > CALIBRATED_S + SETTLED_S)
 
     @property
     def camera(self) -> Camera | None:

@@ -12,7 +12,7 @@ from .low_pass import Response, RotationFilter, VectorFilter
 
 DELAY_S = 0.06  # of every pose, whatever the frame rate: later frames separate noise from motion
 MOTION = Response.delayed(stages=6, cutoff_hz=5.5, delay_s=DELAY_S)
-DISTANCE = Response.delayed(stages=4, cutoff_hz=3.0, delay_s=DELAY_S)  # its logarithm: noisier than the direction
+DISTANCE = Response.delayed(stages=5, cutoff_hz=3.5, delay_s=DELAY_S)  # its logarithm: noisier than the direction
 
 
 class PoseFilter:

@@ -65,6 +65,24 @@ def without_first(data, count, kind="mp4"):
     return target.getvalue()
 
 
+def with_damage(data, numbers, kind="mpegts"):
+    """Return a stream whose packets of these numbers end with zeros, from their middle on."""
+    target = io.BytesIO()
+    with av.open(io.BytesIO(data)) as source, av.open(target, "w", format=kind) as container:
+        stream = container.add_stream_from_template(source.streams.video[0])
+        for k, packet in enumerate(source.demux(video=0)):
+            if packet.dts is None:
+                continue
+            if k in numbers:
+                half = packet.size // 2
+                damaged = av.Packet(bytes(packet)[:half] + bytes(packet.size - half))
+                damaged.pts, damaged.dts, damaged.time_base = packet.pts, packet.dts, packet.time_base
+                packet = damaged
+            packet.stream = stream
+            container.mux(packet)
+    return target.getvalue()
+
+
 @contextmanager
 def _running(server):
     """Run a server meanwhile."""

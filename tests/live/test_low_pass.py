@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 from scope.scope_addon.live.low_pass import Response, RotationFilter, VectorFilter
+from scope.scope_addon.live.smoothing import DELAY_S, PoseFilter
 from scope.solver import rotations
 
 MOTION = Response(4, 6.0, 0.08)
@@ -50,3 +51,24 @@ def test_the_lead_grows_after_the_start_so_that_a_wrong_first_value_does_not_ove
     values = [low_pass(np.zeros(1), 1 / 30)[0] for _ in range(30)]
     assert min(values) > -0.1  # with all of the lead from the start, -0.12
     assert response.lead(10.0) == pytest.approx(6 / (2 * np.pi * 7.0) - 1 / 30)
+
+
+def roots_of_a_pose_filter(distances, rate):
+    """The pelvis (n, 3) of a body straight in front of the camera, after the filters have begun."""
+    poses = PoseFilter()
+    roots = [poses(np.eye(3)[None], np.array([0.0, 0.0, z]), k / rate)[1] for k, z in enumerate(distances)]
+    return np.array(roots)[rate:]
+
+
+def test_noise_of_the_distance_moves_the_body_gently():
+    noise = np.random.default_rng(0).normal(0, 0.01, 1200)
+    roots = roots_of_a_pose_filter(4 + noise, 60)
+    assert np.linalg.norm(60**3 * np.diff(roots, 3, axis=0), axis=1).mean() < 50.0  # m/s³; four stages of 3 Hz: 77
+
+
+@pytest.mark.parametrize("rate", [15, 30, 60])
+def test_who_walks_towards_the_camera_is_where_they_were_a_moment_ago(rate):
+    times = np.arange(3 * rate) / rate
+    roots = roots_of_a_pose_filter(8 - 1.4 * times, rate)
+    late = roots[:, 2] - (8 - 1.4 * (times[rate:] - DELAY_S))
+    assert np.abs(late).max() < 0.01

@@ -58,6 +58,15 @@ def recorded(body, live, frames, tmp_path_factory):
     return Motion.load(path)
 
 
+def world_joints(motion):
+    T = motion.world_from_camera
+    return np.einsum("tij,tkj->tki", T[:, :3, :3], motion.joints_cam) + T[:, None, :3, 3]
+
+
+def jerk(joints):
+    return np.linalg.norm(np.diff(joints[LEAD:], 3, axis=0), axis=-1).mean()
+
+
 def test_later_frames_do_not_change_earlier_poses(body, live, frames):
     people = people_of(body, frames)
     for frame, earlier in zip(frames[:14], live[1], strict=False):
@@ -74,13 +83,12 @@ def test_the_recording_is_close_to_the_offline_capture(body, recorded):
     assert list(recorded.frames) == list(offline.frames[:-LATE])
     relative = [m.joints_cam[: FRAMES - LATE] - m.joints_cam[: FRAMES - LATE, :1] for m in (recorded, offline)]
     assert np.median(np.linalg.norm(relative[0] - relative[1], axis=-1)) < 0.025
-    jerk = [np.linalg.norm(np.diff(joints[LEAD:], 3, axis=0), axis=-1).mean() for joints in relative]
-    assert jerk[0] < 1.5 * jerk[1]
+    assert jerk(relative[0]) < 1.5 * jerk(relative[1])
+    assert jerk(world_joints(recorded)) < 1.5 * jerk(world_joints(offline)[: FRAMES - LATE])
 
 
 def test_feet_that_stand_do_not_slide(recorded):
-    T = recorded.world_from_camera[LEAD:]
-    world = np.einsum("tij,tkj->tki", T[:, :3, :3], recorded.joints_cam[LEAD:]) + T[:, None, :3, 3]
+    world = world_joints(recorded)[LEAD:]
     for joint in (7, 8, 10, 11):  # ankles and toes of somebody who stands still
         assert np.linalg.norm(world[:, joint] - np.median(world[:, joint], axis=0), axis=1).max() < 0.02
 
@@ -89,8 +97,7 @@ def test_dropped_frames_are_filled_in_and_not_valid(recorded, live):
     assert list(np.flatnonzero(~recorded.valid)) == [20, 21]
     joints = np.array([pose.joints for pose in live[1][:FRAMES]])
     given = 0.2 * joints[1:-1] + 0.8 * joints[2:]  # 1.8 frames after their time
-    T = recorded.world_from_camera
-    world = np.einsum("tij,tkj->tki", T[:, :3, :3], recorded.joints_cam) + T[:, None, :3, 3]
+    world = world_joints(recorded)
     # The first frames differ, since the file has the final shape.
     assert np.linalg.norm(world - given, axis=-1)[-10:].max() < 0.01
 

@@ -17,7 +17,7 @@ from scope.scope_addon.capture.tracking.tracker import PeopleTracker
 from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.live.people import LivePeople
 from scope.scope_addon.live.pose import Presence
-from scope.scope_addon.live.session import CALIBRATED_S, CERTAIN_S, SETTLING_S, following_s
+from scope.scope_addon.live.session import CALIBRATED_S, CERTAIN_S, SETTLED_S, following_s
 
 RATE = 15.0
 LATE = 2  # frames after a foot has landed in which smoothing still shows the step: 60 ms, and the time of its filters
@@ -47,7 +47,7 @@ def test_the_estimates_settle_when_they_are_said_to_and_stay(played):
     settled = np.array([pose.is_settled for pose in poses])
     first = int(settled.argmax())
     assert settled[first:].all()
-    assert poses[first].timestamp_s == pytest.approx(CALIBRATED_S + 5 * SETTLING_S, abs=1.5 / RATE)
+    assert poses[first].timestamp_s == pytest.approx(CALIBRATED_S + SETTLED_S, abs=1.5 / RATE)
     betas = np.array([pose.betas for pose in poses[first:]])
     assert np.abs(betas - betas[-1]).max() < 0.01  # standard deviations of shapes
     assert np.ptp(focal[first:]) < 0.001 * focal[-1]
@@ -94,5 +94,5 @@ def test_a_world_that_has_settled_can_be_mended_and_cannot_walk():
     def moved(begin_s, end_s, step_s):
         return sum(1 - np.exp(-step_s / following_s(t)) for t in np.arange(begin_s, end_s, step_s))
 
-    assert np.exp(-moved(CALIBRATED_S + 5 * SETTLING_S, 30.0, 1 / 30)) < 0.2  # is left of a wrong start
+    assert np.exp(-moved(CALIBRATED_S + SETTLED_S, 30.0, 1 / 30)) < 0.2  # is left of a wrong start
     assert moved(CERTAIN_S, 24 * 3600.0, 1.0) < 1.01  # times b

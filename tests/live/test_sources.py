@@ -17,7 +17,7 @@ from scope.scope_addon.live.sources import is_stream, open_source
 from ..capture.media.made_video import patch_track_header, write_video
 from .fake_source import FakeClock
 from .mjpeg_server import mjpeg_server
-from .stream_server import encoded, rtsp_server, sent_by_udp, served, served_as_hls, without_first
+from .stream_server import encoded, rtsp_server, sent_by_udp, served, served_as_hls, with_damage, without_first
 
 
 def test_a_file_is_paced_by_its_timestamps():
@@ -129,6 +129,35 @@ def test_damaged_packets_cost_their_own_frames_only(tmp_path):
     with served(tmp_path, "a.nut", bytes(data)) as address:
         shown = [which(picture.image_rgb) for picture in all_pictures(address)]
     assert [k for k, off in shown if off < 5] == [*range(11), *range(12, 30)]
+
+
+def noisy(count):
+    """Pictures of `moving` with grain, of which every packet has much to say."""
+    grain = np.random.default_rng(1).integers(0, 60, (count, 96, 160, 1))
+    return list((np.array(moving(count)) * 0.8 + grain).astype(np.uint8))
+
+
+@pytest.mark.parametrize("codec", ["libx264", "mpeg4"])
+def test_pictures_that_the_decoder_has_guessed_in_part_are_left_out(tmp_path, codec):
+    last_of_groups = (9, 29)  # on which no others build
+    intact = encoded(noisy(40), codec)
+    shown = []
+    for name, data in (("a.ts", intact), ("b.ts", with_damage(intact, last_of_groups))):
+        with served(tmp_path, name, data) as address:
+            shown.append([picture.image_rgb.astype(int) for picture in all_pictures(address)])
+    expected = [image for k, image in enumerate(shown[0]) if k not in last_of_groups]
+    assert len(shown[1]) == len(expected)
+    assert max(np.abs(a - b).max() for a, b in zip(shown[1], expected, strict=True)) == 0
+
+
+def test_a_stream_all_of_whose_pictures_are_damaged_is_shown_after_a_while(tmp_path):
+    clock = FakeClock()
+    times = iter(np.arange(100.0, 200.0, 0.05))
+    clock.now = lambda: next(times)
+    data = with_damage(encoded(noisy(40), "mpeg4"), range(40))
+    with served(tmp_path, "a.ts", data) as address:
+        first = next(open_source(address).pictures(clock))
+    assert 101.0 <= first.timestamp_s <= 101.3
 
 
 def test_a_server_s_timestamps_may_jump_and_its_rate_change(tmp_path):

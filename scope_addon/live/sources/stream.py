@@ -33,6 +33,7 @@ _FORMATS = (
 )
 STALLED_S = 5.0  # without data, after which a stream counts as interrupted
 KEY_FRAME_S = 10.0  # for which a stream that is joined in the middle is left out until its next key frame
+DAMAGED_S = 1.0  # for which damaged pictures are left out; a stream without others is better than none
 UNREADABLE_S = KEY_FRAME_S + STALLED_S  # without a picture, after which a stream counts as interrupted
 
 
@@ -72,14 +73,14 @@ class StreamSource:
         """Yield what can be decoded, from the first key frame on.
 
         Frames before it continue pictures that never came, and some decoders show them on grey. A packet that was
-        damaged on its way costs its own frame only.
+        damaged on its way costs its own frame only, whether it cannot be decoded or only in part.
 
         :raises VideoError: nothing could be decoded for a while.
         """
         import av
 
         has_begun, began_s = False, clock.now()
-        seen_s = began_s
+        seen_s = intact_s = began_s
         for packet in container.demux(stream):
             now_s = clock.now()
             has_begun = has_begun or packet.is_keyframe or now_s - began_s > KEY_FRAME_S  # streams may have none
@@ -91,7 +92,9 @@ class StreamSource:
                 seen_s = now_s
             elif now_s - seen_s > UNREADABLE_S:
                 raise VideoError(f"{self.name} was interrupted (no picture could be decoded for {UNREADABLE_S:g} s)")
-            yield from frames
+            intact = [frame for frame in frames if not frame.is_corrupt]
+            intact_s = now_s if intact else intact_s
+            yield from intact if now_s - intact_s <= DAMAGED_S else frames
 
     def _open(self) -> InputContainer:
         import av
