@@ -66,7 +66,7 @@ def store_corrections(
 def _entry(armature: bpy.types.Object, motion: Motion, correction: Correction, rate: float) -> dict[str, Any]:
     """Describe a correction."""
     from ...edit.pins.corrections import Contact, FeetOnFloor, Floor, Interpolation, Pin, Upright
-    from .corrected_keys import scene_frame
+    from .corrections.corrected_keys import scene_frame
 
     whole = int(motion.frames[0]), int(motion.frames[-1])
     if isinstance(correction, Pin):

@@ -41,9 +41,9 @@ class SCOPE_OT_smooth(EditOperator):
         from ...edit.smooth import smoothed
         from ...scene.animation_data.actions import remove_cycles
         from ...scene.animation_data.timing import key_frames, restore_scene_range, store_rate
+        from ...scene.character.corrections.uncorrected_keys import write_both
         from ...scene.character.keys import bake_whole_frames, write_clip
         from ...scene.character.root_object import remove_root_object
-        from ...scene.character.uncorrected_keys import write_both
 
         motion = motion_of(armature)
         if motion.corrections:  # which are solved again

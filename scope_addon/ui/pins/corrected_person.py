@@ -48,7 +48,7 @@ def change_corrections(
     :raises UsageError: the motion is no longer there, or keys are missing.
     """
     from ...edit.pins.corrected_motion import corrections_of, with_corrections
-    from ...scene.character.corrected_keys import pinned_places, rewrite_changed_keys
+    from ...scene.character.corrections.corrected_keys import pinned_places, rewrite_changed_keys
     from ...scene.packed_motion import stored_keys
 
     compiled_solver.load()
@@ -110,7 +110,7 @@ def shown_frame(scene: bpy.types.Scene, armature: bpy.types.Object, motion: Moti
     :raises UsageError: the motion has none there.
     """
     from ...scene.animation_data.timing import scene_rate
-    from ...scene.character.corrected_keys import source_frame
+    from ...scene.character.corrections.corrected_keys import source_frame
 
     return source_frame(armature, motion, scene.frame_current + scene.frame_subframe, scene_rate(scene))
 
@@ -128,7 +128,7 @@ def pin_at(
 
     from ...edit.pins.corrected_motion import corrections_of, shot_of
     from ...edit.pins.corrections import Pin, world_of
-    from ...scene.character.corrected_keys import captured_points
+    from ...scene.character.corrections.corrected_keys import captured_points
 
     scene, (location, in_image, reach) = context.scene, place
     context.view_layer.update()

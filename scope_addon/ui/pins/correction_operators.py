@@ -119,7 +119,7 @@ class CorrectSpanOperator(CorrectionOperator, SpanOperator):
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
         """Add the correction and change the keys."""
         from ...edit.pins.corrections import added
-        from ...scene.character.corrected_keys import source_frame
+        from ...scene.character.corrections.corrected_keys import source_frame
 
         motion = motion_of(armature)
         first, last = (source_frame(armature, motion, frame, rate) for frame in (self.start, self.end))

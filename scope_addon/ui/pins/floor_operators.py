@@ -39,7 +39,7 @@ class SCOPE_OT_floor_here(CorrectionOperator):
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
         """Move everybody of the capture, and the camera."""
         from ...edit.pins.corrections import Floor, added
-        from ...scene.character.corrected_keys import heights_of_foot
+        from ...scene.character.corrections.corrected_keys import heights_of_foot
 
         scene, motion = context.scene, motion_of(armature)
         frame = shown_frame(scene, armature, motion)

@@ -93,7 +93,7 @@ class SCOPE_OT_refloor(CorrectionOperator):
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
         """Edit all keys, and keep that with the motion."""
         from ...edit.pins.corrections import FeetOnFloor, added
-        from ...scene.character.edited_keys import floored
+        from ...scene.character.corrections.edited_keys import floored
 
         feet = FeetOnFloor(self.level, self.lift)
         if not _has_motion(armature):

@@ -127,7 +127,7 @@ def _pixels(context: bpy.types.Context, points: list[object]) -> list[tuple[floa
 
     from ...edit.pins.corrected_motion import shot_of
     from ...errors import UsageError
-    from ...scene.character.corrected_keys import captured_points
+    from ...scene.character.corrections.corrected_keys import captured_points
 
     armature, scene = captured_armature(context), context.scene
     if armature is None:  # since the line was begun
