@@ -74,7 +74,7 @@ def _entry(armature: bpy.types.Object, motion: Motion, correction: Correction, r
     elif isinstance(correction, Contact):
         kind, text, span = "CONTACT", f"{correction.foot.title()} Foot Stands", (correction.first, correction.last)
     elif isinstance(correction, Interpolation):
-        kind, text, span = "INTERPOLATION", "Frames Interpolated", (correction.first, correction.last)
+        kind, text, span = "INTERPOLATION", "Interpolated", (correction.first, correction.last)
     elif isinstance(correction, Upright):
         kind, text, span = "UPRIGHT", "Upright Line", whole
     elif isinstance(correction, FeetOnFloor):

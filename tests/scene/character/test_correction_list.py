@@ -28,7 +28,7 @@ def test_a_corrected_file_brings_its_list(tmp_path):
         ("Left Wrist", 51, 51),
         ("Right Foot Stands", 71, 79),
         ("Legs Exchanged", 17, 21),
-        ("Frames Interpolated", 91, 95),
+        ("Interpolated", 91, 95),
         ("Feet on the Floor", 11, 131),
     ]
     assert listed_corrections(build_scene([plain], BODY, None, options).people[0].armature) == []
