@@ -163,7 +163,7 @@ class Motion:
 CORRECTION_KEYS = (
     *("pin_frames", "pin_joints", "pin_uv", "pin_xyz", "pin_reach"),
     *("contact_spans", "contact_feet", "exchange_spans", "exchange_limbs", "upright"),
-    *("floor_frames", "floor_heights"),
+    *("floor_frames", "floor_heights", "interpolated_spans", "snap_level", "snap_lift", "snap_heights"),
     *("uncorrected_rows", "uncorrected_poses", "uncorrected_trans", "uncorrected_poses_raw", "uncorrected_trans_raw"),
     *("uncorrected_joints_cam", "uncorrected_world_from_camera"),
 )

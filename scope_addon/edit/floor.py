@@ -21,14 +21,21 @@ _LIFT_CUTOFF_HZ = 3.0
 
 
 def refloor(
-    clip: Clip, body: Body, betas: NDArray[np.floating[Any]], *, level: bool = False, lift: bool = True
+    clip: Clip,
+    body: Body,
+    betas: NDArray[np.floating[Any]],
+    *,
+    level: bool = False,
+    lift: bool = True,
+    height: float = 0.0,
 ) -> Clip:
-    """Move the motion so that the feet in contact are on z = 0.
+    """Move the motion so that the feet in contact are on the floor.
 
     :param betas: (P,) shape coefficients.
     :param level: also rotate the whole motion about the mean contact point so that the soles in contact lie in a
         horizontal plane, if they are spread widely enough to determine one.
     :param lift: also raise frames whose feet penetrate the floor, smoothly.
+    :param height: z of the floor, metres.
     """
     soles = clip.soles(body, betas)
     weight = standing_probability(soles, UP, clip.times)
@@ -41,7 +48,7 @@ def refloor(
     standing = weight > 0.5
     heights = soles[..., 2]
     floor = float(np.median(heights[standing])) if standing.any() else float(np.median(heights.min(axis=1)))
-    out.root[:, 2] -= floor
+    out.root[:, 2] -= floor - height
     if lift:
         below = np.maximum(0.0, floor - heights.min(axis=1))
         smooth = gaussian_smooth(below, clip.times, _LIFT_CUTOFF_HZ)

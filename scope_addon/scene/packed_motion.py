@@ -18,7 +18,7 @@ from ..motion import Motion
 
 MOTION = "scope_motion"  # property of the armature: the text, or the path of a motion file in older .blend files
 _CONTENT = "motion"  # property of the text: bytes of the motion file
-_KEYS = "uncorrected_keys"  # property of the text: keys from before corrections, see character/uncorrected_keys.py
+_KEYS = "uncorrected_keys"  # property of the text: bytes of ``character/corrections/uncorrected_keys.py``
 _LARGEST_BYTES = 1 << 30  # packed; an hour at 60 frames per second takes a tenth
 _NOTE = """\
 The captured motion of '{name}', which Scope stores in the custom property '{content}' of this text.

@@ -115,7 +115,7 @@ def motion_of(armature: bpy.types.Object) -> Motion:
 def set_motion_of(armature: bpy.types.Object, motion: Motion, keys: bytes = b"") -> None:
     """Store a motion as the armature's captured one. Undo restores the former one, and its duplicates keep it.
 
-    :param keys: the keys from before the motion's corrections, see ``scene/character/uncorrected_keys.py``.
+    :param keys: the keys from before the motion's corrections, see ``scene/character/corrections/uncorrected_keys.py``.
     """
     from ..scene.packed_motion import pack_motion
 

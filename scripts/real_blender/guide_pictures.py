@@ -10,7 +10,7 @@ PICTURES = {
     "footage": ("2_footage_chosen", (1000, 60, 1330, 280)),
     "capturing": ("9_body_over_footage", (700, 60, 1330, 560)),
     "live": ("23_live_recording", (400, 25, 1330, 800)),
-    "result": ("6_result", (1000, 60, 1330, 870)),
+    "result": ("6_result", (1000, 60, 1330, 886)),
     "compared": ("7_compared_with_footage", (0, 25, 1330, 900)),
     "export": ("8_export_window", (230, 165, 1370, 850)),
     "preferences": ("11_preferences", (830, 36, 1518, 572)),

@@ -235,6 +235,7 @@ def corrected(first: int, frame: int) -> Iterator[float]:
     out_of_reach()
     upright_line()
     yield from floor_here(frame)
+    yield from kept_edits(first, frame)
 
 
 def upright_line() -> None:
@@ -269,6 +270,54 @@ def floor_here(frame: int) -> Iterator[float]:
     assert listed() == []
     assert abs(scene.camera.matrix_world.translation.z - camera) < 1e-6
     assert keys() == before
+
+
+def kept_edits(first: int, frame: int) -> Iterator[float]:
+    """Interpolate frames, swap sides and put feet on the floor, which smoothing keeps, until they are taken back."""
+    before, frames = keys(), (first + 8, frame - 2, frame, frame + 2, frame + 10)
+    captured_there = places(frames)
+    use(bpy.ops.scope.interpolate_span, start=frame - 4, end=frame + 4)
+    use(bpy.ops.scope.swap_sides, start=first + 5, end=first + 12, limbs="legs")
+    began = time.monotonic()
+    use(bpy.ops.scope.refloor)
+    report["feet_to_floor_s"] = round(time.monotonic() - began, 2)
+    kinds = ["EXCHANGE", "INTERPOLATION", "FEET"]
+    assert [entry["kind"] for entry in listed()] == kinds, listed()
+    edited_there = places(frames)
+    assert apart(edited_there, captured_there) > 0.02
+    yield 1.0
+    picture("pins_8_edits")
+    for strength in (2.5, 1.0):
+        use(bpy.ops.scope.smooth, strength=strength)
+        yield 0.5
+    report["edits_after_smoothing_mm"] = round(1000 * apart(places(frames), edited_there), 3)
+    assert report["edits_after_smoothing_mm"] < 0.1, report
+    for _ in range(3):  # both smoothings and the feet
+        invoke(bpy.ops.ed.undo)
+    yield 1.0
+    assert [entry["kind"] for entry in listed()] == kinds[:2], listed()
+    invoke(bpy.ops.ed.redo)
+    yield 1.0
+    assert [entry["kind"] for entry in listed()] == kinds, listed()
+    assert apart(places(frames), edited_there) < 1e-5
+    for _ in kinds:
+        use(bpy.ops.scope.remove_correction, index=0)
+    assert listed() == []
+    assert keys() == before
+
+
+def places(frames: tuple[int, ...]) -> list[Vector]:
+    """Return where the wrists, knees and the pelvis are in some frames."""
+    found = []
+    for frame in frames:
+        bpy.context.scene.frame_set(frame)
+        found += [place(joint) for joint in ("left_wrist", "right_wrist", "left_knee", "right_knee", "pelvis")]
+    return found
+
+
+def apart(these: list[Vector], those: list[Vector]) -> float:
+    """Return the largest distance between two lists of places, metres."""
+    return max((a - b).length for a, b in zip(these, those, strict=True))
 
 
 def lowest_skin() -> float:

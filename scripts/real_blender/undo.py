@@ -181,7 +181,8 @@ def capturing() -> Iterator[float]:
 def failing() -> Iterator[float]:
     """Let a correction fail after it has changed keys, and then undo what came before, which must not crash."""
     package = addon().__name__.removesuffix(".ui.capture.capture_operators")
-    keys, errors = (import_module(f"{package}.{name}") for name in ("scene.character.corrected_keys", "errors"))
+    names = "scene.character.corrections.corrected_keys", "errors"
+    keys, errors = (import_module(f"{package}.{name}") for name in names)
 
     def fail(*_: object) -> None:
         raise errors.UsageError("this fails")

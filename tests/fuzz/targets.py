@@ -175,7 +175,7 @@ def _pickled_bodies(_: Path) -> list[bytes]:
 
 def _motions(_: Path) -> list[bytes]:
     from scope.scope_addon.edit.pins.corrected_motion import with_corrections
-    from scope.scope_addon.edit.pins.corrections import Contact, Exchange, Pin, Upright
+    from scope.scope_addon.edit.pins.corrections import Contact, Exchange, FeetOnFloor, Interpolation, Pin, Upright
     from scope.solver.loaders.body_file import load_body
 
     from ..made_motion import made_face, made_motion
@@ -183,7 +183,8 @@ def _motions(_: Path) -> list[bytes]:
     poses, trans = np.zeros((6, 72)), np.zeros((6, 3))
     body = load_body("scope")
     motions = [made_motion(body, poses, trans, face=face) for face in ({}, made_face(6))]
-    corrections = (Pin(2, "head", (320.0, 200.0)), Contact(1, 3, "left"), Exchange(4, 5), Upright.of(np.eye(4)))
+    measured = (Pin(2, "head", (320.0, 200.0)), Contact(1, 3, "left"), Exchange(4, 5), Upright.of(np.eye(4)))
+    corrections = (*measured, Interpolation(1, 2), FeetOnFloor(lift=False))
     return [motion.to_bytes() for motion in (*motions, with_corrections(motions[0], body, corrections))]
 
 

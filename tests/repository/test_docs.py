@@ -23,7 +23,7 @@ from scope.scope_addon.capture.perception.adapters.keypoints.keypoint_network im
 from scope.scope_addon.cli import SAMPLE, build_parser, main
 from scope.scope_addon.command_line.arguments import body_and_options
 from scope.scope_addon.edit.pins.corrected_motion import with_corrections
-from scope.scope_addon.edit.pins.corrections import Contact, Exchange, Floor, Pin, Upright
+from scope.scope_addon.edit.pins.corrections import Contact, Exchange, FeetOnFloor, Floor, Interpolation, Pin, Upright
 from scope.scope_addon.motion import CORRECTION_KEYS, FACE_KEYS, Motion
 from scope.scope_addon.scene.export.output_paths import check_output
 from scope.solver.loaders.body_file import BUILT_IN
@@ -144,12 +144,15 @@ def test_shapes_and_types_of_the_motion_file_are_as_documented(body, tmp_path):
         Contact(1, 3, "left"),
         Exchange(1, 2),
         Exchange(4, 5),
+        Interpolation(2, 3),
         Upright.of(np.eye(4)),
         Floor(3, 0.1),
+        FeetOnFloor(),
     )
     motion = with_corrections(motion, body, changes)
     motion.save(tmp_path / "a.npz")
     sizes = {"T": 7, "K": body.K, "P": body.P, "J": motion.keypoints2d.shape[1], "N": 1, "C": 1, "E": 2, "V": 1, "B": 1}
+    sizes |= {"I": 1, "S": 1}
     sizes |= {"W": len(EXPRESSIONS), "F": motion.face["face_landmarks"].size}
     sizes["U"] = len(motion.corrections["uncorrected_rows"])
     rows = [row for first, rows in tables(DOCS / "motion_file.md") if first == "key" for row in rows]

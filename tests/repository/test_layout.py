@@ -34,6 +34,7 @@ CROSS_CUTTING = {
     "fuzz/test_kills.py": "commands, killed or refused a system call from outside",
     "fuzz/test_fuzz.py": "every reader of files and messages of others, on damaged ones",
     "scripts/test_flamenco.py": "the job type for Flamenco, a JavaScript file",
+    "scripts/test_usage.py": "what shell scripts say about their use",
     "test_read_only.py": "arguments of solving, editing and retargeting, which nothing may change",
     "test_required.py": "a helper of the tests",
 }

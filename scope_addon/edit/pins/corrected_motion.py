@@ -22,6 +22,7 @@ from ...motion import Motion
 from ..clip import Clip, clip_from_motion
 from ..spans import swap_sides
 from .corrections import Contact, Correction, Exchange, Pin, floor_height, from_arrays, to_arrays, world_of
+from .edits import edited
 from .moved import moved_clip, moved_motion
 from .reach import pixel_of
 from .solve_pins import Shot, resolve
@@ -111,11 +112,12 @@ def with_corrections(motion: Motion, body: Body, corrections: tuple[Correction, 
     for raw in (False, True):
         before = clip_from_motion(body, base, raw)
         after = _pinned(clip_from_motion(body, captured, raw), wanted, body)
-        new = (after.rotations != before.rotations).any((1, 2, 3)) | (after.root != before.root).any(1)
+        turned = (after.rotations != before.rotations).any((1, 2, 3))
+        new = turned | (after.root != before.root).any(1)
         changed |= new
         poses, trans = ("poses_raw", "trans_raw") if raw else ("poses", "trans")
         values[poses], values[trans] = getattr(base, poses).copy(), getattr(base, trans).copy()
-        values[poses][new] = log(after.rotations[new]).reshape(values[poses][new].shape)
+        values[poses][turned] = log(after.rotations[turned]).reshape(values[poses][turned].shape)
         values[trans][new] = after.root[new] - body.rest_joints(base.betas)[0]
         if not raw:
             values["joints_cam"] = base.joints_cam.copy()
@@ -134,7 +136,7 @@ def with_corrections(motion: Motion, body: Body, corrections: tuple[Correction, 
 
 
 def corrected(clip: Clip, motion: Motion, body: Body) -> Clip:
-    """Apply the motion's pins, contacts, upright line and floor to another smoothing of it.
+    """Apply the motion's edits, contacts, pins, upright line and floor to another smoothing of it.
 
     :param clip: in the captured world, with its sides exchanged already.
     :raises MotionFileError: the motion's corrections are damaged.
@@ -145,14 +147,14 @@ def corrected(clip: Clip, motion: Motion, body: Body) -> Clip:
 
 
 def _pinned(clip: Clip, motion: Motion, body: Body) -> Clip:
-    """Apply the pins and contacts, in the captured world."""
-    corrections = corrections_of(motion)
+    """Apply the edits, then the contacts and pins, in the captured world."""
+    corrections, shot = corrections_of(motion), shot_of(uncorrected(motion))
+    clip = edited(clip, body, motion.betas, corrections, shot)
     wanted = [c for c in corrections if isinstance(c, Pin | Contact)]
     if not wanted:
         return clip
     # An upright line turns the world about a point on the floor, so the floor's height is nearly the same before it.
-    shot, floor = shot_of(uncorrected(motion)), floor_height(corrections)
-    return resolve(clip, body, motion.betas, wanted, shot, floor=floor)
+    return resolve(clip, body, motion.betas, wanted, shot, floor=floor_height(corrections))
 
 
 def before_smoothing(motion: Motion, body: Body) -> Motion:

@@ -8,7 +8,7 @@ keys have.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,8 @@ from ...errors import MotionFileError, UsageError
 REACH_S = 0.4  # over which a correction fades out on both sides
 FEET = ("left", "right")
 _HIGHEST_M = 1e3
+_LAST_FRAME = 1 << 53
+_MOST_INTERPOLATIONS = 1000
 
 
 @dataclass(frozen=True)
@@ -83,6 +85,38 @@ class Exchange:
 
 
 @dataclass(frozen=True)
+class Interpolation:
+    """The motion from one frame to another, both inclusive, is interpolated from the frames around them."""
+
+    first: int
+    last: int
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        :raises UsageError: the span is empty.
+        """
+        _check_span(self.first, self.last)
+
+
+@dataclass(frozen=True)
+class FeetOnFloor:
+    """Feet in contact are put on the floor of the world that the upright line has turned; see `edit.floor.refloor`."""
+
+    level: bool = False  # the soles in contact too, by turning the motion without the camera
+    lift: bool = True  # also frames in which a foot is under the floor
+    height: float = 0.0  # metres; of the floor that was corrected before, since the feet are put on that
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        :raises UsageError: the height is not a number of metres that a world has.
+        """
+        if not abs(self.height) < _HIGHEST_M:
+            raise UsageError(f"feet cannot be put on a floor at {self.height} m, which no capture has")
+
+
+@dataclass(frozen=True)
 class Upright:
     """The world, with the camera, is turned so that a line that the user drew is upright."""
 
@@ -133,7 +167,7 @@ class Floor:
         return out
 
 
-Correction = Pin | Contact | Exchange | Upright | Floor
+Correction = Pin | Contact | Exchange | Interpolation | Upright | Floor | FeetOnFloor
 
 
 def world_of(corrections: Iterable[Correction]) -> NDArray[np.float64] | None:
@@ -149,7 +183,14 @@ def floor_height(corrections: Iterable[Correction]) -> float:
     return next((c.height for c in corrections if isinstance(c, Floor)), 0.0)
 
 
+def feet_on_floor(corrections: Iterable[Correction]) -> FeetOnFloor | None:
+    """Return how feet are put on the floor; None where they are not."""
+    return next((c for c in corrections if isinstance(c, FeetOnFloor)), None)
+
+
 def _check_span(first: int, last: int) -> None:
+    if max(abs(first), abs(last)) > _LAST_FRAME:
+        raise UsageError(f"there are no frames from {first} to {last}")
     if last < first:
         raise UsageError(f"the span ends in frame {last}, before it begins in frame {first}; swap them")
 
@@ -158,12 +199,18 @@ def added(corrections: tuple[Correction, ...], new: Correction) -> tuple[Correct
     """Return the corrections with a new one; a pin replaces the same joint's pin in the same frame.
 
     The same exchange a second time undoes the first, so that neither remains. An upright line and a floor move the
-    world that those before have made, so that one of each remains.
+    world that those before have made, so that one of each remains. An interpolation replaces those within its span.
+    Feet are put on the floor that was corrected last.
     """
     if isinstance(new, Upright | Floor):
         return _moved_on(corrections, new)
+    if isinstance(new, FeetOnFloor):
+        others = tuple(c for c in corrections if not isinstance(c, FeetOnFloor))
+        return (*others, replace(new, height=floor_height(corrections)))
     if isinstance(new, Exchange) and new in corrections:
         return tuple(c for c in corrections if c != new)
+    if isinstance(new, Interpolation):
+        corrections = tuple(c for c in corrections if not (isinstance(c, Interpolation) and _is_within(c, new)))
     if isinstance(new, Pin):
         corrections = tuple(
             c for c in corrections if not (isinstance(c, Pin) and (c.frame, c.joint) == (new.frame, new.joint))
@@ -171,8 +218,23 @@ def added(corrections: tuple[Correction, ...], new: Correction) -> tuple[Correct
     return corrections if new in corrections else (*corrections, new)
 
 
+def removed(corrections: tuple[Correction, ...], kinds: tuple[type[Correction], ...]) -> tuple[Correction, ...]:
+    """Return the corrections without these kinds; without a corrected floor, feet are put on the captured one."""
+    kept = tuple(c for c in corrections if not isinstance(c, kinds))
+    if floor_height(kept) == floor_height(corrections):
+        return kept
+    return tuple(replace(c, height=0.0) if isinstance(c, FeetOnFloor) else c for c in kept)
+
+
+def _is_within(inner: Interpolation, outer: Interpolation) -> bool:
+    return outer.first <= inner.first and inner.last <= outer.last
+
+
 def _moved_on(corrections: tuple[Correction, ...], new: Upright | Floor) -> tuple[Correction, ...]:
-    """Add what moves the present world: W' = N W, kept as W' = F' U' of a floor and an upright line."""
+    """Add what moves the present world: W' = N W, kept as W' = F' U' of a floor and an upright line.
+
+    What is upright by a line is not levelled by the feet any more.
+    """
     floor = next((c for c in corrections if isinstance(c, Floor)), None)
     upright = next((c for c in corrections if isinstance(c, Upright)), None)
     if isinstance(new, Floor):
@@ -181,6 +243,7 @@ def _moved_on(corrections: tuple[Correction, ...], new: Upright | Floor) -> tupl
         before = np.eye(4) if upright is None else upright.transform
         lowered = np.eye(4) if floor is None else floor.transform
         upright = Upright.of(np.linalg.inv(lowered) @ new.transform @ lowered @ before)
+        corrections = tuple(replace(c, level=False) if isinstance(c, FeetOnFloor) else c for c in corrections)
     others = tuple(c for c in corrections if not isinstance(c, Upright | Floor))
     return (*others, *(c for c in (upright, floor) if c is not None))
 
@@ -192,6 +255,8 @@ def to_arrays(corrections: tuple[Correction, ...]) -> dict[str, NDArray[Any]]:
     exchanges = [c for c in corrections if isinstance(c, Exchange)]
     upright = [c for c in corrections if isinstance(c, Upright)]
     floors = [c for c in corrections if isinstance(c, Floor)]
+    interpolations = [c for c in corrections if isinstance(c, Interpolation)]
+    snaps = [c for c in corrections if isinstance(c, FeetOnFloor)]
     nan = float("nan")
     return {
         "pin_frames": np.array([p.frame for p in pins], np.int64),
@@ -206,6 +271,10 @@ def to_arrays(corrections: tuple[Correction, ...]) -> dict[str, NDArray[Any]]:
         "upright": np.array([u.rows for u in upright], np.float64).reshape(-1, 4, 4),
         "floor_frames": np.array([f.frame for f in floors], np.int64),
         "floor_heights": np.array([f.height for f in floors], np.float64),
+        "interpolated_spans": np.array([(i.first, i.last) for i in interpolations], np.int64).reshape(-1, 2),
+        "snap_level": np.array([s.level for s in snaps], np.bool_),
+        "snap_lift": np.array([s.lift for s in snaps], np.bool_),
+        "snap_heights": np.array([s.height for s in snaps], np.float64),
     }
 
 
@@ -224,6 +293,11 @@ def from_arrays(arrays: Mapping[str, NDArray[Any]]) -> tuple[Correction, ...]:
 
     spans = column("contact_spans", 2), column("exchange_spans", 2)
     floors = column("floor_frames"), column("floor_heights")
+    interpolated, snaps = column("interpolated_spans", 2), (column("snap_level"), column("snap_lift"))
+    if len(interpolated) > _MOST_INTERPOLATIONS:
+        raise MotionFileError(f"the motion has {len(interpolated)} interpolated spans, at most {_MOST_INTERPOLATIONS}")
+    if any(len(flags) and flags.dtype != np.bool_ for flags in snaps):
+        raise MotionFileError("the motion's corrections are damaged: snap_level and snap_lift are not true or false")
     try:
         pins = zip(
             *(column("pin_frames"), column("pin_joints"), column("pin_uv", 2), column("pin_xyz", 3)),
@@ -236,8 +310,13 @@ def from_arrays(arrays: Mapping[str, NDArray[Any]]) -> tuple[Correction, ...]:
             *(Pin(int(f), str(j), _numbers(uv), _numbers(xyz), float(r)) for f, j, uv, xyz, r in pins),
             *(Contact(int(a), int(b), str(foot)) for a, b, foot in contacts),
             *(Exchange(int(a), int(b), str(limbs)) for a, b, limbs in exchanges),
+            *(Interpolation(int(a), int(b)) for a, b in interpolated),
             *(Upright.of(np.asarray(T, float)) for T in column("upright", 4, 4)[:1]),
             *(Floor(int(f), float(h)) for f, h in [*zip(*floors, strict=True)][:1]),
+            *(
+                FeetOnFloor(bool(level), bool(lift), float(height))
+                for level, lift, height in [*zip(*snaps, column("snap_heights"), strict=True)][:1]
+            ),
         )
     except (ValueError, TypeError, OverflowError, UsageError) as error:
         raise MotionFileError(f"the motion's corrections are damaged: {in_one_line(error)}") from error

@@ -110,7 +110,7 @@ def resolve(
 
 def exchanged(clip: Clip, body: Body, exchange: Exchange, shot: Shot) -> Clip:
     """Exchange left and right within a span of source frames; the clip itself if it has no key there."""
-    span = _keys_of_span(clip, exchange.first, exchange.last, shot)
+    span = keys_of_span(clip, exchange.first, exchange.last, shot)
     if not len(span):
         return clip
     swapped = swap_sides(clip, body, clip.times[span[0]], clip.times[span[-1]], exchange.limbs)
@@ -314,7 +314,8 @@ def _key_at(clip: Clip, time: float) -> int | None:
     return key if abs(clip.times[key] - time) <= max(spacing, 0.05) else None
 
 
-def _keys_of_span(clip: Clip, first: int, last: int, shot: Shot) -> NDArray[np.intp]:
+def keys_of_span(clip: Clip, first: int, last: int, shot: Shot) -> NDArray[np.intp]:
+    """Return the indices of a clip's keys at the source frames from ``first`` to ``last``, both inclusive."""
     half = 0.5 * float(np.median(np.diff(shot.times))) if len(shot.times) > 1 else 0.01
     return np.flatnonzero((clip.times >= shot.time(first) - half) & (clip.times <= shot.time(last) + half))
 
@@ -367,7 +368,7 @@ def _clusters(clip: Clip, tracks: list[_Track]) -> list[list[_Track]]:
 
 def _contact_track(refit: PoseRefit, clip: Clip, contact: Contact, shot: Shot, floor: float) -> _Track | None:
     """Return the track of a foot that stands: its sole stays at its median position, on the floor if that is near."""
-    span = _keys_of_span(clip, contact.first, contact.last, shot)
+    span = keys_of_span(clip, contact.first, contact.last, shot)
     if not len(span):
         return None
     which = [k for k, name in enumerate(refit.sole_names) if name.startswith(f"sole/{contact.foot}")]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far corrections put feet under the floor, where a pin asks for it: otherwise the fit keeps them above."""
+"""How far pins put feet under the floor, where one asks for it: otherwise the fit keeps them above."""
 
 from __future__ import annotations
 
@@ -8,22 +8,21 @@ import numpy as np
 from ....solver.body import Body
 from ...kinematics.foot_skin import UNDER_FLOOR_M, foot_heights
 from ...motion import Motion
-from .corrected_motion import corrections_of, uncorrected
-from .corrections import world_of
-from .moved import moved_motion
+from .corrected_motion import corrections_of, with_corrections
+from .corrections import Exchange, FeetOnFloor, Floor, Interpolation, Upright
 
 _NOTICED_M = 0.002
 
 
 def feet_under_floor(motion: Motion, body: Body) -> tuple[float, int]:
-    """Return how far a foot is under the floor because of the motion's corrections, metres, and in how many frames.
+    """Return how far a foot is under the floor because of what was measured, metres, and in how many frames.
 
     :param body: that of the motion.
     :return: of feet that are more than `UNDER_FLOOR_M` under the floor and lower than without pins; or 0 and 0.
     :raises MotionFileError: the motion's corrections are damaged.
     """
-    world = world_of(corrections_of(motion))
-    free = uncorrected(motion) if world is None else moved_motion(uncorrected(motion), body, world)
+    kept = Exchange | Interpolation | Upright | Floor | FeetOnFloor
+    free = with_corrections(motion, body, tuple(c for c in corrections_of(motion) if isinstance(c, kept)))
     lowest, before = (foot_heights(m, body).min(axis=1) for m in (motion, free))
     under = (lowest < -UNDER_FLOOR_M) & (lowest < before - _NOTICED_M)
     return (-float(lowest[under].min()), int(np.count_nonzero(under))) if under.any() else (0.0, 0)

@@ -65,15 +65,20 @@ def store_corrections(
 
 def _entry(armature: bpy.types.Object, motion: Motion, correction: Correction, rate: float) -> dict[str, Any]:
     """Describe a correction."""
-    from ...edit.pins.corrections import Contact, Floor, Pin, Upright
-    from .corrected_keys import scene_frame
+    from ...edit.pins.corrections import Contact, FeetOnFloor, Floor, Interpolation, Pin, Upright
+    from .corrections.corrected_keys import scene_frame
 
+    whole = int(motion.frames[0]), int(motion.frames[-1])
     if isinstance(correction, Pin):
         kind, text, span = "PIN", correction.joint.replace("_", " ").title(), (correction.frame,) * 2
     elif isinstance(correction, Contact):
         kind, text, span = "CONTACT", f"{correction.foot.title()} Foot Stands", (correction.first, correction.last)
+    elif isinstance(correction, Interpolation):
+        kind, text, span = "INTERPOLATION", "Interpolated", (correction.first, correction.last)
     elif isinstance(correction, Upright):
-        kind, text, span = "UPRIGHT", "Upright Line", (int(motion.frames[0]), int(motion.frames[-1]))
+        kind, text, span = "UPRIGHT", "Upright Line", whole
+    elif isinstance(correction, FeetOnFloor):
+        kind, text, span = "FEET", "Feet on the Floor", whole
     elif isinstance(correction, Floor):
         kind, text, span = "FLOOR", "Floor", (correction.frame,) * 2
     else:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that edit the motion of a capture: smoothing, interpolation, left and right, floor, root motion.
+"""Operators that edit the motion of a capture: smoothing and root motion.
 
-All of them read and rewrite the keys of the active capture's armature; only smoothing starts from the captured motion,
-which the .blend file stores. None of them uses the footage.
+Both rewrite the keys of the active capture's armature; smoothing starts from the captured motion, which the .blend file
+stores. Neither uses the footage. Edits that the motion keeps are in ``pins/kept_edits.py``.
 """
 
 from __future__ import annotations
@@ -13,15 +13,11 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
 from .. import compiled_solver
-from ..captured_person import betas_of, motion_of, set_motion_of
-from .edit_base import EditOperator, SpanOperator, edit_clip
+from ..captured_person import motion_of, set_motion_of
+from .edit_base import EditOperator
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from ....solver.body import Body
-    from ...edit.clip import Clip
 
 
 class SCOPE_OT_smooth(EditOperator):
@@ -45,9 +41,9 @@ class SCOPE_OT_smooth(EditOperator):
         from ...edit.smooth import smoothed
         from ...scene.animation_data.actions import remove_cycles
         from ...scene.animation_data.timing import key_frames, restore_scene_range, store_rate
+        from ...scene.character.corrections.uncorrected_keys import write_both
         from ...scene.character.keys import bake_whole_frames, write_clip
         from ...scene.character.root_object import remove_root_object
-        from ...scene.character.uncorrected_keys import write_both
 
         motion = motion_of(armature)
         if motion.corrections:  # which are solved again
@@ -67,79 +63,6 @@ class SCOPE_OT_smooth(EditOperator):
             bake_whole_frames(armature, body, rate)
         restore_scene_range(context.scene, armature)
         remove_root_object(armature)
-        return ""
-
-
-class SCOPE_OT_interpolate_span(SpanOperator):
-    """Replace frames by an interpolation between the pose before and the pose after them"""
-
-    bl_idname = "scope.interpolate_span"
-    bl_label = "Interpolate Frames"
-
-    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
-        """Replace the keys inside the span."""
-        from ...edit.spans import interpolate
-
-        edit_clip(armature, body, rate, lambda clip, _: interpolate(clip, self.start / rate, self.end / rate))
-        return ""
-
-
-class SCOPE_OT_swap_sides(SpanOperator):
-    """Swap the left and right limbs within a span of frames"""
-
-    bl_idname = "scope.swap_sides"
-    bl_label = "Swap Left and Right"
-
-    limbs: EnumProperty(
-        name="Limbs",
-        items=(
-            ("both", "Arms and Legs", "All four limbs", 0),
-            ("legs", "Legs", "Only the legs", 1),
-            ("arms", "Arms", "Only the arms", 2),
-        ),
-        default="both",
-        description="Which limbs are swapped",
-    )
-
-    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
-        """Change the keys inside the span."""
-        from ...edit.spans import swap_sides
-
-        span = self.start / rate, self.end / rate
-        edit_clip(armature, body, rate, lambda clip, _: swap_sides(clip, body, *span, self.limbs))
-        return ""
-
-
-class SCOPE_OT_refloor(EditOperator):
-    """Put feet in contact on the floor, which is at the height of the armature's origin"""
-
-    bl_idname = "scope.refloor"
-    bl_label = "Snap Feet to Floor"
-
-    level: BoolProperty(
-        name="Level the World",
-        default=False,
-        description="Rotate the motion so that all foot contacts are level, after which the camera no longer matches",
-    )
-    lift: BoolProperty(
-        name="Lift Sunken Feet", default=True, description="Raise the frames in which a foot is below the floor"
-    )
-
-    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
-        """Change all keys."""
-        from ...edit.floor import refloor
-        from ...edit.root_motion import relative_to_trajectory, with_trajectory
-        from ...scene.character.root_object import removed_root_motion
-
-        betas = betas_of(armature, body)
-
-        def floored(clip: Clip, frames: NDArray[np.float64]) -> Clip:
-            positions, angles = removed_root_motion(armature, frames)
-            path = positions * [1.0, 1.0, 0.0], angles  # feet in contact are at rest only with root motion
-            placed = refloor(with_trajectory(clip, *path), body, betas, level=self.level, lift=self.lift)
-            return relative_to_trajectory(placed, *path)
-
-        edit_clip(armature, body, rate, floored)
         return ""
 
 
@@ -174,10 +97,4 @@ class SCOPE_OT_root_motion(EditOperator):
         return ""
 
 
-CLASSES = (
-    SCOPE_OT_smooth,
-    SCOPE_OT_interpolate_span,
-    SCOPE_OT_swap_sides,
-    SCOPE_OT_refloor,
-    SCOPE_OT_root_motion,
-)
+CLASSES = (SCOPE_OT_smooth, SCOPE_OT_root_motion)

@@ -10,6 +10,7 @@ import bpy
 from ...scene.character.correction_list import store_corrections
 from .. import compiled_solver
 from ..captured_person import body_of, motion_of, set_motion_of
+from ..edit.edit_base import EditOperator
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -19,31 +20,41 @@ if TYPE_CHECKING:
     from ...motion import Motion
 
 
+class CorrectionOperator(EditOperator):
+    """A correction after which Blender evaluates the current frame again. Not registered."""
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Correct the motion and its keys."""
+        message = super().work(context)
+        context.scene.frame_set(context.scene.frame_current, subframe=context.scene.frame_subframe)
+        return message
+
+
 def change_corrections(
     armature: bpy.types.Object,
     body: Body,
     rate: float,
     change: Callable[[tuple[Correction, ...]], tuple[Correction, ...]],
-    pin: Pin | None = None,
+    added: Correction | None = None,
     rise: float = 0.0,
 ) -> Motion:
     """Change the corrections of a captured person: of the motion, the keys and the list.
 
     :param rate: scene frames per second.
     :param change: returns the new corrections for the present ones.
-    :param pin: the one that this adds, which is met even if edited keys differ from the motion.
-    :param rise: metres by which all keys are raised first, which is an edit of its own.
+    :param added: the one that this adds; a pin or an edit holds even if edited keys differ from the motion.
+    :param rise: metres by which all keys are raised, which is an edit of its own.
     :return: the corrected motion.
     :raises UsageError: the motion is no longer there, or keys are missing.
     """
     from ...edit.pins.corrected_motion import corrections_of, with_corrections
-    from ...scene.character.corrected_keys import pinned_places, rewrite_changed_keys
+    from ...scene.character.corrections.corrected_keys import pinned_places, rewrite_changed_keys
     from ...scene.packed_motion import stored_keys
 
     compiled_solver.load()
     before = motion_of(armature)
     after = with_corrections(before, body, change(corrections_of(before)))
-    keys = rewrite_changed_keys(armature, body, rate, (before, after), stored_keys(armature), pin, rise)
+    keys = rewrite_changed_keys(armature, body, rate, (before, after), stored_keys(armature), added, rise)
     set_motion_of(armature, after, keys.to_bytes() if len(keys.times) else b"")
     store_corrections(armature, after, rate, pinned_places(armature, body, rate, after))
     return after
@@ -60,7 +71,7 @@ def change_world(
 
     :param rate: scene frames per second.
     :param change: returns the new corrections for the present ones, and changes the same of everybody.
-    :param rise: metres by which the keys of this person are raised first.
+    :param rise: metres by which the keys of this person are raised.
     :raises UsageError: the root motion is on an object, or keys are missing.
     """
     import numpy as np
@@ -88,10 +99,20 @@ def change_world(
 
 def without_kinds(corrections: tuple[Correction, ...], kinds: set[str]) -> tuple[Correction, ...]:
     """Return the corrections without those that move the world; the list calls them ``UPRIGHT`` and ``FLOOR``."""
-    from ...edit.pins.corrections import Floor, Upright
+    from ...edit.pins.corrections import Floor, Upright, removed
 
-    removed = tuple(cls for cls in (Upright, Floor) if cls.__name__.upper() in kinds)
-    return tuple(c for c in corrections if not isinstance(c, removed))
+    return removed(corrections, tuple(cls for cls in (Upright, Floor) if cls.__name__.upper() in kinds))
+
+
+def shown_frame(scene: bpy.types.Scene, armature: bpy.types.Object, motion: Motion) -> int:
+    """Return the footage's frame at the scene's current frame.
+
+    :raises UsageError: the motion has none there.
+    """
+    from ...scene.animation_data.timing import scene_rate
+    from ...scene.character.corrections.corrected_keys import source_frame
+
+    return source_frame(armature, motion, scene.frame_current + scene.frame_subframe, scene_rate(scene))
 
 
 def pin_at(
@@ -107,13 +128,12 @@ def pin_at(
 
     from ...edit.pins.corrected_motion import corrections_of, shot_of
     from ...edit.pins.corrections import Pin, world_of
-    from ...scene.animation_data.timing import scene_rate
-    from ...scene.character.corrected_keys import captured_points, source_frame
+    from ...scene.character.corrections.corrected_keys import captured_points
 
     scene, (location, in_image, reach) = context.scene, place
     context.view_layer.update()
     current = scene.frame_current + scene.frame_subframe
-    frame = source_frame(armature, motion, current, scene_rate(scene))
+    frame = shown_frame(scene, armature, motion)
     points = [np.array(location, float)]
     if in_image and scene.camera is not None:
         points.append(np.array(scene.camera.matrix_world.translation))

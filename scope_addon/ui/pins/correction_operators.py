@@ -12,7 +12,7 @@ from ...scene.character.correction_list import listed_corrections
 from ..captured_person import motion_of
 from ..edit.edit_base import EditOperator, SpanOperator
 from ..reporting import iface_, rpt_
-from .corrected_person import change_corrections, change_world, pin_at, without_kinds
+from .corrected_person import CorrectionOperator, change_corrections, change_world, pin_at, without_kinds
 
 if TYPE_CHECKING:
     from ....solver.body import Body
@@ -38,10 +38,10 @@ def floor_warning(armature: bpy.types.Object, body: Body) -> str:
     if not count:
         return ""
     return rpt_(
-        "The corrections put a foot up to {depth:.0f} cm under the floor: move the pin up, or use Snap Feet to Floor"
+        "The corrections put a foot up to {depth:.0f} cm under the floor: move the pin up"
         if len(motion) == 1
         else "The corrections put a foot up to {depth:.0f} cm under the floor in {count} of {total} frames: "
-        "move the pin up, or use Snap Feet to Floor",
+        "move the pin up",
         depth=100 * depth,
         count=count,
         total=len(motion),
@@ -108,7 +108,7 @@ class SCOPE_OT_add_pin(EditOperator):
         return ""
 
 
-class CorrectSpanOperator(SpanOperator):
+class CorrectSpanOperator(CorrectionOperator, SpanOperator):
     """A correction of a span of frames. Not registered."""
 
     if TYPE_CHECKING:  # implemented by each operator
@@ -119,15 +119,14 @@ class CorrectSpanOperator(SpanOperator):
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
         """Add the correction and change the keys."""
         from ...edit.pins.corrections import added
-        from ...scene.character.corrected_keys import source_frame
+        from ...scene.character.corrections.corrected_keys import source_frame
 
         motion = motion_of(armature)
         first, last = (source_frame(armature, motion, frame, rate) for frame in (self.start, self.end))
         new = self.correction(first, last)
-        change_corrections(armature, body, rate, lambda present: added(present, new))
+        change_corrections(armature, body, rate, lambda present: added(present, new), new)
         if warning := floor_warning(armature, body):
             self.report({"WARNING"}, warning)
-        context.scene.frame_set(context.scene.frame_current, subframe=context.scene.frame_subframe)
         return ""
 
 
@@ -151,11 +150,8 @@ class SCOPE_OT_foot_stands(CorrectSpanOperator):
         return Contact(first, last, self.foot)
 
 
-class SCOPE_OT_exchange_sides(CorrectSpanOperator):
-    """Exchange left and right from the first to the last frame; the same once more undoes it"""
-
-    bl_idname = "scope.exchange_sides"
-    bl_label = "Exchange Left and Right"
+class ExchangeOperator(CorrectSpanOperator):
+    """An exchange of left and right limbs. Not registered."""
 
     limbs: EnumProperty(
         name="Limbs",
@@ -175,7 +171,14 @@ class SCOPE_OT_exchange_sides(CorrectSpanOperator):
         return Exchange(first, last, self.limbs)
 
 
-class SCOPE_OT_remove_correction(EditOperator):
+class SCOPE_OT_exchange_sides(ExchangeOperator):
+    """Exchange left and right from the first to the last frame; the same once more undoes it"""
+
+    bl_idname = "scope.exchange_sides"
+    bl_label = "Exchange Left and Right"
+
+
+class SCOPE_OT_remove_correction(CorrectionOperator):
     """Remove the correction; the motion around it is again what it was without it"""
 
     bl_idname = "scope.remove_correction"
@@ -204,7 +207,6 @@ class SCOPE_OT_remove_correction(EditOperator):
                 rate,
                 lambda present: tuple(c for k, c in enumerate(present) if self.index >= 0 and k != self.index),
             )
-        context.scene.frame_set(context.scene.frame_current, subframe=context.scene.frame_subframe)
         return ""
 
 

@@ -9,9 +9,8 @@ import bpy
 from bpy.props import EnumProperty
 
 from ..captured_person import motion_of
-from ..edit.edit_base import EditOperator
 from ..reporting import rpt_
-from .corrected_person import change_world
+from .corrected_person import CorrectionOperator, change_world, shown_frame
 
 if TYPE_CHECKING:
     from ....solver.body import Body
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
 _SAME_M = 0.002
 
 
-class SCOPE_OT_floor_here(EditOperator):
+class SCOPE_OT_floor_here(CorrectionOperator):
     """In this frame, a foot rests on the floor: move the capture and its camera up or down until it does"""
 
     bl_idname = "scope.floor_here"
@@ -40,16 +39,15 @@ class SCOPE_OT_floor_here(EditOperator):
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
         """Move everybody of the capture, and the camera."""
         from ...edit.pins.corrections import Floor, added
-        from ...scene.character.corrected_keys import heights_of_foot, source_frame
+        from ...scene.character.corrections.corrected_keys import heights_of_foot
 
         scene, motion = context.scene, motion_of(armature)
-        frame = source_frame(armature, motion, scene.frame_current + scene.frame_subframe, rate)
+        frame = shown_frame(scene, armature, motion)
         height, shown = heights_of_foot(armature, body, rate, motion, (frame, self.foot))
         floor = Floor(frame, height)
-        # Edited keys, such as those of Snap Feet to Floor, may have the foot elsewhere than the motion.
+        # Edited keys may have the foot elsewhere than the motion.
         rise = height - shown if abs(height - shown) > _SAME_M else 0.0
         change_world(scene, armature, rate, lambda present: added(present, floor), rise)
-        scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
         if warning := _others_under_floor(motion_of(armature), body):
             self.report({"WARNING"}, warning)
         return ""

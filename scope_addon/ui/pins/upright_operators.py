@@ -9,10 +9,10 @@ import bpy
 from bpy.props import FloatVectorProperty
 
 from ..captured_person import captured_armature, motion_of
-from ..edit.edit_base import EditOperator, may_edit
+from ..edit.edit_base import may_edit
 from ..reporting import iface_, sentence, tip_
 from ..view.comparison import camera_of
-from .corrected_person import change_world
+from .corrected_person import CorrectionOperator, change_world, shown_frame
 from .drawing import draw_line, redraw_viewport, viewport_of
 from .pointer import Pointer
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _HELP = "Draw a line along something that is upright: a door, a wall's edge, a post.  Esc: cancel"
 
 
-class SCOPE_OT_set_upright(EditOperator):
+class SCOPE_OT_set_upright(CorrectionOperator):
     """Turn the capture and its camera so that a line in the footage is upright"""
 
     bl_idname = "scope.set_upright"
@@ -35,13 +35,11 @@ class SCOPE_OT_set_upright(EditOperator):
         """Move everybody of the capture, and the camera."""
         from ...edit.pins.corrections import Upright, added
         from ...edit.pins.upright import upright_transform
-        from ...scene.character.corrected_keys import source_frame
 
         scene, motion = context.scene, motion_of(armature)
-        frame = source_frame(armature, motion, scene.frame_current + scene.frame_subframe, rate)
+        frame = shown_frame(scene, armature, motion)
         transform = upright_transform(motion, body, frame, (tuple(self.start), tuple(self.end)))
         change_world(scene, armature, rate, lambda present: added(present, Upright.of(transform)))
-        scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
         return ""
 
 
@@ -129,14 +127,13 @@ def _pixels(context: bpy.types.Context, points: list[object]) -> list[tuple[floa
 
     from ...edit.pins.corrected_motion import shot_of
     from ...errors import UsageError
-    from ...scene.animation_data.timing import scene_rate
-    from ...scene.character.corrected_keys import captured_points, source_frame
+    from ...scene.character.corrections.corrected_keys import captured_points
 
     armature, scene = captured_armature(context), context.scene
     if armature is None:  # since the line was begun
         raise UsageError("the captured person was removed; select another one")
     motion, current = motion_of(armature), scene.frame_current + scene.frame_subframe
-    frame = source_frame(armature, motion, current, scene_rate(scene))
+    frame = shown_frame(scene, armature, motion)
     at = captured_points(armature, current, np.array(points, float))
     u, v = (shot_of(motion).project(frame, point) for point in at)
     return [(float(u[0]), float(u[1])), (float(v[0]), float(v[1]))]

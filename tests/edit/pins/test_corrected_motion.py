@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.edit.clip import clip_from_motion
 from scope.scope_addon.edit.pins.corrected_motion import corrections_of, shot_of, uncorrected, with_corrections
-from scope.scope_addon.edit.pins.corrections import Contact, Exchange, Pin, Upright
+from scope.scope_addon.edit.pins.corrections import Contact, Exchange, FeetOnFloor, Interpolation, Pin, Upright
 from scope.scope_addon.edit.pins.solve_pins import missed
 from scope.scope_addon.edit.smooth import smoothed
 from scope.scope_addon.edit.spans import swap_sides
@@ -38,7 +38,7 @@ def test_pins_hold_whatever_the_smoothing(strength):
 
 
 def test_the_file_keeps_the_corrections_and_removing_them_restores_the_motion(tmp_path):
-    corrections = (pin(), Contact(60, 66, "left"), Exchange(10, 16))
+    corrections = (pin(), Contact(60, 66, "left"), Exchange(10, 16), Interpolation(70, 74), FeetOnFloor())
     motion = with_corrections(MOTION, BODY, corrections)
     motion.save(tmp_path / "a.npz")
     back = Motion.load(tmp_path / "a.npz")

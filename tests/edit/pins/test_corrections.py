@@ -6,11 +6,14 @@ import pytest
 from scope.scope_addon.edit.pins.corrections import (
     Contact,
     Exchange,
+    FeetOnFloor,
     Floor,
+    Interpolation,
     Pin,
     Upright,
     added,
     from_arrays,
+    removed,
     to_arrays,
 )
 from scope.scope_addon.errors import MotionFileError, UsageError
@@ -20,8 +23,11 @@ ALL = (
     Pin(9, "head", position=(0.1, -0.2, 1.7), reach=0.25),
     Contact(4, 8, "left"),
     Exchange(2, 6, "legs"),
+    Interpolation(4, 7),
+    Interpolation(1, 2),
     Upright((1.0, 0, 0, 0.5, 0, 0, -1.0, 0, 0, 1.0, 0, 2.0, 0, 0, 0, 1.0)),
     Floor(7, -0.125),
+    FeetOnFloor(level=True, lift=False, height=-0.125),
 )
 
 
@@ -45,6 +51,17 @@ def test_damaged_arrays_are_an_error():
         ("floor_heights", np.array([np.inf])),
         ("floor_heights", np.zeros(2)),
         ("floor_frames", np.zeros((1, 2))),
+        ("interpolated_spans", np.zeros((1, 3), int)),
+        ("interpolated_spans", np.array([[5, 4]])),
+        ("interpolated_spans", np.array([[0, np.inf]])),
+        ("interpolated_spans", np.array([["a", "b"]])),
+        ("interpolated_spans", np.array([[0, 2**63]], np.uint64)),
+        ("interpolated_spans", np.zeros((1001, 2), int)),
+        ("snap_level", np.array([1.0])),
+        ("snap_lift", np.array(["yes"])),
+        ("snap_lift", np.zeros(2, bool)),
+        ("snap_heights", np.array([np.nan])),
+        ("snap_heights", np.array([1e6])),
     ):
         with pytest.raises(MotionFileError):
             from_arrays(arrays | {name: value})
@@ -60,6 +77,8 @@ def test_damaged_arrays_are_an_error():
         lambda: Contact(5, 4, "left"),
         lambda: Contact(1, 4, "both"),
         lambda: Exchange(1, 4, "feet"),
+        lambda: Interpolation(5, 4),
+        lambda: FeetOnFloor(height=np.inf),
     ],
 )
 def test_impossible_values_are_refused(make):
@@ -82,3 +101,23 @@ def test_a_second_upright_line_turns_what_the_first_has_made():
 
 def test_the_same_exchange_again_undoes_the_first():
     assert added(ALL, ALL[3]) == (*ALL[:3], *ALL[4:])
+
+
+def test_an_interpolation_replaces_those_within_its_span():
+    assert added(ALL, Interpolation(3, 8)) == (*ALL[:4], *ALL[5:], Interpolation(3, 8))
+    assert added(ALL, Interpolation(5, 8)) == (*ALL, Interpolation(5, 8))
+
+
+def test_feet_are_put_on_the_floor_that_was_corrected_last():
+    assert added((Floor(3, 0.5),), FeetOnFloor()) == (Floor(3, 0.5), FeetOnFloor(height=0.5))
+    assert added(ALL[-1:], FeetOnFloor()) == (FeetOnFloor(),)
+
+
+def test_without_the_corrected_floor_feet_are_put_on_the_captured_one():
+    assert removed(ALL, (Floor,)) == (*ALL[:-2], FeetOnFloor(level=True, lift=False))
+    assert removed(ALL, (Upright,)) == (*ALL[:6], *ALL[7:])
+
+
+def test_an_upright_line_replaces_what_was_levelled():
+    line = Upright.of(np.eye(4))
+    assert added((FeetOnFloor(level=True, lift=False),), line) == (FeetOnFloor(level=False, lift=False), line)

@@ -6,7 +6,7 @@ import json
 import bpy
 import pytest
 from scope.scope_addon.edit.pins.corrected_motion import with_corrections
-from scope.scope_addon.edit.pins.corrections import Contact, Exchange, Pin
+from scope.scope_addon.edit.pins.corrections import Contact, Exchange, FeetOnFloor, Interpolation, Pin
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.character.correction_list import listed_corrections
@@ -19,6 +19,7 @@ ENTRY = {"kind": "PIN", "text": "Left Wrist", "joint": "left_wrist", "first": 4,
 def test_a_corrected_file_brings_its_list(tmp_path):
     plain = motion_of(walk(2.0))
     changes = (Pin(20, "left_wrist", (300.0, 200.0)), Contact(30, 34, "right"), Exchange(3, 5, "legs"))
+    changes = (*changes, Interpolation(40, 42), FeetOnFloor())
     with_corrections(plain, BODY, changes).save(tmp_path / "a.npz")
     bpy.context.scene.render.fps = 60  # twice the motion's rate
     options = BuildOptions(start_frame=11.0)
@@ -27,6 +28,8 @@ def test_a_corrected_file_brings_its_list(tmp_path):
         ("Left Wrist", 51, 51),
         ("Right Foot Stands", 71, 79),
         ("Legs Exchanged", 17, 21),
+        ("Interpolated", 91, 95),
+        ("Feet on the Floor", 11, 131),
     ]
     assert listed_corrections(build_scene([plain], BODY, None, options).people[0].armature) == []
 

@@ -102,7 +102,7 @@ def test_export_buttons_write_files_and_do_not_change_the_scene(fake_worker, foo
     assert contents() == before
 
 
-def test_a_motion_file_contains_the_captured_motion(fake_worker, footage, tmp_path):
+def test_a_motion_file_contains_the_captured_motion_and_the_edits_that_it_keeps(fake_worker, footage, tmp_path):
     captured(fake_worker, footage)
     armature, cached = bpy.data.objects["person"], next((cache().root / "captures").rglob("person1.npz"))
     kept = Motion.load(cached)
@@ -111,6 +111,8 @@ def test_a_motion_file_contains_the_captured_motion(fake_worker, footage, tmp_pa
     bpy.ops.scope.export(filepath=str(tmp_path / "walk.npz"), format="NPZ")
     got = Motion.load(tmp_path / "walk.npz")
     assert np.array_equal(got.poses, kept.poses)
+    assert np.ptp(got.trans - kept.trans, axis=0)[:2].max() == 0
+    assert got.corrections["snap_lift"].tolist() == [True]
     bpy.ops.scope.clear_cache()
     assert not cached.exists()
     bpy.ops.scope.export(filepath=str(tmp_path / "again.npz"), format="NPZ")

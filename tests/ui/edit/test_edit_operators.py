@@ -108,13 +108,14 @@ def test_interpolating_and_swapping_a_span(rig):
     bpy.ops.scope.swap_sides(start=20, end=30, limbs="legs")
     swapped = keys(rig)[0]
     assert turned(swapped.rotations[19:30], before.rotations[19:30]) > 10
-    assert turned(np.delete(swapped.rotations, range(19, 30), 0), np.delete(before.rotations, range(19, 30), 0)) < 0.01
+    around = range(15, 34)  # smoothing has mixed the sides at the ends of the span, so it is smoothed again there
+    assert turned(np.delete(swapped.rotations, around, 0), np.delete(before.rotations, around, 0)) < 0.01
     bpy.ops.scope.swap_sides(start=20, end=30, limbs="legs")
     assert turned(keys(rig)[0].rotations, before.rotations) < 0.05
     bpy.ops.scope.interpolate_span(start=40, end=44)
     assert 0.1 < turned(keys(rig)[0].rotations, before.rotations) < 8
     with pytest.raises(RuntimeError, match="reaches the motion's end"):
-        bpy.ops.scope.interpolate_span(start=-5, end=44)
+        bpy.ops.scope.interpolate_span(start=1, end=44)
 
 
 def test_feet_to_floor(rig):

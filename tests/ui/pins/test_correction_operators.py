@@ -155,13 +155,13 @@ def test_without_corrections_keys_and_motion_are_again_the_same_to_the_bit(rig, 
     for name in order:
         CORRECTIONS[name](wrist)
     assert any(not np.array_equal(now, before[curve]) for curve, now in keys(rig).items())
-    while listed_corrections(rig):
-        bpy.ops.scope.remove_correction(index=len(listed_corrections(rig)) // 2)
+    while added := [k for k, e in enumerate(listed_corrections(rig)) if e["kind"] != "INTERPOLATION"]:
+        bpy.ops.scope.remove_correction(index=added[len(added) // 2])
     assert_same_keys(keys(rig), before)
     again = stored_motion_of(rig)
     for name in ("poses", "trans", "poses_raw", "trans_raw", "joints_cam", "world_from_camera"):
         np.testing.assert_array_equal(getattr(again, name), getattr(motion, name))
-    assert again.corrections == {}
+    assert again.corrections.keys() == motion.corrections.keys()
 
 
 def test_removing_one_of_several_leaves_what_the_others_alone_give(rig):

@@ -119,8 +119,9 @@ def test_keys_that_were_put_on_the_floor_before_are_on_it_afterwards(rig):
     bpy.ops.scope.floor_here()
     assert abs(snapped) < 0.1
     assert abs(lowest(rig)) < 0.002
-    bpy.ops.scope.smooth(strength=1.0)  # discards the edit, and keeps the correction
+    bpy.ops.scope.smooth(strength=1.0)  # keeps both
     assert abs(lowest(rig)) < 0.002
+    assert kinds(rig) == ["FLOOR", "FEET"]
 
 
 def test_feet_under_the_floor_in_other_frames_are_said(rig, capfd):

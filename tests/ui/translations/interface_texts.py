@@ -21,8 +21,9 @@ OPERATOR, DEFAULT = "Operator", "*"  # Blender's contexts
 UNTRANSLATED = {"Scope", "FBX", "glTF", "BVH", "USD", "NPZ", "CPU", "CUDA", "TensorRT", "DirectML", "Core ML", "Y", "Z"}
 # Texts that are composed, in .blend files as well: joints under the mouse, corrections, stages of the progress.
 _JOINTS = {name.replace("_", " ").title() for name in HANDLES}
-_CORRECTIONS = {"Left Foot Stands", "Right Foot Stands", "Upright Line", "Floor"} | {
-    f"{what} Exchanged" for what in ("Left and Right", "Arms", "Legs")
+_CORRECTIONS = {
+    *("Left Foot Stands", "Right Foot Stands", "Upright Line", "Floor", "Feet on the Floor", "Interpolated"),
+    *(f"{what} Exchanged" for what in ("Left and Right", "Arms", "Legs")),
 }
 _STAGES = {stage.capitalize() for stage in (*STAGES, *FIRST_ONLY)}
 _LOOKUPS = {"iface_", "rpt_", "tip_", "translate"}

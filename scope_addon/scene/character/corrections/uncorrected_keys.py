@@ -16,12 +16,12 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ....solver.body import Body
-from ....solver.loaders.npz import read_npz
-from ...edit.clip import Clip
-from ...errors import MotionFileError
-from ..animation_data.actions import read_keys
-from .keys import channel_curves, write_clip
+from .....solver.body import Body
+from .....solver.loaders.npz import read_npz
+from ....edit.clip import Clip
+from ....errors import MotionFileError
+from ...animation_data.actions import read_keys
+from ..keys import channel_curves, write_clip
 
 _SAME = 2e-3  # frames; keys are single precision
 _NAMES = ("times", "before", "written")

@@ -12,18 +12,19 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ....solver.body import Body
-from ...edit.clip import Clip, sample
-from ...edit.pins.corrected_motion import corrections_of, pin_in_world, shot_of, uncorrected
-from ...edit.pins.corrections import Pin, world_of
-from ...edit.pins.floor_here import foot_height
-from ...edit.pins.moved import moved_clip
-from ...edit.pins.solve_pins import missed, resolve
-from ...edit.smooth import smoothed
-from ...errors import UsageError
-from ...motion import Motion
-from .keys import channel_curves, read_clip, write_keys
-from .root_object import clip_with_root_motion, root_object
+from .....solver.body import Body
+from ....edit.clip import Clip, sample
+from ....edit.pins.corrected_motion import corrections_of, pin_in_world, shot_of, uncorrected
+from ....edit.pins.corrections import Correction, FeetOnFloor, Pin, feet_on_floor, world_of
+from ....edit.pins.floor_here import foot_height
+from ....edit.pins.moved import moved_clip
+from ....edit.pins.solve_pins import missed, resolve
+from ....edit.smooth import smoothed
+from ....errors import UsageError
+from ....motion import Motion
+from ..keys import channel_curves, read_clip, write_keys
+from ..root_object import clip_with_root_motion, root_object
+from .edited_keys import KeyEdits, begin_with_edits, meet_floor
 from .uncorrected_keys import UncorrectedKeys, changed_rows, differ, keyed_values, restore
 
 _SAME_FRAME = 2e-3
@@ -37,7 +38,7 @@ def rewrite_changed_keys(
     rate: float,
     motions: tuple[Motion, Motion],
     stored: object = None,
-    pin: Pin | None = None,
+    added: Correction | None = None,
     rise: float = 0.0,
 ) -> UncorrectedKeys:
     """Change the keys from one motion to another, which differs from it in its corrections.
@@ -47,18 +48,18 @@ def rewrite_changed_keys(
     :param rate: scene frames per second.
     :param motions: before and after.
     :param stored: bytes of the ``UncorrectedKeys`` of the last change.
-    :param pin: a new one, which is met even if edited keys differ from the motion.
-    :param rise: metres by which all keys are raised first, which is an edit of its own.
+    :param added: a new correction; a pin or an edit holds even if edited keys differ from the motion.
+    :param rise: metres by which all keys are raised, which is an edit of its own.
     :return: the keys that are now different from those without corrections.
     :raises UsageError: when a bone or its keys are missing.
     """
     start, (before, after) = float(armature.get("scope_start", 0.0)), motions
     known = UncorrectedKeys.from_bytes(stored, len(channel_curves(armature, body)))
     restored = restore(armature, body, start, rate, known)
+    on_floor = feet_on_floor(corrections_of(after)) is not None  # would undo a rise before it
+    if rise and not on_floor:
+        _raise_keys(armature, body, rate, rise)
     clip, frames = read_clip(armature, body, rate)
-    if rise:
-        clip = Clip(clip.times, clip.rotations, clip.root + [0.0, 0.0, rise])
-        write_keys(armature, body, clip, frames, np.ones(len(frames), bool))
     strength = float(armature.get("scope_smoothing", 1.0))
     free, old, new = (
         _at(smoothed(body, m, strength), clip.times, _start(armature, rate))
@@ -73,14 +74,30 @@ def rewrite_changed_keys(
     exact = again if was is not None else again | ~differ(free, old)
     old.rotations[exact], old.root[exact] = free.rotations[exact], free.root[exact]
     rows = frames.astype(np.float32)
-    values = keyed_values(armature, body, rows)
-    _write_change(armature, body, clip, frames, (old, new), _moves(again, was, now))
-    if pin is not None:
-        _meet_pin(armature, body, rate, after, pin)
+    values, moves = keyed_values(armature, body, rows), _moves(again, was, now)
+    edits = KeyEdits(corrections_of(after), after.betas, shot_of(after, _start(armature, rate)), added, exact)
+    if edits.any():
+        begun, old = begin_with_edits(armature, body, (_moved_rows(clip, moves)[0], old), frames, edits)
+        write_keys(armature, body, begun, frames, differ(begun, clip))
+        clip, moves = begun, np.tile(np.eye(4), (len(frames), 1, 1))
+    _write_change(armature, body, clip, frames, (old, new), moves)
+    if isinstance(added, Pin):
+        _meet_pin(armature, body, rate, after, added)
+    elif isinstance(added, FeetOnFloor) and not exact.all():
+        meet_floor(armature, body, rate, after, edits)
+    if rise and on_floor:
+        _raise_keys(armature, body, rate, rise)
     after_values = keyed_values(armature, body, rows)
     same = (values == after_values) | (np.isnan(values) & np.isnan(after_values))
     changed = differ(free, new) | ~same.all(axis=1) | (now is not None)
     return changed_rows(rows, exact & changed, (values, after_values), start, rate)
+
+
+def _raise_keys(armature: bpy.types.Object, body: Body, rate: float, rise: float) -> None:
+    """Raise all keys by metres; ``rate`` is the scene's, frames per second."""
+    clip, frames = read_clip(armature, body, rate)
+    raised = Clip(clip.times, clip.rotations, clip.root + [0.0, 0.0, rise])
+    write_keys(armature, body, raised, frames, np.ones(len(frames), bool))
 
 
 def pinned_places(
@@ -216,9 +233,16 @@ def _write_change(
     shift = (inverse[:, 0] @ (new.root - old.root)[which, :, None])[..., 0]
     root[which] += (clip.rotations[which, 0] @ shift[..., None])[..., 0]
     rotations[which] = clip.rotations[which] @ inverse @ new.rotations[which]
+    changed = Clip(clip.times, rotations, root)
     if moves is not None:
-        moved = (moves != np.eye(4)).any(axis=(1, 2))
-        rotations[moved, 0] = moves[moved, :3, :3] @ rotations[moved, 0]
-        root[moved] = (moves[moved, :3, :3] @ root[moved, :, None])[..., 0] + moves[moved, :3, 3]
+        changed, moved = _moved_rows(changed, moves)
         which = which | moved
-    write_keys(armature, body, Clip(clip.times, rotations, root), frames, which)
+    write_keys(armature, body, changed, frames, which)
+
+
+def _moved_rows(clip: Clip, moves: NDArray[np.float64]) -> tuple[Clip, NDArray[np.bool_]]:
+    """Move each row in the world by its rigid transform (T, 4, 4); also return which rows (T,) that moves."""
+    rotations, root, moved = clip.rotations.copy(), clip.root.copy(), (moves != np.eye(4)).any(axis=(1, 2))
+    rotations[moved, 0] = moves[moved, :3, :3] @ rotations[moved, 0]
+    root[moved] = (moves[moved, :3, :3] @ root[moved, :, None])[..., 0] + moves[moved, :3, 3]
+    return Clip(clip.times, rotations, root), moved

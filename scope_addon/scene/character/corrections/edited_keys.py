@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The edits that a motion keeps, applied to keys, which may differ from the motion.
+
+Who interpolates frames or puts feet on the floor means what is displayed. So the keys are edited themselves, and so is
+the clip that they are compared with; then the change of the motion, as by pins, is applied to them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from .....solver.body import Body
+from ....edit.clip import Clip
+from ....edit.pins.corrected_motion import corrections_of
+from ....edit.pins.corrections import Correction, FeetOnFloor, Interpolation, feet_on_floor
+from ....edit.pins.edits import edited, floor_above, interpolated, on_floor
+from ....edit.pins.solve_pins import Shot
+from ....edit.root_motion import relative_to_trajectory, with_trajectory
+from ....motion import Motion
+from ..keys import read_clip, write_keys
+from ..root_object import removed_root_motion
+
+_SAME_M = 0.0005
+
+
+@dataclass(frozen=True)
+class KeyEdits:
+    """The corrections of a motion, the last one among them, and the keys that are to be edited."""
+
+    corrections: tuple[Correction, ...]
+    betas: NDArray[np.floating[Any]]  # (P,) shape coefficients
+    shot: Shot  # on the clock of the keys
+    new: Correction | None  # which is applied to all keys
+    rows: NDArray[np.bool_]  # (T,) keys that begin without corrections, to which all edits are applied
+
+    def any(self) -> bool:
+        """Return whether there is an edit among the corrections."""
+        return any(isinstance(c, Interpolation | FeetOnFloor) for c in self.corrections)
+
+
+def begin_with_edits(
+    armature: bpy.types.Object, body: Body, clips: tuple[Clip, Clip], frames: NDArray[np.float64], edits: KeyEdits
+) -> tuple[Clip, Clip]:
+    """Edit keys, and the clip that they are compared with.
+
+    :param clips: the keys, in the world that the corrections have moved; and the other one, in the captured world.
+    :param frames: (T,) scene frames of the keys.
+    :return: both, edited in the rows that an edit is applied to.
+    :raises UsageError: a new interpolation has no keys, or none on one side.
+    """
+    keys, old = clips
+    for each in (c for c in edits.corrections if isinstance(c, Interpolation)):
+        new = each == edits.new
+        rows = np.ones(len(frames), bool) if new else edits.rows
+        keys = _with_rows(keys, interpolated(keys, [each], edits.shot, strict=new), rows)
+        old = _with_rows(old, interpolated(old, [each], edits.shot), rows)
+    feet = feet_on_floor(edits.corrections)
+    # The floor of a few keys would not be that of all; others have the change of the motion.
+    enough = edits.rows.all() if isinstance(edits.new, FeetOnFloor) else 2 * edits.rows.sum() > len(frames)
+    if feet is None or not enough:
+        return keys, old
+    only = np.flatnonzero(edits.rows)
+    placed = _placed(armature, body, _rows_of(keys, only), frames[only], edits, feet)
+    others = tuple(c for c in edits.corrections if not isinstance(c, Interpolation))
+    compared = edited(_rows_of(old, only), body, edits.betas, others, edits.shot)
+    return _replaced(keys, only, placed), _replaced(old, only, compared)
+
+
+def meet_floor(armature: bpy.types.Object, body: Body, rate: float, motion: Motion, edits: KeyEdits) -> None:
+    """Put feet on the floor whose keys were edited, if they are not there although those of the motion are.
+
+    :param rate: scene frames per second.
+    """
+    feet = feet_on_floor(corrections_of(motion))
+    if feet is None:
+        return
+    clip, frames = read_clip(armature, body, rate)
+    placed = _placed(armature, body, clip, frames, edits, feet)
+    if np.abs(placed.root - clip.root).max() > _SAME_M:
+        write_keys(armature, body, placed, frames, np.ones(len(frames), bool))
+
+
+def floored(
+    armature: bpy.types.Object,
+    body: Body,
+    betas: NDArray[np.floating[Any]],
+    keys: tuple[Clip, NDArray[np.float64]],
+    feet: FeetOnFloor,
+    height: float = 0.0,
+) -> Clip:
+    """Put the feet of keys on the floor: those in contact are at rest only with their root motion.
+
+    :param betas: (P,) shape coefficients.
+    :param keys: the keys, and their scene frames (T,).
+    :param height: z of the floor, metres, in the armature's space.
+    """
+    clip, frames = keys
+    positions, angles = removed_root_motion(armature, frames)
+    path = positions * [1.0, 1.0, 0.0], angles
+    placed = on_floor(with_trajectory(clip, *path), body, betas, feet, height)
+    return relative_to_trajectory(placed, *path)
+
+
+def _placed(
+    armature: bpy.types.Object,
+    body: Body,
+    clip: Clip,
+    frames: NDArray[np.float64],
+    edits: KeyEdits,
+    feet: FeetOnFloor,
+) -> Clip:
+    return floored(armature, body, edits.betas, (clip, frames), feet, floor_above(edits.corrections, feet))
+
+
+def _rows_of(clip: Clip, rows: NDArray[np.intp]) -> Clip:
+    return Clip(clip.times[rows], clip.rotations[rows], clip.root[rows])
+
+
+def _with_rows(clip: Clip, other: Clip, rows: NDArray[np.bool_]) -> Clip:
+    only = np.flatnonzero(rows)
+    return _replaced(clip, only, _rows_of(other, only))
+
+
+def _replaced(clip: Clip, rows: NDArray[np.intp], part: Clip) -> Clip:
+    """Return a clip with other values in some rows."""
+    rotations, root = clip.rotations.copy(), clip.root.copy()
+    rotations[rows], root[rows] = part.rotations, part.root
+    return Clip(clip.times, rotations, root)

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What scripts say about their use, before they set anything up."""
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
+PARTS = set(re.findall(r"^    ([a-z |]+)\) ", (SCRIPTS / "real_blender" / "run.sh").read_text(), re.M))
+
+
+def run(name, *arguments):
+    return subprocess.run(
+        ["bash", str(SCRIPTS / name), *arguments], capture_output=True, text=True, check=False, timeout=60
+    )
+
+
+def parts():
+    """The parts that can be run inside Blender."""
+    return {part for line in PARTS for part in line.split(" | ")} - {"install"}
+
+
+@pytest.mark.parametrize("name", ["blender", "browser", "debian"])
+@pytest.mark.parametrize("option", ["--help", "-h"])
+def test_a_script_prints_its_own_usage(name, option):
+    done = run(name, option)
+    assert done.returncode == 0
+    assert done.stdout.startswith(f"./scripts/{name} [")
+    assert done.stderr == ""
+    assert len(done.stdout.splitlines()) < 15
+
+
+def test_the_usage_names_every_part():
+    assert len(parts()) > 10
+    assert [part for part in parts() if not re.search(rf"\b{part}\b", run("blender", "--help").stdout)] == []
+
+
+def test_an_unknown_part_is_refused_with_those_that_exist():
+    done = run("blender", "--part", "panel", "--part", "nonsense")
+    assert done.returncode != 0
+    assert done.stdout == ""
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("blender: there is no part 'nonsense'; there are panel ")
+    assert [part for part in parts() if not re.search(rf"\b{part}\b", line)] == []
+
+
+@pytest.mark.parametrize("arguments", [["--part"], ["--seed"], ["--parts", "panel"]])
+def test_other_mistakes_are_one_sentence(arguments):
+    done = run("blender", *arguments)
+    assert done.returncode != 0
+    assert len(done.stderr.splitlines()) == 1
+    assert "--help shows" in done.stderr
