@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The lifter's training data against geometry worked out by hand, and its export against PyTorch."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scope.scope_addon.capture.fitting.keypoint_offsets import offset
@@ -10,8 +12,17 @@ from scope.scope_addon.capture.perception.lifter_window import MIDDLE, OFFSETS_S
 from scope.solver.names import BLAZEPOSE
 from scope.solver.rotations import exp
 from scope.tools.train_lifter import detector_noise
-from scope.tools.train_lifter.augment import Motions, PoseSampler, small_rotations
-from scope.tools.train_lifter.dataset import Dataset, cameras, cut_short, lines_of_sight, pitches
+from scope.tools.train_lifter.augment import Motions, PoseSampler, arms_hang, small_rotations
+from scope.tools.train_lifter.dataset import (
+    HEIGHTS_M,
+    WIDE,
+    Dataset,
+    Variety,
+    cameras,
+    cut_short,
+    lines_of_sight,
+    pitches,
+)
 from scope.tools.train_lifter.detector_noise import Persistence
 
 from ..required import missing, package
@@ -87,15 +98,13 @@ def test_a_camera_that_looks_down_sees_the_world_s_up_tip_towards_it():
     assert np.quantile(pitch, 0.99) < 46
 
 
-def test_input_without_noise_is_the_projection_of_the_target(dataset, monkeypatch):
+def test_input_without_noise_is_the_projection_of_the_target(body, motions, monkeypatch):
     """With the detector's errors off, the virtual camera at the right distance projects the target onto the input."""
     monkeypatch.setattr(detector_noise, "PLACEMENT", np.zeros(33))
-    monkeypatch.setattr(detector_noise, "offset", lambda name: np.zeros(3))
     monkeypatch.setattr(detector_noise, "IMAGE_NOISE", 0.0)
     monkeypatch.setattr(detector_noise, "CUT_SHARE", 0.0)
     monkeypatch.setattr(detector_noise, "SWAP_SHARE", 0.0)
-    monkeypatch.setattr(detector_noise, "FOCAL_SPREAD", 0.0)
-    batch = dataset.batch((0, 0), 20)
+    batch = Dataset(body, motions, Variety(focal_spread=0.0, mean_offsets=False)).batch((0, 0), 20)
     for x, P in zip(batch.input[:, MIDDLE].astype(float), batch.points.astype(float), strict=True):
         u = x[:66].reshape(33, 2) * np.exp(x[-1])
         # u (P_z + t_z) = P_xy + t_xy, linear in t
@@ -114,6 +123,8 @@ def test_keypoints_are_placed_around_where_networks_see_them():
     expected = np.array([offset(name) for name in BLAZEPOSE])
     assert np.allclose(placed.mean(axis=0), expected, atol=0.002)
     assert np.allclose(placed.std(axis=0), detector_noise.PLACEMENT[:, None], rtol=0.05)
+    without = detector_noise.placements(np.random.default_rng(0), 4000, mean_offsets=False)
+    assert np.allclose(without.mean(axis=0), 0, atol=0.002)
 
 
 def test_a_batch_depends_on_its_seed_alone(dataset):
@@ -185,13 +196,57 @@ def test_held_cameras_look_down_on_hips_below_them_and_less_so_from_afar():
     assert np.subtract(*np.degrees(np.quantile(far, [0.6, 0.1]))) < 12
 
 
+def test_cameras_at_any_height_look_further_down_and_up():
+    rng = np.random.default_rng(0)
+    usual, wide = (lines_of_sight(rng, np.full(8000, 0.9), np.full(8000, 6.0), share) for share in (0.0, 1.0))
+    low, high = (np.arcsin((height - 0.9) / 6.0) for height in HEIGHTS_M)
+    assert np.mean((wide > low) & (wide < high)) > 0.7  # those that are not held have any pitch
+    beyond = np.arcsin((2.6 - 0.9) / 6.0)  # of a camera higher than people hold it
+    assert np.mean((wide > beyond) & (wide < high)) > np.mean((usual > beyond) & (usual < high)) + 0.05
+
+
+def test_arms_of_the_share_that_was_asked_for_hang(body):
+    """The default body rests with its arms out; turned down at the shoulders by what its own bones say, they hang."""
+    at = body.joint_names.index
+    out, down = (np.tile(np.eye(3), (20, body.K + 1, 1, 1)).astype(np.float32) for _ in range(2))
+    for side in ("left", "right"):
+        bone = body.l[at(f"{side}_wrist")] + body.l[at(f"{side}_elbow")]
+        turn = np.cross(bone, [0.0, -1.0, 0.0])
+        angle = np.arccos(-bone[1] / np.linalg.norm(bone))
+        down[:, at(f"{side}_shoulder")] = exp(turn / np.linalg.norm(turn) * angle)
+        out[:, at(f"{side}_shoulder")] = exp(turn / np.linalg.norm(turn) * (angle - np.pi / 2))
+    poses = np.concatenate([out, down])
+    assert arms_hang(body, poses).tolist() == 20 * [False] + 20 * [True]
+    with pytest.raises(ValueError, match="hang"):
+        PoseSampler(body, Motions(out, np.zeros(20, int), np.full(20, 30.0)), 0.6)
+    motions = Motions(poses, np.repeat([0, 1], 20), np.full(40, 30.0))
+    shares = []
+    for share in (0.0, 0.6):
+        windows = PoseSampler(body, motions, share).motion_windows(np.random.default_rng(0), 2000)
+        shares.append(arms_hang(body, windows[:, MIDDLE]).mean())
+    assert shares[1] > shares[0] + 0.2
+
+
+def test_wide_data_shows_nearer_people_farther_from_the_centre(body, motions):
+    near, off, assumed = [], [], []
+    for variety in (Variety(), replace(WIDE, hanging_share=0.0)):
+        scene = Dataset(body, motions, variety).scene(np.random.default_rng(0), 2000)
+        hips = scene.points[:, MIDDLE, HIPS].mean(axis=1)
+        near.append(np.linalg.norm(hips, axis=1).min())
+        off.append(np.abs(hips[:, 0] / hips[:, 2]).max())
+        assumed.append(np.log(scene.focal_ratio).std())
+    assert np.allclose(near, [1.8, 1.2], atol=0.05)
+    assert np.allclose(off, [0.5, 0.75], atol=0.02)
+    assert np.allclose(assumed, [0.1, 0.35], rtol=0.1)
+
+
 def test_the_exported_network_is_the_trained_one(tmp_path):
     try:
         import torch
     except ImportError:
         missing("torch is not installed, which trains the lifting network: pip install torch", "SCOPE_WITHOUT_TRAINING")
     package("onnx")
-    from scope.tools.train_lifter.export import export
+    from scope.tools.train_lifter.export import export, read_exported
     from scope.tools.train_lifter.network import LiftingNetwork
 
     torch.manual_seed(0)
@@ -209,3 +264,7 @@ def test_the_exported_network_is_the_trained_one(tmp_path):
     ours, sigma = Lifter(tmp_path / "lifter.onnx").run(x)
     assert np.abs(ours - points).max() < 1e-3 * np.abs(points).max()
     assert np.abs(sigma - log_sigma).max() < 1e-3
+    with torch.no_grad():
+        again, sigma_again = (a.numpy() for a in read_exported(tmp_path / "lifter.onnx")(torch.from_numpy(x)))
+    assert np.abs(again - points).max() < 1e-5 * np.abs(points).max()
+    assert np.abs(sigma_again - log_sigma).max() < 1e-5

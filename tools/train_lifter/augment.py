@@ -4,7 +4,7 @@
 A pose is a state of each joint, Ω (24, 3, 3), and a root rotation into a world with y up; a motion is a window of poses
 at the lifter's moments. Torso, arms and legs sometimes come from different recordings, joints are rotated at random
 by a constant of the window, the body leans, some motions run slower, faster or backwards, and half of all samples are
-mirrored.
+mirrored. On request, the arms of a share of the samples hang as in some recording, see `Variety`.
 """
 
 from __future__ import annotations
@@ -34,6 +34,8 @@ SPEED_SPREAD = 0.2  # of the logarithm of a motion's speed
 SHAPE_SPREAD, SHAPE_LIMIT = 1.0, 2.5
 BONE_SPREAD = 0.04  # of the logarithm of each bone's length, left and right alike
 CLUSTERS = 256
+# Hanging arms: the most that upper arms and forearms may be off straight down, and the share of JOINT_NOISE they get.
+HANGING_UPPER, HANGING_FORE, HANGING_NOISE = np.radians(25.0), np.radians(45.0), 0.3
 
 
 @dataclass(frozen=True)
@@ -84,11 +86,18 @@ def load_motions(path: Path) -> Motions:
 
 
 class PoseSampler:
-    """Draws augmented poses and shapes for one body."""
+    """Draws augmented poses and shapes for one body.
 
-    def __init__(self, body: Body, motions: Motions) -> None:
-        self.body, self.motions = body, motions
+    :raises ValueError: hanging arms are asked for, but no recording has any.
+    """
+
+    def __init__(self, body: Body, motions: Motions, hanging_share: float = 0.0) -> None:
+        self.body, self.motions, self.hanging_share = body, motions, hanging_share
         self._cumulative = np.cumsum(motions.share)
+        if hanging_share:
+            self._hanging = np.cumsum(motions.share * arms_hang(body, motions.Omega))
+            if not self._hanging[-1]:
+                raise ValueError("in none of the recordings, both arms hang; ask for a share of 0")
         names = body.joint_names
         partner = {"left": "right", "right": "left"}
         self.partner = np.array([names.index("_".join(partner.get(w, w) for w in n.split("_"))) for n in names])
@@ -109,9 +118,12 @@ class PoseSampler:
         signs = np.outer(np.diag(_MIRROR), np.diag(_MIRROR)).astype(Omega.dtype)
         return (Omega * signs)[..., self.partner, :, :]
 
-    def _windows(self, rng: np.random.Generator, n: int) -> NDArray[np.float32]:
-        """Draw windows (n, WINDOW, 24, 3, 3) of one recording each."""
-        drawn = np.searchsorted(self._cumulative, rng.random(n) * self._cumulative[-1])
+    def _windows(
+        self, rng: np.random.Generator, n: int, cumulative: NDArray[np.float64] | None = None
+    ) -> NDArray[np.float32]:
+        """Draw windows (n, WINDOW, 24, 3, 3) of one recording each; ``cumulative`` (F,) sums of the frames' shares."""
+        cumulative = self._cumulative if cumulative is None else cumulative
+        drawn = np.searchsorted(cumulative, rng.random(n) * cumulative[-1])
         middle = np.minimum(drawn, len(self.motions) - 1)
         speed = np.exp(SPEED_SPREAD * rng.standard_normal(n)) * np.where(rng.random(n) < 0.5, 1, -1)
         frames = np.round(OFFSETS_S * self.motions.fps[middle][:, None] * speed[:, None]).astype(int)
@@ -131,6 +143,8 @@ class PoseSampler:
                 Omega[rows, :, joint] = other[:, :, joint]
         strength = np.abs(rng.standard_normal((n, 1, 1), np.float32)) * (rng.random((n, 1, 1)) > AS_RECORDED)
         turn = rng.standard_normal((n, len(self._noise), 3), np.float32) * self._noise[:, None] * strength
+        if self.hanging_share:
+            self._let_arms_hang(rng, Omega, turn)
         _turn_joints(Omega, small_rotations(turn.astype(np.float32)))
         heading, direction = rng.uniform(0, 2 * np.pi, (2, n))
         lean = rng.standard_normal(n) * np.where(rng.random(n) < STRONG_LEAN_SHARE, STRONG_LEAN, LEAN)
@@ -141,6 +155,14 @@ class PoseSampler:
         )
         Omega[:, :, 0] = turned[:, None] @ Omega[:, :, 0]
         return Omega
+
+    def _let_arms_hang(self, rng: np.random.Generator, Omega: NDArray[np.float32], turn: NDArray[np.float32]) -> None:
+        """Replace the arms of some windows (n, WINDOW, 24, 3, 3), and reduce their rotations (n, 24, 3), in place."""
+        rows = np.flatnonzero(rng.random(len(Omega)) < self.hanging_share)
+        other = self._windows(rng, len(rows), self._hanging)
+        for joint in np.concatenate(self._parts[1:3]):
+            Omega[rows, :, joint] = other[:, :, joint]
+            turn[rows, joint] *= HANGING_NOISE
 
     def pose(self, rng: np.random.Generator) -> NDArray[np.float32]:
         """Draw the pose (24, 3, 3) of one moment."""
@@ -155,6 +177,18 @@ class PoseSampler:
         bones = (body.l + np.einsum("ijp,np->nij", body.S, betas)) * factor[..., None]
         keypoints = body.v_bar[at] + np.einsum("ijp,np->nij", body.V[at], betas)
         return bones.astype(np.float32), keypoints.astype(np.float32)
+
+
+def arms_hang(body: Body, Omega: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Return (F,) bool: whether both upper arms and both forearms of poses (F, 24, 3, 3), y up, point down."""
+    R, hang, at = [Omega[:, 0]], np.ones(len(Omega), bool), body.joint_names.index
+    for k, parent in enumerate(body.parents[1:], 1):
+        R.append(R[int(parent)] @ Omega[:, k])
+    for side in ("left", "right"):
+        for start, end, most in (("shoulder", "elbow", HANGING_UPPER), ("elbow", "wrist", HANGING_FORE)):
+            bone = body.l[at(f"{side}_{end}")]
+            hang &= -(R[at(f"{side}_{start}")] @ bone)[:, 1] > np.cos(most) * np.linalg.norm(bone)
+    return hang
 
 
 @njit(fastmath=True)

@@ -19,16 +19,39 @@ from . import detector_noise
 from .augment import Motions, PoseSampler, small_rotations
 from .detector_noise import Persistence
 
-NEAREST_M, FARTHEST_M = 1.8, 12.0
+FARTHEST_M = 12.0
 PITCH_LEVEL, PITCH_SPREAD = np.radians(8.0), np.radians(9.0)
 PITCH_LOWEST, PITCH_HIGHEST = np.radians(-15.0), np.radians(45.0)
 # Most cameras are hand-held or on a stand: their pitch towards a person follows from height and distance.
 HELD_SHARE, HELD_HEIGHT_M, HELD_SPREAD_M, LOWEST_M = 0.7, 1.3, 0.4, 0.1
+HEIGHTS_M = (0.3, 3.0)  # see `Variety.any_height_share`
 ROLL_SPREAD = np.radians(3.0)
-FIELD = (0.5, 0.4)  # |x/z| and |y/z| of the person's position in the image
 DRIFT_PER_S = (0.1, 0.03, 0.08)  # one standard deviation, of x/z, y/z and the logarithm of the distance
 # Windows truncated at a clip's start or end, and windows of still images.
 CUT_SHORT_SHARE, STILL_SHARE = 0.06, 0.06
+
+
+@dataclass(frozen=True)
+class Variety:
+    """In what the people and cameras of a training may differ.
+
+    ``nearest_m``: distance of the nearest person. ``field``: largest |x/z| and |y/z| of the person's position in the
+    image. ``any_height_share``: of the hand-held cameras, those at any height in HEIGHTS_M instead of a person's.
+    ``focal_spread``: standard deviation of the logarithm of assumed over true focal length. ``hanging_share``: of the
+    samples, those whose arms hang. ``mean_offsets``: see `detector_noise.placements`.
+    """
+
+    nearest_m: float = 1.8
+    field: tuple[float, float] = (0.5, 0.4)
+    any_height_share: float = 0.0
+    focal_spread: float = 0.1
+    hanging_share: float = 0.0
+    mean_offsets: bool = True
+
+
+USUAL = Variety()
+# Wide-angle lenses, near and off-centre people, cameras at any height, focal lengths as uncertain as those of captures.
+WIDE = Variety(1.2, (0.75, 0.5), 0.5, 0.35, 0.25)
 
 
 @dataclass(frozen=True)
@@ -59,8 +82,9 @@ class Scene:
 class Dataset:
     """Draws batches for one body from motions."""
 
-    def __init__(self, body: Body, motions: Motions) -> None:
-        self.body, self.sampler = body, PoseSampler(body, motions)
+    def __init__(self, body: Body, motions: Motions, variety: Variety = USUAL) -> None:
+        self.body, self.variety = body, variety
+        self.sampler = PoseSampler(body, motions, variety.hanging_share)
         self.part = body.keypoint_part[list(body.keypoint_set("blazepose").values())].astype(np.int64)
         self._parents = np.asarray(body.parents, np.int64)
 
@@ -87,19 +111,19 @@ class Dataset:
         """Draw n people of random motion, shape and position."""
         Omega = self.sampler.motion_windows(rng, n)
         bones, local = self.sampler.proportions(rng, n)
-        displaced = detector_noise.placements(rng, n)
+        displaced = detector_noise.placements(rng, n, self.variety.mean_offsets)
         points, seen = self.keypoints(Omega, bones, local, displaced)
         middle = points[:, :, HIPS].mean(axis=2, keepdims=True)
-        x, y = rng.uniform(-1, 1, (2, n)) * np.array(FIELD)[:, None]
-        distance = np.exp(rng.uniform(np.log(NEAREST_M), np.log(FARTHEST_M), n))
+        x, y = rng.uniform(-1, 1, (2, n)) * np.array(self.variety.field)[:, None]
+        distance = np.exp(rng.uniform(np.log(self.variety.nearest_m), np.log(FARTHEST_M), n))
         above_floor = middle[:, MIDDLE, 0, 1] - points[:, MIDDLE, :, 1].min(axis=1)
-        down = lines_of_sight(rng, above_floor, distance)
+        down = lines_of_sight(rng, above_floor, distance, self.variety.any_height_share)
         into = np.swapaxes(cameras(rng, n, down - np.arctan2(y, np.hypot(x, 1))), 1, 2)[:, None]
         drift = [OFFSETS_S * (speed * rng.standard_normal((n, 1))) for speed in DRIFT_PER_S]
         ray = np.stack([x[:, None] + drift[0], y[:, None] + drift[1], np.ones((n, WINDOW))], axis=-1)
         away = (distance[:, None] * np.exp(drift[2]))[..., None]
         place = (ray / np.linalg.norm(ray, axis=-1, keepdims=True) * away).astype(np.float32)[:, :, None]
-        focal_ratio = np.exp(detector_noise.FOCAL_SPREAD * rng.standard_normal(n)).astype(np.float32)
+        focal_ratio = np.exp(self.variety.focal_spread * rng.standard_normal(n)).astype(np.float32)
         return Scene((points - middle) @ into + place, (seen - middle) @ into + place, focal_ratio)
 
     def batch(self, seed: tuple[int, ...], n: int) -> Batch:
@@ -179,14 +203,21 @@ def _forward(
 
 
 def lines_of_sight(
-    rng: np.random.Generator, above_floor: NDArray[np.float32], distance: NDArray[np.float32]
+    rng: np.random.Generator,
+    above_floor: NDArray[np.float32],
+    distance: NDArray[np.float32],
+    any_height_share: float = 0.0,
 ) -> NDArray[np.float32]:
     """Draw the angles (n,) in radians by which the line from the camera to the hips points down.
 
     sin⁻¹((camera's height − hips' height) / distance) for hand-held cameras, any angle for the others.
+
+    :param above_floor: (n,) metres, of the hips;  distance: (n,) metres;  any_height_share: see `Variety`.
     """
     n = len(distance)
     height = np.maximum(HELD_HEIGHT_M + HELD_SPREAD_M * rng.standard_normal(n), LOWEST_M)
+    if any_height_share:
+        height = np.where(rng.random(n) < any_height_share, rng.uniform(*HEIGHTS_M, n), height)
     held = np.arcsin(np.clip((height - above_floor) / distance, -0.7, 0.7))
     return np.where(rng.random(n) < HELD_SHARE, held, rng.uniform(PITCH_LOWEST, PITCH_HIGHEST, n))
 

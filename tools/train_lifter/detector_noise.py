@@ -34,7 +34,6 @@ SWAP_SHARE = 0.01  # samples in which the arms, or the legs, have left and right
 CUT_SHARE = 0.12  # samples in which part of the body is outside the image
 SWAP_LASTS = 0.7  # of the window's moments
 CONFIDENCE_LASTS = 0.7  # of the keypoints keep their confidence through the window
-FOCAL_SPREAD = 0.1  # of the logarithm of assumed over true focal length
 # World landmarks. Depth is mostly too small: on renders by a factor of 0.3 for arms, 0.6 for trunk and legs.
 UNKNOWN_SHARE = 0.3
 TILT, TURN = np.radians(10.0), np.radians(9.0)
@@ -96,10 +95,14 @@ class Persistence:
         return self.mix(constant, rng.standard_normal((n, WINDOW, *shape), np.float32))
 
 
-def placements(rng: np.random.Generator, n: int) -> NDArray[np.float32]:
-    """Draw keypoint offsets (n, 33, 3) f32, metres, of n people, in the axes of their parts."""
+def placements(rng: np.random.Generator, n: int, mean_offsets: bool = True) -> NDArray[np.float32]:
+    """Draw keypoint offsets (n, 33, 3) f32, metres, of n people, in the axes of their parts.
+
+    :param mean_offsets: around those of `keypoint_offsets`; otherwise around zero.
+    """
     own = PLACEMENT[:, None] * rng.standard_normal((n, len(PLACEMENT), 3))
-    return (np.array([offset(name) for name in KEYPOINT_NAMES]) + own).astype(np.float32)
+    mean = np.array([offset(name) for name in KEYPOINT_NAMES]) if mean_offsets else 0.0
+    return (mean + own).astype(np.float32)
 
 
 def image_errors(rng: np.random.Generator, persistence: Persistence) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

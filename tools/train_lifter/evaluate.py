@@ -20,7 +20,7 @@ from ...scope_addon.capture.perception.lifter import HIPS, LIFTER_FILE, Lifter, 
 from ...scope_addon.capture.perception.lifter_window import MIDDLE
 from ...solver.loaders.body_file import load_body
 from .augment import load_motions
-from .dataset import Dataset
+from .dataset import USUAL, WIDE, Dataset, Variety
 from .pairs import load_pairs
 from .split import held_out_frames
 
@@ -42,9 +42,9 @@ def measure_renders(lifter: Lifter, pairs: Path) -> dict[str, Any]:
     return result
 
 
-def measure_takes(lifter: Lifter, motions: Path, n: int = 8192) -> dict[str, Any]:
+def measure_takes(lifter: Lifter, motions: Path, variety: Variety = USUAL, n: int = 8192) -> dict[str, Any]:
     """Return millimetres on held-out takes with simulated errors: all samples, and those with world landmarks."""
-    batch = Dataset(load_body("scope"), held_out_frames(load_motions(motions))).batch((2, 0), n)
+    batch = Dataset(load_body("scope"), held_out_frames(load_motions(motions)), variety).batch((2, 0), n)
     points, _ = lifter.run(batch.input)
     error, known = points - batch.points, batch.input[:, MIDDLE, -2] > 0.5
     return {"takes": n, "with_world_mm": _limb_error(error[known]), "without_world_mm": _limb_error(error[~known])}
@@ -68,7 +68,9 @@ def main() -> None:
     parser.add_argument("--network", type=Path, default=LIFTER_FILE)
     a = parser.parse_args()
     lifter = Lifter(a.network)
-    result = measure_renders(lifter, a.pairs) | {"imitated": measure_takes(lifter, a.motions)}
+    result = measure_renders(lifter, a.pairs) | {
+        name: measure_takes(lifter, a.motions, variety) for name, variety in (("imitated", USUAL), ("wide", WIDE))
+    }
     print(json.dumps(result, indent=1))
 
 

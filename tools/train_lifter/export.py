@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Write the network as ONNX: matrices in half precision followed by a Cast, the rest in single precision."""
+"""Write the network as ONNX, and read it again.
+
+Matrices are in half precision, followed by a Cast, the rest in single precision.
+"""
 
 from __future__ import annotations
 
@@ -15,9 +18,10 @@ from onnx import TensorProto, helper, numpy_helper
 from ...scope_addon.atomic_write import atomic_path
 from ...scope_addon.capture.perception.lifter import INPUT_SIZE, KEYPOINT_COUNT
 from ...scope_addon.capture.perception.lifter_window import WINDOW
-from .network import LOG_SIGMA_RANGE, LiftingNetwork
+from .network import LOG_SIGMA_RANGE, MERGES, LiftingNetwork
 
 OPSET = 17
+SIGMA_BIAS = 3.0  # which the network subtracts from log σ
 
 
 class _Graph:
@@ -78,7 +82,7 @@ def export(network: LiftingNetwork, path: Path) -> None:
     weight, bias, n = array(network.leave.weight), array(network.leave.bias), KEYPOINT_COUNT * 3
     points = g.linear(x, "flat_points", weight[:n], bias[:n])
     g.add("Reshape", [points, g.constant("points_shape", np.array([-1, KEYPOINT_COUNT, 3]))], "points")
-    sigma = g.linear(x, "flat_sigma", weight[n:], bias[n:] - 3.0)
+    sigma = g.linear(x, "flat_sigma", weight[n:], bias[n:] - SIGMA_BIAS)
     sigma = g.add("Reshape", [sigma, g.constant("sigma_shape", np.array([-1, KEYPOINT_COUNT, 2]))], "sigma_raw")
     low, high = (g.constant(f"sigma_limit{k}", np.array(v, np.float32)) for k, v in enumerate(LOG_SIGMA_RANGE))
     sigma = g.add("Clip", [sigma, low, high], "sigma_clipped")
@@ -99,3 +103,22 @@ def export(network: LiftingNetwork, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     with atomic_path(path) as temporary:
         onnx.save(model, str(temporary))
+
+
+def read_exported(path: Path) -> LiftingNetwork:
+    """Read a network that `export` has written.
+
+    :raises KeyError: it is not such a network.
+    """
+    found = {w.name: np.array(numpy_helper.to_array(w)) for w in onnx.load(str(path)).graph.initializer}
+    blocks = sum(name.startswith("first") and name.endswith(".weight") for name in found)
+    network = LiftingNetwork(len(found["enter.bias"]), blocks)
+    names = {f"merges.{k}.{part}": f"merge_{part}{k}" for k in range(MERGES) for part in ("norm", "first", "second")}
+    names |= {f"blocks.{k}.{part}": f"{part}{k}" for k in range(blocks) for part in ("norm", "first", "second")}
+    state = {name: found[name] for name in ("mean", "spread", "sigma_offset")}
+    for ours, theirs in (names | {"enter": "enter", "norm": "norm"}).items():
+        state |= {f"{ours}.{kind}": found[f"{theirs}.{kind}"] for kind in ("weight", "bias")}
+    state["leave.weight"] = np.concatenate([found["flat_points.weight"], found["flat_sigma.weight"]])
+    state["leave.bias"] = np.concatenate([found["flat_points.bias"], found["flat_sigma.bias"] + SIGMA_BIAS])
+    network.load_state_dict({name: torch.from_numpy(array.astype(np.float32)) for name, array in state.items()})
+    return network

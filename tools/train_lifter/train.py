@@ -3,7 +3,7 @@
 
 AdamW with a cosine schedule in bfloat16; the exponential mean of the weights is exported. Every tenth take is held out,
 to evaluate and to calibrate the uncertainties; the landmark network's renders only evaluate. The weights are kept next
-to the exported network, from which another training can continue (``--start``).
+to the exported network, from which another training can continue (``--start``), as from an exported network itself.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import math
 import time
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import asdict, replace
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -26,8 +27,8 @@ from ...scope_addon.capture.perception.lifter import HIPS, network_input
 from ...scope_addon.capture.perception.lifter_window import MIDDLE, WINDOW
 from ...solver.loaders.body_file import load_body
 from .augment import load_motions
-from .dataset import Batch, Dataset
-from .export import export
+from .dataset import USUAL, WIDE, Batch, Dataset, Variety
+from .export import export, read_exported
 from .network import LiftingNetwork, loss
 from .pairs import load_pairs
 from .split import held_out_frames, training_frames
@@ -42,9 +43,9 @@ _TRAINING, _VALIDATION = 0, 1  # first number of a batch's seed
 _dataset: Dataset | None = None
 
 
-def _start(motions: Path) -> None:
+def _start(motions: Path, variety: Variety) -> None:
     global _dataset
-    _dataset = Dataset(load_body("scope"), training_frames(load_motions(motions)))
+    _dataset = Dataset(load_body("scope"), training_frames(load_motions(motions)), variety)
 
 
 def _make(seed: tuple[int, ...]) -> Batch:
@@ -52,9 +53,9 @@ def _make(seed: tuple[int, ...]) -> Batch:
     return _dataset.batch(seed, BATCH)
 
 
-def batches(motions: Path, seed: int, steps: int, workers: int) -> Iterator[Batch]:
+def batches(motions: Path, variety: Variety, seed: int, steps: int, workers: int) -> Iterator[Batch]:
     """Yield the batches of a training, in an order that does not depend on the number of processes."""
-    with get_context("spawn").Pool(workers, _start, (motions,)) as pool:
+    with get_context("spawn").Pool(workers, _start, (motions, variety)) as pool:
         waiting = deque(pool.apply_async(_make, ((_TRAINING, seed, k),)) for k in range(min(AHEAD, steps)))
         for k in range(len(waiting), steps + len(waiting)):
             yield waiting.popleft().get()
@@ -62,9 +63,9 @@ def batches(motions: Path, seed: int, steps: int, workers: int) -> Iterator[Batc
                 waiting.append(pool.apply_async(_make, ((_TRAINING, seed, k),)))
 
 
-def held_out_batch(motions: Path, n: int = 8192) -> Batch:
+def held_out_batch(motions: Path, variety: Variety, n: int = 8192) -> Batch:
     """Return samples of the held-out takes."""
-    return Dataset(load_body("scope"), held_out_frames(load_motions(motions))).batch((_VALIDATION, 0), n)
+    return Dataset(load_body("scope"), held_out_frames(load_motions(motions)), variety).batch((_VALIDATION, 0), n)
 
 
 def renders(pairs: Path) -> Batch:
@@ -108,6 +109,14 @@ def calibrate(network: LiftingNetwork, batch: Batch) -> None:
         network.sigma_offset[:, k] = torch.from_numpy(np.log(np.sqrt(np.square(part).mean(axis=1))).astype(np.float32))
 
 
+def _weights(path: Path) -> dict[str, Any]:
+    """Read the weights of a training (`CHECKPOINT`), or of an exported network."""
+    if path.suffix == ".onnx":
+        return read_exported(path).state_dict()
+    weights: dict[str, Any] = torch.load(path, weights_only=True)
+    return weights
+
+
 def train(
     motions: Path,
     pairs: Path,
@@ -118,21 +127,23 @@ def train(
     minutes: float,
     rate: float = PEAK_RATE,
     start_from: Path | None = None,
+    variety: Variety = USUAL,
 ) -> None:
     """Train and export. The schedule follows the steps or the time, ``minutes``, whichever ends first.
 
-    :param rate: the highest learning rate;  start_from: weights of an earlier training (`CHECKPOINT`).
+    :param rate: the highest learning rate;  start_from: weights of an earlier training (`CHECKPOINT`), or its export;
+        variety: of the training and the held-out data.
     """
     torch.manual_seed(seed)
     torch.set_num_threads(1)
-    validation = held_out_batch(motions)
+    validation = held_out_batch(motions, variety)
     rendered = renders(pairs)
     network = LiftingNetwork()
     x = torch.from_numpy(validation.input[:, MIDDLE])
     network.mean.copy_(x.mean(0))
     network.spread.copy_(x.std(0) + 1e-3)
     if start_from:
-        network.load_state_dict(torch.load(start_from, weights_only=True))
+        network.load_state_dict(_weights(start_from))
         network.sigma_offset.zero_()
     mean = copy.deepcopy(network)
     matrices = {"params": [p for p in network.parameters() if p.ndim > 1], "weight_decay": DECAY}
@@ -140,7 +151,7 @@ def train(
     optimizer = torch.optim.AdamW([matrices, others], rate, (0.9, 0.98))
     log: list[dict[str, Any]] = []
     start, total = time.perf_counter(), 0.0
-    for step, batch in enumerate(batches(motions, seed, steps, workers)):
+    for step, batch in enumerate(batches(motions, variety, seed, steps, workers)):
         done = max(step / steps, (time.perf_counter() - start) / (60 * minutes))
         if done >= 1:
             break
@@ -169,7 +180,8 @@ def train(
             torch.save(mean.state_dict(), folder / CHECKPOINT)
     calibrate(mean, validation)
     measured = {"held_out": measure(mean, validation), "renders": measure(mean, rendered)}
-    summary = {"seed": seed, "steps": step, "rate": rate, "batch": BATCH, **measured, "log": log}
+    settings = {"seed": seed, "steps": step, "rate": rate, "batch": BATCH, "variety": asdict(variety)}
+    summary = {**settings, **measured, "log": log}
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "log.json").write_text(json.dumps(summary, indent=1) + "\n")
     export(mean, folder / "lifter.onnx")
@@ -187,9 +199,12 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=60.0)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--rate", type=float, default=PEAK_RATE, help="the highest learning rate")
-    parser.add_argument("--start", type=Path, help="weights of an earlier training to go on from")
+    parser.add_argument("--start", type=Path, help="weights of an earlier training to go on from: .pt or .onnx")
+    parser.add_argument("--wide", action="store_true", help="more cameras, focal lengths and hanging arms")
+    parser.add_argument("--no-offsets", action="store_true", help="without the landmark network's keypoint offsets")
     a = parser.parse_args()
-    train(a.motions, a.pairs, a.output, a.seed, a.steps, a.workers, a.minutes, a.rate, a.start)
+    variety = replace(WIDE if a.wide else USUAL, mean_offsets=not a.no_offsets)
+    train(a.motions, a.pairs, a.output, a.seed, a.steps, a.workers, a.minutes, a.rate, a.start, variety)
 
 
 if __name__ == "__main__":
