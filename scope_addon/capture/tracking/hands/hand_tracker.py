@@ -4,49 +4,101 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..perception.execution import Execution
-from ..perception.hand_landmarks import HAND_POINTS, HandEstimate, HandNetwork
-from ..perception.hand_region import HAND_LENGTH_M, SIDES, WRISTS, pixels_per_metre, region_from_body
-from ..perception.observation import Observation
-from ..perception.palm_detector import PalmDetector
-from ..perception.region import Region
-from .frame_clock import FRAME_S, PATIENCE_S, is_search_due
+from ...perception.execution import Execution
+from ...perception.hand_landmarks import HAND_POINTS, HandEstimate, HandNetwork
+from ...perception.hand_region import HAND_LENGTH_M, SIDES, WRISTS, pixels_per_metre, region_from_body
+from ...perception.observation import Observation
+from ...perception.palm_detector import SCORE_THRESHOLD, PalmDetector
+from ...perception.region import Region
+from ..frame_clock import EAGER_S, FRAME_S, PATIENCE_S, is_search_due
+from .hand_assignment import (
+    CERTAIN_PRESENCE,
+    DETECTED,
+    PREDICTED,
+    SECOND,
+    SECOND_TENTATIVE,
+    SURE_WRIST,
+    TENTATIVE,
+    Key,
+    Least,
+    assigned,
+    without_duplicates,
+)
+from .hand_color import is_like, palm_color
 
 FIRST_PRESENCE = 0.1  # in a rough region, from which the better one of the landmarks is looked at
-# Least presence with the wrist at the body's, and elsewhere: of a hand whose palm was detected, or that was seen in the
-# frame before; and of one that is only predicted from the body.
-DETECTED_PRESENCE, PREDICTED_PRESENCE = (0.5, 0.5), (0.6, 0.8)
-WRIST_DISTANCE = 0.7  # largest distance between the hand's wrist and the body's, in hand lengths
-UNSURE_WRIST_DISTANCE = 1.2  # where the body's wrist is uncertain
-SURE_WRIST = 0.5
-MIN_SIZE, MAX_SIZE = 0.25, 2.0  # of the hand, in the hand lengths of the body
-SAME_HAND = 0.35  # mean distance of the keypoints, in sizes of the hand, below which two hands are one
+FAR_MOTION = 0.15  # of the wrist in a frame, in hand lengths, from which the region that does not move is tried as well
 SEARCH_SCALE = 2.3  # side of the square in which a palm is searched, in sides of the predicted region
+CLOSER_SCALE, SMALLER_SCALE = 1.5, 0.7  # of the square and the region of a second look, likewise
+UNSURE_SCORE = 0.2  # of a palm in a second look
 MOST_PALMS = 2
 SMALLEST_HAND_PX = 12.0
-DISAGREEMENT_THRESHOLD = 0.3
-CERTAIN_PRESENCE = 0.95  # from which a hand is none that the network imagines
-MIN_SIDE_PROBABILITY = 0.15  # of the right side
-SAME_WRIST, OTHER_WRIST = 0.3, 1.0  # distances of the body's two wrists from a hand of the wrong side, in hand lengths
 _MARGIN = 0.3  # of a region's side, by which its centre may be outside the image
 
-_Key = tuple[int, int]  # tracklet number, and 0 for the left hand or 1 for the right one
+
+class _Found(NamedTuple):
+    """An estimate that may be this hand, whether the network is sure of it, and the palm's colour."""
+
+    estimate: HandEstimate
+    is_sure: bool
+    color: NDArray[np.float64] | None
 
 
 @dataclass
 class _Hand:
-    """The state of one hand of one person: the estimate in the frame before, if there was one."""
+    """The state of one hand of one person: what was found in the frame before, if anything, and the body's wrist."""
 
-    estimate: HandEstimate | None
-    seen_s: float  # when it was last seen; if never, when it was first looked for
+    found: _Found | None
+    wrist_px: NDArray[np.float64]
+    seen_s: float  # when it was last surely seen; if never, when it was first looked for
     searched_s: float  # when it was last looked for
+    color: NDArray[np.float64] | None = None  # of the palm, when it was last surely seen
+
+
+@dataclass(frozen=True)
+class _Sight:
+    """Where one hand is looked for: ``scale`` in pixels per metre, ``side`` 0 left, 1 right, ``color`` of the palm."""
+
+    image_rgb: NDArray[np.uint8]
+    person: Observation
+    side: int
+    scale: float
+    color: NDArray[np.float64] | None
+
+    @property
+    def wrist_px(self) -> NDArray[np.float64]:
+        """The body's wrist (2,)."""
+        wrist: NDArray[np.float64] = self.person.keypoints_px[WRISTS[self.side]]
+        return wrist
+
+    @property
+    def wrist_confidence(self) -> float:
+        """Of the body's wrist."""
+        return float(self.person.keypoints_confidence[WRISTS[self.side]])
+
+    @property
+    def hand_px(self) -> float:
+        """Length of the hand in pixels."""
+        return HAND_LENGTH_M * self.scale
+
+    def judge(self, estimate: HandEstimate, sure: Least, tentative: Least) -> _Found | None:
+        """Return an estimate if it may be this hand, see `assigned`; unless it is certain, in the hand's colour."""
+        color = palm_color(self.image_rgb, estimate.keypoints_px)
+        if estimate.presence < CERTAIN_PRESENCE and not is_like(color, self.color):
+            return None
+        for is_sure, least in ((True, sure), (False, tentative)):
+            hand = assigned(estimate, self.person, self.scale, self.side, least)
+            if hand is not None:
+                return _Found(hand, is_sure, color)
+        return None
 
 
 class HandTracker:
@@ -61,7 +113,7 @@ class HandTracker:
     def __init__(self, threads: int, folder: Path | None = None, execution: Execution | None = None) -> None:
         self._network = HandNetwork(threads, folder, execution)
         self._palms = PalmDetector(threads, folder, execution)
-        self._hands: dict[_Key, _Hand] = {}
+        self._hands: dict[Key, _Hand] = {}
         self._time_s = 0.0
 
     def another(self) -> HandTracker:
@@ -73,146 +125,122 @@ class HandTracker:
     def step(
         self, image_rgb: NDArray[np.uint8], observations: Sequence[tuple[int, Observation]], time_s: float | None = None
     ) -> list[tuple[int, Observation]]:
-        """Add ``hands`` to the observations of one frame.
+        """Add ``hands`` to the observations of one frame; tentative ones as in `tentative_hands`.
 
         :param image_rgb: (H, W, 3).
         :param observations: tracklet number and observation of each person.
         :param time_s: when the frame is shown; None: a thirtieth of a second after the one before.
         """
         self._time_s = now = self._time_s + FRAME_S if time_s is None else time_s
-        keys = [(number, side) for number, _ in observations for side in range(len(SIDES))]
-        self._hands = {key: self._hands.get(key) or _Hand(None, now, now - PATIENCE_S) for key in keys}
         people = dict(observations)
-        found = {key: self._find(image_rgb, self._hands[key], people[key[0]], key[1]) for key in keys}
-        found = _without_duplicates(found, people)
-        for key, estimate in found.items():
-            hand = self._hands[key]
-            hand.estimate = estimate
-            if estimate is not None:
-                hand.seen_s = now
+        sights = {
+            (n, side): self._sight(image_rgb, o, (n, side)) for n, o in observations for side in range(len(SIDES))
+        }
+        self._hands = {
+            key: self._hands.get(key) or _Hand(None, sight.wrist_px, now, now - PATIENCE_S)
+            for key, sight in sights.items()
+        }
+        found = {key: self._find(sight, self._hands[key]) for key, sight in sights.items()}
+        kept = without_duplicates({key: hand and hand.estimate for key, hand in found.items()}, people)
+        found = {key: hand if kept[key] is not None else None for key, hand in found.items()}
+        for key, hand in found.items():
+            state = self._hands[key]
+            state.found, state.wrist_px = hand, sights[key].wrist_px
+            if hand is not None and hand.is_sure:
+                state.seen_s, state.color = now, hand.color
         return [(n, replace(o, hands=_as_array([found[n, s] for s in range(len(SIDES))]))) for n, o in observations]
 
-    def _find(self, image_rgb: NDArray[np.uint8], hand: _Hand, person: Observation, side: int) -> HandEstimate | None:
-        """Look for the hand where it was a frame ago, otherwise where the body's pose predicts it."""
+    def _sight(self, image_rgb: NDArray[np.uint8], person: Observation, key: Key) -> _Sight:
         scale = pixels_per_metre(person.keypoints_px, person.world_landmarks)
-        if hand.estimate is not None:
-            estimate = self._network.estimate(image_rgb, hand.estimate.next_region)
-            found = assigned(estimate, person, scale, side)
-            if found is not None:
-                return found
-        elif not is_search_due(self._time_s, hand.seen_s, hand.searched_s):
-            return None
-        hand.searched_s = self._time_s
-        predicted = region_from_body(person.keypoints_px, scale, side)
-        if HAND_LENGTH_M * scale < SMALLEST_HAND_PX or not _is_in_image(predicted, image_rgb):
-            return None
-        return self._search(image_rgb, predicted, person, scale, side)
+        known = self._hands.get(key)
+        return _Sight(image_rgb, person, key[1], scale, known.color if known else None)
 
-    def _search(
-        self, image_rgb: NDArray[np.uint8], predicted: Region, person: Observation, scale: float, side: int
-    ) -> HandEstimate | None:
+    def _find(self, sight: _Sight, hand: _Hand) -> _Found | None:
+        """Look for the hand where it was a frame ago, otherwise where the body's pose predicts it."""
+        followed = None
+        if hand.found is not None:
+            least = DETECTED if hand.found.is_sure else PREDICTED
+            for region in _followed(hand.found.estimate, sight.wrist_px - hand.wrist_px, sight.hand_px):
+                estimate = self._network.estimate(sight.image_rgb, region)
+                followed = _better(followed, sight.judge(estimate, least, TENTATIVE))
+                if followed is not None and followed.is_sure:
+                    return followed
+        if not is_search_due(self._time_s, hand.seen_s, hand.searched_s):
+            return followed
+        hand.searched_s = self._time_s
+        predicted = region_from_body(sight.person.keypoints_px, sight.scale, sight.side)
+        if sight.hand_px < SMALLEST_HAND_PX or not _is_in_image(predicted, sight.image_rgb):
+            return followed
+        just_lost = self._time_s - hand.seen_s <= EAGER_S
+        return _better(self._search(sight, predicted, look_again=just_lost), followed)
+
+    def _search(self, sight: _Sight, predicted: Region, look_again: bool) -> _Found | None:
         """Find the hand whose palm is nearest to the predicted region, or without a palm, any hand in that region.
 
-        Each is estimated twice: the landmarks give a better region than the palm.
-
-        :param scale: pixels per metre.
+        Where the network is sure of none although the body's wrist is seen, it may look again: for palms in a smaller
+        square, in which blurred and small ones score higher, and for a hand in a smaller region.
         """
         around = replace(predicted, side_px=SEARCH_SCALE * predicted.side_px)
+        palms = self._palms_near(sight, predicted, around, SCORE_THRESHOLD)
+        found = self._first_sure(sight, [*((palm, DETECTED) for palm in palms), (predicted, PREDICTED)], TENTATIVE)
+        if not look_again or (found is not None and found.is_sure) or sight.wrist_confidence < SURE_WRIST:
+            return found
+        closer, smaller = (replace(predicted, side_px=k * predicted.side_px) for k in (CLOSER_SCALE, SMALLER_SCALE))
+        palms = self._palms_near(sight, predicted, closer, UNSURE_SCORE)
+        again = self._first_sure(sight, [(region, SECOND) for region in (*palms, smaller)], SECOND_TENTATIVE)
+        return _better(found, again)
+
+    def _palms_near(self, sight: _Sight, predicted: Region, square: Region, threshold: float) -> list[Region]:
+        """Return the hands' regions by the palms in a square that are nearest to the predicted region."""
         palms = sorted(
-            self._palms.detect(image_rgb, around),
+            self._palms.detect(sight.image_rgb, square, threshold),
             key=lambda palm: float(np.hypot(*np.subtract(palm.region.center_px, predicted.center_px))),
         )
-        candidates = [(palm.region, DETECTED_PRESENCE) for palm in palms[:MOST_PALMS]]
-        for region, least_presence in [*candidates, (predicted, PREDICTED_PRESENCE)]:
-            first = self._network.estimate(image_rgb, region)
+        return [palm.region for palm in palms[:MOST_PALMS]]
+
+    def _first_sure(self, sight: _Sight, regions: Sequence[tuple[Region, Least]], tentative: Least) -> _Found | None:
+        """Return the hand in the first region, each with what it requires, in which there surely is one.
+
+        Otherwise the best tentative one. Each is estimated twice: the landmarks give a better region.
+        """
+        found = None
+        for region, least in regions:
+            first = self._network.estimate(sight.image_rgb, region)
             if first.presence < FIRST_PRESENCE:
                 continue
-            second = self._network.estimate(image_rgb, first.next_region)
-            found = assigned(second, person, scale, side, least_presence)
-            if found is not None:
-                return found
-        return None
+            second = self._network.estimate(sight.image_rgb, first.next_region)
+            for estimate in (second, first):
+                found = _better(found, sight.judge(estimate, least, tentative))
+                if found is not None and found.is_sure:
+                    return found
+        return found
 
 
-def assigned(
-    estimate: HandEstimate,
-    person: Observation,
-    scale: float,
-    side: int,
-    least_presence: tuple[float, float] = DETECTED_PRESENCE,
-) -> HandEstimate | None:
-    """Return a hand as this hand of the person; None if it cannot be.
+def _followed(estimate: HandEstimate, motion_px: NDArray[np.float64], hand_px: float) -> list[Region]:
+    """Return where a hand that was seen a frame ago may be: moved with the body's wrist, and at its place of then."""
+    region = estimate.next_region
+    if np.linalg.norm(motion_px) < FAR_MOTION * hand_px:
+        return [region]
+    x, y = np.asarray(region.center_px) + motion_px
+    return [replace(region, center_px=(float(x), float(y))), region]
 
-    Its wrist has to be near the body's, its size like the body's. Where the network is not certain of a hand, its
-    keypoints in the image have to agree with those in space, which an imagined hand's do not.
 
-    A hand that the network takes for one of the other side is somebody else's or the person's other one, unless its
-    wrist is this one and the other is far away: seen edge-on, left and right hands look alike. In an orthographic
-    projection, a left hand looks like a right one with reversed depth, which is then returned.
+def _better(a: _Found | None, b: _Found | None) -> _Found | None:
+    """Return the sure one of two findings, or the one with more presence."""
+    both = [found for found in (a, b) if found is not None]
+    return max(both, key=lambda found: (found.is_sure, found.estimate.presence), default=None)
 
-    :param scale: pixels per metre at the person's distance.
-    :param side: 0 left, 1 right.
-    :param least_presence: with the wrist at the body's, and elsewhere.
+
+def _as_array(hands: Sequence[_Found | None]) -> NDArray[np.float64]:
+    """Return (2, 21, 6) pixels, confidence and world landmarks of both hands; zeros where one was not found.
+
+    The confidence of a tentative hand is negative.
     """
-    sure = person.keypoints_confidence[WRISTS[side]] >= SURE_WRIST
-    length = HAND_LENGTH_M * scale
-    near, elsewhere = least_presence
-    distance, other = _wrist_distances(estimate, person, scale)[[side, 1 - side]]
-    if (
-        not estimate.presence >= (near if distance <= SAME_WRIST else elsewhere)
-        or distance > (WRIST_DISTANCE if sure else UNSURE_WRIST_DISTANCE)
-        or not MIN_SIZE * length <= estimate.size_px <= MAX_SIZE * length
-        or (estimate.presence < CERTAIN_PRESENCE and estimate.disagreement > DISAGREEMENT_THRESHOLD)
-    ):
-        return None
-    probability = estimate.left if side == 0 else 1.0 - estimate.left
-    if probability >= MIN_SIDE_PROBABILITY:
-        return estimate
-    if not sure or distance > SAME_WRIST or other < OTHER_WRIST:
-        return None
-    mirrored = estimate.world_landmarks * np.array([1.0, 1.0, -1.0])
-    return replace(estimate, world_landmarks=mirrored, left=1.0 - estimate.left)
-
-
-def _wrist_distances(estimate: HandEstimate, person: Observation, scale: float) -> NDArray[np.float64]:
-    """Return the distances (2,) of the hand's wrist from the body's left and right one, in hand lengths."""
-    distances: NDArray[np.float64] = np.linalg.norm(estimate.keypoints_px[0] - person.keypoints_px[WRISTS], axis=1)
-    return distances / (HAND_LENGTH_M * scale)
-
-
-def _without_duplicates(
-    found: Mapping[_Key, HandEstimate | None], people: Mapping[int, Observation]
-) -> dict[_Key, HandEstimate | None]:
-    """Assign a hand that was found more than once to the nearest wrist; None for the others."""
-
-    def distance(key: _Key) -> float:
-        number, side = key
-        estimate = found[key]
-        wrist = people[number].keypoints_px[WRISTS[side]]
-        return np.inf if estimate is None else float(np.linalg.norm(estimate.keypoints_px[0] - wrist))
-
-    unique = dict(found)
-    keys = sorted(found, key=distance)
-    for k, key in enumerate(keys):
-        estimate = unique[key]
-        if estimate is not None and any(_is_same_hand(estimate, unique[other]) for other in keys[:k]):
-            unique[key] = None
-    return unique
-
-
-def _is_same_hand(a: HandEstimate, b: HandEstimate | None) -> bool:
-    if b is None:
-        return False
-    distance = np.linalg.norm(a.keypoints_px - b.keypoints_px, axis=1).mean()
-    return bool(distance < SAME_HAND * min(a.size_px, b.size_px))
-
-
-def _as_array(hands: Sequence[HandEstimate | None]) -> NDArray[np.float64]:
-    """Return (2, 21, 6) pixels, confidence and world landmarks of both hands; zeros where one was not found."""
     out = np.zeros((len(hands), HAND_POINTS, 6))
     for row, hand in zip(out, hands, strict=True):
         if hand is not None:
-            row[:, :2], row[:, 2], row[:, 3:] = hand.keypoints_px, hand.presence, hand.world_landmarks
+            row[:, :2], row[:, 3:] = hand.estimate.keypoints_px, hand.estimate.world_landmarks
+            row[:, 2] = hand.estimate.presence if hand.is_sure else -hand.estimate.presence
     return out
 
 
