@@ -31,7 +31,7 @@ def palm_color(image_rgb: NDArray[np.uint8], keypoints_px: NDArray[np.float64]) 
 
 
 def is_like(color: NDArray[np.float64] | None, before: NDArray[np.float64] | None) -> bool:
-    """Return whether two colours (3,) can be those of one hand; also where one of them is not known.
+    """Return whether a colour (3,) and an earlier one (3,) can be one hand's; also where one of them is not known.
 
     Light and shadow change all channels by one factor, which may be large; something else differs in tint as well.
     """

@@ -35,7 +35,7 @@ from .hand_assignment import (
 from .hand_color import is_like, palm_color
 
 FIRST_PRESENCE = 0.1  # in a rough region, from which the better one of the landmarks is looked at
-FAR_MOTION = 0.15  # of the wrist in a frame, in hand lengths, from which the region that does not move is tried as well
+FAR_MOTION = 0.35  # of the wrist in a frame, in hand lengths, from which the region that does not move is tried as well
 SEARCH_SCALE = 2.3  # side of the square in which a palm is searched, in sides of the predicted region
 CLOSER_SCALE, SMALLER_SCALE = 1.5, 0.7  # of the square and the region of a second look, likewise
 UNSURE_SCORE = 0.2  # of a palm in a second look
@@ -160,7 +160,8 @@ class HandTracker:
         followed = None
         if hand.found is not None:
             least = DETECTED if hand.found.is_sure else PREDICTED
-            for region in _followed(hand.found.estimate, sight.wrist_px - hand.wrist_px, sight.hand_px):
+            motion = sight.wrist_px - hand.wrist_px if sight.wrist_confidence >= SURE_WRIST else np.zeros(2)
+            for region in _followed(hand.found.estimate, motion, sight.hand_px):
                 estimate = self._network.estimate(sight.image_rgb, region)
                 followed = _better(followed, sight.judge(estimate, least, TENTATIVE))
                 if followed is not None and followed.is_sure:
