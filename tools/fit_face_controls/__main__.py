@@ -10,7 +10,8 @@ from pathlib import Path
 from ...scope_addon.errors import exit_status
 from ...scope_addon.retarget.face.face_controls import FOLDER
 from ...solver.errors import ScopeError
-from ..build_body.source import DOWNLOADS, fetch_wheel
+from ..build_body.source import fetch_wheel
+from ..pinned_wheel import DOWNLOADS
 from .amounts import write_map
 from .default_rig import BY_HAND, fit_default_rig
 from .shapes import read_shapes

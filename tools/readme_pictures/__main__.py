@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``python -m scope.tools.readme_pictures``: make the pictures. All but the animations need ../shared/data."""
+"""``python -m scope.tools.readme_pictures``: make the pictures. Animations and real faces need no ../shared/data."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ...scope_addon.atomic_write import atomic_path
 from ...solver.loaders.body_file import ASSETS
-from . import animation, pictures
+from . import animation, photographs, pictures
 from .clips import DATA
 
 ANIMATIONS = tuple(animation.CUTS)
@@ -25,9 +25,12 @@ PICTURES = {
     "along_the_view": pictures.along_the_view,
     "from_behind": pictures.from_behind,
     "two_floors": pictures.two_floors,
+    "real_faces": photographs.real_faces,
 }
+WITHOUT_DATA = (*ANIMATIONS, "real_faces")
 BY_BENCHMARKS = ("smplify", "scenes")  # drawn by `./scripts/bench` with these names, and copied from build/bench
-LARGEST_BYTES = 60_000
+MOST_BYTES = 60_000
+LARGEST_BYTES = dict.fromkeys((*PICTURES, *BY_BENCHMARKS), MOST_BYTES) | {"real_faces": 120_000}
 
 
 def main() -> int:
@@ -41,7 +44,7 @@ def main() -> int:
     if unknown:
         parser.error(f"there is no picture {', '.join(sorted(unknown))}; choose from {', '.join(known)}")
     names = arguments.names or known
-    if not set(names) <= set(ANIMATIONS) and not DATA.is_dir():
+    if not set(names) <= set(WITHOUT_DATA) and not DATA.is_dir():
         print(f"{DATA} does not exist: the pictures show captures of its clips", file=sys.stderr)
         return 1
     arguments.out.mkdir(parents=True, exist_ok=True)
@@ -49,16 +52,16 @@ def main() -> int:
         if name in ANIMATIONS:
             _write_animation(name, arguments.out / f"{name}.webp")
         else:
-            write_jpeg(arguments.out / f"{name}.jpg", PICTURES[name]())
+            write_jpeg(arguments.out / f"{name}.jpg", PICTURES[name](), LARGEST_BYTES[name])
     return 0
 
 
-def write_jpeg(path: Path, picture: NDArray[np.uint8]) -> None:
+def write_jpeg(path: Path, picture: NDArray[np.uint8], most_bytes: int = MOST_BYTES) -> None:
     """Write a JPEG, as good as its size allows."""
     bgr = cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)
     for quality in range(90, 30, -4):
         data = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
-        if len(data) <= LARGEST_BYTES:
+        if len(data) <= most_bytes:
             break
     with atomic_path(path) as temporary:
         temporary.write_bytes(data)

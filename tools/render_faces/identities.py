@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..build_body.build import shape_mesh
-from ..build_body.source import DATA, DOWNLOADS, fetch_wheel, read_target
+from ..build_body.source import DATA, fetch_wheel, read_target
+from ..pinned_wheel import DOWNLOADS
 
 PARTS = ("cheek", "chin", "eyebrows", "eyes", "forehead", "head", "mouth", "nose")
 MOVES_HEAD = re.compile(r"head/head-(trans|angle)")  # where the head is, which is the pose's

@@ -47,4 +47,5 @@ SETS: dict[str, FaceSet] = {
     "talk_reflections": _held_out(worn="thick glasses"),
     "talk_dark_glasses": _condition(worn="dark glasses"),
     "talk_beard": _condition(worn="beard"),
+    "talk_half_minute": FaceSet(talk_and_grimaces, 23, {"people": 1, "seconds": 30.0}, cycles=False),
 }

@@ -29,6 +29,7 @@ HAND_KEYPOINT_NAMES = tuple(f"hand/{side}_{name}" for side in SIDES for name in 
 # places the wrist further into the palm than the body has its joint.
 PIXEL_WEIGHT, WRIST_PIXEL_WEIGHT = 0.3, 0.05
 DIRECTION_WEIGHT = 0.25  # of a bone in a hand of presence 1: twice the standard deviation of a bone of the body
+RELIABLE = 0.8  # presence below which directions count by its cube: of a blurred hand, the place is right, not the pose
 # Flexion of a finger joint towards the palm, at least and at most, and largest deviation from this axis; radians.
 _KNUCKLE, _HINGE = (-0.5, 1.7, 0.4), (-0.2, 2.0, 0.2)
 _THUMB = (-0.4, 0.4, 1.2)  # rotation of a thumb joint about its own bone, and deviation from it
@@ -95,6 +96,7 @@ class HandMeasurer:
         if not seen:
             return measured
         confidence = hands[seen, :, 2]
+        reliable = confidence * np.minimum(confidence / RELIABLE, 1.0) ** 2
         directions = self._directions(hands[seen])
         return replace(
             measured,
@@ -107,7 +109,7 @@ class HandMeasurer:
                 np.concatenate([bones.starts, self._starts[seen].ravel()]),
                 np.concatenate([bones.ends, self._ends[seen].ravel()]),
                 np.concatenate([bones.directions, directions.reshape(-1, 3)]),
-                np.concatenate([bones.confidence, DIRECTION_WEIGHT * confidence[:, self._to].ravel()]),
+                np.concatenate([bones.confidence, DIRECTION_WEIGHT * reliable[:, self._to].ravel()]),
             ),
         )
 

@@ -38,8 +38,8 @@ class Observation:
     ``acquired``: the person was not tracked from the previous frame; ``appearance``: see `appearance`, in some frames;
     ``reference_landmarks``: pending result of the heavy network, to replace ``world_landmarks``, in few frames. Order:
     `KEYPOINT_NAMES`. ``hands`` (2, 21, 6), if requested: pixels, confidence and world landmarks of the left and right
-    hand, see `hand_tracker`; zeros where not seen. ``face``, if requested: see `face_record`. ``mask``: the person's
-    outline, in few frames.
+    hand, see `hand_tracker`; zeros where not seen, the confidence negative where `tentative_hands` decides later.
+    ``face``, if requested: see `face_record`. ``mask``: the person's outline, in few frames.
     """
 
     keypoints_px: NDArray[np.float64]

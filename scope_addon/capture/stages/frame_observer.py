@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..media.frame import Frame
 from ..perception.observation import Observation
 from ..tracking.face.face_tracker import FaceTracker
-from ..tracking.hand_tracker import HandTracker
+from ..tracking.hands.hand_tracker import HandTracker
 from ..tracking.landmarks.mask_schedule import MaskSchedule
 from ..tracking.scene_cuts import SceneCuts
 from ..tracking.tracker import PeopleTracker

@@ -10,7 +10,7 @@ from ..options import CaptureOptions, most_people
 from ..perception.execution import Execution
 from ..perception.kept.kept_estimates import KeptEstimates
 from ..tracking.face.face_tracker import FaceTracker
-from ..tracking.hand_tracker import HandTracker
+from ..tracking.hands.hand_tracker import HandTracker
 from ..tracking.tracker import PeopleTracker
 from .frame_observer import Trackers
 

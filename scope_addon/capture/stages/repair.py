@@ -3,8 +3,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from ..camera.intrinsics import Camera
 from ..fitting.ablation import Ablation
+from ..tracking.hands.tentative_hands import confirmed
 from ..tracking.keypoint_jumps import repair_keypoint_jumps
 from ..tracking.left_right import repair_left_right
 from ..tracking.limb_swap import repair_limb_swaps
@@ -12,7 +15,9 @@ from ..tracking.track import Track
 
 
 def repair(track: Track, camera: Camera, ablation: Ablation) -> Track:
-    """Undo left-right swaps and limb swaps, and replace keypoint jumps."""
+    """Undo left-right swaps and limb swaps, replace keypoint jumps, and keep tentative hands that others support."""
     if ablation.left_right:
         track = repair_limb_swaps(repair_left_right(track, camera))
+    if track.hands is not None:
+        track = replace(track, hands=confirmed(track.hands, track.times))
     return repair_keypoint_jumps(track) if ablation.keypoint_jumps else track

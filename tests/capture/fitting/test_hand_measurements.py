@@ -27,7 +27,7 @@ from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.left_right import MIRROR_PARTNER, repair_left_right
 from scope.scope_addon.capture.tracking.track import Tracklet, make_track
 from scope.scope_addon.errors import UsageError
-from scope.solver import State, default_priors, fit, load_body
+from scope.solver import Keypoints2D, Measurements, OrientationField, State, default_priors, fit, load_body
 from scope.solver.compiled.part import Part
 from scope.solver.residuals.joint_limits import evaluate
 from scope.solver.rotations import exp, log
@@ -246,3 +246,21 @@ def test_tracks_keep_hands_in_their_rows_and_swap_them_with_left_and_right():
     repaired = repair_left_right(judged, choose_camera(640, 480))
     assert repaired.hands[1, 1].max() == 1
     assert repaired.hands[1, 0].max() == 0
+
+
+def test_directions_of_a_hand_that_is_hardly_present_count_less_than_its_place(body):
+    weights = []
+    for presence in (0.9, 0.3):
+        hands = np.zeros((2, HAND_POINTS, 6))
+        hands[0, :, :2] = 300.0
+        hands[0, :, 2] = presence
+        hands[0, :, 3:] = np.random.default_rng(0).normal(0, 0.05, (HAND_POINTS, 3))
+        empty = Measurements(
+            keypoints2d=Keypoints2D(np.zeros(0, int), np.zeros((0, 2)), np.zeros(0)),
+            orientation_field=OrientationField(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 3)), np.zeros(0)),
+        )
+        added = HandMeasurer(body, np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]])).add(empty, hands)
+        weights.append((added.keypoints2d.confidence.sum(), added.orientation_field.confidence.sum()))
+    (place, turn), (place_low, turn_low) = weights
+    assert place_low / place == pytest.approx(1 / 3)
+    assert turn_low / turn < 0.1

@@ -14,8 +14,8 @@ from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.perception.palm_detector import Palm
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.pipeline import capture
-from scope.scope_addon.capture.tracking import hand_tracker
-from scope.scope_addon.capture.tracking.hand_tracker import HandTracker
+from scope.scope_addon.capture.tracking.hands import hand_tracker
+from scope.scope_addon.capture.tracking.hands.hand_tracker import HandTracker
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker
 from scope.solver.loaders.body_file import load_body
 from scope.solver.rotations import exp
@@ -63,7 +63,7 @@ class FakePalms:
     def __init__(self, hands):
         self.hands, self.calls = hands, 0
 
-    def detect(self, _image, where):
+    def detect(self, _image, where, threshold):
         self.calls += 1
         near = [h for h in self.hands if np.hypot(*(h.keypoints_px[9] - where.center_px)) < where.side_px / 2]
         return [Palm(0.9, h.region) for h in near]
@@ -119,8 +119,61 @@ def test_a_missing_hand_is_searched_equally_often_at_any_frame_rate(follow, rate
     for k in range(3 * rate):
         tracker.step(IMAGE, [(0, person())], k / rate)
         calls.append(tracker._palms.calls)
-    assert calls[rate // 3] == 2 * (rate // 3 + 1)
+    assert calls[rate // 3] == 2 * 2 * (rate // 3 + 1)  # with a second look each time
     assert 22 <= calls[3 * rate - 1] - calls[rate - 1] <= 32  # in two seconds, both hands
+
+
+def test_a_hand_is_followed_with_the_wrist_where_it_moves_far_in_a_frame(follow):
+    hands = [hand_at((300, 500))]
+    tracker = follow(hands)
+    tracker.step(IMAGE, [(0, person())])
+    hands[0] = hand_at((300 + 2 * LENGTH, 500))
+    palms = tracker._palms.calls
+    (_, found), *_ = tracker.step(IMAGE, [(0, person(left_wrist=(300 + 2 * LENGTH, 500)))])
+    assert np.array_equal(found.hands[0, :, :2], hands[0].keypoints_px)
+    assert tracker._palms.calls == palms + 2  # both of the right hand, which is not there
+
+
+def test_a_hand_that_the_network_is_unsure_of_is_reported_as_tentative_and_followed(follow):
+    hands = [hand_at((300, 500))]
+    tracker = follow(hands)
+    tracker.step(IMAGE, [(0, person())])
+    hands[0] = hand_at((300, 500), presence=0.3)
+    for _ in range(15):
+        (_, found), *_ = tracker.step(IMAGE, [(0, person())])
+        assert (found.hands[0, :, 2] == -0.3).all()
+        assert np.array_equal(found.hands[0, :, :2], hands[0].keypoints_px)
+    hands[0] = hand_at((300, 500), presence=0.1)
+    (_, found), *_ = tracker.step(IMAGE, [(0, person())])
+    assert not found.hands.any()
+
+
+def test_a_hand_of_another_colour_than_before_is_imagined_unless_it_is_certain(follow):
+    skin, cloth = (np.full((1000, 1000, 3), color, np.uint8) for color in ((134, 104, 79), (26, 40, 45)))
+    hands = [hand_at((300, 500), presence=0.9)]
+    tracker = follow(hands)
+    for image, presence, is_seen in ((skin, 0.9, True), (cloth, 0.9, False), (skin, 0.9, True), (cloth, 0.97, True)):
+        hands[0] = hand_at((300, 500), presence=presence)
+        (_, found), *_ = tracker.step(image, [(0, person())])
+        assert (found.hands[0, 0, 2] > 0) == is_seen
+        assert is_seen or not found.hands[0].any()
+
+
+@pytest.mark.parametrize(("away", "is_seen"), [(0.2, True), (0.4, False)])
+def test_a_second_look_finds_a_hand_by_an_unsure_palm_but_only_at_the_bodys_wrist(follow, away, is_seen):
+    class InPalms(FakeHands):
+        def estimate(self, image, region):
+            of_body = min(abs(region.side_px / LENGTH - scale) for scale in (1.5, 0.7 * 1.5)) < 0.01
+            return hand_at(region.center_px, presence=0.0) if of_body else super().estimate(image, region)
+
+    class UnsurePalms(FakePalms):
+        def detect(self, image, where, threshold):
+            return super().detect(image, where, threshold) if threshold < 0.5 else []
+
+    hands = [hand_at((300 + away * LENGTH, 500), presence=0.7)]
+    tracker = follow(hands)
+    tracker._network, tracker._palms = InPalms(hands), UnsurePalms(hands)
+    assert seen(tracker, person())[0] == is_seen
 
 
 def test_a_hand_far_from_the_bodys_wrist_is_dropped(follow):

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whose hand it is: checks of an estimate against a person's body, and hands that were found more than once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...perception.hand_landmarks import HandEstimate
+from ...perception.hand_region import HAND_LENGTH_M, WRISTS
+from ...perception.observation import Observation
+
+WRIST_DISTANCE = 0.7  # largest distance between the hand's wrist and the body's, in hand lengths
+UNSURE_WRIST_DISTANCE = 1.2  # where the body's wrist is uncertain
+SURE_WRIST = 0.5
+MAX_SIZE = 2.0  # of the hand, in the hand lengths of the body
+SAME_HAND = 0.35  # mean distance of the keypoints, in sizes of the hand, below which two hands are one
+DISAGREEMENT_THRESHOLD = 0.3
+CERTAIN_PRESENCE = 0.95  # from which a hand is none that the network imagines
+MIN_SIDE_PROBABILITY = 0.15  # of the right side
+SAME_WRIST, OTHER_WRIST = 0.3, 1.0  # distances of the body's two wrists from a hand of the wrong side, in hand lengths
+
+Key = tuple[int, int]  # tracklet number, and 0 for the left hand or 1 for the right one
+
+
+class Least(NamedTuple):
+    """Least presence of a hand with its wrist at the body's, and elsewhere; least size in the body's hand lengths."""
+
+    near: float
+    elsewhere: float
+    size: float = 0.25
+
+
+DETECTED = Least(0.5, 0.5)  # of a hand whose palm was detected, or that was seen in the frame before
+PREDICTED = Least(0.6, 0.8)  # of one that is only predicted from the body
+TENTATIVE = Least(0.2, 0.2)  # of one that may be believed later, see `tentative_hands`
+# The same of hands in a second look, which finds small ones in the skin of a forearm.
+SECOND, SECOND_TENTATIVE = Least(0.6, np.inf, 0.42), Least(0.2, np.inf, 0.42)
+
+
+def assigned(
+    estimate: HandEstimate, person: Observation, scale: float, side: int, least: Least = DETECTED
+) -> HandEstimate | None:
+    """Return a hand as this hand of the person; None if it cannot be.
+
+    Its wrist has to be near the body's, its size like the body's. Where the network is not certain of a hand, its
+    keypoints in the image have to agree with those in space, which an imagined hand's do not.
+
+    A hand that the network takes for one of the other side is somebody else's or the person's other one, unless its
+    wrist is this one and the other is far away: seen edge-on, left and right hands look alike. In an orthographic
+    projection, a left hand looks like a right one with reversed depth, which is then returned.
+
+    :param scale: pixels per metre at the person's distance.
+    :param side: 0 left, 1 right.
+    """
+    sure = person.keypoints_confidence[WRISTS[side]] >= SURE_WRIST
+    length = HAND_LENGTH_M * scale
+    distance, other = _wrist_distances(estimate, person, scale)[[side, 1 - side]]
+    if (
+        not estimate.presence >= (least.near if distance <= SAME_WRIST else least.elsewhere)
+        or distance > (WRIST_DISTANCE if sure else UNSURE_WRIST_DISTANCE)
+        or not least.size * length <= estimate.size_px <= MAX_SIZE * length
+        or (estimate.presence < CERTAIN_PRESENCE and estimate.disagreement > DISAGREEMENT_THRESHOLD)
+    ):
+        return None
+    probability = estimate.left if side == 0 else 1.0 - estimate.left
+    if probability >= MIN_SIDE_PROBABILITY:
+        return estimate
+    if not sure or distance > SAME_WRIST or other < OTHER_WRIST:
+        return None
+    mirrored = estimate.world_landmarks * np.array([1.0, 1.0, -1.0])
+    return replace(estimate, world_landmarks=mirrored, left=1.0 - estimate.left)
+
+
+def _wrist_distances(estimate: HandEstimate, person: Observation, scale: float) -> NDArray[np.float64]:
+    """Return the distances (2,) of the hand's wrist from the body's left and right one, in hand lengths."""
+    distances: NDArray[np.float64] = np.linalg.norm(estimate.keypoints_px[0] - person.keypoints_px[WRISTS], axis=1)
+    return distances / (HAND_LENGTH_M * scale)
+
+
+def without_duplicates(
+    found: Mapping[Key, HandEstimate | None], people: Mapping[int, Observation]
+) -> dict[Key, HandEstimate | None]:
+    """Assign a hand that was found more than once to the nearest wrist; None for the others."""
+
+    def distance(key: Key) -> float:
+        number, side = key
+        estimate = found[key]
+        wrist = people[number].keypoints_px[WRISTS[side]]
+        return np.inf if estimate is None else float(np.linalg.norm(estimate.keypoints_px[0] - wrist))
+
+    unique = dict(found)
+    keys = sorted(found, key=distance)
+    for k, key in enumerate(keys):
+        estimate = unique[key]
+        if estimate is not None and any(_is_same_hand(estimate, unique[other]) for other in keys[:k]):
+            unique[key] = None
+    return unique
+
+
+def _is_same_hand(a: HandEstimate, b: HandEstimate | None) -> bool:
+    if b is None:
+        return False
+    distance = np.linalg.norm(a.keypoints_px - b.keypoints_px, axis=1).mean()
+    return bool(distance < SAME_HAND * min(a.size_px, b.size_px))

