@@ -143,6 +143,25 @@ COMMANDS = (
         continues=True,
     ),
     Command(
+        "windows",  # one of a long clip, whose finished windows it keeps as well
+        PROGRAM,
+        (
+            "continued",
+            "capture",
+            "in/short.mp4",
+            "--window-seconds",
+            "0.12",
+            "-o",
+            "out/short.npz",
+            "--quality",
+            "fast",
+        ),
+        ("out/short.npz",),
+        ("short",),
+        _is_same,
+        continues=True,
+    ),
+    Command(
         "live",
         SCOPE,
         ("live", "in/short.mp4", "--record", "out/live.npz", "--keep-footage", "out/live.mp4"),
