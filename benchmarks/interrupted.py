@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A long clip of 1080p captured by the command line, killed on the way, and captured again.
 
-    python -m scope.benchmarks.interrupted [--minutes 60] [--kill-at 0.7]
+    python -m scope.benchmarks.interrupted [--minutes 60] [--kill-at 0.7] [--window-seconds S]
 
 One person walks there and back again, in a file of 1920 x 1080 at 30 frames a second: a shared clip, encoded once and
 its packets repeated. The process group is killed with SIGKILL, and the same command run again. Prints JSON: times,
@@ -181,14 +181,17 @@ def files_below(*folders: Path) -> dict[str, int]:
     return {str(path): path.stat().st_size for each in folders for path in sorted(each.rglob("*")) if path.is_file()}
 
 
-def interrupted(clip: Path, frames: int, kill_at: float, folder: Path) -> dict[str, Any]:
-    """Capture a clip, killed on the way, and again; return the figures."""
+def interrupted(clip: Path, frames: int, kill_at: float, folder: Path, given: list[str]) -> dict[str, Any]:
+    """Capture a clip, killed on the way, and again; return the figures.
+
+    :param given: further arguments.
+    """
     places = {name: folder / name for name in ("tmp", "caches", "out")}
     for place in places.values():
         place.mkdir()
     environment = dict(os.environ, TMPDIR=str(places["tmp"]), XDG_CACHE_HOME=str(places["caches"]))
     out = places["out"] / "walk.npz"
-    command = [str(ROOT / "scripts" / "capture"), str(clip), "--quality", "fast", "-o", str(out)]
+    command = [str(ROOT / "scripts" / "capture"), str(clip), "--quality", "fast", "-o", str(out), *given]
     figures: dict[str, Any] = {"frames": frames, "load_at_start": os.getloadavg()}
     for name, share in (("killed", kill_at), ("again", np.inf)):
         run = Run(command, environment, share)
@@ -216,13 +219,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="interrupted")
     parser.add_argument("--minutes", type=float, default=60.0)
     parser.add_argument("--kill-at", type=float, default=0.7, help="share of the frames that are tracked")
+    parser.add_argument("--window-seconds", type=float, help="for a short clip; two minutes by default")
     args = parser.parse_args()
+    given = [] if args.window_seconds is None else ["--window-seconds", f"{args.window_seconds:g}"]
     frames = round(60 * FPS * args.minutes)
     clip = CACHE / f"walk_{WIDTH}x{HEIGHT}_{frames}.mp4"
     if not clip.exists():
         make_clip(clip, frames)
     with tempfile.TemporaryDirectory(dir=CACHE) as folder:
-        json.dump(interrupted(clip, frames, args.kill_at, Path(folder)), sys.stdout, indent=1)
+        json.dump(interrupted(clip, frames, args.kill_at, Path(folder), given), sys.stdout, indent=1)
 
 
 if __name__ == "__main__":

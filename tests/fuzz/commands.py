@@ -143,19 +143,9 @@ COMMANDS = (
         continues=True,
     ),
     Command(
-        "windows",  # one of a long clip, whose finished windows it keeps as well
-        PROGRAM,
-        (
-            "continued",
-            "capture",
-            "in/short.mp4",
-            "--window-seconds",
-            "0.12",
-            "-o",
-            "out/short.npz",
-            "--quality",
-            "fast",
-        ),
+        "windows",  # one of a long clip, which keeps its finished windows
+        SCOPE,
+        ("capture", "in/short.mp4", "--window-seconds", "0.2", "-o", "out/short.npz", "--quality", "fast"),
         ("out/short.npz",),
         ("short",),
         _is_same,
