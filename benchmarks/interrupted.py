@@ -24,6 +24,7 @@ import tempfile
 import threading
 import time
 from fractions import Fraction
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +41,7 @@ from .frames import CACHE
 
 ROOT = Path(__file__).resolve().parents[1]
 CLIP = ROOT.parent / "shared" / "data" / "clips" / "walk_side_static.mp4"
+WHOLE = 150  # frames of it in which the whole person is in the picture
 WIDTH, HEIGHT, FPS = 1920, 1080, 30
 STAGE = "finding the person"
 _PROGRESS = re.compile(r"\r\x1b\[K(\w[\w ]*?) +\[[#.]*\] (\d+)/(\d+)(?=\r)")
@@ -51,7 +53,8 @@ def make_clip(path: Path, frames: int, source: Path = CLIP) -> None:
     """Write some frames of a clip, there and back again: one round is encoded, and its packets are repeated."""
     with open_video(source) as video:
         images = [
-            cv2.resize(f.image_rgb, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA).astype(np.uint8) for f in video
+            cv2.resize(frame.image_rgb, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA).astype(np.uint8)
+            for frame in islice(video, WHOLE)
         ]
     path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=path.parent) as folder:
