@@ -3,7 +3,7 @@
 
     python -m scope.benchmarks.interrupted [--minutes 60] [--kill-at 0.7] [--window-seconds S]
 
-One person walks there and back again, in a file of 1920 x 1080 at 30 frames a second: a shared clip, encoded once and
+Two people move there and back again, in a file of 1920 x 1080 at 30 frames a second: a shared clip, encoded once and
 its packets repeated. The process group is killed with SIGKILL, and the same command run again. Prints JSON: times,
 highest memory of all processes together, what was kept, and what is right or wrong with the motion. It needs ../shared,
 and Linux.
@@ -41,7 +41,7 @@ from .frames import CACHE
 
 ROOT = Path(__file__).resolve().parents[1]
 CLIP = ROOT.parent / "shared" / "data" / "clips" / "walk_side_static.mp4"
-WHOLE = 150  # frames of it in which the whole person is in the picture
+WHOLE = 150  # frames of it before one of the two people jumps off a roof
 WIDTH, HEIGHT, FPS = 1920, 1080, 30
 STAGE = "finding the person"
 _PROGRESS = re.compile(r"\r\x1b\[K(\w[\w ]*?) +\[[#.]*\] (\d+)/(\d+)(?=\r)")
