@@ -12,7 +12,6 @@ from ..footage import shown
 from ..motion import Motion
 from .media.video import Video, open_video
 from .options import CaptureOptions, check_options
-from .perception.kept.kept_estimates import KeptEstimates
 from .stages.clock import Progress, StageClock
 from .stages.footage import Footage, Listeners, Watch
 from .stages.observe import observe
@@ -42,8 +41,8 @@ def capture(
 ) -> Capture:
     """Capture the people of a video or still image, the most prominent one first.
 
-    :param unfinished: folder in which estimates are kept while this lasts, and found if an earlier capture was killed;
-        the caller removes it. None: nothing is kept.
+    :param unfinished: folder in which estimates and finished windows are kept while this lasts, and found if an earlier
+        capture was killed; the caller removes it. None: nothing is kept.
     :param windows: folder with windows of a long clip that `observe_windows` has written; those that are missing are
         observed now.
     :raises UsageError: an option has an impossible value, contradicts another one or does not suit the body.
@@ -54,8 +53,7 @@ def capture(
     check_options(body, options)
     clock = StageClock()
     with open_video(Path(path), options.wanted) as video:
-        kept = KeptEstimates(unfinished)
-        footage, tracks = observe(video, body, options, clock, Listeners(progress, watch), kept, windows)
+        footage, tracks = observe(video, body, options, clock, Listeners(progress, watch), unfinished, windows)
     with clock.stage("solver"):
         tracks = [repair(track, footage.camera, options.ablation) for track in tracks]
         solved = solve(_shot(video, body, options, footage), tracks, progress, options.heights_m)

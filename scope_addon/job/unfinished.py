@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Folders of captures in progress: what the networks have found, with which the same capture continues after a kill."""
+"""Folders of captures in progress: what has been observed, with which the same capture continues after a kill."""
 
 from __future__ import annotations
 
@@ -64,10 +64,20 @@ def _remove_abandoned(parent: Path) -> None:
     with suppress(OSError):
         for folder in parent.iterdir():
             with suppress(OSError):
-                size = sum(file.stat().st_size for file in folder.iterdir())
-                found.append((time.time() - folder.stat().st_mtime, size, folder))
+                size, changed_s = _size_and_time(folder)
+                found.append((time.time() - changed_s, size, folder))
     total = 0
     for age_s, size, folder in sorted(found):
         total += size
         if age_s > _ABANDONED_S or (total > _LARGEST and age_s > _RUNNING_S):
             shutil.rmtree(folder, ignore_errors=True)
+
+
+def _size_and_time(folder: Path) -> tuple[int, float]:
+    """Return the bytes of a folder's files, and when a file was last written into it or its folders.
+
+    :raises OSError: it is being removed.
+    """
+    below = [folder, *folder.rglob("*")]
+    size = sum(path.stat().st_size for path in below if path.is_file())
+    return size, max(path.stat().st_mtime for path in below if path.is_dir())

@@ -45,6 +45,12 @@ def stop_at(frame: int):
     return progress
 
 
+def assert_same(resumed, whole):
+    assert len(whole) >= FRAMES - 3
+    for name in ("poses", "trans", "betas", "keypoints2d", "joints_cam", "joint_confidence"):
+        assert np.array_equal(getattr(resumed, name), getattr(whole, name)), name
+
+
 def test_a_stopped_capture_continues_to_the_same_result(tmp_path, body, networks, runs):
     options = CaptureOptions(quality="fast", threads=1, wanted=VideoRange(0.0, 0.6, Fraction(30)))
     folder = tmp_path / "unfinished"
@@ -54,7 +60,22 @@ def test_a_stopped_capture_continues_to_the_same_result(tmp_path, body, networks
     resumed = capture(SAMPLE, body, options, unfinished=folder).motions[0]
     after = len(runs) - before
     whole = capture(SAMPLE, body, options).motions[0]
-    assert len(whole) >= FRAMES - 3
     assert len(runs) - before - after > before > 3 * after > 0
-    for name in ("poses", "trans", "betas", "keypoints2d", "joints_cam", "joint_confidence"):
-        assert np.array_equal(getattr(resumed, name), getattr(whole, name)), name
+    assert_same(resumed, whole)
+
+
+def test_a_stopped_capture_of_a_long_clip_goes_on_in_its_middle(tmp_path, body, networks, runs):
+    """Three windows of 0.2 s, of which two are finished, without the estimates that would give the same."""
+    options = CaptureOptions(quality="fast", threads=1, window_s=0.2, wanted=VideoRange(0.0, 0.6))
+    folder = tmp_path / "unfinished"
+    with pytest.raises(CancelledError):
+        capture(SAMPLE, body, options, stop_at(FRAMES - 5), unfinished=folder)
+    assert len(list(folder.glob("windows-*/*.npz"))) == 2
+    for estimates in folder.glob("*.npz"):
+        estimates.unlink()
+    before = len(runs)
+    resumed = capture(SAMPLE, body, options, unfinished=folder).motions[0]
+    after = len(runs) - before
+    whole = capture(SAMPLE, body, options).motions[0]
+    assert 2 * after < len(runs) - before - after
+    assert_same(resumed, whole)

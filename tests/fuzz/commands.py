@@ -143,6 +143,15 @@ COMMANDS = (
         continues=True,
     ),
     Command(
+        "windows",  # one of a long clip, which keeps its finished windows
+        SCOPE,
+        ("capture", "in/short.mp4", "--window-seconds", "0.2", "-o", "out/short.npz", "--quality", "fast"),
+        ("out/short.npz",),
+        ("short",),
+        _is_same,
+        continues=True,
+    ),
+    Command(
         "live",
         SCOPE,
         ("live", "in/short.mp4", "--record", "out/live.npz", "--keep-footage", "out/live.mp4"),

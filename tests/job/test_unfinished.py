@@ -63,6 +63,21 @@ def test_what_is_old_or_too_much_is_removed(tmp_path, footage, monkeypatch):
     assert [folder.exists() for folder in folders] == [True, True, False, False]
 
 
+def test_folders_in_it_count_by_their_size_and_time(tmp_path, footage, monkeypatch):
+    folders = [tmp_path / FOLDER / name for name in ("hour", "written", "month")]
+    for folder, age_s, inner_s in zip(folders, (3600, 86400, 30 * 86400), (3600, 0, 30 * 86400), strict=True):
+        windows = folder / "windows-0"
+        windows.mkdir(parents=True)
+        (windows / "window00000.npz").write_bytes(bytes(1000))
+        for path, age in ((windows, inner_s), (folder, age_s)):
+            os.utime(path, (time.time() - age,) * 2)
+    end(tmp_path, footage)
+    assert [folder.exists() for folder in folders] == [True, True, False]
+    monkeypatch.setattr(unfinished, "_LARGEST", 1500)
+    end(tmp_path, footage)
+    assert [folder.exists() for folder in folders] == [False, True, False]
+
+
 def test_clearing_the_cache_removes_it(tmp_path, footage):
     folder = end(tmp_path, footage, KeyboardInterrupt())
     cache = Cache(tmp_path)

@@ -103,3 +103,15 @@ def test_imports_are_relative():
         if module.split(".")[0] == "scope" and not level
     ]
     assert absolute == []
+
+
+def test_no_operator_of_the_panel_opens_a_rigs_file():
+    """As the threat model says: Blender's importers run under limits in a shell, which its window could not have."""
+    reads_files = {"load_rig", "check_rig", "export_on_rig", "rig_source", "RigSource"}
+    for path in sources("scope_addon/ui"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom):
+                assert not reads_files & {alias.name for alias in node.names}, path
+    importers = ("import_scene", "libraries.load", "wm.append", "wm.link")
+    readers = [path.stem for path in sources("scope_addon") if any(name in path.read_text() for name in importers)]
+    assert readers == ["completeness", "rig_file"]  # the first reads what Scope has just written

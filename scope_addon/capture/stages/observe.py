@@ -38,12 +38,13 @@ def observe(
     options: CaptureOptions,
     clock: StageClock,
     listeners: Listeners,
-    kept: KeptEstimates | None = None,
+    unfinished: Path | None = None,
     windows: Path | None = None,
 ) -> tuple[Footage, list[Track]]:
     """Detect and track the people of all frames, the most prominent one first.
 
-    :param kept: estimates of an earlier capture that was killed, and where to keep those of this one.
+    :param unfinished: folder with what an earlier capture that was killed has found, and in which to keep what this one
+        finds; None: nothing is kept.
     :param windows: folder with windows of a long clip that were observed before.
     :raises VideoError: there is no frame in the chosen range.
     :raises NoPersonError: nobody was found.
@@ -55,9 +56,10 @@ def observe(
     plan = plan_windows(video, options.window_s)
     with BackgroundEstimators(camera, video.width, video.height, live, fits) as background, opencv_in_one_thread():
         if len(plan) > 1:
-            clip = LongClip(video, plan, options, clock, background.pool, kept)
+            clip = LongClip(video, plan, options, clock, background.pool, unfinished)
             footage, tracks = clip.observe(background, fits, live, listeners, windows)
         else:
+            kept = KeptEstimates(unfinished)
             footage, tracks = _observe_short(video, options, background, (clock, live, listeners), kept)
     if not len(footage.timestamps):
         raise no_frames_error(video)
@@ -72,7 +74,7 @@ def _observe_short(
     options: CaptureOptions,
     background: BackgroundEstimators,
     observers: tuple[StageClock, LiveBody, Listeners],
-    kept: KeptEstimates | None,
+    kept: KeptEstimates,
 ) -> tuple[Footage, list[Track]]:
     """Observe a clip of one window."""
     clock, live, listeners = observers

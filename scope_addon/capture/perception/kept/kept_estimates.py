@@ -8,6 +8,7 @@ found only where the network would give the same again, bit for bit, whatever th
 from __future__ import annotations
 
 import hashlib
+import io
 import os
 import threading
 import time
@@ -90,9 +91,11 @@ class KeptEstimates:
         try:
             if not self._wrote:
                 self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            with atomic_path(path) as temporary, temporary.open("wb") as file:
-                keys = np.frombuffer(b"".join(self._new), np.uint8).reshape(-1, _KEY_BYTES)
-                np.savez(file, keys=keys, values=np.stack(list(self._new.values())))
+            packed = io.BytesIO()  # a zip file that the disk refuses prints a traceback when it is destroyed
+            keys = np.frombuffer(b"".join(self._new), np.uint8).reshape(-1, _KEY_BYTES)
+            np.savez(packed, keys=keys, values=np.stack(list(self._new.values())))
+            with atomic_path(path) as temporary:
+                temporary.write_bytes(packed.getbuffer())
             self._wrote = True
             self._bytes += path.stat().st_size
         except (OSError, ScopeError):

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Observation of a long clip, window by window.
 
-In one piece, all windows are observed in one pass. Some or all of them may also have been observed before, by other
-processes, which each began to decode at their own window. The result is the same, because
+In one piece, all windows are observed in one pass; a capture that was killed goes on after its last finished window.
+Some or all of them may also have been observed before, by other processes, which each began to decode at their own
+window. The result is the same, because
 
 - what is observed in a window depends on its frames alone;
 - a window whose first frames are not those of the window before, image by image, is observed again with the clip
@@ -15,6 +16,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +40,7 @@ from ..footage import Footage, Listeners, given_camera, no_frames_error
 from ..frame_observer import FrameObserver, Trackers
 from ..networks import network_threads, open_trackers
 from .joined_windows import JoinedWindows
+from .kept_windows import KeptWindows
 from .plan import Window
 from .window_file import load_window, save_window
 from .window_record import WindowRecord
@@ -51,7 +55,8 @@ class LongClip:
 
     :param windows: all of them.
     :param pool: in which the background is followed.
-    :param kept: estimates of the landmark networks on disk.
+    :param unfinished: folder with what an earlier capture that was killed has found, and in which to keep what this one
+        finds; None: nothing is kept.
     """
 
     def __init__(
@@ -61,9 +66,11 @@ class LongClip:
         options: CaptureOptions,
         clock: StageClock,
         pool: ThreadPoolExecutor,
-        kept: KeptEstimates | None = None,
+        unfinished: Path | None = None,
     ) -> None:
-        self._video, self._windows, self._options, self._clock, self._kept = video, windows, options, clock, kept
+        self._video, self._windows, self._options, self._clock = video, windows, options, clock
+        self._kept = KeptEstimates(unfinished)
+        self._kept_windows = KeptWindows(unfinished, options, (video.width, video.height))
         self._camera, self._pool = given_camera(video, options), pool
         self._execution = Execution(options.provider)
         self._threads = network_threads(options, self._execution)
@@ -122,11 +129,15 @@ class LongClip:
         return files, frames
 
     def _observe_all(self, live: LiveBody, listeners: Listeners) -> None:
-        """Observe all windows in one pass."""
-        done, expected = 0, self._video.expected_frames
+        """Observe all windows in one pass, from the first on that an earlier capture has not finished."""
+        known = self._join_kept()
+        done, expected = len(self._joined), self._video.expected_frames
+        listeners.progress(_FINDING, done, max(expected, done))
+        if known == len(self._windows):
+            return
 
         def seam(ended: WindowRun, following: WindowRun | None) -> WindowRun | None:
-            self._joined.add(ended.record())
+            self._add(ended, is_whole=following is not None or ended.window.number + 1 == len(self._windows))
             regions = self._joined.missed(following.record()) if following is not None else []
             if following is None or not regions:
                 return following
@@ -138,13 +149,54 @@ class LongClip:
             listeners.watch(frame, largest, live)
             listeners.progress(_FINDING, done, max(expected, done))
 
+        run, pairs = self._first_run(self._windows[known])
         run_windows(
-            self._windows,
-            self._begin,
-            frame_pairs(iter(self._video), self._clock),
+            self._windows[known:],
+            lambda window: run if window.number == run.window.number else self._begin(window),
+            pairs,
             seam,
             watch,
         )
+
+    def _join_kept(self) -> int:
+        """Join the first windows as far as an earlier capture has finished them, and return their number."""
+        for window in self._windows:
+            record = self._kept_windows.load(window)
+            if record is None or not self._joined.accepts(record):
+                return window.number
+            self._joined.add(record)
+        return len(self._windows)
+
+    def _add(self, ended: WindowRun, is_whole: bool) -> None:
+        """Join a window, and keep it.
+
+        :param is_whole: whether it did not end early with the footage, which may be whole when it is read again.
+        """
+        record = ended.record()
+        self._joined.add(record)
+        if is_whole:
+            warnings = (*self._execution.warnings, *self._video.warnings)
+            execution = self._execution.describe(self._threads)
+            self._kept_windows.save(replace(record, execution=execution, warnings=warnings))
+
+    def _first_run(self, window: Window) -> tuple[WindowRun, Iterator[tuple[Frame, Frame | None]]]:
+        """Return the run of the first window that is observed, and the frames from its own first one on.
+
+        After windows that are known, it begins in the middle of the footage, unless its images are others then.
+        """
+        for exact in (False, True):
+            run, pairs = self._begin(window), frame_pairs(self._frames(window, exact), self._clock)
+            if not window.number:
+                break
+            for pair in pairs:
+                if window.has_begun(pair[0].timestamp_s):
+                    pairs = chain([pair], pairs)
+                    break
+                run.add(*pair)
+            if self._joined.accepts(run.record()):
+                break
+        regions = self._joined.missed(run.record()) if window.number else []
+        return (self._warmed_up(run, regions) if regions else run), pairs
 
     def _warmed_up(self, run: WindowRun, regions: list[Region]) -> WindowRun:
         """Return another run of a window, with people in given regions, up to the frame that the first one reached."""

@@ -7,6 +7,7 @@ window counts for nothing: the window is observed again.
 
 from __future__ import annotations
 
+import io
 import json
 from pathlib import Path
 from typing import Any
@@ -99,8 +100,10 @@ def save_window(folder: Path, record: WindowRecord, size: tuple[int, int]) -> Pa
         "text": np.frombuffer(text, np.uint8),
         **_people_arrays(record.tracklets),
     }
-    with atomic_path(path) as temporary, temporary.open("wb") as file:
-        np.savez(file, **{name: _as_declared(name, value) for name, value in arrays.items()})
+    packed = io.BytesIO()  # a zip file that the disk refuses prints a traceback when it is destroyed
+    np.savez(packed, **{name: _as_declared(name, value) for name, value in arrays.items()})
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(packed.getbuffer())
     return path
 
 

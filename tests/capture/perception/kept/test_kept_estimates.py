@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import gc
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -95,3 +97,20 @@ def test_nothing_is_kept_without_a_folder():
     kept = KeptEstimates()
     assert kept.key("net", CROP, REGION) is None
     assert kept.find(None) is None
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there is no limit on the size of a file")
+def test_on_a_full_disk_nothing_is_kept_and_nothing_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A half-written zip file printed a traceback when it was destroyed."""
+    resource, unraisable = pytest.importorskip("resource"), list[object]()
+    monkeypatch.setattr(sys, "unraisablehook", unraisable.append)
+    before, kept = resource.getrlimit(resource.RLIMIT_FSIZE), KeptEstimates(tmp_path)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))
+    try:
+        kept.add(kept.key("net", CROP, REGION), np.ones(9000))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    gc.collect()
+    assert kept.key("net", CROP, REGION) is None
+    assert list(tmp_path.iterdir()) == []
+    assert unraisable == []

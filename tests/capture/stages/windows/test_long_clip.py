@@ -4,73 +4,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
-import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.media.frame import Frame
-from scope.scope_addon.capture.media.video import Video, open_video
-from scope.scope_addon.capture.options import CaptureOptions
-from scope.scope_addon.capture.stages.clock import StageClock
-from scope.scope_addon.capture.stages.footage import Listeners
+from scope.scope_addon.capture.media.video import Video
 from scope.scope_addon.capture.stages.windows import joined_windows
-from scope.scope_addon.capture.stages.windows.long_clip import LongClip
 from scope.scope_addon.capture.stages.windows.observe_part import count_windows, observe_windows
-from scope.scope_addon.capture.stages.windows.plan import plan_windows
-from scope.scope_addon.capture.tracking.landmarks import tracking_networks
 from scope.scope_addon.capture.tracking.track import Track
 
-from ...fake_people import FakeDetector, FakeLandmarks, Person, pictures
-
-RED, BLUE = (220, 30, 30), (30, 30, 220)
-FPS, FRAMES, WINDOW_S = 30, 210, 2.0  # three windows: frames 0 to 59, 60 to 119, and the rest
-SMALL = Person(lambda t: (150 + 0.5 * t, 130), RED, size_px=45)
-# Present when the second window's trackers begin, and so large that they would not care about the other one.
-LARGE = Person(lambda t: (430, 130) if 20 <= t < 75 else None, BLUE, size_px=115)
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("clip")
-    for t, image in enumerate(pictures([SMALL, LARGE], FRAMES, (600, 260))):
-        cv2.imwrite(str(folder / f"frame{t:04d}.png"), cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
-    return folder
-
-
-@pytest.fixture
-def windows_of(monkeypatch: pytest.MonkeyPatch, folder: Path) -> Callable[..., list[Track]]:
-    """``windows_of(options, parts=None)``: the tracks of the clip, or those joined from a folder of windows."""
-    people = [SMALL, LARGE]
-    monkeypatch.setattr(tracking_networks, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people, "heavy" in name))
-    monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_: FakeDetector(people))
-
-    def observed(options: CaptureOptions, parts: Path | None = None) -> list[Track]:
-        with open_video(folder) as video, ThreadPoolExecutor(2) as pool:
-            clip = LongClip(video, plan_windows(video, options.window_s), options, StageClock(), pool)
-            background: Any = SimpleNamespace(wait_for_solver=lambda progress: None)
-            fits: Any = SimpleNamespace(is_due=lambda time_s: False)
-            live: Any = None
-            listeners = Listeners(lambda *_: None, lambda *_: None)
-            return clip.observe(background, fits, live, listeners, parts)[1]
-
-    return observed
-
-
-def options(people: int | str = "largest") -> CaptureOptions:
-    return CaptureOptions(quality="fast", threads=1, people=people, window_s=WINDOW_S)
-
-
-def assert_same(a: list[Track], b: list[Track]) -> None:
-    assert len(a) == len(b)
-    for one, other in zip(a, b, strict=True):
-        for name in ("frames", "times", "seen", "keypoints_px", "confidence", "world_landmarks", "acquired"):
-            assert np.array_equal(getattr(one, name), getattr(other, name)), name
-        assert np.array_equal(one.reference_rows, other.reference_rows)
-        assert np.array_equal(one.reference_landmarks, other.reference_landmarks)
+from .conftest import FRAMES, SMALL, assert_same, options
 
 
 def places(track: Track) -> np.ndarray:

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import gc
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -132,3 +134,20 @@ def test_damaged_bytes_never_raise(tmp_path: Path) -> None:
             data[at] = rng.integers(256)
         path.write_bytes(data[: rng.integers(1, len(data))] if rng.random() < 0.3 else data)
         load_window(tmp_path, WINDOW, SIZE)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there is no limit on the size of a file")
+def test_a_full_disk_is_an_error_and_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A half-written zip file printed a traceback when it was destroyed."""
+    resource, unraisable = pytest.importorskip("resource"), list[object]()
+    monkeypatch.setattr(sys, "unraisablehook", unraisable.append)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))
+    try:
+        with pytest.raises(OSError, match="too large"):
+            save_window(tmp_path, record(), (640, 480))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    gc.collect()
+    assert list(tmp_path.iterdir()) == []
+    assert unraisable == []

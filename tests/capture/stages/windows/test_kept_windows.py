@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A long clip whose capture was stopped goes on after its finished windows, to the same result, bit for bit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.media.frame import Frame
+from scope.scope_addon.capture.media.video import Video
+from scope.scope_addon.capture.options import CaptureOptions
+from scope.scope_addon.capture.stages.windows import kept_windows
+from scope.scope_addon.capture.tracking.track import Track
+from scope.scope_addon.errors import CancelledError
+
+from .conftest import FPS, FRAMES, assert_same, options
+
+
+def stop(windows_of: Callable[..., list[Track]], given: CaptureOptions, unfinished: Path, frame: int) -> None:
+    with pytest.raises(CancelledError):
+        windows_of(given, None, unfinished, frame)
+
+
+@pytest.mark.parametrize("people", ["largest", 2])
+@pytest.mark.parametrize(("frame", "goes_on_at_s"), [(40, 0.0), (75, 1.0), (130, 3.0), (210, 3.0)])
+def test_a_clip_that_was_stopped_goes_on_after_its_last_finished_window(
+    windows_of: Callable[..., list[Track]],
+    observed_times: list[float],
+    tmp_path: Path,
+    people: int | str,
+    frame: int,
+    goes_on_at_s: float,
+) -> None:
+    """Also at the first seam, where the next window's trackers care about somebody else."""
+    stop(windows_of, options(people), tmp_path, frame)
+    observed_times.clear()
+    tracks = windows_of(options(people), None, tmp_path)
+    assert observed_times[0] == pytest.approx(goes_on_at_s)
+    assert_same(tracks, windows_of(options(people)))
+
+
+def test_a_clip_all_of_whose_windows_are_finished_is_not_observed_again(
+    windows_of: Callable[..., list[Track]], observed_times: list[float], tmp_path: Path
+) -> None:
+    tracks = windows_of(options(), None, tmp_path)
+    observed_times.clear()
+    assert_same(windows_of(options(), None, tmp_path), tracks)
+    assert observed_times == []
+
+
+def flipped(whole: bytes) -> bytes:
+    middle = len(whole) // 2
+    return whole[:middle] + bytes([whole[middle] ^ 255]) + whole[middle + 1 :]
+
+
+@pytest.mark.parametrize("damage", [lambda whole: whole[:-100], flipped])
+def test_from_a_damaged_window_on_a_stopped_clip_is_observed_again(
+    windows_of: Callable[..., list[Track]],
+    observed_times: list[float],
+    tmp_path: Path,
+    damage: Callable[[bytes], bytes],
+) -> None:
+    stop(windows_of, options(), tmp_path, 130)
+    (second,) = tmp_path.glob("windows-*/window00001.npz")
+    second.write_bytes(damage(second.read_bytes()))
+    observed_times.clear()
+    tracks = windows_of(options(), None, tmp_path)
+    assert observed_times[0] == pytest.approx(1.0)
+    assert_same(tracks, windows_of(options()))
+
+
+def test_windows_found_with_other_options_or_networks_are_not_taken(
+    windows_of: Callable[..., list[Track]], observed_times: list[float], tmp_path: Path
+) -> None:
+    calibration = tmp_path / "camera.json"
+    calibration.write_text('{"image_size": [600, 260], "K": [[500, 0, 300], [0, 500, 130], [0, 0, 1]]}')
+    given = replace(options(2), calibration=calibration)
+    stop(windows_of, given, tmp_path, 130)
+    for other, begins_at_s in ((replace(given, threads=2), 3.0), (options(2), 0.0), (replace(given, people=1), 0.0)):
+        observed_times.clear()
+        stop(windows_of, other, tmp_path, 150)
+        assert observed_times[0] == pytest.approx(begins_at_s)
+    calibration.write_text(calibration.read_text().replace("500, 130", "400, 130"))
+    observed_times.clear()
+    stop(windows_of, given, tmp_path, 150)
+    assert observed_times[0] == 0.0
+
+
+def test_a_stopped_clip_whose_middle_is_decoded_to_other_images_goes_on_from_its_beginning(
+    windows_of: Callable[..., list[Track]],
+    observed_times: list[float],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The frames before are decoded, but not observed."""
+    sought = Video.frames_from
+
+    def damaged(video: Video, start_s: float) -> Iterator[Frame]:
+        for k, frame in enumerate(sought(video, start_s)):
+            yield Frame(frame.index + 5, frame.timestamp_s, np.full_like(frame.image_rgb, 90)) if k < 40 else frame
+
+    stop(windows_of, options(), tmp_path, 75)
+    whole = windows_of(options())
+    with monkeypatch.context() as patch:
+        patch.setattr(Video, "frames_from", damaged)
+        observed_times.clear()
+        assert_same(windows_of(options(), None, tmp_path), whole)
+    assert min(observed_times) == pytest.approx(1.0)
+    assert max(observed_times) == pytest.approx((FRAMES - 1) / FPS)
+
+
+def test_windows_are_kept_within_bounds(
+    windows_of: Callable[..., list[Track]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    windows_of(options(), None, tmp_path / "whole")
+    sizes = [file.stat().st_size for file in sorted(tmp_path.glob("whole/windows-*/*"))]
+    assert len(sizes) == 3
+    monkeypatch.setattr(kept_windows, "LARGEST", sizes[0] + sizes[1] // 2)
+    windows_of(options(), None, tmp_path / "small")
+    assert [file.stat().st_size for file in sorted(tmp_path.glob("small/windows-*/*"))] == sizes[:2]
+    (tmp_path / "file").write_text("in the way")
+    assert_same(windows_of(options(), None, tmp_path / "file"), windows_of(options()))
+
+
+def test_a_window_that_ended_early_with_the_footage_is_not_kept(
+    windows_of: Callable[..., list[Track]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where a disk fails for a moment."""
+    frames = Video.__iter__
+    with monkeypatch.context() as patch:
+        patch.setattr(Video, "__iter__", lambda video: (f for f in frames(video) if f.timestamp_s < 3))
+        windows_of(options(), None, tmp_path)
+    assert [file.name for file in tmp_path.glob("windows-*/*")] == ["window00000.npz"]
+    assert_same(windows_of(options(), None, tmp_path), windows_of(options()))
