@@ -15,7 +15,7 @@ from ..options import option
 from .declared_properties import blender_property
 from .preferences import preferences
 from .reporting import ReportingOperator, rpt_, sentence
-from .view.view_operators import frame_selected, hide_startup_cube
+from .view.view_operators import show_new_capture
 
 if TYPE_CHECKING:
     from ..scene.build import BuildOptions
@@ -63,8 +63,7 @@ class SCOPE_OT_import_motion(ReportingOperator):
         with all_or_nothing(context.scene):
             for path, imported in zip(paths, found, strict=True):
                 _build(context.scene, path, imported, self._build_options(context.scene))
-        hide_startup_cube(context)
-        frame_selected(context)
+        show_new_capture(context)
         notes = list(dict.fromkeys(note for imported in found for note in imported.notes))
         if notes:
             self.report({"WARNING"}, sentence("; ".join(notes)))

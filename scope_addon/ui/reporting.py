@@ -30,9 +30,15 @@ def tip_(text: str, **values: object) -> str:
     return translated.format(**values) if values else translated
 
 
-def sentence(error: Exception | str) -> str:
-    """Return an error's message with a capital first letter, as the panel shows it."""
+def sentence(error: Exception | str, name: str = "") -> str:
+    """Return an error's message with a capital first letter, as the panel shows it; a file's name keeps its own.
+
+    :param name: of a file with which the message may begin; without it, a first word such as ``walk.mp4`` is one.
+    """
     text = shown(str(error).strip()) or type(error).__name__
+    first = text.split()[0].rstrip(":,")
+    if (name and text.startswith(shown(name))) or "." in first.rstrip("."):
+        return text
     return text[:1].upper() + text[1:]
 
 

@@ -15,7 +15,7 @@ from .. import warm_up
 from ..live.live_state import state as live_state
 from ..reporting import iface_, rpt_, tip_
 from ..view.sidebar import redraw_sidebars, show_tab
-from ..view.view_operators import frame_selected, hide_startup_cube
+from ..view.view_operators import show_new_capture
 from . import preview_picture
 from .job_operator import JobOperator, clear_status_bar
 
@@ -188,8 +188,7 @@ class SCOPE_OT_capture(JobOperator):
     def end(self, context: bpy.types.Context, outcome: set[str]) -> set[str]:
         """Stop the job and the timer, show what was built, and return the outcome."""
         if "FINISHED" in outcome:
-            hide_startup_cube(context)
-            frame_selected(context)
+            show_new_capture(context)
         return super().end(context, outcome)
 
 

@@ -229,10 +229,10 @@ class SCOPE_PT_figures(Tab, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""
-        _draw_figures(self.layout, context.scene.scope.result)
+        _draw_figures(context, self.layout, context.scene.scope.result)
 
 
-def _draw_figures(layout: bpy.types.UILayout, result: bpy.types.PropertyGroup) -> None:
+def _draw_figures(context: bpy.types.Context, layout: bpy.types.UILayout, result: bpy.types.PropertyGroup) -> None:
     """Draw footage, people, frames and error. A .blend file written by the command line has no figures."""
     column = layout.column(align=True)
     column.label(text=shown(Path(result.footage).name) or result.collection.name, icon="FILE_MOVIE")
@@ -249,18 +249,18 @@ def _draw_figures(layout: bpy.types.UILayout, result: bpy.types.PropertyGroup) -
         from ...job.progress import duration
 
         frames = iface_("{frames}, captured in {time}", frames=frames, time=duration(seconds))
-    column.label(text=frames, icon="TIME")
+    draw_text(context, column, frames, "TIME")
     if result.camera:
         error = iface_("Reprojection error {pixels:.1f} px", pixels=result.reprojection_px)
-        column.label(text=error, icon="CON_CAMERASOLVER")
+        draw_text(context, column, error, "CON_CAMERASOLVER")
         if result.sigma_cm > 0.0:
             sigma = iface_("Joints ± {sigma:.1f} cm (standard deviation, median)", sigma=result.sigma_cm)
-            column.label(text=sigma, icon="EMPTY_ARROWS")
+            draw_text(context, column, sigma, "EMPTY_ARROWS")
         if result.heights:
-            column.label(text=iface_("Height {heights}", heights=result.heights), icon="USER")
-        column.label(text=iface_("Lens: {lens}", lens=result.camera), icon="CAMERA_DATA")
+            draw_text(context, column, iface_("Height {heights}", heights=result.heights), "USER")
+        draw_text(context, column, iface_("Lens: {lens}", lens=result.camera), "CAMERA_DATA")
     if result.execution:
-        column.label(text=iface_("Networks on {processor}", processor=result.execution), icon="MEMORY")
+        draw_text(context, column, iface_("Networks on {processor}", processor=result.execution), "MEMORY")
 
 
 def _draw_warning(context: bpy.types.Context, box: bpy.types.UILayout, warning: bpy.types.PropertyGroup) -> None:

@@ -43,11 +43,11 @@ def show_result(shown: bpy.types.PropertyGroup, footage: str, report: dict[str, 
     shown.pixel_aspect = pixel_aspect(first)
     shown.warnings.clear()
     for line in report.get("warnings", ()):
-        _add_warning(shown, str(line))
+        _add_warning(shown, sentence(str(line), first.source))
     for index, person in enumerate(result.people):
         whose = "" if len(result.people) == 1 else f"person {index + 1}: "
         for reason, spans in frame_warnings(person.motion, person.frames, person.under_floor).items():
-            _add_warning(shown, whose + REASONS[reason], spans)
+            _add_warning(shown, sentence(whose + REASONS[reason]), spans)
 
 
 def frame_warnings(motion: Motion, frames: NDArray[np.float64], under_floor: NDArray[np.bool_]) -> dict[str, str]:
@@ -82,4 +82,4 @@ def _text(spans: list[Span], frames: NDArray[np.float64]) -> str:
 
 def _add_warning(shown: bpy.types.PropertyGroup, text: str, spans: str = "") -> None:
     warning = shown.warnings.add()
-    warning.text, warning.spans = sentence(text), spans
+    warning.text, warning.spans = text, spans

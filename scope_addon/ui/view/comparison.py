@@ -13,7 +13,7 @@ from mathutils import Matrix, Quaternion, Vector
 
 from ..captured_person import captured_armature
 from .frame_fit import fit_frame, unfit_frame
-from .viewports import viewport_at
+from .viewports import viewport_at, viewports
 
 _LEAST_SIDE = 0.3  # of the viewport's width
 _DRAWN_AFTER_S = 0.2
@@ -68,6 +68,37 @@ def end(window: bpy.types.Window, area: bpy.types.Area) -> None:
             bpy.ops.view3d.view_camera()  # Blender's own toggle restores the previous view
     if not space.use_local_camera:
         space.camera = window.scene.camera  # leaving local view brings back the one from before it
+
+
+def end_others(scene: bpy.types.Scene, shown: bpy.types.Collection) -> None:
+    """End every comparison of a capture other than the shown one: its footage would be behind the wrong body."""
+    for window, area in viewports():
+        if _compares_another(scene, area.spaces.active, shown):
+            end(window, area)
+            if side := side_area(window.screen):
+                _close_later(side)
+
+
+def _close_later(side: bpy.types.Area) -> None:
+    """Close the side view when no operator runs: Blender crashes when a running one's context was closed."""
+    pointer = side.as_pointer()
+
+    def close() -> None:
+        found = viewport_at(pointer)
+        if found is not None and _is_side(found[1].spaces.active):
+            close_side_view(*found)
+
+    if not bpy.app.background:
+        bpy.app.timers.register(close, first_interval=_DRAWN_AFTER_S)
+
+
+def _compares_another(scene: bpy.types.Scene, space: bpy.types.SpaceView3D, shown: bpy.types.Collection) -> bool:
+    """Return whether a viewport looks through the camera of a capture of the scene that is not the shown one."""
+    camera = space.camera
+    if not space.local_view or space.region_3d.view_perspective != "CAMERA" or camera is None:
+        return False
+    captures = [each for each in scene.collection.children_recursive if "scope_capture" in each]
+    return camera.name not in shown.all_objects and any(camera.name in each.all_objects for each in captures)
 
 
 def side_area(screen: bpy.types.Screen) -> bpy.types.Area | None:

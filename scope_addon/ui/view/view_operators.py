@@ -38,6 +38,19 @@ def frame_selected(context: bpy.types.Context) -> None:
             bpy.ops.view3d.view_selected()
 
 
+def show_new_capture(context: bpy.types.Context) -> None:
+    """Show the capture that was just added: the viewports leave the comparison of an earlier one."""
+    from ...scene.visibility import hide_again
+
+    hide_startup_cube(context)
+    shown = context.scene.scope.result.collection
+    if shown is not None:
+        comparison.end_others(context.scene, shown)
+        for other in [obj for obj in captured_people(context) if obj.name not in shown.all_objects]:
+            hide_again(other, context.view_layer)  # it was shown for the comparison alone
+    frame_selected(context)
+
+
 class SCOPE_OT_look_through(bpy.types.Operator):
     """Toggle the view of the body over the footage. Sets the scene's camera and resolution"""
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from mathutils import Euler, Matrix
 from scope.scope_addon.ui.view import comparison
+from scope.scope_addon.ui.view.view_operators import show_new_capture
 
 
 @pytest.mark.parametrize("heading", [0.0, 0.7, 3.0])
@@ -46,3 +47,42 @@ def test_bones_are_hidden_in_the_view_and_shown_again_after_it():
             assert not overlay.show_bones
             comparison.end(window, area)
         assert overlay.show_bones is shown
+
+
+def capture_with_camera(name):
+    """Return a capture's collection with a camera, linked to the scene, and the camera."""
+    collection, camera = bpy.data.collections.new(name), bpy.data.objects.new(name, bpy.data.cameras.new(name))
+    collection["scope_capture"] = 1
+    collection.objects.link(camera)
+    bpy.context.scene.collection.children.link(collection)
+    return collection, camera
+
+
+def test_a_new_capture_ends_the_comparison_of_an_earlier_one_and_no_other_view(monkeypatch):
+    bpy.ops.wm.read_homefile(use_factory_startup=True)
+    window, scene = bpy.context.window_manager.windows[0], bpy.context.scene
+    area = next(each for each in window.screen.areas if each.type == "VIEW_3D")
+    space = area.spaces.active
+    earlier, scene.camera = capture_with_camera("earlier")
+    with bpy.context.temp_override(window=window, area=area):
+        comparison.begin(bpy.context, area, earlier)
+    assert space.local_view
+    assert space.region_3d.view_perspective == "CAMERA"
+    comparison.end_others(scene, earlier)
+    assert space.local_view  # it is the shown capture itself
+    scene.scope.capture, _ = capture_with_camera("new")
+    side, closed = next(each for each in window.screen.areas if each.type == "OUTLINER"), []
+    monkeypatch.setattr(comparison, "side_area", lambda screen: side)
+    monkeypatch.setattr(comparison, "_close_later", closed.append)
+    with bpy.context.temp_override(window=window, area=area):
+        show_new_capture(bpy.context)
+    assert space.local_view is None
+    assert space.region_3d.view_perspective != "CAMERA"
+    assert space.overlay.show_bones
+    assert closed == [side]
+    own = bpy.data.objects.new("own", bpy.data.cameras.new("own"))
+    scene.collection.objects.link(own)
+    space.camera, space.region_3d.view_perspective = own, "CAMERA"
+    with bpy.context.temp_override(window=window, area=area):
+        show_new_capture(bpy.context)
+    assert space.region_3d.view_perspective == "CAMERA"
