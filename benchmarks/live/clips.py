@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Footage that goes on: the sample clip played there and back, so that nothing jumps where a round ends."""
+"""Footage that goes on: a clip played there and back, so that nothing jumps where a round ends."""
 
 from __future__ import annotations
 
@@ -23,29 +23,45 @@ from .observed import there_and_back
 FPS = 30
 
 
-def there_and_back_clip(seconds: float, size: tuple[int, int] | None = None) -> Path:
-    """Return the sample clip, there and back again for some seconds, as a video; cached in build/bench.
+def there_and_back_clip(seconds: float, size: tuple[int, int] | None = None, source: Path = SAMPLE) -> Path:
+    """Return a clip, there and back again for some seconds, as a video; cached in build/bench.
 
     :param size: to which the pictures are enlarged; None: their own.
     """
-    name = "sample" if size is None else f"sample_{size[0]}x{size[1]}"
+    name = source.stem if size is None else f"{source.stem}_{size[0]}x{size[1]}"
     target = CACHE / f"{name}_{seconds:g}s.mp4"
     if target.exists():
         return target
-    with open_video(SAMPLE) as video:
-        pictures = [frame.image_rgb for frame in video]
+    with open_video(source) as video:
+        pictures, fps = [frame.image_rgb for frame in video], video.fps
     if size is not None:
         pictures = [cv2.resize(picture, size, interpolation=cv2.INTER_CUBIC).astype(np.uint8) for picture in pictures]
     order = there_and_back(len(pictures))
     CACHE.mkdir(parents=True, exist_ok=True)
     with atomic_path(target) as temporary:
-        _write(temporary, [pictures[order[k % len(order)]] for k in range(round(seconds * FPS))])
+        _write(temporary, fps, [pictures[order[k % len(order)]] for k in range(round(seconds * fps))])
     return target
 
 
-def _write(path: Path, pictures: list[NDArray[np.uint8]]) -> None:
+def there_and_back_truth(truth: Path, count: int, frames: int, target: Path) -> None:
+    """Write the ground truth of a clip of ``count`` frames for the ``frames`` of `there_and_back_clip`.
+
+    :param truth: with a row for each of its ``frame_index`` in every array of that length.
+    """
+    with np.load(truth) as file:
+        values = {key: file[key] for key in file.files}
+    row_of, order = {int(frame): row for row, frame in enumerate(values["frame_index"])}, there_and_back(count)
+    rows = {k: row_of[order[k % len(order)]] for k in range(frames) if order[k % len(order)] in row_of}
+    looped = {
+        key: value[list(rows.values())] if value.ndim and len(value) == len(row_of) else value
+        for key, value in values.items()
+    }
+    np.savez(target, **(looped | {"frame_index": np.array(list(rows))}))
+
+
+def _write(path: Path, fps: Fraction, pictures: list[NDArray[np.uint8]]) -> None:
     with av.open(str(path), "w", format="mp4") as container:
-        stream = container.add_stream("libx264", rate=FPS, options={"crf": "18", "preset": "veryfast"})
+        stream = container.add_stream("libx264", rate=fps, options={"crf": "18", "preset": "veryfast"})
         stream.height, stream.width = pictures[0].shape[:2]
         stream.pix_fmt = "yuv420p"
         for picture in pictures:

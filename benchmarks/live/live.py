@@ -58,7 +58,8 @@ def _offline(body: Body, quick: bool, _minutes: float) -> dict[str, Any]:
     rows = [
         [f"{name}, {how.replace('_', ' ')}", *(of_clip[how].get(key) for key in MEASURES)]
         for name, of_clip in found.items()
-        for how in ("offline", "every_frame", "real_time")
+        for how in ("offline", "every_frame", "real_time", "there_and_back")
+        if how in of_clip
     ]
     head = [name + ("" if target is None else f" (≤ {target:g})") for name, target in MEASURES.values()]
     print(table(("clip", *head), rows), end="\n\n", flush=True)

@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Live captures against the offline one of the same footage and preset: with every frame, and played in real time."""
+"""Live captures against the offline one of the same footage and preset: with every frame, and played in real time.
+
+Pose2Sim's clips end before the first estimates do, so they are also played there and back, in real time as well.
+"""
 
 from __future__ import annotations
 
 import json
 import os
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -22,10 +26,12 @@ from ...scope_addon.motion import Motion
 from ...solver import Body
 from ..gate import clips
 from ..perception.accuracy import evaluate_motion
+from .clips import there_and_back_clip, there_and_back_truth
 from .measures import common_rows, compared, seen_from_the_world
 
 QUALITY = "fast"
 FEWEST = 10  # poses of which anything can be said
+SHORT_S, LONG_S = 4.0, 10.0  # a clip that is played there and back as well, and for how long
 
 
 def against_offline(body: Body, quick: bool, say: Callable[[str], None]) -> dict[str, Any]:
@@ -42,6 +48,8 @@ def against_offline(body: Body, quick: bool, say: Callable[[str], None]) -> dict
         of_clip["every_frame"] = _measured(every_frame(body, video), offline, body, truth)
         motion, told = in_real_time(body, video)
         of_clip["real_time"] = _measured(motion, offline, body, truth) | told
+        if offline.timestamps[-1] < SHORT_S:
+            of_clip["there_and_back"] = there_and_back_in_real_time(body, video, truth, len(offline))
         say(f"{name}: {json.dumps(of_clip)}")
     return figures
 
@@ -77,6 +85,18 @@ def in_real_time(body: Body, video: Path) -> tuple[Motion, dict[str, Any]]:
     assert recording.camera is not None
     told = {"load": load, "poses": report["poses"], "dropped": report["dropped"], "latency_ms": report["latency_ms"]}
     return recording.motion(recording.camera), told
+
+
+def there_and_back_in_real_time(body: Body, video: Path, truth: Path, count: int) -> dict[str, Any]:
+    """Return the figures of a clip of ``count`` frames that is played there and back in real time."""
+    clip = there_and_back_clip(LONG_S, source=video)
+    offline = capture(clip, body, CaptureOptions(quality=QUALITY)).motions[0]
+    motion, told = in_real_time(body, clip)
+    with tempfile.TemporaryDirectory() as folder:
+        looped = Path(folder) / "truth.npz"
+        there_and_back_truth(truth, count, len(offline), looped)
+        slide_offline = _against_truth(offline, looped)["foot_slide_cm"]
+        return _measured(motion, offline, body, looped) | told | {"offline_foot_slide_cm": slide_offline}
 
 
 def _against_truth(motion: Motion, truth: Path) -> dict[str, float]:
