@@ -69,6 +69,26 @@ def windows_of(monkeypatch: pytest.MonkeyPatch, folder: Path) -> Callable[..., l
     return observed
 
 
+@pytest.fixture(scope="module")
+def found() -> dict[int | str, list[Track]]:
+    """What `undisturbed` has found, by the people who were asked for."""
+    return {}
+
+
+@pytest.fixture
+def undisturbed(
+    windows_of: Callable[..., list[Track]], found: dict[int | str, list[Track]]
+) -> Callable[..., list[Track]]:
+    """``undisturbed(people="largest")``: the tracks of the clip without a stop; computed once."""
+
+    def tracks(people: int | str = "largest") -> list[Track]:
+        if people not in found:
+            found[people] = windows_of(options(people))
+        return found[people]
+
+    return tracks
+
+
 @pytest.fixture
 def observed_times(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """The times of all frames that were observed, in order."""

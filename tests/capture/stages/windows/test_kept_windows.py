@@ -24,10 +24,13 @@ def stop(windows_of: Callable[..., list[Track]], given: CaptureOptions, unfinish
         windows_of(given, None, unfinished, frame)
 
 
-@pytest.mark.parametrize("people", ["largest", 2])
-@pytest.mark.parametrize(("frame", "goes_on_at_s"), [(40, 0.0), (75, 1.0), (130, 3.0), (210, 3.0)])
+@pytest.mark.parametrize(
+    ("people", "frame", "goes_on_at_s"),
+    [("largest", 40, 0.0), ("largest", 75, 1.0), (2, 75, 1.0), (2, 130, 3.0), ("largest", 210, 3.0)],
+)
 def test_a_clip_that_was_stopped_goes_on_after_its_last_finished_window(
     windows_of: Callable[..., list[Track]],
+    undisturbed: Callable[..., list[Track]],
     observed_times: list[float],
     tmp_path: Path,
     people: int | str,
@@ -39,7 +42,7 @@ def test_a_clip_that_was_stopped_goes_on_after_its_last_finished_window(
     observed_times.clear()
     tracks = windows_of(options(people), None, tmp_path)
     assert observed_times[0] == pytest.approx(goes_on_at_s)
-    assert_same(tracks, windows_of(options(people)))
+    assert_same(tracks, undisturbed(people))
 
 
 def test_a_clip_all_of_whose_windows_are_finished_is_not_observed_again(
@@ -59,6 +62,7 @@ def flipped(whole: bytes) -> bytes:
 @pytest.mark.parametrize("damage", [lambda whole: whole[:-100], flipped])
 def test_from_a_damaged_window_on_a_stopped_clip_is_observed_again(
     windows_of: Callable[..., list[Track]],
+    undisturbed: Callable[..., list[Track]],
     observed_times: list[float],
     tmp_path: Path,
     damage: Callable[[bytes], bytes],
@@ -69,7 +73,7 @@ def test_from_a_damaged_window_on_a_stopped_clip_is_observed_again(
     observed_times.clear()
     tracks = windows_of(options(), None, tmp_path)
     assert observed_times[0] == pytest.approx(1.0)
-    assert_same(tracks, windows_of(options()))
+    assert_same(tracks, undisturbed())
 
 
 def test_windows_found_with_other_options_or_networks_are_not_taken(
@@ -91,6 +95,7 @@ def test_windows_found_with_other_options_or_networks_are_not_taken(
 
 def test_a_stopped_clip_whose_middle_is_decoded_to_other_images_goes_on_from_its_beginning(
     windows_of: Callable[..., list[Track]],
+    undisturbed: Callable[..., list[Track]],
     observed_times: list[float],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -103,7 +108,7 @@ def test_a_stopped_clip_whose_middle_is_decoded_to_other_images_goes_on_from_its
             yield Frame(frame.index + 5, frame.timestamp_s, np.full_like(frame.image_rgb, 90)) if k < 40 else frame
 
     stop(windows_of, options(), tmp_path, 75)
-    whole = windows_of(options())
+    whole = undisturbed()
     with monkeypatch.context() as patch:
         patch.setattr(Video, "frames_from", damaged)
         observed_times.clear()
@@ -113,7 +118,10 @@ def test_a_stopped_clip_whose_middle_is_decoded_to_other_images_goes_on_from_its
 
 
 def test_windows_are_kept_within_bounds(
-    windows_of: Callable[..., list[Track]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    windows_of: Callable[..., list[Track]],
+    undisturbed: Callable[..., list[Track]],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     windows_of(options(), None, tmp_path / "whole")
     sizes = [file.stat().st_size for file in sorted(tmp_path.glob("whole/windows-*/*"))]
@@ -122,11 +130,14 @@ def test_windows_are_kept_within_bounds(
     windows_of(options(), None, tmp_path / "small")
     assert [file.stat().st_size for file in sorted(tmp_path.glob("small/windows-*/*"))] == sizes[:2]
     (tmp_path / "file").write_text("in the way")
-    assert_same(windows_of(options(), None, tmp_path / "file"), windows_of(options()))
+    assert_same(windows_of(options(), None, tmp_path / "file"), undisturbed())
 
 
 def test_a_window_that_ended_early_with_the_footage_is_not_kept(
-    windows_of: Callable[..., list[Track]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    windows_of: Callable[..., list[Track]],
+    undisturbed: Callable[..., list[Track]],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """As where a disk fails for a moment."""
     frames = Video.__iter__
@@ -134,4 +145,4 @@ def test_a_window_that_ended_early_with_the_footage_is_not_kept(
         patch.setattr(Video, "__iter__", lambda video: (f for f in frames(video) if f.timestamp_s < 3))
         windows_of(options(), None, tmp_path)
     assert [file.name for file in tmp_path.glob("windows-*/*")] == ["window00000.npz"]
-    assert_same(windows_of(options(), None, tmp_path), windows_of(options()))
+    assert_same(windows_of(options(), None, tmp_path), undisturbed())
