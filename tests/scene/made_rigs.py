@@ -166,6 +166,16 @@ def truth(motion=None, body=BODY):
     return out
 
 
+def renamed(rig, names):
+    """Link a copy of a rig to the scene whose bones have other names, by their present ones."""
+    data = rig.data.copy()
+    for bone, name in names.items():
+        data.bones[bone].name = name
+    own = bpy.data.objects.new("own", data)
+    bpy.context.scene.collection.objects.link(own)
+    return own
+
+
 def seen(rig, bones, frames=FRAMES):
     """Return the heads (T, B, 3) in the world."""
     out = []

@@ -63,11 +63,7 @@ def check(places, before, target):
 def test_the_rig_that_the_motion_is_retargeted_to_is_corrected(rig):
     before, target = correct(rig)
     names = [f"mixamorig:{name}" for name in NAMES]
-    data = rig.data.copy()
-    for bone, name in zip(NAMES, names, strict=True):
-        data.bones[bone].name = name
-    own = bpy.data.objects.new("own", data)
-    bpy.context.scene.collection.objects.link(own)
+    own = made_rigs.renamed(rig, dict(zip(NAMES, names, strict=True)))
     settings = bpy.context.scene.scope_retarget
     settings.rig, settings.feet = own, False  # the bones, without what keeps feet of other rigs on the floor
     bpy.ops.scope.guess_bones()

@@ -51,11 +51,7 @@ def off(places):
 
 def test_the_rig_that_the_motion_is_retargeted_to_has_the_edits(rig):
     names = [f"mixamorig:{name}" for name in NAMES]
-    data = rig.data.copy()
-    for bone, name in zip(NAMES, names, strict=True):
-        data.bones[bone].name = name
-    own = bpy.data.objects.new("own", data)
-    bpy.context.scene.collection.objects.link(own)
+    own = made_rigs.renamed(rig, dict(zip(NAMES, names, strict=True)))
     settings = bpy.context.scene.scope_retarget
     settings.rig = own
     bpy.ops.scope.guess_bones()
