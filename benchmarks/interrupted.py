@@ -34,7 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scope_addon.capture.media.video import open_video
-from ..scope_addon.edit.clip import clip_from_motion
+from ..scope_addon.edit.clip import Clip, clip_from_motion
 from ..scope_addon.motion import Motion
 from ..solver import load_body
 from .frames import CACHE
@@ -162,7 +162,7 @@ def checked(path: Path, frames: int) -> dict[str, Any]:
     lowest = np.empty(len(motion))
     for begin in range(0, len(motion), _BLOCK):
         part = slice(begin, begin + _BLOCK)
-        some = type(clip)(clip.times[part], clip.rotations[part], clip.root[part])
+        some = Clip(clip.times[part], clip.rotations[part], clip.root[part])
         lowest[part] = some.soles(body, motion.betas)[..., 2].min(axis=1)
     arrays = (motion.poses, motion.trans, motion.poses_raw, motion.trans_raw, motion.betas, motion.joints_cam)
     return {

@@ -10,15 +10,20 @@ from __future__ import annotations
 import contextlib
 import errno
 import glob
+import io
 import os
 import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from ..solver.processes import is_abandoned, owner
 from .errors import OutputError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 _temporary_files: set[Path] = set()
 
@@ -49,6 +54,22 @@ def atomic_path(path: Path) -> Iterator[Path]:
     finally:
         _remove_with_drafts(temporary)
         _temporary_files.discard(temporary)
+
+
+def write_npz(path: Path, **arrays: NDArray[Any]) -> None:
+    """Write arrays of any shapes as an uncompressed ``.npz``, complete or not at all.
+
+    They are packed in memory: a zip file that the disk refuses prints a traceback when it is destroyed.
+
+    :raises OSError: the file cannot be written.
+    :raises OutputError: ``path`` exists and is not a regular file.
+    """
+    import numpy as np
+
+    packed = io.BytesIO()
+    np.savez(packed, **arrays)
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(packed.getbuffer())
 
 
 def resolve_link(path: Path) -> Path:

@@ -11,7 +11,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ..options import Place
-from .capture.captures import shown_capture
+from .capture.captures import captures_of, shown_capture
 from .captured_person import PERSON, motion_of
 from .declared_properties import with_options
 from .reporting import ReportingOperator, rpt_, tip_
@@ -75,7 +75,7 @@ class SCOPE_OT_export(ReportingOperator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Require a capture in the scene."""
-        if not any("scope_capture" in c for c in context.scene.collection.children_recursive):
+        if not captures_of(context.scene):
             cls.poll_message_set(tip_("The scene contains no capture yet"))
             return False
         return True

@@ -11,6 +11,7 @@ import math
 import bpy
 from mathutils import Matrix, Quaternion, Vector
 
+from ..capture.captures import captures_of
 from ..captured_person import captured_armature
 from .frame_fit import fit_frame, unfit_frame
 from .viewports import viewport_at, viewports
@@ -97,8 +98,8 @@ def _compares_another(scene: bpy.types.Scene, space: bpy.types.SpaceView3D, show
     camera = space.camera
     if not space.local_view or space.region_3d.view_perspective != "CAMERA" or camera is None:
         return False
-    captures = [each for each in scene.collection.children_recursive if "scope_capture" in each]
-    return camera.name not in shown.all_objects and any(camera.name in each.all_objects for each in captures)
+    has_capture = any(camera.name in each.all_objects for each in captures_of(scene))
+    return has_capture and camera.name not in shown.all_objects
 
 
 def side_area(screen: bpy.types.Screen) -> bpy.types.Area | None:

@@ -8,7 +8,6 @@ found only where the network would give the same again, bit for bit, whatever th
 from __future__ import annotations
 
 import hashlib
-import io
 import os
 import threading
 import time
@@ -20,7 +19,7 @@ from numpy.typing import NDArray
 
 from .....solver.errors import ScopeError
 from .....solver.loaders.archive import read_members
-from ....atomic_write import atomic_path
+from ....atomic_write import write_npz
 from ..region import Region
 
 INTERVAL_S = 20.0  # between two files: the work that a kill can cost
@@ -91,11 +90,8 @@ class KeptEstimates:
         try:
             if not self._wrote:
                 self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            packed = io.BytesIO()  # a zip file that the disk refuses prints a traceback when it is destroyed
             keys = np.frombuffer(b"".join(self._new), np.uint8).reshape(-1, _KEY_BYTES)
-            np.savez(packed, keys=keys, values=np.stack(list(self._new.values())))
-            with atomic_path(path) as temporary:
-                temporary.write_bytes(packed.getbuffer())
+            write_npz(path, keys=keys, values=np.stack(list(self._new.values())))
             self._wrote = True
             self._bytes += path.stat().st_size
         except (OSError, ScopeError):

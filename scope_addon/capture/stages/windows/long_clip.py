@@ -188,11 +188,7 @@ class LongClip:
             run, pairs = self._begin(window), frame_pairs(self._frames(window, exact), self._clock)
             if not window.number:
                 break
-            for pair in pairs:
-                if window.has_begun(pair[0].timestamp_s):
-                    pairs = chain([pair], pairs)
-                    break
-                run.add(*pair)
+            pairs = _up_to_begin(run, pairs)
             if self._joined.accepts(run.record()):
                 break
         regions = self._joined.missed(run.record()) if window.number else []
@@ -202,11 +198,7 @@ class LongClip:
         """Return another run of a window, with people in given regions, up to the frame that the first one reached."""
         for exact in (False, True):
             other = self._begin(run.window, regions)
-            images = self._frames(run.window, exact)
-            for frame, upcoming in frame_pairs(images, self._clock):
-                if run.window.has_begun(frame.timestamp_s):
-                    break
-                other.add(frame, upcoming)
+            _up_to_begin(other, frame_pairs(self._frames(run.window, exact), self._clock))
             if np.array_equal(other.record().checksums, run.record().checksums):
                 break
         return other
@@ -290,3 +282,12 @@ class LongClip:
         motion = record.motion(camera, found, size)
         lines = record.lines(motion, found)
         return Footage(np.array(joined.timestamps), found, motion, lines, joined.cuts_s(), execution, warnings)
+
+
+def _up_to_begin(run: WindowRun, pairs: Iterator[tuple[Frame, Frame | None]]) -> Iterator[tuple[Frame, Frame | None]]:
+    """Observe the frames before a window's own first one, and return the pairs from that one on."""
+    for pair in pairs:
+        if run.window.has_begun(pair[0].timestamp_s):
+            return chain([pair], pairs)
+        run.add(*pair)
+    return pairs

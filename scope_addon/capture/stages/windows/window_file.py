@@ -7,7 +7,6 @@ window counts for nothing: the window is observed again.
 
 from __future__ import annotations
 
-import io
 import json
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 
 from .....solver.errors import InputError, ScopeError
 from .....solver.loaders.archive import read_members
-from ....atomic_write import atomic_path
+from ....atomic_write import write_npz
 from ...camera.background_record import BackgroundRecord
 from ...camera.heading_drift import FrameEdges
 from ...camera.line_segments import Segments
@@ -100,10 +99,7 @@ def save_window(folder: Path, record: WindowRecord, size: tuple[int, int]) -> Pa
         "text": np.frombuffer(text, np.uint8),
         **_people_arrays(record.tracklets),
     }
-    packed = io.BytesIO()  # a zip file that the disk refuses prints a traceback when it is destroyed
-    np.savez(packed, **{name: _as_declared(name, value) for name, value in arrays.items()})
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(packed.getbuffer())
+    write_npz(path, **{name: _as_declared(name, value) for name, value in arrays.items()})
     return path
 
 
