@@ -15,9 +15,10 @@ from ...kinematics.contact_points import CONTACT_POINTS, with_contact_points
 from ..camera.intrinsics import Camera
 from ..perception.lifter import Lifted, default_lifter
 from ..perception.lifter_window import windows_around
+from ..tracking.face.head_direction import across_head, certainty
 from ..tracking.track import Track
 from .ablation import NO_ABLATION, Ablation
-from .frame_measurements import DEPTH_SIGMA_M, Measurer
+from .frame_measurements import DEPTH_SIGMA_M, EARS, Measurer
 from .hand_measurements import HandMeasurer, with_finger_limits
 from .keypoint_offsets import with_keypoint_offsets
 from .stature import with_stature, with_unknown_stature
@@ -64,6 +65,7 @@ class PreparedTrack:
     weights: Weights
     hand_measurer: HandMeasurer | None = None
     hands: NDArray[np.floating[Any]] | None = None  # (T, 2, 21, 6) as in the track, undistorted; None: not looked for
+    head: NDArray[np.floating[Any]] | None = None  # (T, 4) direction across it, certainty; None: no face looked for
     camera: Camera | None = None  # of the masks; None where the track has none
     stance: Stance | None = None  # in each frame's camera; the body's last keypoints are then its contact points
 
@@ -76,13 +78,15 @@ class PreparedTrack:
         return self.measurer.measure(self.pixels[k], self.track.confidence[k], points, sigma, root_cam)
 
     def measure_all(self, k: int) -> Measurements:
-        """Return the measurements of frame ``k`` with pelvis, floor and hands, where these are known.
+        """Return the measurements of frame ``k`` with pelvis, floor, head and hands, where these are known.
 
-        The shape is estimated without floor and hands, because they hardly depend on it.
+        The shape is estimated without floor, head and hands, because it hardly depends on them.
         """
         measured = self.measure(k, None if self.stance is None else self.stance.root_cam[k])
         if self.stance is not None:
             measured = replace(measured, floor=self.stance.floor(k, self.contact_point_indices))
+        if self.head is not None:
+            measured = self.measurer.with_head(measured, self.head[k, :3], float(self.head[k, 3]))
         if self.hand_measurer is None or self.hands is None:
             return measured
         return self.hand_measurer.add(measured, self.hands[k])
@@ -133,6 +137,9 @@ def prepare_track(
     priors = replace(default_priors(body), joint_weights=joint_weights(body))
     priors = with_unknown_stature(priors, body) if height_m is None else with_stature(priors, body, height_m)
     prepared = PreparedTrack(body, track, measurer, pixels, lifted, priors, ablation.weights(WEIGHTS), camera=camera)
+    if track.face is not None:
+        across, ears = across_head(track.face, camera), lifted.points[:, EARS[1]] - lifted.points[:, EARS[0]]
+        prepared = replace(prepared, head=np.column_stack([across, certainty(track.face, across, ears)]))
     if track.hands is None:
         return prepared
     hands = np.concatenate([camera.undistort(track.hands[..., :2]), track.hands[..., 2:]], axis=-1)

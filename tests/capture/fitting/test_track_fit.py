@@ -11,8 +11,12 @@ from scope.scope_addon.capture.fitting import track_fit
 from scope.scope_addon.capture.fitting.frame_sequence import FittedTrack
 from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
 from scope.scope_addon.capture.fitting.prepared_track import Stance, prepare_track
+from scope.scope_addon.capture.perception.face.face_landmarks import FACE_POINTS, FaceEstimate
+from scope.scope_addon.capture.perception.face.face_record import record
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.lifter import Lifted, Lifter
+from scope.scope_addon.capture.perception.region import Region
+from scope.scope_addon.capture.tracking.face.expression_fit import load_response
 from scope.scope_addon.capture.tracking.track import Track
 from scope.scope_addon.capture.world.camera_path import CameraPath
 from scope.scope_addon.capture.world.clip.clip_fit import fit_clip
@@ -116,6 +120,24 @@ def test_a_person_nearer_than_first_estimated_is_smaller():
         moved = second.t_camera_root[:, 2].mean() / first.t_camera_root[:, 2].mean()
         assert abs(moved / nearer - 1) < 0.05
         assert abs(leg(second) / leg(first) / moved - 1) < 0.03
+
+
+def test_a_head_leans_as_its_face_does_although_the_bodys_keypoints_say_that_it_is_upright():
+    body, camera, lean_deg = load_body("scope"), choose_camera(1080, 1920), 15.0
+    track, response = _standing_track(body, camera), load_response()
+    face = 30.0 * response.reference @ exp(np.radians([0.0, 0.0, lean_deg])).T * [1, -1, -1]
+    landmarks = np.tile([*track.keypoints_px[0, :11].mean(axis=0), 0.0], (FACE_POINTS, 1))
+    landmarks[response.landmarks] += face
+    row = record(FaceEstimate(landmarks, 1.0, Region((0.0, 0.0), 1.0, 0.0)), None)
+    for each, expected in ((track, 0.0), (replace(track, face=np.tile(row, (FRAMES, 1))), lean_deg)):
+        prepared = prepare_track(body, each, camera)
+        first = track_fit.fit_track(prepared, lambda *_: None)
+        for fit in (first, _refit(prepared, first, _stance(first))):
+            R = body.forward_kinematics(fit.rotations, fit.t_camera_root, fit.betas)[0][
+                :, body.joint_names.index("head")
+            ]
+            lean = np.degrees(np.arctan2(-R[:, 1, 0], R[:, 0, 0]))
+            np.testing.assert_allclose(lean, expected, atol=4)
 
 
 def test_a_confident_direction_corrects_a_limb_in_earlier_frames_as_well():

@@ -80,6 +80,14 @@ def eye_light_of(rows: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
     return rows[:, _LIGHT]
 
 
+def presence_of(rows: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    """Return (T,) the presence of the faces of rows, less where they are seen from the side, but not where small."""
+    low, high = _FACE_PX
+    of_size = np.clip((rows[:, 1] - low) / (high - low), 0.0, 1.0)
+    found: NDArray[np.floating[Any]] = np.minimum(rows[:, 0] / np.maximum(of_size, 1e-3), 1.0)
+    return found
+
+
 def with_expression(
     rows: NDArray[np.floating[Any]], weights: NDArray[np.float64], directions: NDArray[np.float64]
 ) -> NDArray[np.floating[Any]]:
