@@ -292,7 +292,7 @@ TEXTS = {
     "Person Detector": "Personendetektor",
     "Picture of Current Frame": "Bild des aktuellen Frames",
     "Pin a joint to a place in one frame, and solve the motion around it again": "Ein Gelenk in einem Bild an eine Stelle heften und die Bewegung ringsum neu berechnen",
-    "Pin the joint only in the camera's image; its distance from the camera is free": "Das Gelenk nur im Kamerabild anheften; der Abstand zur Kamera ist frei",
+    "Pin the joint only in the camera's image; its distance from the camera is free, except the pelvis's": "Das Gelenk nur im Kamerabild anheften; der Abstand zur Kamera ist frei, außer beim Becken",
     "Pitch": "Nicken",
     "Pixel of the footage, from its top left": "Pixel des Filmmaterials, von oben links",
     "Play Scene": "Szene abspielen",

@@ -292,7 +292,7 @@ TEXTS = {
     "Person Detector": "Detector de personas",
     "Picture of Current Frame": "Imagen del fotograma actual",
     "Pin a joint to a place in one frame, and solve the motion around it again": "Anclar una articulación a un lugar en un fotograma y recalcular el movimiento cercano",
-    "Pin the joint only in the camera's image; its distance from the camera is free": "Anclar la articulación solo en la imagen de la cámara; su distancia a la cámara queda libre",
+    "Pin the joint only in the camera's image; its distance from the camera is free, except the pelvis's": "Anclar la articulación solo en la imagen de la cámara; su distancia a la cámara queda libre, salvo la de la pelvis",
     "Pitch": "Cabeceo",
     "Pixel of the footage, from its top left": "Píxel de la filmación, desde la esquina superior izquierda",
     "Play Scene": "Reproducir escena",

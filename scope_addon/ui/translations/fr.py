@@ -292,7 +292,7 @@ TEXTS = {
     "Person Detector": "Détecteur de personnes",
     "Picture of Current Frame": "Image de la frame actuelle",
     "Pin a joint to a place in one frame, and solve the motion around it again": "Épingler une articulation à un endroit dans une frame, et recalculer le mouvement autour",
-    "Pin the joint only in the camera's image; its distance from the camera is free": "N’épingler l’articulation que dans l’image de la caméra ; sa distance à la caméra est libre",
+    "Pin the joint only in the camera's image; its distance from the camera is free, except the pelvis's": "N’épingler l’articulation que dans l’image de la caméra ; sa distance à la caméra est libre, sauf celle du bassin",
     "Pitch": "Tangage",
     "Pixel of the footage, from its top left": "Pixel du métrage, depuis le coin supérieur gauche",
     "Play Scene": "Lire la scène",

@@ -292,7 +292,7 @@ TEXTS = {
     "Person Detector": "人物検出器",
     "Picture of Current Frame": "現在のフレームの画像",
     "Pin a joint to a place in one frame, and solve the motion around it again": "1 フレームで関節を位置にピン留めし、前後のモーションを再計算します",
-    "Pin the joint only in the camera's image; its distance from the camera is free": "カメラの画像内でのみ関節をピン留めします。カメラからの距離は自由です",
+    "Pin the joint only in the camera's image; its distance from the camera is free, except the pelvis's": "カメラの画像内でのみ関節をピン留めします。骨盤を除き、カメラからの距離は自由です",
     "Pitch": "ピッチ",
     "Pixel of the footage, from its top left": "左上を原点とするフッテージのピクセル",
     "Play Scene": "シーンを再生",

@@ -292,7 +292,7 @@ TEXTS = {
     "Person Detector": "人物检测器",
     "Picture of Current Frame": "当前帧的图片",
     "Pin a joint to a place in one frame, and solve the motion around it again": "在一帧中将关节钉在某处，并重新解算其前后的动作",
-    "Pin the joint only in the camera's image; its distance from the camera is free": "仅在摄像机图像中钉住关节；其与摄像机的距离不受限制",
+    "Pin the joint only in the camera's image; its distance from the camera is free, except the pelvis's": "仅在摄像机图像中钉住关节；除骨盆外，其与摄像机的距离不受限制",
     "Pitch": "俯仰",
     "Pixel of the footage, from its top left": "素材的像素，从左上角算起",
     "Play Scene": "播放场景",
