@@ -34,9 +34,7 @@ _MOST_MARKS = 512
 class JobProgress:
     """Convert the worker's progress messages to what the panel shows."""
 
-    def __init__(
-        self, clock: Callable[[], float] = time.monotonic, earlier: Mapping[str, float] | None = None
-    ) -> None:
+    def __init__(self, clock: Callable[[], float] = time.monotonic, earlier: Mapping[str, float] | None = None) -> None:
         """Begin at 0.
 
         :param clock: returns the time in seconds.

@@ -10,7 +10,15 @@ from pathlib import Path
 from typing import Any
 
 _WHAT, _FILE = "stage times", "times.json"
-_SETTINGS = ("quality", "hands", "face", "people", "body", "provider", "threads")  # on which the time of a frame depends
+_SETTINGS = (
+    "quality",
+    "hands",
+    "face",
+    "people",
+    "body",
+    "provider",
+    "threads",
+)  # on which the time of a frame depends
 _MOST_KINDS = 50
 
 
