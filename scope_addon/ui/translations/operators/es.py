@@ -58,6 +58,7 @@ OPERATORS = {
     "Set Frame Rate from Footage": "Usar la velocidad de la filmación",
     "Set Upright": "Definir la vertical",
     "Set Upright in View": "Definir la vertical en la vista",
+    "Show Capture": "Mostrar captura",
     "Side View": "Vista lateral",
     "Smooth Motion": "Suavizar movimiento",
     "Snap Feet to Floor": "Ajustar pies al suelo",
