@@ -32,8 +32,8 @@ def load_stage_times(folder: Path, kind: str) -> dict[str, float]:
 
     :param folder: of the cache.
     """
-    times = _read(folder).get(kind)
-    return dict(times) if _are_times(times) else {}
+    times: object = _read(folder).get(kind)
+    return dict(times) if isinstance(times, dict) and _are_times(times) else {}
 
 
 def save_stage_times(folder: Path, kind: str, seconds: Mapping[str, float], frames: int) -> None:

@@ -182,7 +182,7 @@ LONG = [f"2026-03-14_interview_camera_left_take_{k:03d}" for k in (1, 2)]
 
 def drawn(name: str, width: int) -> dict[str, list]:
     """What the list draws of a capture in a sidebar of a width, by kind of widget."""
-    found = {"prop": [], "operator": [], "label": []}
+    found: dict[str, list] = {"prop": [], "operator": [], "label": []}
 
     class Layout:
         active = alignment = None
