@@ -20,9 +20,9 @@ from ...errors import UsageError, VideoError
 from ...footage import shown
 from ...job.cache import Cache, CachedCapture
 from ...job.process import ROOT, START_SCRIPT, WorkerProcess
-from ...job.progress import BUILDING, JobProgress
+from ...job.progress.job_progress import BUILDING, JobProgress
+from ...job.progress.stage_times import kind_of, load_stage_times, save_stage_times
 from ...job.request import JobRequest, code_version
-from ...job.stage_times import kind_of, load_stage_times, save_stage_times
 from ...motion import Motion
 from ...options import Place
 from ...options.body_choice import chosen_body

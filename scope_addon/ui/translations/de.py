@@ -2,8 +2,9 @@
 """German."""
 
 from .operators.de import OPERATORS as OPERATORS
+from .stages.de import STAGES
 
-TEXTS = {
+TEXTS = STAGES | {
     "'{action}' is an asset of this file; save the file in an asset library": "'{action}' ist ein Asset dieser Datei; die Datei in einer Asset-Bibliothek speichern",
     "'{action}' is now an asset": "'{action}' ist jetzt ein Asset",
     "'{mesh}' is linked from {file}, so its keyframes would not be saved in this file: make it local": "'{mesh}' ist aus {file} verknüpft, die Schlüsselbilder würden nicht in dieser Datei gespeichert: lokal machen",
@@ -61,7 +62,6 @@ TEXTS = {
     "Body with Hands": "Körper mit Händen",
     "Bone": "Knochen",
     "Bone of your rig": "Knochen des eigenen Rigs",
-    "Building the scene": "Szene wird aufgebaut",
     "CPU threads for the networks; 0: all cores": "CPU-Threads für die Netze; 0: alle Kerne",
     "Cache Folder": "Cache-Ordner",
     "Cache Size": "Cache-Größe",
@@ -98,7 +98,6 @@ TEXTS = {
     "Choose where the person's root motion is stored": "Wählen, wo die Wurzelbewegung der Person gespeichert wird",
     "Choose your rig first": "Zuerst das eigene Rig wählen",
     "Compare with Footage first": "Zuerst mit dem Filmmaterial vergleichen",
-    "Compiling the solver": "Löser wird kompiliert",
     "Compiling the solver in the background, {percent:.0f} %": "Löser wird im Hintergrund kompiliert, {percent:.0f} %",
     "Confidence": "Sicherheit",
     "Confidence of the guess": "Sicherheit der Vermutung",
@@ -141,8 +140,6 @@ TEXTS = {
     "File": "Datei",
     "File per Person": "Datei pro Person",
     "Find the best cycle within a span of frames, close it, and repeat it": "Den besten Zyklus in einem Bildbereich finden, schließen und wiederholen",
-    "Finding the person": "Person wird gesucht",
-    "Finding the shape": "Form wird bestimmt",
     "First Frame": "Erstes Bild",
     "First frame of the span": "Erstes Bild des Bereichs",
     "Floor": "Boden",
@@ -384,14 +381,10 @@ TEXTS = {
     "Smallest network: for a first look or a slow computer": "Kleinstes Netz: für einen ersten Eindruck oder einen langsamen Rechner",
     "Smooth": "Glätten",
     "Smooth the captured motion again, more or less strongly. Keeps corrections, discards other changes": "Die erfasste Bewegung neu glätten, stärker oder schwächer. Behält Korrekturen, verwirft andere Änderungen",
-    "Solving": "Bewegung wird berechnet",
-    "Solving each frame": "Jedes Bild wird berechnet",
-    "Solving the clip": "Bewegung des Clips wird berechnet",
     "Source": "Quelle",
     "Speed versus accuracy": "Geschwindigkeit gegen Genauigkeit",
     "Start": "Start",
     "Start of the captured part, in seconds": "Beginn des erfassten Teils in Sekunden",
-    "Starting": "Wird gestartet",
     "Stop Capture": "Erfassung stoppen",
     "Stop the Capture?": "Erfassung stoppen?",
     "Stop the live capture. What was recorded is written as keyframes; otherwise the last pose stays": "Die Live-Erfassung stoppen. Aufgenommenes wird als Schlüsselbilder geschrieben; sonst bleibt die letzte Pose",
@@ -472,7 +465,6 @@ TEXTS = {
     "Write a separate file for each person": "Für jede Person eine eigene Datei schreiben",
     "Write captures to a file": "Erfassungen in eine Datei schreiben",
     "Write the recorded pictures of a camera or stream as a video beside the .blend file, from which a more accurate motion of the same take can be captured": "Die aufgenommenen Bilder einer Kamera oder eines Streams als Video neben die .blend-Datei schreiben, aus dem sich eine genauere Bewegung derselben Aufnahme erfassen lässt",
-    "Writing": "Wird geschrieben",
     "Writing the recording": "Die Aufnahme wird geschrieben",
     "Wrote {files} in {folder}": "{files} nach {folder} geschrieben",
     "Y points down, as in the camera's axes of pose estimation networks": "Y zeigt nach unten, wie in den Kameraachsen von Netzen zur Posenschätzung",
@@ -494,9 +486,5 @@ TEXTS = {
     "{path} is not a file; choose a video or image": "{path} ist keine Datei; ein Video oder Bild wählen",
     "{rate:.0f} pose/s, latency {latency:.0f} ms": "{rate:.0f} Pose/s, Latenz {latency:.0f} ms",
     "{rate:.0f} poses/s, latency {latency:.0f} ms": "{rate:.0f} Posen/s, Latenz {latency:.0f} ms",
-    "{rate:.1f} frames/s": "{rate:.1f} Bilder/s",
     "{size} of captures in {folder}": "{size} an Erfassungen in {folder}",
-    "{stage} (first capture only)": "{stage} (nur bei der ersten Erfassung)",
-    "{stage}, {done} of {total}": "{stage}, {done} von {total}",
-    "{time} left": "noch {time}",
 }

@@ -2,8 +2,9 @@
 """Spanish."""
 
 from .operators.es import OPERATORS as OPERATORS
+from .stages.es import STAGES
 
-TEXTS = {
+TEXTS = STAGES | {
     "'{action}' is an asset of this file; save the file in an asset library": "'{action}' es un recurso de este archivo; guarde el archivo en una biblioteca de recursos",
     "'{action}' is now an asset": "'{action}' ya es un recurso",
     "'{mesh}' is linked from {file}, so its keyframes would not be saved in this file: make it local": "'{mesh}' está vinculado desde {file}, así que sus claves no se guardarían en este archivo: hágalo local",
@@ -61,7 +62,6 @@ TEXTS = {
     "Body with Hands": "Cuerpo con manos",
     "Bone": "Hueso",
     "Bone of your rig": "Hueso de su rig",
-    "Building the scene": "Creando la escena",
     "CPU threads for the networks; 0: all cores": "Hilos de CPU para las redes; 0: todos los núcleos",
     "Cache Folder": "Carpeta de caché",
     "Cache Size": "Tamaño de caché",
@@ -98,7 +98,6 @@ TEXTS = {
     "Choose where the person's root motion is stored": "Elegir dónde se guarda el movimiento raíz de la persona",
     "Choose your rig first": "Elija antes su rig",
     "Compare with Footage first": "Compare antes con la filmación",
-    "Compiling the solver": "Compilando el algoritmo",
     "Compiling the solver in the background, {percent:.0f} %": "Compilando el algoritmo en segundo plano, {percent:.0f} %",
     "Confidence": "Confianza",
     "Confidence of the guess": "Confianza de la suposición",
@@ -141,8 +140,6 @@ TEXTS = {
     "File": "Archivo",
     "File per Person": "Archivo por persona",
     "Find the best cycle within a span of frames, close it, and repeat it": "Encontrar el mejor ciclo en un rango de fotogramas, cerrarlo y repetirlo",
-    "Finding the person": "Buscando a la persona",
-    "Finding the shape": "Buscando la forma",
     "First Frame": "Primer fotograma",
     "First frame of the span": "Primer fotograma del rango",
     "Floor": "Suelo",
@@ -384,14 +381,10 @@ TEXTS = {
     "Smallest network: for a first look or a slow computer": "La red más pequeña: para un primer vistazo o un equipo lento",
     "Smooth": "Suavizar",
     "Smooth the captured motion again, more or less strongly. Keeps corrections, discards other changes": "Suavizar de nuevo el movimiento capturado, con más o menos fuerza. Conserva correcciones, descarta otros cambios",
-    "Solving": "Calculando",
-    "Solving each frame": "Calculando cada fotograma",
-    "Solving the clip": "Calculando el clip",
     "Source": "Fuente",
     "Speed versus accuracy": "Rapidez frente a precisión",
     "Start": "Inicio",
     "Start of the captured part, in seconds": "Inicio de la parte capturada, en segundos",
-    "Starting": "Iniciando",
     "Stop Capture": "Detener captura",
     "Stop the Capture?": "¿Detener la captura?",
     "Stop the live capture. What was recorded is written as keyframes; otherwise the last pose stays": "Detener la captura en vivo. Lo grabado se escribe como fotogramas clave; si no, queda la última pose",
@@ -472,7 +465,6 @@ TEXTS = {
     "Write a separate file for each person": "Escribir un archivo aparte por persona",
     "Write captures to a file": "Escribir capturas en un archivo",
     "Write the recorded pictures of a camera or stream as a video beside the .blend file, from which a more accurate motion of the same take can be captured": "Escribir las imágenes grabadas de una cámara o transmisión como vídeo junto al archivo .blend, a partir del cual se puede capturar un movimiento más preciso de la misma toma",
-    "Writing": "Escribiendo",
     "Writing the recording": "Escribiendo la grabación",
     "Wrote {files} in {folder}": "Escrito {files} en {folder}",
     "Y points down, as in the camera's axes of pose estimation networks": "Y apunta hacia abajo, como en los ejes de cámara de las redes de estimación de pose",
@@ -494,9 +486,5 @@ TEXTS = {
     "{path} is not a file; choose a video or image": "{path} no es un archivo; elija un video o una imagen",
     "{rate:.0f} pose/s, latency {latency:.0f} ms": "{rate:.0f} pose/s, latencia {latency:.0f} ms",
     "{rate:.0f} poses/s, latency {latency:.0f} ms": "{rate:.0f} poses/s, latencia {latency:.0f} ms",
-    "{rate:.1f} frames/s": "{rate:.1f} fotogramas/s",
     "{size} of captures in {folder}": "{size} de capturas en {folder}",
-    "{stage} (first capture only)": "{stage} (solo en la primera captura)",
-    "{stage}, {done} of {total}": "{stage}, {done} de {total}",
-    "{time} left": "quedan {time}",
 }

@@ -2,8 +2,9 @@
 """French."""
 
 from .operators.fr import OPERATORS as OPERATORS
+from .stages.fr import STAGES
 
-TEXTS = {
+TEXTS = STAGES | {
     "'{action}' is an asset of this file; save the file in an asset library": "'{action}' est une ressource de ce fichier ; enregistrez le fichier dans une bibliothèque de ressources",
     "'{action}' is now an asset": "'{action}' est maintenant une ressource",
     "'{mesh}' is linked from {file}, so its keyframes would not be saved in this file: make it local": "'{mesh}' est lié depuis {file}, ses images clés ne seraient pas enregistrées dans ce fichier : rendez-le local",
@@ -61,7 +62,6 @@ TEXTS = {
     "Body with Hands": "Corps avec mains",
     "Bone": "Os",
     "Bone of your rig": "Os de votre rig",
-    "Building the scene": "Construction de la scène",
     "CPU threads for the networks; 0: all cores": "Threads CPU pour les réseaux ; 0 : tous les cœurs",
     "Cache Folder": "Dossier du cache",
     "Cache Size": "Taille du cache",
@@ -98,7 +98,6 @@ TEXTS = {
     "Choose where the person's root motion is stored": "Choisir où le mouvement racine de la personne est stocké",
     "Choose your rig first": "Choisissez d’abord votre rig",
     "Compare with Footage first": "Comparez d’abord avec le métrage",
-    "Compiling the solver": "Compilation du solveur",
     "Compiling the solver in the background, {percent:.0f} %": "Compilation du solveur en arrière-plan, {percent:.0f} %",
     "Confidence": "Confiance",
     "Confidence of the guess": "Confiance dans la correspondance",
@@ -141,8 +140,6 @@ TEXTS = {
     "File": "Fichier",
     "File per Person": "Un fichier par personne",
     "Find the best cycle within a span of frames, close it, and repeat it": "Trouver le meilleur cycle dans un intervalle de frames, le fermer et le répéter",
-    "Finding the person": "Recherche de la personne",
-    "Finding the shape": "Recherche de la forme",
     "First Frame": "Première frame",
     "First frame of the span": "Première frame de l’intervalle",
     "Floor": "Sol",
@@ -384,14 +381,10 @@ TEXTS = {
     "Smallest network: for a first look or a slow computer": "Le plus petit réseau : pour un premier aperçu ou un ordinateur lent",
     "Smooth": "Lisser",
     "Smooth the captured motion again, more or less strongly. Keeps corrections, discards other changes": "Lisser de nouveau le mouvement capturé, plus ou moins fort. Garde les corrections, perd les autres changements",
-    "Solving": "Calcul du mouvement",
-    "Solving each frame": "Calcul de chaque image",
-    "Solving the clip": "Calcul du mouvement du clip",
     "Source": "Source",
     "Speed versus accuracy": "Vitesse ou précision",
     "Start": "Début",
     "Start of the captured part, in seconds": "Début de la partie capturée, en secondes",
-    "Starting": "Démarrage",
     "Stop Capture": "Arrêter la capture",
     "Stop the Capture?": "Arrêter la capture ?",
     "Stop the live capture. What was recorded is written as keyframes; otherwise the last pose stays": "Arrêter la capture en direct. Ce qui a été enregistré est écrit en images clés ; sinon, la dernière pose reste",
@@ -472,7 +465,6 @@ TEXTS = {
     "Write a separate file for each person": "Écrire un fichier par personne",
     "Write captures to a file": "Écrire des captures dans un fichier",
     "Write the recorded pictures of a camera or stream as a video beside the .blend file, from which a more accurate motion of the same take can be captured": "Écrire les images enregistrées d’une caméra ou d’un flux dans une vidéo à côté du fichier .blend, à partir de laquelle un mouvement plus précis de la même prise peut être capturé",
-    "Writing": "Écriture",
     "Writing the recording": "Écriture de l'enregistrement",
     "Wrote {files} in {folder}": "{files} écrit dans {folder}",
     "Y points down, as in the camera's axes of pose estimation networks": "Y pointe vers le bas, comme les axes de caméra des réseaux d’estimation de pose",
@@ -494,9 +486,5 @@ TEXTS = {
     "{path} is not a file; choose a video or image": "{path} n’est pas un fichier ; choisissez une vidéo ou une image",
     "{rate:.0f} pose/s, latency {latency:.0f} ms": "{rate:.0f} pose/s, latence {latency:.0f} ms",
     "{rate:.0f} poses/s, latency {latency:.0f} ms": "{rate:.0f} poses/s, latence {latency:.0f} ms",
-    "{rate:.1f} frames/s": "{rate:.1f} images/s",
     "{size} of captures in {folder}": "{size} de captures dans {folder}",
-    "{stage} (first capture only)": "{stage} (première capture seulement)",
-    "{stage}, {done} of {total}": "{stage}, {done} sur {total}",
-    "{time} left": "reste {time}",
 }

@@ -2,8 +2,9 @@
 """Japanese."""
 
 from .operators.ja import OPERATORS as OPERATORS
+from .stages.ja import STAGES
 
-TEXTS = {
+TEXTS = STAGES | {
     "'{action}' is an asset of this file; save the file in an asset library": "'{action}' はこのファイルのアセットです。ファイルをアセットライブラリに保存してください",
     "'{action}' is now an asset": "'{action}' をアセットにしました",
     "'{mesh}' is linked from {file}, so its keyframes would not be saved in this file: make it local": "'{mesh}' は {file} からリンクされているため、キーフレームがこのファイルに保存されません。ローカル化してください",
@@ -61,7 +62,6 @@ TEXTS = {
     "Body with Hands": "手付きボディ",
     "Bone": "ボーン",
     "Bone of your rig": "自分のリグのボーン",
-    "Building the scene": "シーンを構築中",
     "CPU threads for the networks; 0: all cores": "ネットワーク用の CPU スレッド数。0：全コア",
     "Cache Folder": "キャッシュフォルダー",
     "Cache Size": "キャッシュサイズ",
@@ -98,7 +98,6 @@ TEXTS = {
     "Choose where the person's root motion is stored": "人物のルートモーションの保存先を選択",
     "Choose your rig first": "先に自分のリグを選択してください",
     "Compare with Footage first": "先にフッテージと比較してください",
-    "Compiling the solver": "ソルバーをコンパイル中",
     "Compiling the solver in the background, {percent:.0f} %": "ソルバーをバックグラウンドでコンパイル中、{percent:.0f} %",
     "Confidence": "信頼度",
     "Confidence of the guess": "推測の信頼度",
@@ -141,8 +140,6 @@ TEXTS = {
     "File": "ファイル",
     "File per Person": "人物ごとにファイル",
     "Find the best cycle within a span of frames, close it, and repeat it": "フレーム範囲から最適な周期を見つけ、閉じて繰り返します",
-    "Finding the person": "人物を検出中",
-    "Finding the shape": "体型を推定中",
     "First Frame": "最初のフレーム",
     "First frame of the span": "範囲の最初のフレーム",
     "Floor": "床",
@@ -384,14 +381,10 @@ TEXTS = {
     "Smallest network: for a first look or a slow computer": "最小のネットワーク：最初の確認や遅いコンピューター用",
     "Smooth": "スムーズ",
     "Smooth the captured motion again, more or less strongly. Keeps corrections, discards other changes": "キャプチャしたモーションを強弱を変えて再度スムージングします。修正は保持し、他の変更は破棄します",
-    "Solving": "解析中",
-    "Solving each frame": "各フレームを解析中",
-    "Solving the clip": "クリップ全体を解析中",
     "Source": "ソース",
     "Speed versus accuracy": "速度と精度のどちらを優先するか",
     "Start": "開始",
     "Start of the captured part, in seconds": "キャプチャする範囲の開始（秒）",
-    "Starting": "開始中",
     "Stop Capture": "キャプチャを停止",
     "Stop the Capture?": "キャプチャを停止しますか？",
     "Stop the live capture. What was recorded is written as keyframes; otherwise the last pose stays": "ライブキャプチャを停止します。記録した動きはキーフレームとして書き込まれ、記録がなければ最後のポーズが残ります",
@@ -472,7 +465,6 @@ TEXTS = {
     "Write a separate file for each person": "人物ごとに別のファイルを書き出す",
     "Write captures to a file": "キャプチャをファイルに書き出す",
     "Write the recorded pictures of a camera or stream as a video beside the .blend file, from which a more accurate motion of the same take can be captured": "カメラやストリームの録画した映像を .blend ファイルの隣に動画として書き出します。同じテイクのより正確なモーションをそこからキャプチャできます",
-    "Writing": "書き込み中",
     "Writing the recording": "記録を書き込んでいます",
     "Wrote {files} in {folder}": "{files} を {folder} に書き出しました",
     "Y points down, as in the camera's axes of pose estimation networks": "Y が下向き。姿勢推定ネットワークのカメラ軸と同じ",
@@ -494,9 +486,5 @@ TEXTS = {
     "{path} is not a file; choose a video or image": "{path} はファイルではありません。動画または画像を選択してください",
     "{rate:.0f} pose/s, latency {latency:.0f} ms": "{rate:.0f} ポーズ/秒、遅延 {latency:.0f} ms",
     "{rate:.0f} poses/s, latency {latency:.0f} ms": "{rate:.0f} ポーズ/秒、遅延 {latency:.0f} ms",
-    "{rate:.1f} frames/s": "{rate:.1f} フレーム/秒",
     "{size} of captures in {folder}": "{folder} にキャプチャ {size}",
-    "{stage} (first capture only)": "{stage}（初回のキャプチャのみ）",
-    "{stage}, {done} of {total}": "{stage}、{done} / {total}",
-    "{time} left": "残り {time}",
 }

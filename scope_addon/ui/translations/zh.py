@@ -2,8 +2,9 @@
 """Simplified Chinese."""
 
 from .operators.zh import OPERATORS as OPERATORS
+from .stages.zh import STAGES
 
-TEXTS = {
+TEXTS = STAGES | {
     "'{action}' is an asset of this file; save the file in an asset library": "“{action}”是此文件的资产；请将文件保存到资产库中",
     "'{action}' is now an asset": "“{action}”现为资产",
     "'{mesh}' is linked from {file}, so its keyframes would not be saved in this file: make it local": "“{mesh}”链接自 {file}，其关键帧不会保存在此文件中：请使其本地化",
@@ -61,7 +62,6 @@ TEXTS = {
     "Body with Hands": "带手的身体",
     "Bone": "骨骼",
     "Bone of your rig": "您的绑定中的骨骼",
-    "Building the scene": "正在构建场景",
     "CPU threads for the networks; 0: all cores": "网络使用的 CPU 线程数；0：全部核心",
     "Cache Folder": "缓存文件夹",
     "Cache Size": "缓存大小",
@@ -98,7 +98,6 @@ TEXTS = {
     "Choose where the person's root motion is stored": "选择人物根运动的存储位置",
     "Choose your rig first": "请先选择您的绑定",
     "Compare with Footage first": "请先与素材对比",
-    "Compiling the solver": "正在编译解算器",
     "Compiling the solver in the background, {percent:.0f} %": "正在后台编译解算器，{percent:.0f} %",
     "Confidence": "置信度",
     "Confidence of the guess": "猜测的置信度",
@@ -141,8 +140,6 @@ TEXTS = {
     "File": "文件",
     "File per Person": "每人一个文件",
     "Find the best cycle within a span of frames, close it, and repeat it": "在帧范围内寻找最佳循环，将其闭合并重复",
-    "Finding the person": "正在查找人物",
-    "Finding the shape": "正在估算体型",
     "First Frame": "首帧",
     "First frame of the span": "范围的首帧",
     "Floor": "地面",
@@ -384,14 +381,10 @@ TEXTS = {
     "Smallest network: for a first look or a slow computer": "最小的网络：用于初步查看或较慢的电脑",
     "Smooth": "平滑",
     "Smooth the captured motion again, more or less strongly. Keeps corrections, discards other changes": "以不同强度重新平滑捕捉的动作。保留修正，丢弃其他更改",
-    "Solving": "正在解算",
-    "Solving each frame": "正在逐帧解算",
-    "Solving the clip": "正在解算片段",
     "Source": "来源",
     "Speed versus accuracy": "速度与精度的权衡",
     "Start": "开始",
     "Start of the captured part, in seconds": "捕捉部分的开始时间（秒）",
-    "Starting": "正在启动",
     "Stop Capture": "停止捕捉",
     "Stop the Capture?": "停止捕捉？",
     "Stop the live capture. What was recorded is written as keyframes; otherwise the last pose stays": "停止实时捕捉。录制的内容写为关键帧；否则保留最后的姿势",
@@ -472,7 +465,6 @@ TEXTS = {
     "Write a separate file for each person": "为每个人物写出单独的文件",
     "Write captures to a file": "将捕捉写入文件",
     "Write the recorded pictures of a camera or stream as a video beside the .blend file, from which a more accurate motion of the same take can be captured": "将摄像头或流的已录制画面作为视频写入 .blend 文件旁边，可据此捕捉同一镜次的更精确动作",
-    "Writing": "正在写入",
     "Writing the recording": "正在写入录制",
     "Wrote {files} in {folder}": "已将 {files} 写入 {folder}",
     "Y points down, as in the camera's axes of pose estimation networks": "Y 向下，与姿态估计网络的摄像机轴相同",
@@ -494,9 +486,5 @@ TEXTS = {
     "{path} is not a file; choose a video or image": "{path} 不是文件；请选择视频或图像",
     "{rate:.0f} pose/s, latency {latency:.0f} ms": "{rate:.0f} 姿势/秒，延迟 {latency:.0f} 毫秒",
     "{rate:.0f} poses/s, latency {latency:.0f} ms": "{rate:.0f} 姿势/秒，延迟 {latency:.0f} 毫秒",
-    "{rate:.1f} frames/s": "{rate:.1f} 帧/秒",
     "{size} of captures in {folder}": "{folder} 中有 {size} 的捕捉",
-    "{stage} (first capture only)": "{stage}（仅首次捕捉）",
-    "{stage}, {done} of {total}": "{stage}，{done} / {total}",
-    "{time} left": "剩余 {time}",
 }

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
-from scope.scope_addon.job.progress import JobProgress, duration
+from scope.scope_addon.job.progress.job_progress import JobProgress, duration
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene.footage_strip import start_of, strips_of
 from scope.scope_addon.ui import drop

@@ -11,7 +11,7 @@ from typing import Any
 import bpy
 import scope
 from scope.scope_addon import ui
-from scope.scope_addon.job.progress import BUILDING, FIRST_ONLY, STAGES
+from scope.scope_addon.job.progress.job_progress import BUILDING, FIRST_ONLY, STAGES
 from scope.scope_addon.ui.pins.pin_tool import HANDLES
 from scope.scope_addon.ui.translations import CONTEXT
 
@@ -38,7 +38,7 @@ def interface_texts() -> set[Message]:
     for module in ui._MODULES:
         for cls in module.CLASSES:
             found |= set(_of_class(cls))
-    for path in [*(ROOT / "ui").rglob("*.py"), ROOT / "job" / "progress.py"]:
+    for path in [*(ROOT / "ui").rglob("*.py"), ROOT / "job" / "progress" / "job_progress.py"]:
         found |= set(_of_source(ast.parse(path.read_text(encoding="utf-8"))))
     return {(context, text) for context, text in found if any(map(str.isalpha, text)) and text not in UNTRANSLATED}
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scope.scope_addon.job.progress import BUILDING, STAGES, JobProgress
+from scope.scope_addon.job.progress.job_progress import BUILDING, STAGES, JobProgress
 
 MEASURED = json.loads((Path(__file__).parent / "measured_progress.json").read_text("utf-8"))
 LAST_S = 2.0  # of a capture, in which the estimate does not matter any more
