@@ -5,6 +5,7 @@
 - ``jobs/<name>/``: a capture that is being written; it is moved to ``captures`` when it is complete
 - ``unfinished/<name>/``: what a capture that was cancelled or killed had found, see `unfinished`
 - ``kernels/``: the machine code that was compiled here. Clearing keeps it, except for that of replaced versions
+- ``times.json``: how long the stages of the last captures took, see `progress`. Clearing keeps it
 
 Blender loads this when it starts, so that what only captures need is imported where it is used.
 """

@@ -7,10 +7,12 @@ Usage: ``blender --python pins.py -- VIDEO OUT_FOLDER``
 from __future__ import annotations
 
 import json
+import math
+import os
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import bpy
@@ -18,8 +20,11 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
-from session import FOOTAGE, OUT, captured, invoke, key, picture, run, show_tab, use, viewport
+from session import FOOTAGE, OUT, captured, click, invoke, key, picture, press, run, show_tab, until, use, viewport
 
+# On a screen of 1600 x 1000, in the comparison of the only capture.
+DOCUMENTATION, RAW, NORMAL, STRONG = (1222, 97), (1086, 529), (1165, 529), (1244, 529)
+LEFT_FOOT_STANDS, EXCHANGE, UPRIGHT_LINE, FLOOR_HERE = (1105, 811), (1175, 836), (1175, 863), (1175, 888)
 report: dict[str, object] = {"blender": bpy.app.version_string}
 
 
@@ -89,6 +94,8 @@ def steps() -> Iterator[float]:
     scene.frame_set(frame)
     invoke(bpy.ops.ed.undo_push, message="Frame")  # as scrubbing does
     yield 1.5
+    yield from pressed()
+    yield from upright_line_from_the_side()
     invoke(bpy.ops.scope.pin_limb, "INVOKE_DEFAULT")
     yield 1.0
     picture("pins_1_handles")
@@ -103,6 +110,77 @@ def steps() -> Iterator[float]:
     missed = {k: v for k, v in report.items() if k.endswith("_px") and v > 2.5}
     (OUT / "pins.json").write_text(json.dumps(report))
     assert not missed, missed
+
+
+def pressed() -> Iterator[float]:
+    """Press the buttons of the panel with the mouse, and the OK of their dialogs; undo each."""
+    browser, opened = OUT / "browser.sh", OUT / "opened"
+    browser.write_text(f'#!/bin/sh\necho "$1" >{opened}\n')
+    browser.chmod(0o755)
+    os.environ["BROWSER"] = str(browser)
+    yield from press(DOCUMENTATION, opened.exists)
+    page = opened.read_text().strip()
+    assert Path(page.removeprefix("file://")).is_file(), page
+    found = []
+    for place in (RAW, STRONG, NORMAL):
+        before = keys()
+        yield from press(place, lambda before=before: keys() != before)
+        found.append(keys())
+    assert found[0] != found[1] != found[2] != found[0]
+    before = keys()
+    for place, kind in ((LEFT_FOOT_STANDS, "CONTACT"), (EXCHANGE, "EXCHANGE")):
+        yield from confirmed(place, lambda kind=kind: [entry["kind"] for entry in listed()] == [kind])
+        assert keys() != before
+        yield from undone(before)
+    yield from press(FLOOR_HERE, lambda: [entry["kind"] for entry in listed()] == ["FLOOR"])
+    yield from undone(before)
+
+
+def undone(before: list[list[float]]) -> Iterator[float]:
+    """Undo the only correction: the keys are as before."""
+    invoke(bpy.ops.ed.undo)
+    yield 0.5
+    assert listed() == []
+    assert keys() == before
+
+
+def confirmed(place: tuple[int, int], happened: Callable[[], bool]) -> Iterator[float]:
+    """Click a button that opens a dialog, and confirm it, until something has happened."""
+    for _ in range(6):
+        click(*place)
+        yield 2.0
+        subprocess.run(["xdotool", "key", "Return"], check=True)  # with the mouse on the dialog, which stays open then
+        for _ in range(20):
+            yield 0.1
+            if happened():
+                return
+        subprocess.run(["xdotool", "key", "Escape"], check=True)
+        yield 0.5
+    raise RuntimeError(f"the dialog of the button at {place} was not confirmed")
+
+
+def upright_line_from_the_side() -> Iterator[float]:
+    """Draw the upright line in the view from the side; the tool begins with its button beside the footage."""
+    use(bpy.ops.scope.side_view)
+    yield 2.0
+    window, camera, before = viewport()["window"], bpy.context.scene.camera, keys()
+    area = next(a for a in window.screen.areas if a.type == "VIEW_3D" and a.spaces.active.lock_object)
+    yield from press(UPRIGHT_LINE, lambda: len(window.modal_operators) > 0)
+    was, (x, y) = camera.matrix_world.copy(), on_screen("left_ankle", area)
+    xdotool(*move(x - 3, y), *move(x, y), "mousedown", 1, "sleep", "0.3", *move(x + 12, y - 180))
+    yield 2.0
+    xdotool(*move(x + 20, y - 300))
+    yield 1.0
+    picture("pins_9_upright_from_the_side")
+    xdotool("mouseup", 1)
+    yield from until(lambda: [entry["kind"] for entry in listed()] == ["UPRIGHT"], 20, "the upright line")
+    yield 0.5
+    turned = camera.matrix_world.to_quaternion().rotation_difference(was.to_quaternion()).angle
+    report["upright_from_the_side_deg"] = round(math.degrees(turned), 2)
+    assert abs(math.degrees(turned) - math.degrees(math.atan2(20, 300))) < 0.3, report
+    yield from undone(before)
+    use(bpy.ops.scope.side_view)
+    yield 1.0
 
 
 def tools() -> int:
@@ -126,10 +204,21 @@ def disabled() -> Iterator[float]:
 
 def drawn(joint: str, area: bpy.types.Area | None = None) -> bool:
     """Return whether a white handle is drawn on a joint; the suit under it is dark."""
+    return min(pixels(joint, area)) > 180
+
+
+def is_orange(joint: str) -> bool:
+    """Return whether the handle on a joint is that of a pin that was missed."""
+    red, green, blue = pixels(joint)[12:15]
+    return red > 200 and 80 < green < 180 and blue < 100
+
+
+def pixels(joint: str, area: bpy.types.Area | None = None) -> bytes:
+    """Return the colors of the 3 x 3 pixels on a joint."""
     x, y = on_screen(joint, area)
     place = f"3x3+{round(x) - 1}+{round(y) - 1}"
     command = ["import", "-window", "root", "-crop", place, "-depth", "8", "rgb:-"]
-    return min(subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout) > 180
+    return subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout
 
 
 def hidden_by_its_button() -> Iterator[float]:
@@ -196,6 +285,7 @@ def dragged(was: tuple[float, float], by: tuple[int, int]) -> Iterator[float]:
         yield 0.5
         report[f"smoothed_{strength}_px"] = off("left_wrist", target)
     yield from dragged_while_busy("left_ankle", (24, -20))
+    yield from dragged_out_of_reach()
     yield from dragged_in_side_view("right_wrist", (-20, -15))
     key("Escape")
     yield 1.0
@@ -209,6 +299,17 @@ def dragged_while_busy(joint: str, by: tuple[int, int]) -> Iterator[float]:
     yield 3.0
     assert [e["joint"] for e in listed()[before:]] == [joint], listed()
     report["dragged_while_busy_px"] = off(joint, (x + by[0], y + by[1]))
+    invoke(bpy.ops.ed.undo)
+    yield 1.0
+
+
+def dragged_out_of_reach() -> Iterator[float]:
+    """Drag a wrist farther away than the arm is long: its handle is orange, as long as the pin is there."""
+    before, wrist, shoulder = len(listed()), on_screen("right_wrist"), on_screen("right_shoulder")
+    yield from drag("right_wrist", (round(wrist[0] - shoulder[0]), round(wrist[1] - shoulder[1])))
+    assert [bool(e["missed"]) for e in listed()[before:]] == [True], listed()
+    yield from until(lambda: is_orange("right_wrist"), 20, "the orange handle")
+    picture("pins_10_missed")
     invoke(bpy.ops.ed.undo)
     yield 1.0
 

@@ -138,6 +138,7 @@ def edits() -> dict[str, Callable[[], object]]:
         "mark as asset": lambda: use(scope.mark_asset, author="Ada"),
         "footage to sequencer": lambda: use(scope.footage_to_sequencer),
         "rename take": lambda: use(scope.rename_take, name="renamed"),
+        "upright line": lambda: use(scope.set_upright_in_view, end=(0.0, 0.1, 1.5), direction=(1.0, 0.0, 0.0)),
         "floor here": lambda: use(scope.floor_here),
         "push to NLA": lambda: use(scope.push_to_nla),  # last, because it leaves no action to edit
     }

@@ -172,6 +172,11 @@ class Steps(FileSteps):
                 "frame": first,
             },
             "set_upright": {"start": (300, 100), "end": (300 + chance.uniform(-30, 30), 400)},
+            "set_upright_in_view": {
+                "start": (0, 0, 0),
+                "end": (0, chance.uniform(-0.2, 0.2), 1.5),
+                "direction": (1.0, 0.0, chance.uniform(-0.1, 0.1)),
+            },
             "remove_correction": {"index": chance.choice((-1, 0, 0, 1))},
         }
         return values.get(name, {})

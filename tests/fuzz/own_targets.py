@@ -29,7 +29,7 @@ def read_request(path: Path) -> None:
 
 def read_reply(path: Path) -> None:
     from scope.scope_addon.job.messages import parse_message
-    from scope.scope_addon.job.progress import JobProgress
+    from scope.scope_addon.job.progress.job_progress import JobProgress
 
     progress = JobProgress()
     for line in path.read_bytes().splitlines(keepends=True):

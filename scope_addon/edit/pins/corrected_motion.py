@@ -24,7 +24,7 @@ from ..spans import swap_sides
 from .corrections import Contact, Correction, Exchange, Pin, floor_height, from_arrays, to_arrays, world_of
 from .edits import edited
 from .moved import moved_clip, moved_motion
-from .reach import pixel_of
+from .rays import pixel_of
 from .solve_pins import Shot, resolve
 
 _KEPT = ("poses", "trans", "poses_raw", "trans_raw", "joints_cam")

@@ -27,6 +27,7 @@ from ....solver.residuals import joint_limits
 from ...errors import UsageError
 from ...kinematics.contact_points import SOLES, with_contact_points
 from ...kinematics.foot_skin import UNDER_FLOOR_M, FootSkin
+from .rays import Camera, point_at_depth
 
 # Inverse variances: per radian² of joints, per metre² of points and of the pelvis, per squared image coordinate.
 FREE, GIRDLE, STIFF = 1.0, 10.0, 100.0
@@ -66,6 +67,12 @@ def limb_of(joint: str) -> str:
         if side in ("left", "right") and bare.startswith(names):
             return f"{side}_{limb}"
     return "trunk" if joint in _TRUNK else f"{side}_arm"  # fingers
+
+
+def _bent_by(joints: tuple[str, ...]) -> set[str]:
+    """Return the limbs that bend where the pelvis or hips are moved: the legs, whose feet stay where they are."""
+    moved = "pelvis" in joints or any(joint.endswith("hip") for joint in joints)
+    return {"left_leg", "right_leg"} if moved else set()
 
 
 def compiled_solver() -> ModuleType:
@@ -145,7 +152,7 @@ class PoseRefit:
         root: NDArray[np.float64],
         joints: tuple[str, ...],
         points: Points,
-        camera: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
+        camera: Camera | None = None,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Fit one pose to points.
 
@@ -154,13 +161,14 @@ class PoseRefit:
         :param camera: world_from_camera (4, 4) and intrinsics (3, 3), for points in pixels.
         :return: the new pose.
         """
+        root_prior = root + self._shift_in_image(rotations, root, points, camera)
         T = np.eye(4) if camera is None else camera[0]
         R_camera_world, center = T[:3, :3].T, T[:3, 3]
         in_space = [k for k, v in enumerate(points.values) if len(v) == 3]
         in_image = [k for k, v in enumerate(points.values) if len(v) == 2]
         numbers, weights = np.array(points.numbers, int), np.array(points.weights)
         measured = self._solver.Measurements(
-            pose_priors=self._root_prior(R_camera_world @ rotations[0], R_camera_world @ (root - center), joints)
+            pose_priors=self._root_prior(R_camera_world @ rotations[0], R_camera_world @ (root_prior - center), joints)
         )
         if in_space:
             xyz = (np.array([points.values[k] for k in in_space]) - center) @ R_camera_world.T
@@ -180,10 +188,24 @@ class PoseRefit:
         out = np.concatenate([(R_camera_world.T @ found.R_camera_root)[None], found.Omega])
         return out, R_camera_world.T @ found.t_camera_root + center
 
+    def _shift_in_image(
+        self, rotations: NDArray[np.float64], root: NDArray[np.float64], points: Points, camera: Camera | None
+    ) -> NDArray[np.float64]:
+        """Return the shift (3,) by which hips that are measured in the image move there at their depth."""
+        numbers = {self.number(name): self.joint(name) for name in ("left_hip", "right_hip")}
+        pixels = [(numbers[n], v) for n, v in zip(points.numbers, points.values, strict=True) if n in numbers]
+        pixels = [(joint, value) for joint, value in pixels if len(value) == 2]
+        if not pixels or camera is None:
+            return np.zeros(3)
+        at = self.place(rotations, root)[1]
+        shifts = [point_at_depth(camera, pixel, at[joint]) - at[joint] for joint, pixel in pixels]
+        mean: NDArray[np.float64] = np.mean(shifts, axis=0)
+        return mean
+
     def _root_prior(self, R: NDArray[np.float64], t: NDArray[np.float64], joints: tuple[str, ...]) -> PosePriors:
         """Return the prior on the pelvis, which may move where the trunk is corrected."""
         trunk = any(limb_of(j) == "trunk" or j.endswith(("hip", "collar")) for j in joints)
-        share = 0.01 if "pelvis" in joints or any(j.endswith("hip") for j in joints) else 0.1 if trunk else 1.0
+        share = 0.1 if trunk and not _bent_by(joints) else 1.0  # legs rather than bend than let the body move away
         rotation = PELVIS_ROTATION * (0.1 if trunk else 1.0)
         posed: PosePriors = self._solver.PosePriors([0], R[None], t[None], [rotation], [PELVIS_POSITION * share])
         return posed
@@ -191,6 +213,9 @@ class PoseRefit:
     def _weights(self, joints: tuple[str, ...]) -> NDArray[np.float64]:
         """Return the weights (K,) of the joints' prior."""
         weights = np.full(len(self.names), STIFF)
+        for k, name in enumerate(self.names):
+            if limb_of(name) in _bent_by(joints):
+                weights[k] = FREE
         for name in joints:
             part = int(self.body.parents[self.joint(name)])
             while part > 0:
@@ -207,6 +232,6 @@ class PoseRefit:
     def _limits_of(self, joints: tuple[str, ...]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Return the limits of knees and elbows of the corrected limbs: other joints stay as they were."""
         ints, floats = self._limits
-        limbs = {limb_of(name) for name in joints}
+        limbs = {limb_of(name) for name in joints} | _bent_by(joints)
         keep = np.array([limb_of(self.names[k]) in limbs for k in ints[:, 0]], bool)
         return ints[keep], floats[keep]

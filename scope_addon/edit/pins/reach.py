@@ -4,6 +4,9 @@
 A pin that is farther away than the limb is long would otherwise be met by moving the whole body. So the pin is moved
 towards the limb's first joint, on the straight line, until the stretched limb and a small slack reach it. The slack is
 what shoulder girdle, trunk and pelvis may add. Pins of the pelvis and the hips are not limited: they move the body.
+
+A pin of the pelvis in the image keeps the person at their depth. Were the depth free, the body could meet a pin below
+the pelvis by moving away from a camera that is lower than it, rather than by bending the knees.
 """
 
 from __future__ import annotations
@@ -14,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .pose_refit import PoseRefit, limb_of
+from .rays import Camera, nearest_on_ray, pixel_of, point_at_depth
 
 SLACK_M = 0.03
 _MOVES_BODY = ("pelvis", "left_hip", "right_hip")
-Camera = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 def within_reach(
@@ -34,27 +37,21 @@ def within_reach(
     :param places: the joints before the correction (K+1, 3), world, and other joints that are pinned in space, (3,).
     :param camera: world_from_camera (4, 4) and intrinsics (3, 3), for a target in pixels.
     :param slack: metres that may be added to the limb's length.
-    :return: as ``target``.
+    :return: as ``target``; of the pelvis always (3,).
     """
+    at, pinned = places
+    if joint == "pelvis" and len(target) == 2 and camera is not None:
+        return point_at_depth(camera, target, at[refit.joint(joint)])
     if joint in _MOVES_BODY:
         return target
-    at, pinned = places
     first, reach = _first_joint(refit, joint, pinned)
     origin = pinned.get(first, at[refit.joint(first)])
-    nearest = target if len(target) == 3 or camera is None else _nearest_on_ray(camera, target, origin)
+    nearest = target if len(target) == 3 or camera is None else nearest_on_ray(camera, target, origin)
     distance = float(np.linalg.norm(nearest - origin))
     if distance <= reach + slack:
         return target
     place: NDArray[np.float64] = origin + (nearest - origin) * ((reach + slack) / distance)
     return place if len(target) == 3 or camera is None else pixel_of(camera, place)
-
-
-def pixel_of(camera: Camera, point: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Project a point (3,), world, to a pixel (2,)."""
-    T, K = camera
-    p = K @ (T[:3, :3].T @ (np.asarray(point, float) - T[:3, 3]))
-    pixel: NDArray[np.float64] = p[:2] / p[2]
-    return pixel
 
 
 def _first_joint(refit: PoseRefit, joint: str, pinned: Mapping[str, NDArray[np.float64]]) -> tuple[str, float]:
@@ -70,12 +67,3 @@ def _first_joint(refit: PoseRefit, joint: str, pinned: Mapping[str, NDArray[np.f
         part = parent
         if part == 0 or refit.names[part] == root or refit.names[part] in pinned:
             return refit.names[part], length
-
-
-def _nearest_on_ray(camera: Camera, pixel: NDArray[np.float64], point: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the point (3,) nearest to another one of those in front of the camera that project to a pixel (2,)."""
-    T, K = camera
-    ray = T[:3, :3] @ np.linalg.solve(K, np.array([*pixel, 1.0]))
-    ray /= np.linalg.norm(ray)
-    nearest: NDArray[np.float64] = T[:3, 3] + max(float((point - T[:3, 3]) @ ray), 1e-3) * ray
-    return nearest

@@ -32,7 +32,8 @@ from ..spans import swap_sides
 from .corrections import Contact, Correction, Exchange, Pin
 from .fade import faded
 from .pose_refit import FLOOR_M, HELD, PINNED, PINNED_2D, STANDING, Points, PoseRefit, limb_of
-from .reach import SLACK_M, pixel_of, within_reach
+from .rays import pixel_of
+from .reach import SLACK_M, within_reach
 
 _UP = np.array([0.0, 0.0, 1.0])
 _CONTACT_REACH_S = 0.25
@@ -229,8 +230,9 @@ class _Correction:
         limb = limb_of(own[0])
         if not limb.endswith("arm"):
             points.floor = float(self._floor[key])
+        free = () if all(joint.endswith("hip") for joint in own) else refit.soles_of(limb)  # a hip moves over its foot
         for k, name in enumerate(refit.sole_names):
-            if name not in refit.soles_of(limb) and self._standing[key, k] > _STANDS:
+            if name not in free and self._standing[key, k] > _STANDS:
                 points.add(refit.number(name), soles[k], STANDING * self._standing[key, k])
         moves_trunk = limb == "trunk" or any(joint.endswith(("hip", "collar")) for joint in own)
         for name in () if moves_trunk else refit.ends:

@@ -20,7 +20,8 @@ from ...errors import UsageError, VideoError
 from ...footage import shown
 from ...job.cache import Cache, CachedCapture
 from ...job.process import ROOT, START_SCRIPT, WorkerProcess
-from ...job.progress import JobProgress
+from ...job.progress.job_progress import BUILDING, JobProgress
+from ...job.progress.stage_times import kind_of, load_stage_times, save_stage_times
 from ...job.request import JobRequest, code_version
 from ...motion import Motion
 from ...options import Place
@@ -47,12 +48,13 @@ class CaptureJob:
         :raises ScopeError: a setting is invalid, or the worker cannot be started.
         """
         self._cache: Cache = cache()
-        self.progress = JobProgress()
         self.cancelled = False
         self.messages = 0  # of the worker so far
         self._scene_uid = scene.session_uid
         self._options = build_options(scene)
         self._request = capture_request(scene)
+        self._kind = kind_of(self._request.values)
+        self.progress = JobProgress(earlier=load_stage_times(self._cache.root, self._kind))
         self._key = self._request.key(code_version(ROOT))
         self._captured: CachedCapture | None = self._cache.find(self._key)
         self._worker: WorkerProcess | None = None
@@ -92,7 +94,7 @@ class CaptureJob:
             return True
         if not self._building:  # built in the next step, so that the panel can show this stage first
             self._building = True
-            self.progress.update("building the scene", 0, 0)
+            self.progress.update(BUILDING, 0, 0)
             return True
         scene = next((s for s in bpy.data.scenes if s.session_uid == self._scene_uid), None)
         if scene is None:
@@ -116,6 +118,8 @@ class CaptureJob:
         self._captured = self._cache.keep(
             self._worker.job_folder, self._key, self._result["motions"], self._result["report"]
         )
+        self.progress.update(BUILDING, 0, 0)
+        save_stage_times(self._cache.root, self._kind, self.progress.seconds, self.progress.frames)
         limit = preferences()
         self._cache.prune((limit.cache_limit_gb if limit else 2) * 10**9)
         self._worker.close()

@@ -208,7 +208,7 @@ class SCOPE_OT_cancel(bpy.types.Operator):
         seconds = time.monotonic() - state.started
         if seconds <= ASK_AFTER_S or bpy.app.background:
             return self.execute(context)
-        from ...job.progress import duration
+        from ...job.progress.job_progress import duration
 
         outcome: set[str] = context.window_manager.invoke_confirm(
             self,

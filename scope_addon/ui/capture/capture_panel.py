@@ -21,7 +21,7 @@ from .captures import draw_captures, people_of, people_text, shown_capture
 from .frame_rate_operators import differs, keyed_for
 
 if TYPE_CHECKING:
-    from ...job.progress import JobProgress
+    from ...job.progress.job_progress import JobProgress
 
 _PIXELS_PER_CHARACTER = 7.0
 
@@ -246,7 +246,7 @@ def _draw_figures(context: bpy.types.Context, layout: bpy.types.UILayout, result
     seconds = result.frames / result.frames_per_second if result.frames_per_second else 0.0
     frames = iface_("{count} frame" if result.frames == 1 else "{count} frames", count=result.frames)
     if seconds:
-        from ...job.progress import duration
+        from ...job.progress.job_progress import duration
 
         frames = iface_("{frames}, captured in {time}", frames=frames, time=duration(seconds))
     draw_text(context, column, frames, "TIME")

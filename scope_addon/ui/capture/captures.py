@@ -6,12 +6,21 @@ The result is stored with the collection, so it is saved, undone, appended, link
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import bpy
+from bpy.props import StringProperty
 
 from ..captured_person import captured_armature
 from ..reporting import iface_
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
 CAPTURE = "scope_capture"  # custom property that ``scene.build`` gives to a capture's collection
+# Widths in pixels at a scale of 1: what surrounds a row of the list in the sidebar, an icon, and what the text may be.
+_AROUND, _ICON, _DEFAULT_WIDTH = 62.0, 22.0, 260.0
+_PADDING, _WIDE = 10.0, 340.0  # of a text; of a sidebar with room for the words beside the number of people
 
 
 def captures_of(scene: bpy.types.Scene) -> list[bpy.types.Collection]:
@@ -68,12 +77,58 @@ def _make_active(capture: bpy.types.Collection) -> None:
     layer.objects.active = people[0]
 
 
+def elided(text: str, width: float, measure: Callable[[str], float]) -> str:
+    """Return a text that fits into a width, without its middle if need be: the beginning and end tell names apart.
+
+    :param measure: returns the width of a text.
+    """
+    if measure(text) <= width:
+        return text
+    for kept in range(len(text) - 1, 0, -1):
+        short = f"{text[: (kept + 1) // 2]}…{text[len(text) - kept // 2 :]}"
+        if measure(short) <= width:
+            return short
+    return "…"
+
+
+def _text_width(text: str) -> float:
+    """Return the width of a text in the interface's font, in pixels at a scale of 1."""
+    import blf
+
+    blf.size(0, float(bpy.context.preferences.ui_styles[0].widget.points))
+    return float(blf.dimensions(0, text)[0])
+
+
+class SCOPE_OT_show_capture(bpy.types.Operator):
+    """Show this capture"""
+
+    bl_idname = "scope.show_capture"
+    bl_label = "Show Capture"
+    bl_options = {"UNDO", "INTERNAL"}
+
+    name: StringProperty(name="Name", description="Name of the capture's collection")
+
+    @classmethod
+    def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
+        """Return the whole name, which the list may have no room for."""
+        return str(properties.name)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Select it in the list."""
+        capture = bpy.data.collections.get(self.name)
+        if capture not in captures_of(context.scene):
+            return {"CANCELLED"}
+        context.scene.scope.capture = capture
+        _make_active(capture)
+        return {"FINISHED"}
+
+
 class SCOPE_UL_captures(bpy.types.UIList):
     """The captures of the scene."""
 
     def draw_item(
         self,
-        _context: bpy.types.Context,
+        context: bpy.types.Context,
         layout: bpy.types.UILayout,
         _data: bpy.types.BlendData,
         item: bpy.types.Collection,
@@ -81,13 +136,30 @@ class SCOPE_UL_captures(bpy.types.UIList):
         _settings: bpy.types.PropertyGroup,
         _active_property: str,
     ) -> None:
-        """Draw one capture: its name, its people, and whether it has warnings; grey without an armature."""
+        """Draw one capture: its name, its people, and whether it has warnings; grey without an armature.
+
+        A name that is too long is drawn without its middle, and whole in its tooltip.
+        """
         people, result = people_of(item), item.scope_result
-        row = layout.split(factor=0.6, align=True)
+        scale = context.preferences.system.ui_scale
+        sidebar = context.region.width / scale if context.region else _DEFAULT_WIDTH
+        text = people_text(len(people)) if people else iface_("removed")
+        if people and sidebar < _WIDE:
+            text = str(len(people))
+        beside = _text_width(text) + 2 * _ICON + _PADDING
+        width = max(sidebar - _AROUND, 2 * beside)
+        row = layout.split(factor=1.0 - beside / width, align=True)
         row.active = bool(people)
-        row.prop(item, "name", text="", emboss=False, icon="OUTLINER_COLLECTION" if people else "GHOST_DISABLED")
+        icon = "OUTLINER_COLLECTION" if people else "GHOST_DISABLED"
+        name = elided(item.name, width - beside - _ICON - _PADDING, _text_width)
+        if name == item.name:
+            row.prop(item, "name", text="", emboss=False, icon=icon)
+        else:
+            cell = row.row(align=True)
+            cell.alignment = "LEFT"
+            cell.operator("scope.show_capture", text=name, translate=False, emboss=False, icon=icon).name = item.name
         details = row.row(align=True)
-        details.label(text=people_text(len(people)) if people else iface_("removed"))
+        details.label(text=text, translate=False, icon="OUTLINER_OB_ARMATURE" if people else "NONE")
         details.label(text="", icon="ERROR" if people and len(result.warnings) else "BLANK1")
 
     def filter_items(
@@ -112,4 +184,4 @@ def draw_captures(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
         )
 
 
-CLASSES = (SCOPE_UL_captures,)
+CLASSES = (SCOPE_OT_show_capture, SCOPE_UL_captures)

@@ -76,7 +76,8 @@ class SCOPE_OT_add_pin(EditOperator):
     in_image: BoolProperty(
         name="In the Image",
         default=False,
-        description="Pin the joint only in the camera's image; its distance from the camera is free",
+        description="Pin the joint only in the camera's image; its distance from the camera is free, except the "
+        "pelvis's",
     )
     reach: FloatProperty(
         name="Reach",

@@ -27,6 +27,7 @@ _SIDED = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "foot")
 HANDLES = ("head", "pelvis", *(f"{side}_{name}" for side in ("left", "right") for name in _SIDED))
 _RADIUS, _NEAR, _MOVED = 6.0, 16.0, 3.0  # pixels
 _FREE, _HOVERED, _PINNED, _LINE = (1.0, 1.0, 1.0, 0.8), (1.0, 0.8, 0.2, 1.0), (0.9, 0.2, 0.2, 1.0), (1.0, 0.8, 0.2, 0.9)
+_MISSED = (1.0, 0.5, 0.1, 1.0)
 _HELP = "Drag a handle to where the joint is.  Scrub or play to go to other frames.  Esc or Enter: done"
 
 
@@ -127,6 +128,7 @@ class SCOPE_OT_pin_limb(bpy.types.Operator):
         if event.type == "LEFTMOUSE" and event.value == "PRESS" and inside:
             session.hovered = _nearest(session, area, region)
             session.dragged, session.start = session.hovered, session.mouse
+            context.workspace.status_text_set(iface_(_HELP))  # in place of the last pin's warnings
             busy = bool(session.dragged)
         elif event.type == "LEFTMOUSE" and event.value == "RELEASE" and busy:
             self._drop(context, area, region)
@@ -168,7 +170,9 @@ class SCOPE_OT_pin_limb(bpy.types.Operator):
             self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
             return
         for warning in last_pin_warnings:
-            self.report({"WARNING"}, warning)
+            self.report({"WARNING"}, warning)  # in Blender's log: its status bar shows the tool's text in place of it
+        if last_pin_warnings:
+            context.workspace.status_text_set("  ".join(last_pin_warnings))
 
 
 def _redraw() -> None:
@@ -223,7 +227,8 @@ def _draw(session: _Session) -> None:
         return  # only evaluated objects know in which local views they are
     here = context.area.as_pointer() == session.area
     frame, scale = context.scene.frame_current, context.preferences.system.ui_scale
-    pinned = {e["joint"] for e in listed_corrections(armature) if e["kind"] == "PIN" and e["first"] == frame}
+    pins = [e for e in listed_corrections(armature) if e["kind"] == "PIN" and e["first"] == frame]
+    missed = {e["joint"]: e["missed"] for e in pins}  # how far away the joint stays; empty where it does not
     gpu.state.blend_set("ALPHA")
     for name, place in _joint_positions(session).items():
         at = location_3d_to_region_2d(context.region, context.region_data, place)
@@ -233,13 +238,19 @@ def _draw(session: _Session) -> None:
             target = (at[0] + session.mouse[0] - session.start[0], at[1] + session.mouse[1] - session.start[1])
             draw_line([tuple(at), target], _LINE)
             draw_disc(target, 1.4 * _RADIUS * scale, _HOVERED)
-        color = _HOVERED if name == session.hovered else _PINNED if name in pinned else _FREE
+        color = _FREE if name not in missed else _MISSED if missed[name] else _PINNED
+        if name == session.hovered:
+            color = _HOVERED
         draw_disc(tuple(at), (1.3 if name == session.hovered else 1.0) * _RADIUS * scale, color)
-        if here and name in (session.hovered, session.dragged):
+        label = iface_(name.replace("_", " ").title()) if here and name in (session.hovered, session.dragged) else ""
+        if label or missed.get(name):
+            blf.enable(0, blf.SHADOW)  # over light footage
+            blf.shadow(0, 5, 0.0, 0.0, 0.0, 0.9)
             blf.size(0, 13 * scale)
-            blf.color(0, 1.0, 1.0, 1.0, 1.0)
+            blf.color(0, *(_MISSED if missed.get(name) else (1.0, 1.0, 1.0, 1.0)))
             blf.position(0, at[0] + 14 * scale, at[1] + 8 * scale, 0)
-            blf.draw(0, iface_(name.replace("_", " ").title()))
+            blf.draw(0, "  ".join(filter(None, (label, missed.get(name)))))
+            blf.disable(0, blf.SHADOW)
     gpu.state.blend_set("NONE")
 
 

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that correct what is upright in the world, by a line in the footage."""
+"""Operators that correct what is upright in the world, by a line in the footage or in a view from the side."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import bpy
@@ -19,7 +20,11 @@ from .pointer import Pointer
 if TYPE_CHECKING:
     from ....solver.body import Body
 
-_HELP = "Draw a line along something that is upright: a door, a wall's edge, a post.  Esc: cancel"
+_HELP = (
+    "Draw a line along something that is upright: a door or post in the footage, or somebody who stands in a view from "
+    "the side.  Esc: cancel"
+)
+_NAVIGATION = ("MIDDLEMOUSE", "WHEEL", "TRACKPAD", "NUMPAD")  # how the types of events begin that move a view
 
 
 class SCOPE_OT_set_upright(CorrectionOperator):
@@ -43,28 +48,67 @@ class SCOPE_OT_set_upright(CorrectionOperator):
         return ""
 
 
+class SCOPE_OT_set_upright_in_view(CorrectionOperator):
+    """Turn the capture and its camera so that a line in an orthographic view from a side is upright"""
+
+    bl_idname = "scope.set_upright_in_view"
+    bl_label = "Set Upright in View"
+
+    start: FloatVectorProperty(name="Start", size=3, subtype="TRANSLATION", description="Point of the scene")
+    end: FloatVectorProperty(name="End", size=3, subtype="TRANSLATION", description="Point of the scene")
+    direction: FloatVectorProperty(
+        name="Direction", size=3, default=(0.0, 1.0, 0.0), description="Direction of the scene in which the view looks"
+    )
+
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+        """Move everybody of the capture, and the camera."""
+        import numpy as np
+
+        from ...edit.pins.corrections import Upright, added
+        from ...edit.pins.upright import upright_transform_in_view
+        from ...scene.character.corrections.corrected_keys import captured_points
+
+        scene, motion = context.scene, motion_of(armature)
+        points = np.array([self.start, self.end, self.start])
+        points[2] += self.direction
+        current = scene.frame_current + scene.frame_subframe
+        start, end, beyond = captured_points(armature, current, points)
+        transform = upright_transform_in_view(motion, body, (start, end), beyond - start)
+        change_world(scene, armature, rate, lambda present: added(present, Upright.of(transform)))
+        return ""
+
+
+@dataclass
+class _Line:
+    """The line that is drawn: its ends in pixels of a region, and the address of the region's viewport."""
+
+    ends: list[tuple[float, float]] = field(default_factory=list)
+    area: int = 0
+
+
 class SCOPE_OT_upright_line(bpy.types.Operator):
-    """Draw a line in the footage along something that is upright; the capture and its camera turn with it"""
+    """Draw a line in the footage or from a side along what is upright; the capture and its camera turn with it"""
 
     bl_idname = "scope.upright_line"
     bl_label = "Upright Line"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Require the view through the capture's camera."""
+        """Require a viewport in which the line can be drawn."""
         space = context.space_data
-        if space is None or space.type != "VIEW_3D" or space.region_3d.view_perspective != "CAMERA":
-            cls.poll_message_set(tip_("Press Compare with Footage first: the line is drawn in the footage"))
+        areas = context.window.screen.areas if context.window else ()
+        if space is None or space.type != "VIEW_3D" or not any(_takes_line(context.scene, area) for area in areas):
+            cls.poll_message_set(
+                tip_("Press Compare with Footage, or show an orthographic view from a side: the line is drawn there")
+            )
             return False
-        return may_edit(cls, context) and context.scene.camera == camera_of(context.scene)
+        return may_edit(cls, context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Wait for the line."""
-        self._area = context.area.as_pointer()
-        self._line: list[tuple[float, float]] = []
+        self._line = _Line()
         self._pointer = Pointer()
-        draw = bpy.types.SpaceView3D.draw_handler_add
-        self._handler = draw(_draw, (self._line, self._area), "WINDOW", "POST_PIXEL")
+        self._handler = bpy.types.SpaceView3D.draw_handler_add(_draw, (self._line,), "WINDOW", "POST_PIXEL")
         context.workspace.status_text_set(iface_(_HELP))
         context.window.cursor_modal_set("CROSSHAIR")
         context.window_manager.modal_handler_add(self)
@@ -72,22 +116,27 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Follow the mouse."""
-        viewport = viewport_of(self._area)
+        line = self._line
+        x, y = self._pointer.place(event)
+        if event.type in ("ESC", "RIGHTMOUSE") and event.value == "PRESS":
+            self.cancel(context)
+            return {"CANCELLED"}
+        if not line.ends:
+            area = _area_at(context, x, y) if event.type == "LEFTMOUSE" and event.value == "PRESS" else None
+            if area is not None:
+                line.area = area.as_pointer()
+                _, region = viewport_of(line.area) or (None, None)
+                line.ends = [(x - region.x, y - region.y)] * 2 if region is not None else []
+            return {"PASS_THROUGH"} if event.type.startswith(_NAVIGATION) else {"RUNNING_MODAL"}
+        viewport = viewport_of(line.area)
         if viewport is None:
             self.cancel(context)
             return {"CANCELLED"}
         area, region = viewport
-        x, y = self._pointer.place(event)
-        mouse = (x - region.x, y - region.y)
-        if event.type in ("ESC", "RIGHTMOUSE") and event.value == "PRESS":
-            self.cancel(context)
-            return {"CANCELLED"}
-        if event.type == "LEFTMOUSE" and event.value == "PRESS":
-            self._line[:] = [mouse, mouse]
-        elif event.type == "MOUSEMOVE" and self._line:
-            self._line[1] = mouse
+        if event.type == "MOUSEMOVE":
+            line.ends[1] = (x - region.x, y - region.y)
             area.tag_redraw()
-        elif event.type == "LEFTMOUSE" and event.value == "RELEASE" and self._line:
+        elif event.type == "LEFTMOUSE" and event.value == "RELEASE":
             self.cancel(context)
             self._finish(context, area, region)
             return {"FINISHED"}
@@ -98,7 +147,7 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
         bpy.types.SpaceView3D.draw_handler_remove(self._handler, "WINDOW")
         context.workspace.status_text_set(None)
         context.window.cursor_modal_restore()
-        redraw_viewport(self._area)
+        redraw_viewport(self._line.area)
 
     def _finish(self, context: bpy.types.Context, area: bpy.types.Area, region: bpy.types.Region) -> None:
         """Set what is upright, which is a step to undo of its own."""
@@ -106,16 +155,38 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
 
         from ....solver.errors import ScopeError
 
-        view = area.spaces.active.region_3d
-        rays = [
-            region_2d_to_origin_3d(region, view, at) + 3.0 * region_2d_to_vector_3d(region, view, at)
-            for at in self._line
-        ]
+        view, ends = area.spaces.active.region_3d, self._line.ends
+        origins = [region_2d_to_origin_3d(region, view, at) for at in ends]
+        directions = [region_2d_to_vector_3d(region, view, at) for at in ends]
         try:
-            start, end = _pixels(context, rays)
-            bpy.ops.scope.set_upright("EXEC_DEFAULT", True, start=start, end=end)
+            if view.view_perspective == "CAMERA":
+                rays = [origin + 3.0 * along for origin, along in zip(origins, directions, strict=True)]
+                start, end = _pixels(context, rays)
+                bpy.ops.scope.set_upright("EXEC_DEFAULT", True, start=start, end=end)
+            else:
+                start, end = origins
+                use = bpy.ops.scope.set_upright_in_view
+                use("EXEC_DEFAULT", True, start=start, end=end, direction=directions[0])
         except (RuntimeError, ScopeError) as error:
             self.report({"ERROR"}, sentence(str(error).removeprefix("Error: ")))
+
+
+def _takes_line(scene: bpy.types.Scene, area: bpy.types.Area) -> bool:
+    """Return whether an area shows the footage through the capture's camera, or an orthographic view."""
+    if area.type != "VIEW_3D":
+        return False
+    perspective = area.spaces.active.region_3d.view_perspective
+    through_camera = perspective == "CAMERA" and scene.camera is not None and scene.camera == camera_of(scene)
+    return perspective == "ORTHO" or through_camera
+
+
+def _area_at(context: bpy.types.Context, x: int, y: int) -> bpy.types.Area | None:
+    """Return the area under the mouse, unless it takes no line or a sidebar, toolbar or header is there."""
+    for area in context.window.screen.areas:
+        shown = [r for r in area.regions if r.width > 1 and 0 <= x - r.x < r.width and 0 <= y - r.y < r.height]
+        if shown and all(r.type == "WINDOW" for r in shown) and _takes_line(context.scene, area):
+            return area
+    return None
 
 
 def _pixels(context: bpy.types.Context, points: list[object]) -> list[tuple[float, float]]:
@@ -139,9 +210,9 @@ def _pixels(context: bpy.types.Context, points: list[object]) -> list[tuple[floa
     return [(float(u[0]), float(u[1])), (float(v[0]), float(v[1]))]
 
 
-def _draw(line: list[tuple[float, float]], area: int) -> None:
-    if line and bpy.context.area is not None and bpy.context.area.as_pointer() == area:
-        draw_line(line, (1.0, 0.8, 0.2, 0.9))
+def _draw(line: _Line) -> None:
+    if line.ends and bpy.context.area is not None and bpy.context.area.as_pointer() == line.area:
+        draw_line(line.ends, (1.0, 0.8, 0.2, 0.9))
 
 
-CLASSES = (SCOPE_OT_set_upright, SCOPE_OT_upright_line)
+CLASSES = (SCOPE_OT_set_upright, SCOPE_OT_set_upright_in_view, SCOPE_OT_upright_line)

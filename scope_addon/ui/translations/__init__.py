@@ -2,7 +2,8 @@
 """The interface in other languages: one module per language, registered with ``bpy.app.translations``.
 
 Each module has two tables from the English text to its translation: ``OPERATORS`` for the labels of operators, which
-are buttons and menu entries, and ``TEXTS`` for everything else. Error messages of the solver stay English.
+are buttons and menu entries, and ``TEXTS`` for everything else. The texts of a capture's progress are in ``stages``.
+Error messages of the solver stay English.
 """
 
 from __future__ import annotations

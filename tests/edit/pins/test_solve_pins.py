@@ -98,11 +98,52 @@ def test_a_pin_at_the_joint_itself_changes_nothing():
     np.testing.assert_allclose(still.joints(BODY, BETAS), JOINTS, atol=2e-4)
 
 
-def test_a_dragged_pelvis_leaves_a_standing_foot_where_it_is():
+def standing():
+    """Somebody who stands with bent knees."""
     still = Clip(TRUTH.times, np.repeat(TRUTH.rotations[:1], T, axis=0), np.repeat(TRUTH.root[:1], T, axis=0))
     knees = [NAMES.index(name) for name in ("left_knee", "right_knee", "left_hip", "right_hip")]
     for joint, angle in zip(knees, (0.8, 0.8, -0.4, -0.4), strict=True):
         still.rotations[:, joint] = exp(np.array([angle, 0, 0]))
+    lowest = still.soles(BODY, BETAS)[..., 2].min()
+    return Clip(still.times, still.rotations, still.root - [0.0, 0.0, lowest])
+
+
+@pytest.mark.parametrize("height", [0.3, 1.0, 2.5])
+@pytest.mark.parametrize("down", [0.05, 0.1, 0.2])
+@pytest.mark.parametrize("joint", ["pelvis", "left_hip"])
+def test_a_body_that_is_pulled_down_in_the_image_bends_its_knees_in_place(joint, down, height):
+    still, number = standing(), NAMES.index(joint)
+    at, soles = still.joints(BODY, BETAS), still.soles(BODY, BETAS)
+    camera = level_camera(T)
+    camera[:, 2, 3] = height
+    shot = Shot(SHOT.frames, SHOT.times, camera, SHOT.intrinsics)
+    pin = Pin(45, joint, tuple(shot.project(45, at[45, number] - [0.0, 0.0, down])))
+    moved = resolve(still, BODY, BETAS, [pin], shot)
+    assert missed(moved, BODY, BETAS, pin, shot) < 0.5
+    change = moved.joints(BODY, BETAS) - at
+    assert np.abs(change[:, number, 1]).max() < 0.02  # the camera looks along y
+    assert abs(change[45, number, 2] + down) < 0.01
+    assert np.linalg.norm(moved.soles(BODY, BETAS) - soles, axis=-1).max() < 0.01
+
+
+@pytest.mark.parametrize("pitch", [20.0, 70.0])
+def test_a_pelvis_in_the_image_stays_at_its_depth_whatever_the_camera_looks_at(pitch):
+    at = JOINTS[45, 0]
+    camera = np.tile(np.eye(4), (T, 1, 1))
+    c, s = np.cos(np.radians(pitch)), np.sin(np.radians(pitch))
+    camera[:, :3, :3] = np.stack([[1.0, 0, 0], [0, -s, -c], [0, c, -s]], axis=1)
+    camera[:, :3, 3] = at - 3.0 * camera[0, :3, 2]
+    shot = Shot(SHOT.frames, SHOT.times, camera, SHOT.intrinsics)
+    u, v = shot.project(45, at)
+    pin = Pin(45, "pelvis", (u + 15.0, v + 15.0))
+    moved = resolve(TRUTH, BODY, BETAS, [pin], shot)
+    assert missed(moved, BODY, BETAS, pin, shot) < 0.5
+    along = [0.0, 1.0, 0.0] if pitch < 45 else camera[0, :3, 2]
+    assert abs((moved.joints(BODY, BETAS)[45, 0] - at) @ along) < 0.01
+
+
+def test_a_dragged_pelvis_leaves_a_standing_foot_where_it_is():
+    still = standing()
     at = still.joints(BODY, BETAS)
     pin = Pin(45, "pelvis", position=tuple(at[45, 0] + [0.03, 0.0, -0.06]))
     moved = resolve(still, BODY, BETAS, [pin], SHOT)

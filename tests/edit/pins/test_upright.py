@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A line that is upright corrects a tilted world."""
+"""A line that is upright, in the image or in a view from the side, corrects a tilted world."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from scope.scope_addon.edit.clip import clip_from_motion
 from scope.scope_addon.edit.pins.corrected_motion import distance_from_pin, shot_of, with_corrections
 from scope.scope_addon.edit.pins.corrections import Pin, Upright
 from scope.scope_addon.edit.pins.moved import moved_clip, moved_motion
-from scope.scope_addon.edit.pins.upright import upright_transform
+from scope.scope_addon.edit.pins.upright import upright_transform, upright_transform_in_view
 from scope.scope_addon.edit.smooth import smoothed
 from scope.scope_addon.errors import UsageError
 from scope.solver.rotations import exp
@@ -73,3 +73,47 @@ def test_an_upright_line_turns_every_smoothing_as_the_motion(strength):
 def test_a_line_that_cannot_be_upright_is_refused(line, says):
     with pytest.raises(UsageError, match=says):
         upright_transform(TRUTH, BODY, 20, line)
+
+
+def leaning(degrees=8.0):
+    """The truth in a world that leans towards the camera, and the post in it."""
+    tilt = np.eye(4)
+    tilt[:3, :3] = exp(np.radians([degrees, 0.0, 0.0]))
+    return moved_motion(TRUTH, BODY, tilt), POST @ tilt[:3, :3].T
+
+
+def tilt_of(motion):
+    """Degrees from the true up."""
+    up = motion.world_from_camera[0, :3, :3] @ TRUTH.world_from_camera[0, :3, :3].T
+    return np.degrees(np.arccos(up[2, 2]))
+
+
+@pytest.mark.parametrize("direction", [(1, 0, 0), (-1, 0, 0), (1, 0, -0.09), (1, 0.3, -0.09)])
+def test_a_line_from_the_side_corrects_a_lean_that_a_line_in_the_image_does_not(direction):
+    motion, post = leaning()
+    line = tuple(tuple(shot_of(motion).project(20, point)) for point in post)
+    assert tilt_of(moved_motion(motion, BODY, upright_transform(motion, BODY, 20, line))) > 7
+    nearer = np.array([2.0, -0.5])[:, None] * np.array(direction)  # drawn somewhere along the view's direction
+    transform = upright_transform_in_view(motion, BODY, post + nearer, np.array(direction, float))
+    fixed = moved_motion(motion, BODY, transform)
+    assert tilt_of(fixed) < (0.3 if direction[1] == 0 else 3.0)  # what is across is seen only from its side
+    post = post @ transform[:3, :3].T
+    across = np.cross(direction, [0.0, 0.0, 1.0])
+    assert abs((post[1] - post[0]) @ across) < 1e-3  # upright in that view
+    feet = clip_from_motion(BODY, motion, raw=False).soles(BODY, TRUTH.betas).reshape(-1, 3).mean(axis=0)
+    assert np.linalg.norm(transform[:3, :3] @ feet + transform[:3, 3] - feet) < 0.15  # about the floor under the person
+
+
+@pytest.mark.parametrize(
+    ("line", "direction", "says"),
+    [
+        (((0, 0, 0), (0, 0.02, 0.09)), (1, 0, 0), "shorter"),
+        (((0, 0, 0), (0.5, 0, 0.05)), (1, 0, 0), "shorter"),
+        (((0, 0, 0), (0, 1, 0.5)), (1, 0, 0), "from upright"),
+        (((0, 0, 0), (0, 1, 0)), (0, 0, -1), "from a side"),
+        (((0, 0, 0), (0, 0, 1)), (1, 0, -1), "from a side"),
+    ],
+)
+def test_a_line_in_a_view_that_cannot_be_upright_is_refused(line, direction, says):
+    with pytest.raises(UsageError, match=says):
+        upright_transform_in_view(TRUTH, BODY, np.array(line, float), np.array(direction, float))

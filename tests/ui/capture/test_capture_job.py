@@ -65,6 +65,24 @@ def test_a_result_is_built_shown_and_cached(fake_worker, footage):
     assert len(captures()) == 2
 
 
+def test_the_next_capture_of_a_kind_knows_how_long_the_stages_took(fake_worker, footage):
+    steps = "".join(f"send('progress', stage='finding the person', done={k}, total=10)\n" for k in range(11))
+    fake_worker(f"{steps}send('progress', stage='solving', done=1, total=10)\ntime.sleep(0.3)\nfinish()")
+    scene = bpy.context.scene
+    scene.scope.footage = str(footage)
+    assert bpy.ops.scope.capture() == {"FINISHED"}
+    for quality, known in (("BEST", True), ("FAST", False)):
+        scene.scope.quality = quality
+        job = CaptureJob(scene)
+        job.close()
+        assert bool(job.progress._earlier) == known
+    scene.scope.quality = "BEST"
+    footage.write_bytes(footage.read_bytes() + b" ")  # other footage of the same kind
+    job = CaptureJob(scene)
+    job.close()
+    assert 0.02 < job.progress._earlier["solving"] < 0.5
+
+
 def test_blender_does_not_wait_for_a_worker_that_is_ending(fake_worker, footage, tmp_path):
     fake_worker(f"finish()\nwhile not os.path.exists({str(tmp_path / 'end')!r}):\n    time.sleep(0.01)")
     bpy.context.scene.scope.footage = str(footage)

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
-from scope.scope_addon.job.progress import JobProgress, duration
+from scope.scope_addon.job.progress.job_progress import JobProgress, duration
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene.footage_strip import start_of, strips_of
 from scope.scope_addon.ui import drop
@@ -334,12 +334,18 @@ def test_progress_shows_stage_speed_and_remaining_time():
     progress = JobProgress(clock=lambda: now[0])
     assert progress.lines() == ["Starting"]
     progress.update("finding the person", 0, 100)
-    now[0] = 10.0
-    progress.update("finding the person", 50, 100)
+    for second in range(1, 4):
+        now[0] = float(second)
+        progress.update("finding the person", 5 * second, 100)
+    assert progress.lines() == ["Finding the person, 15 of 100", "5.0 frames/s"]
+    for second in range(4, 11):
+        now[0] = float(second)
+        progress.update("finding the person", 5 * second, 100)
     assert progress.frames_per_second == pytest.approx(5.0)
-    assert 0.3 < progress.fraction < 0.4
+    assert 0.4 < progress.fraction < 0.5
     assert progress.lines()[0] == "Finding the person, 50 of 100"
     assert progress.lines()[1].startswith("5.0 frames/s, ")
+    assert progress.lines()[1].endswith(" left")
     before = progress.fraction
     progress.update("finding the shape", 0, 0)
     assert progress.fraction > before
@@ -349,17 +355,19 @@ def test_progress_shows_stage_speed_and_remaining_time():
 def test_compiling_has_its_own_progress_and_no_remaining_time():
     now = [0.0]
     progress = JobProgress(clock=lambda: now[0])
-    for second in range(10, 51, 10):
+    for second in range(10, 51):
         now[0] = float(second)
         progress.update("finding the person", 2 * second, 100)
-    before, left = progress.fraction, progress.seconds_left
+    before = progress.fraction
+    assert progress.seconds_left is not None
     for second in range(50, 150):
         now[0] = float(second)
         progress.update("compiling the solver", second - 50, 100)
         assert progress.lines() == [f"Compiling the solver (first capture only), {second - 50} of 100"]
     progress.update("finding the shape", 1, 100)
     assert progress.fraction == pytest.approx(before, abs=0.01)
-    assert progress.seconds_left == pytest.approx(left, rel=0.1)
+    assert "finding the shape" not in progress.seconds
+    assert progress.seconds["finding the person"] == pytest.approx(40.0)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 
 import bpy
 import pytest
-from scope.scope_addon.ui.capture.captures import captures_of, people_of, shown_capture
+from scope.scope_addon.ui.capture.captures import captures_of, elided, people_of, shown_capture
 from scope.scope_addon.ui.captured_person import PERSON, captured_armature
 
 
@@ -175,3 +175,78 @@ def test_a_rig_finds_its_person_after_renaming(two):
     bpy.context.scene.scope.capture = bpy.data.collections["person"]
     bpy.data.collections["person"].objects.unlink(person)
     assert captured_armature(bpy.context) != person
+
+
+LONG = [f"2026-03-14_interview_camera_left_take_{k:03d}" for k in (1, 2)]
+
+
+def drawn(name: str, width: int) -> dict[str, list]:
+    """What the list draws of a capture in a sidebar of a width, by kind of widget."""
+    found: dict[str, list] = {"prop": [], "operator": [], "label": []}
+
+    class Layout:
+        active = alignment = None
+
+        def split(self, **_):
+            return self
+
+        row = split
+
+        def prop(self, data, prop, **_):
+            found["prop"].append(getattr(data, prop))
+
+        def operator(self, _name, text, **_):
+            properties = type("Properties", (), {"name": ""})()
+            found["operator"].append((text, properties))
+            return properties
+
+        def label(self, text, **_):
+            found["label"].append(text)
+
+    preferences = type("P", (), {"system": type("S", (), {"ui_scale": 1.0})()})()
+    context = type("C", (), {"preferences": preferences, "region": type("R", (), {"width": width})()})()
+    item = bpy.data.collections[name]
+    bpy.types.SCOPE_UL_captures.draw_item(None, context, Layout(), bpy.data, item, 0, None, "")
+    return found
+
+
+def test_long_names_are_told_apart_in_a_narrow_sidebar(two):
+    for former, name in zip(two, LONG, strict=True):
+        bpy.data.collections[former].name = name
+    texts = []
+    for name in LONG:
+        narrow = drawn(name, 260)
+        assert narrow["prop"] == []
+        [(text, properties)] = narrow["operator"]
+        assert properties.name == name  # the tooltip and what a click shows
+        assert bpy.types.SCOPE_OT_show_capture.description(bpy.context, properties) == name
+        assert "…" in text
+        assert text.startswith(LONG[0][:4])
+        assert 10 < len(text) < 30
+        assert drawn(name, 700)["prop"] == [name]
+        texts.append(text)
+    assert texts[0] != texts[1]
+    assert drawn(LONG[0], 260)["label"] == ["1", ""]
+    assert drawn(LONG[0], 700)["label"] == ["1 person", ""]
+
+
+def test_a_name_that_is_clicked_is_shown(two):
+    assert bpy.ops.scope.show_capture(name="person") == {"FINISHED"}
+    assert shown() == ("person", 1, "First")
+    assert captured_armature(bpy.context).name == "person"
+    bpy.data.collections.new("no capture")
+    assert bpy.ops.scope.show_capture(name="no capture") == {"CANCELLED"}
+    assert shown()[0] == "person"
+
+
+@pytest.mark.parametrize("width", range(0, 14))
+def test_a_text_without_its_middle_is_as_long_as_it_may_be(width):
+    text = elided("abcdefghij", width, len)
+    assert len(text) <= max(width, 1)
+    if 1 < width < 10:
+        assert len(text) == width
+        head, tail = text.split("…")
+        assert "abcdefghij".startswith(head)
+        assert "abcdefghij".endswith(tail)
+    elif width >= 10:
+        assert text == "abcdefghij"

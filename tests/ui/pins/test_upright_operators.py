@@ -5,12 +5,13 @@ import bpy
 import numpy as np
 import pytest
 from bpy_extras.object_utils import world_to_camera_view
-from mathutils import Vector
+from mathutils import Matrix, Vector
 from scope.scope_addon.edit.pins.corrected_motion import shot_of
 from scope.scope_addon.edit.pins.moved import moved_motion
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
 from scope.scope_addon.scene.character.correction_list import listed_corrections
+from scope.scope_addon.scene.packed_motion import pack_motion
 from scope.scope_addon.ui.captured_person import motion_of as stored_motion_of
 from scope.solver.rotations import exp
 
@@ -167,6 +168,59 @@ def test_the_line_of_one_person_is_that_of_everybody_of_the_capture():
     for person, expected in zip(people, before, strict=True):
         for name, values in everything(person).items():
             np.testing.assert_array_equal(values, expected[name], err_msg=str(name))
+
+
+@pytest.fixture
+def leaning(tmp_path):
+    """A walk captured by a camera whose world leans by 8 degrees towards it; the armature is turned and moved."""
+    tilt = np.eye(4)
+    tilt[:3, :3] = exp(np.radians([8.0, 0.0, 0.0]))
+    armature = captured(moved_motion(motion_of(walk(2.0)), BODY, tilt))
+    pack_motion(armature, moved_motion(motion_of(walk(2.0)), BODY, tilt).to_bytes())
+    place = Matrix.LocRotScale(Vector((3.0, 1.0, 0.0)), Matrix.Rotation(0.7, 3, "Z").to_quaternion(), None)
+    scene = bpy.context.scene
+    scene.camera = next(o for o in scene.objects if o.type == "CAMERA")
+    for obj in (armature, scene.camera):
+        obj.matrix_world = place @ obj.matrix_world
+    scene.render.resolution_x, scene.render.resolution_y = 640, 480
+    scene.frame_set(20)
+    view = place.to_3x3() @ Vector((1.0, 0.0, 0.0))
+    post = [place @ Vector(tilt[:3, :3] @ np.array(point)) for point in POST]
+    return armature, {"start": post[0] - 5 * view, "end": post[1] - 5 * view, "direction": view}
+
+
+def lean_of_camera():
+    """Degrees by which the scene's camera looks up or down."""
+    ahead = bpy.context.scene.camera.matrix_world.to_3x3() @ Vector((0, 0, -1))
+    return abs(np.degrees(np.arcsin(ahead.z)))
+
+
+def test_a_line_from_the_side_turns_person_and_camera_until_it_is_removed(leaning):
+    armature, line = leaning
+    before, seen = everything(armature), in_image(armature)
+    assert lean_of_camera() > 7
+    bpy.context.scene.frame_set(20)
+    bpy.ops.scope.set_upright_in_view(**line)
+    assert kinds(armature) == ["UPRIGHT"]
+    assert lean_of_camera() < 0.1
+    np.testing.assert_allclose(in_image(armature), seen, atol=2e-3)
+    for strength in (0.0, 2.5, 1.0):
+        bpy.ops.scope.smooth(strength=strength)
+    np.testing.assert_allclose(in_image(armature), seen, atol=2e-3)
+    bpy.ops.scope.remove_correction(index=0)
+    for name, values in everything(armature).items():
+        np.testing.assert_allclose(values, before[name], atol=1e-6, err_msg=str(name))
+
+
+def test_a_line_in_a_view_from_above_is_refused(leaning):
+    armature, line = leaning
+    before = in_image(armature)
+    bpy.context.scene.frame_set(20)
+    with pytest.raises(RuntimeError, match="from a side"):
+        bpy.ops.scope.set_upright_in_view(**(line | {"direction": (0.0, 0.0, -1.0)}))
+    with pytest.raises(RuntimeError, match="from a side"):
+        bpy.ops.scope.set_upright_in_view(**(line | {"direction": (0.0, 0.0, 0.0)}))
+    np.testing.assert_array_equal(in_image(armature), before)
 
 
 def test_a_refused_line_changes_nothing(rig):

@@ -11,7 +11,7 @@ from typing import Any
 import bpy
 import scope
 from scope.scope_addon import ui
-from scope.scope_addon.job.progress import FIRST_ONLY, STAGES
+from scope.scope_addon.job.progress.job_progress import BUILDING, FIRST_ONLY, STAGES
 from scope.scope_addon.ui.pins.pin_tool import HANDLES
 from scope.scope_addon.ui.translations import CONTEXT
 
@@ -25,7 +25,7 @@ _CORRECTIONS = {
     *("Left Foot Stands", "Right Foot Stands", "Upright Line", "Floor", "Feet on the Floor", "Interpolated"),
     *(f"{what} Exchanged" for what in ("Left and Right", "Arms", "Legs")),
 }
-_STAGES = {stage.capitalize() for stage in (*STAGES, *FIRST_ONLY)}
+_STAGES = {stage.capitalize() for stage in (*STAGES, *FIRST_ONLY, BUILDING)}
 _LOOKUPS = {"iface_", "rpt_", "tip_", "translate"}
 _LAYOUT_TEXTS = {"text", "placeholder", "title", "message", "confirm_text"}
 
@@ -38,7 +38,7 @@ def interface_texts() -> set[Message]:
     for module in ui._MODULES:
         for cls in module.CLASSES:
             found |= set(_of_class(cls))
-    for path in [*(ROOT / "ui").rglob("*.py"), ROOT / "job" / "progress.py"]:
+    for path in [*(ROOT / "ui").rglob("*.py"), ROOT / "job" / "progress" / "job_progress.py"]:
         found |= set(_of_source(ast.parse(path.read_text(encoding="utf-8"))))
     return {(context, text) for context, text in found if any(map(str.isalpha, text)) and text not in UNTRANSLATED}
 

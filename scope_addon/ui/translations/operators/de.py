@@ -57,6 +57,8 @@ OPERATORS = {
     "Save Bone Map": "Knochenzuordnung speichern",
     "Set Frame Rate from Footage": "Bildrate vom Filmmaterial übernehmen",
     "Set Upright": "Senkrechte setzen",
+    "Set Upright in View": "Senkrechte in Ansicht setzen",
+    "Show Capture": "Erfassung zeigen",
     "Side View": "Seitenansicht",
     "Smooth Motion": "Bewegung glätten",
     "Snap Feet to Floor": "Füße auf den Boden setzen",

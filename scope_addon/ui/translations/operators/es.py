@@ -57,6 +57,8 @@ OPERATORS = {
     "Save Bone Map": "Guardar mapa de huesos",
     "Set Frame Rate from Footage": "Usar la velocidad de la filmación",
     "Set Upright": "Definir la vertical",
+    "Set Upright in View": "Definir la vertical en la vista",
+    "Show Capture": "Mostrar captura",
     "Side View": "Vista lateral",
     "Smooth Motion": "Suavizar movimiento",
     "Snap Feet to Floor": "Ajustar pies al suelo",

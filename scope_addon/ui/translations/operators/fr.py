@@ -57,6 +57,8 @@ OPERATORS = {
     "Save Bone Map": "Enregistrer la table des os",
     "Set Frame Rate from Footage": "Reprendre la fréquence du métrage",
     "Set Upright": "Définir la verticale",
+    "Set Upright in View": "Définir la verticale dans la vue",
+    "Show Capture": "Afficher la capture",
     "Side View": "Vue de profil",
     "Smooth Motion": "Lisser le mouvement",
     "Snap Feet to Floor": "Poser les pieds au sol",

@@ -57,6 +57,8 @@ OPERATORS = {
     "Save Bone Map": "ボーンマップを保存",
     "Set Frame Rate from Footage": "フッテージのフレームレートに設定",
     "Set Upright": "垂直を設定",
+    "Set Upright in View": "ビューで垂直を設定",
+    "Show Capture": "キャプチャを表示",
     "Side View": "側面ビュー",
     "Smooth Motion": "モーションをスムーズに",
     "Snap Feet to Floor": "足を床にスナップ",

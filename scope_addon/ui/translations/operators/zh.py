@@ -57,6 +57,8 @@ OPERATORS = {
     "Save Bone Map": "保存骨骼映射",
     "Set Frame Rate from Footage": "采用素材帧率",
     "Set Upright": "设置竖直",
+    "Set Upright in View": "在视图中设置竖直",
+    "Show Capture": "显示捕捉",
     "Side View": "侧视图",
     "Smooth Motion": "平滑动作",
     "Snap Feet to Floor": "双脚吸附到地面",

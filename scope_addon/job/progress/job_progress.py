@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The progress of a job: completed fraction, frames per second, remaining time."""
+
+from __future__ import annotations
+
+import time
+from bisect import bisect_right
+from collections.abc import Callable, Mapping
+
+from ...capture.stages.clock import COMPILING
+
+# Share of the total time that each stage of a capture takes, in order; measured on clips of 5 to 10 seconds.
+STAGES = {
+    "starting": 0.06,
+    "finding the person": 0.76,
+    "finding the shape": 0.07,
+    "solving": 0.02,
+    "solving the clip": 0.06,
+    "solving each frame": 0.02,
+    "writing": 0.01,
+}
+
+
+# Stages that only the first capture after installation has; they take none of the others' shares.
+FIRST_ONLY = (COMPILING,)
+BUILDING = "building the scene"  # after the worker has ended
+
+_FINDING = "finding the person"  # the stage whose speed those after it are estimated by
+_MEASURED_S, _MEASURED_STEPS = 4.0, 12  # of a stage, before its speed is believed
+_STEADY = 1.5  # largest ratio between the speeds of the last two thirds of that time
+_MOST_MARKS = 512
+
+
+class JobProgress:
+    """Convert the worker's progress messages to what the panel shows."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic, earlier: Mapping[str, float] | None = None) -> None:
+        """Begin at 0.
+
+        :param clock: returns the time in seconds.
+        :param earlier: seconds for each frame of the stages of an earlier capture of the same kind, if there was one.
+        """
+        self._clock = clock
+        self._earlier = dict(earlier or {})
+        self._stage_start = clock()
+        self._stage_first = 0  # frames done when the stage began
+        self._marks: list[tuple[float, int]] = []  # of this stage: times, and what was done then
+        self._repeated = False  # whether stages run for a second person
+        self.seconds: dict[str, float] = {}  # of each stage that has ended
+        self.frames = 0  # of the footage, as far as known
+        self.stage, self.done, self.total = "starting", 0, 0
+        self.fraction = 0.0  # of the whole job, 0..1; it never decreases, although stages repeat for each person
+
+    def update(self, stage: str, done: int, total: int) -> None:
+        """Take one progress message of the worker: ``done`` of ``total``, which is 0 if unknown."""
+        now = self._clock()
+        if stage != self.stage:
+            self.seconds[self.stage] = self.seconds.get(self.stage, 0.0) + now - self._stage_start
+            self._repeated |= stage in self.seconds and stage in STAGES
+            self.stage, self._stage_start, self._stage_first, self._marks = stage, now, done, []
+        self.done, self.total = done, total
+        if stage == _FINDING:
+            self.frames = total
+        self._marks.append((now, done))
+        if len(self._marks) > _MOST_MARKS:
+            del self._marks[1:-1:2]
+        self.fraction = max(self.fraction, self._fraction_at_stage())
+
+    def _fraction_at_stage(self) -> float:
+        """Return the completed fraction of the job. A stage without a total counts as not begun."""
+        if self.stage not in STAGES:
+            return 0.0
+        names = list(STAGES)
+        before = sum(STAGES[n] for n in names[: names.index(self.stage)])
+        within = min(1.0, self.done / self.total) if self.total > 0 else 0.0
+        return min(1.0, before + STAGES[self.stage] * within)
+
+    @property
+    def frames_per_second(self) -> float | None:
+        """Speed of the current stage; None until it can be measured."""
+        elapsed, frames = self._clock() - self._stage_start, self.done - self._stage_first
+        is_measured = self.total > 1 and frames > 0 and elapsed > 0.5 and self.stage not in FIRST_ONLY
+        return frames / elapsed if is_measured else None
+
+    @property
+    def seconds_left(self) -> float | None:
+        """Estimated remaining time of the job; None until it is known to about a half.
+
+        It is what the stage still takes at its own speed, and what those after it took in an earlier capture of the
+        same kind, or else their usual part of the time that finding the person takes. The time before a stage's first
+        frame, as for loading the networks, says nothing about what is left.
+        """
+        if self.stage not in STAGES or self.stage == "starting":
+            return None
+        here = self._left_in_stage()
+        if here is None or (self._repeated and not self._earlier):
+            return None
+        names = list(STAGES)
+        after = [self._expected(name) for name in names[names.index(self.stage) + 1 :]]
+        return None if None in after else here + sum(filter(None, after))
+
+    def _left_in_stage(self) -> float | None:
+        if self.total > 0 and (speed := self._steady_speed()) is not None:
+            return max(0, self.total - self.done) / speed
+        expected = self._expected(self.stage) if self._earlier and self.stage != _FINDING else None
+        return None if expected is None else max(0.0, expected - (self._clock() - self._stage_start))
+
+    def _steady_speed(self) -> float | None:
+        """Return the speed of the stage in the last third of its time so far; None if it is not steady yet.
+
+        The first third does not count: the networks' first frames take longer.
+        """
+        start, first = self._marks[0] if self._marks else (self._stage_start, 0)
+        now = self._clock()
+        if now - start < _MEASURED_S or self.done - first < _MEASURED_STEPS:
+            return None
+        third = (now - start) / 3.0
+        marks = [self._marks[bisect_right(self._marks, (start + k * third, 1 << 60)) - 1][1] for k in (1, 2)]
+        before, after = marks[1] - marks[0], self.done - marks[1]
+        if min(before, after) <= 0 or max(before, after) > _STEADY * min(before, after):
+            return None
+        return after / third
+
+    def _expected(self, stage: str) -> float | None:
+        """Return how long a stage takes for the whole footage; None if that is not known."""
+        if self._earlier:
+            return self._earlier.get(stage, 0.0) * self.frames
+        speed = self._steady_speed() if self.stage == _FINDING else None
+        if speed is not None:
+            finding = self.frames / speed
+        elif _FINDING in self.seconds:
+            finding = self.seconds[_FINDING]
+        else:
+            return None
+        return finding * STAGES[stage] / STAGES[_FINDING]
+
+    def lines(self, translate: Callable[[str], str] = str) -> list[str]:
+        """Return the lines to show: the stage, and speed and remaining time if they are known.
+
+        :param translate: returns a text in the user's language, with the same placeholders.
+        """
+        stage = translate(self.stage.capitalize())
+        if self.stage in FIRST_ONLY:
+            stage = translate("{stage} (first capture only)").format(stage=stage)
+        if self.total > 0:
+            stage = translate("{stage}, {done} of {total}").format(stage=stage, done=self.done, total=self.total)
+        lines = [stage]
+        speed, left = [], []
+        if rate := self.frames_per_second:
+            speed = [translate("{rate:.1f} frames/s").format(rate=rate)]
+        if self.seconds_left is not None:
+            left = [translate("{time} left").format(time=duration(self.seconds_left))]
+        if speed or left:
+            lines.append(", ".join(speed + left))
+        return lines
+
+
+def duration(seconds: float) -> str:
+    """Format a duration: ``45 s``, ``3 min 05 s``, ``1 h 02 min``."""
+    seconds = max(0, round(seconds))
+    if seconds < 60:
+        return f"{seconds} s"
+    if seconds < 3600:
+        return f"{seconds // 60} min {seconds % 60:02d} s"
+    return f"{seconds // 3600} h {seconds % 3600 // 60:02d} min"

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The remaining time, against what captures have really taken.
+
+`measured_progress.json` has the messages of captures: seconds, stage, done and total. The last is at the end.
+"""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scope.scope_addon.job.progress.job_progress import BUILDING, STAGES, JobProgress
+
+MEASURED = json.loads((Path(__file__).parent / "measured_progress.json").read_text("utf-8"))
+LAST_S = 2.0  # of a capture, in which the estimate does not matter any more
+
+
+def replayed(messages, earlier=None):
+    """Return the time, what is left in truth and the estimate at 400 times of a capture, and its progress."""
+    now, rest = [0.0], list(messages)
+    progress, found = JobProgress(lambda: now[0], earlier), []
+    end = messages[-1][0]
+    for t in np.linspace(0.0, end, 400, endpoint=False):
+        while rest and rest[0][0] <= t:
+            now[0], stage, done, total = rest.pop(0)
+            progress.update(stage, done, total)
+        now[0] = t
+        found.append((t, end - t, progress.seconds_left))
+    now[0] = end
+    progress.update(BUILDING, 0, 0)
+    return found, progress
+
+
+def of_each_frame(messages):
+    """Return the seconds of each stage for a frame, as they are kept for the next capture."""
+    progress = replayed(messages)[1]
+    return {stage: seconds / progress.frames for stage, seconds in progress.seconds.items()}
+
+
+@pytest.mark.parametrize("again", [False, True], ids=["first", "again"])
+@pytest.mark.parametrize("name", MEASURED)
+def test_the_remaining_time_is_right_to_about_a_half_whenever_it_is_shown(name, again):
+    found, _ = replayed(MEASURED[name], of_each_frame(MEASURED[name]) if again else None)
+    ratios = [estimate / left for _, left, estimate in found if estimate is not None and left > LAST_S]
+    assert 0.6 < min(ratios)
+    assert max(ratios) < 1.6
+    assert abs(np.median(ratios) - 1) < 0.3
+    shown = [estimate is not None for _, _, estimate in found]
+    assert np.mean(shown) > (0.45 if again else 0.3)
+
+
+@pytest.mark.parametrize("name", MEASURED)
+def test_captures_have_the_stages_whose_shares_the_bar_shows(name):
+    stages = [stage for _, stage, _, _ in MEASURED[name]]
+    assert set(stages) | {"starting"} == set(STAGES)
+    _, progress = replayed(MEASURED[name])
+    assert progress.fraction == pytest.approx(1.0 - STAGES["writing"])
+    end, took = MEASURED[name][-1][0], progress.seconds
+    for stage, share in STAGES.items():
+        assert abs(took.get(stage, 0.0) / end - share) < 0.12, stage
+
+
+def test_start_up_is_not_extrapolated():
+    now = [20.0]
+    progress = JobProgress(clock=lambda: now[0])
+    now[0] = 60.0  # loading the networks
+    progress.update("finding the person", 1, 1000)
+    assert progress.seconds_left is None
+    for second in range(1, 11):
+        now[0] = 60.0 + second
+        progress.update("finding the person", 1 + 10 * second, 1000)
+    assert 80 < progress.seconds_left < 130
+
+
+def test_a_stage_that_slows_down_has_no_remaining_time_until_it_is_steady():
+    now = [0.0]
+    progress = JobProgress(clock=lambda: now[0])
+    for k in range(200):  # what an earlier capture has kept is passed quickly
+        now[0] = 0.01 * k
+        progress.update("finding the person", k, 1000)
+    for k in range(200, 230):
+        now[0] += 0.5
+        progress.update("finding the person", k, 1000)
+        assert progress.seconds_left is None or progress.seconds_left > 250
+    for k in range(230, 300):
+        now[0] += 0.5
+        progress.update("finding the person", k, 1000)
+    assert progress.seconds_left == pytest.approx(0.5 * 700 * 1.3, rel=0.1)
+
+
+def test_stages_of_a_second_person_have_no_remaining_time_without_an_earlier_capture():
+    messages = [(1.0, "finding the person", 0, 100)]
+    messages += [(1.0 + 0.2 * k, "finding the person", k, 100) for k in range(101)]
+    messages += [(22.0, "finding the shape", 0, 0), (23.0, "solving", 1, 100)]
+    messages += [(24.0, "finding the shape", 0, 0)]
+    second = [(26.0 + 0.2 * k, "solving", k, 100) for k in range(60)]
+    found, _ = replayed([*messages, *second])
+    assert all(left is None for t, _, left in found if t > 24.0)
