@@ -27,7 +27,8 @@ from .processes import runs, wait_for
 
 FRAMES = 31  # of the sample clip up to --end 1, both ends included
 
-# Replaces the capture: the clip's text decides the outcome, and every call is logged in the folder of the clips.
+# Replaces the capture: the clip's text decides the outcome, and every call is logged in the folder of the clips. What
+# "hangs" runs until its standard input ends.
 PROGRAM = """
 import json, sys, pathlib
 clip = pathlib.Path(sys.argv[2])
@@ -42,6 +43,8 @@ if text == "broken":
     print("scope: warning: slow\\nscope: it is not a video", file=sys.stderr); sys.exit(1)
 if text == "crash":
     import os; os.abort()
+if text == "hangs":
+    sys.stdin.read(); sys.exit(130)
 print("Blender says something")
 for path in outputs:
     pathlib.Path(path).write_text("result of " + text)
@@ -59,11 +62,16 @@ def folder(tmp_path):
     return clips
 
 
-def calls(folder):
+def calls_so_far(folder):
     log = folder / "calls.log"
     lines = log.read_text().splitlines() if log.exists() else []
-    log.unlink(missing_ok=True)
     return sorted(Path(json.loads(line)[1]).name for line in lines)
+
+
+def calls(folder):
+    found = calls_so_far(folder)
+    (folder / "calls.log").unlink(missing_ok=True)
+    return found
 
 
 def batch(folder, out, options=None, suffixes=(".npz", ".glb")):
@@ -252,16 +260,20 @@ def test_names_are_unique_where_one_equals_another_clips_person(tmp_path):
 
 
 def test_an_interrupt_stops_the_running_clips_and_keeps_the_finished(folder, tmp_path):
+    (folder / "c.png").write_text("hangs")  # otherwise the third may end before the interrupt
+
     def interrupt(stage, done, total):
         if done == 2:
+            wait_for(lambda: len(calls_so_far(folder)) == 3)
             raise KeyboardInterrupt
 
     out = tmp_path / "out"
     with pytest.raises(KeyboardInterrupt):
         batch(folder, out).run(1, progress=interrupt)
     report = json.loads((out / REPORT_NAME).read_text())
-    assert len(report["files"]) == 2
-    calls(folder)
+    assert [entry["file"] for entry in report["files"]] == ["a.mp4", "b.mov"]
+    assert calls(folder) == ["a.mp4", "b.mov", "c.png"]
+    (folder / "c.png").write_text("nobody")
     batch(folder, out).run(1)
     assert "a.mp4" not in calls(folder)
 
