@@ -8,7 +8,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import av
@@ -394,7 +393,7 @@ def test_a_signal_whose_exception_is_lost_ends_the_batch_too(folder, tmp_path, m
 
     def runs_on(runner, task):
         signals.received.append(signal.SIGINT)
-        time.sleep(3)
+        wait_for(lambda: runner._processes._stopped)
         return {"status": "failed", "file": task.name, "message": ""}
 
     monkeypatch.setattr(LocalRunner, "_capture", runs_on)
