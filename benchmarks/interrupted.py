@@ -130,6 +130,7 @@ class Run:
         self.seen.setdefault(f"{stage} from", place)
         self.seen[stage] = place
         if stage == STAGE and done >= self._kill_at * total:
+            self._kill_at = np.inf  # what it had written before is still read, when its group may be gone
             os.killpg(self._process.pid, signal.SIGKILL)
 
     def _watch_memory(self) -> None:
