@@ -22,6 +22,7 @@ from scope.scope_addon.scene.export.export import export
 from scope.solver import learned_prior
 from scope.solver.loaders.body_file import BUILT_IN, GROWTH
 
+from .long_clip import played_again_and_again
 from .processes import runs, wait_for
 
 ROOT = START_SCRIPT.parents[2]
@@ -35,9 +36,10 @@ def folder(tmp_path):
     return tmp_path / "job"
 
 
-def test_an_isolated_worker_starts_and_reports(folder):
+def test_an_isolated_worker_starts_and_reports(folder, tmp_path):
     """-I ignores PYTHONPATH, the script's folder and the current folder, as inside Blender."""
-    worker = WorkerProcess(JobRequest(SAMPLE, quality="fast", threads=1), folder, None, [sys.executable, "-I"])
+    request = JobRequest(played_again_and_again(tmp_path / "long.mp4"), quality="fast", threads=1)
+    worker = WorkerProcess(request, folder, None, [sys.executable, "-I"])
     messages = []
     wait_for(lambda: messages.extend(worker.poll()) or {"progress", "preview"} <= {m["event"] for m in messages})
     assert all(m["event"] in {"progress", "preview"} for m in messages)
@@ -48,11 +50,12 @@ def test_an_isolated_worker_starts_and_reports(folder):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="looks at /proc")
-def test_the_worker_ends_when_its_parent_is_killed(folder):
+def test_the_worker_ends_when_its_parent_is_killed(folder, tmp_path):
+    footage = played_again_and_again(tmp_path / "long.mp4")
     code = (
         "import sys, time\nfrom pathlib import Path\n"
         "from scope.scope_addon.job.process import WorkerProcess, JobRequest\n"
-        f"worker = WorkerProcess(JobRequest({SAMPLE!r}), Path({str(folder)!r}), None)\n"
+        f"worker = WorkerProcess(JobRequest({footage!r}), Path({str(folder)!r}), None)\n"
         "while not worker.poll(): time.sleep(0.01)\n"
         "print(worker.pid, flush=True); time.sleep(600)"
     )

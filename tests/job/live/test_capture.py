@@ -5,7 +5,6 @@ import sys
 from dataclasses import replace
 from types import SimpleNamespace
 
-import av
 import numpy as np
 import pytest
 from scope.scope_addon.errors import VideoError
@@ -14,14 +13,12 @@ from scope.scope_addon.job.live.commands import RECORD, Commands
 from scope.scope_addon.job.live.process import LiveProcess
 from scope.scope_addon.job.live.request import LiveRequest
 from scope.scope_addon.job.messages import WorkerFailedError
-from scope.scope_addon.job.process import START_SCRIPT
 from scope.scope_addon.motion import Motion
 
 from ...live.fake_source import FakeSource
 from ...live.outputs.test_vmc import pose_of
+from ..long_clip import played_again_and_again
 from ..processes import wait_for
-
-SAMPLE = str(START_SCRIPT.parents[2] / "assets" / "sample" / "sample.mp4")
 
 
 @pytest.fixture
@@ -30,24 +27,8 @@ def folder(tmp_path):
     return tmp_path / "job"
 
 
-def played_again_and_again(path, rounds=20):
-    """Write the sample clip so often that it does not end before its eighth pose comes on a busy machine."""
-    with av.open(str(path), "w") as target:
-        stream = None
-        for number in range(rounds):
-            with av.open(SAMPLE) as source:
-                shown = source.streams.video[0]
-                stream = stream or target.add_stream_from_template(shown)
-                for packet in source.demux(shown):
-                    if packet.size:
-                        packet.pts += number * shown.duration
-                        packet.dts, packet.stream = packet.pts, stream
-                        target.mux(packet)
-    return str(path)
-
-
 def test_what_is_recorded_is_what_was_shown(folder, tmp_path, networks, body):
-    source = played_again_and_again(tmp_path / "long.mp4")
+    source = played_again_and_again(tmp_path / "long.mp4")  # the sample ends before the eighth pose on a busy machine
     live = LiveProcess(LiveRequest(source, reconnect_s=0.0, threads=1), folder, None, [sys.executable, "-I"])
     live.record()
     poses, result = [], []
