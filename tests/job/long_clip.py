@@ -16,9 +16,10 @@ def played_again_and_again(path: Path, rounds: int = 20) -> str:
         for number in range(rounds):
             with av.open(str(SAMPLE)) as source:
                 shown = source.streams.video[0]
+                assert shown.duration is not None
                 stream = stream or target.add_stream_from_template(shown)
                 for packet in source.demux(shown):
-                    if packet.size:
+                    if packet.size and packet.pts is not None:
                         packet.pts += number * shown.duration
                         packet.dts, packet.stream = packet.pts, stream
                         target.mux(packet)
