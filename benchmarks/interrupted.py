@@ -31,18 +31,21 @@ from typing import Any
 import av
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from ..scope_addon.capture.media.video import open_video
 from ..scope_addon.edit.clip import Clip, clip_from_motion
 from ..scope_addon.motion import Motion
 from ..solver import load_body
 from .frames import CACHE
+from .live.clips import write_video
+from .live.observed import there_and_back
 
 ROOT = Path(__file__).resolve().parents[1]
 CLIP = ROOT.parent / "shared" / "data" / "clips" / "walk_side_static.mp4"
 WHOLE = 150  # frames of it before one of the two people jumps off a roof
 WIDTH, HEIGHT, FPS = 1920, 1080, 30
+# So that packets can be repeated: no frame is predicted from a later one, and a round begins with a key frame.
+OPTIONS = {"preset": "ultrafast", "crf": "26", "x264-params": "bframes=0:keyint=120:scenecut=0:open-gop=0"}
 STAGE = "finding the person"
 _PROGRESS = re.compile(r"\r\x1b\[K(\w[\w ]*?) +\[[#.]*\] (\d+)/(\d+)(?=\r)")
 _INTERVAL_S = 0.5  # between two looks at the memory
@@ -59,23 +62,13 @@ def make_clip(path: Path, frames: int, source: Path = CLIP) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=path.parent) as folder:
         once = Path(folder) / "once.mp4"
-        _encode(once, images + images[-2:0:-1])
+        write_video(once, [images[k] for k in there_and_back(len(images))], Fraction(FPS), OPTIONS)
         with av.open(str(path), "w") as target:
             stream = None
             for index in range(0, frames, 2 * len(images) - 2):
                 with av.open(str(once)) as round_:
                     stream = stream or target.add_stream_from_template(round_.streams.video[0])
                     _append(target, stream, round_, range(index, frames))
-
-
-def _encode(path: Path, images: list[NDArray[np.uint8]]) -> None:
-    with av.open(str(path), "w") as target:
-        options = {"preset": "ultrafast", "crf": "26", "x264-params": "bframes=0:keyint=120:scenecut=0:open-gop=0"}
-        stream = target.add_stream("libx264", rate=FPS, options=options)
-        stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
-        for image in images:
-            target.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
-        target.mux(stream.encode())
 
 
 def _append(target: Any, stream: Any, round_: Any, numbers: range) -> None:
@@ -130,6 +123,7 @@ class Run:
         self.seen.setdefault(f"{stage} from", place)
         self.seen[stage] = place
         if stage == STAGE and done >= self._kill_at * total:
+            self._kill_at = np.inf  # what it had written before is still read, when its group may be gone
             os.killpg(self._process.pid, signal.SIGKILL)
 
     def _watch_memory(self) -> None:

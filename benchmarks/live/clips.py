@@ -21,6 +21,7 @@ from ..frames import CACHE
 from .observed import there_and_back
 
 FPS = 30
+OPTIONS = {"crf": "18", "preset": "veryfast"}  # of the encoder
 
 
 def there_and_back_clip(seconds: float, size: tuple[int, int] | None = None, source: Path = SAMPLE) -> Path:
@@ -39,7 +40,7 @@ def there_and_back_clip(seconds: float, size: tuple[int, int] | None = None, sou
     order = there_and_back(len(pictures))
     CACHE.mkdir(parents=True, exist_ok=True)
     with atomic_path(target) as temporary:
-        _write(temporary, fps, [pictures[order[k % len(order)]] for k in range(round(seconds * fps))])
+        write_video(temporary, [pictures[order[k % len(order)]] for k in range(round(seconds * fps))], fps, OPTIONS)
     return target
 
 
@@ -59,9 +60,13 @@ def there_and_back_truth(truth: Path, count: int, frames: int, target: Path) -> 
     np.savez(target, **(looped | {"frame_index": np.array(list(rows))}))
 
 
-def _write(path: Path, fps: Fraction, pictures: list[NDArray[np.uint8]]) -> None:
+def write_video(path: Path, pictures: list[NDArray[np.uint8]], fps: Fraction, options: dict[str, str]) -> None:
+    """Write RGB pictures as H.264 in an .mp4 file.
+
+    :param options: of the encoder.
+    """
     with av.open(str(path), "w", format="mp4") as container:
-        stream = container.add_stream("libx264", rate=fps, options={"crf": "18", "preset": "veryfast"})
+        stream = container.add_stream("libx264", rate=fps, options=options)
         stream.height, stream.width = pictures[0].shape[:2]
         stream.pix_fmt = "yuv420p"
         for picture in pictures:

@@ -20,8 +20,8 @@ from session import ARGUMENTS, FOOTAGE, OUT, addon, invoke, run, until, use
 
 
 def footage() -> Iterator[float]:
-    """Capture the footage, up to the middle; return what it does."""
-    bpy.context.scene.scope.quality = "FAST"
+    """Capture the footage, slowly enough not to end before Blender does; return what it does."""
+    bpy.context.scene.scope.quality = "BEST"
     bpy.ops.scope.choose_footage(filepath=FOOTAGE)
     use(bpy.ops.scope.capture, "INVOKE_DEFAULT")
     yield from until(lambda: addon().state.job is None or addon().state.job.progress.done > 5, 300, "the worker")

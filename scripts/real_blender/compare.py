@@ -56,11 +56,12 @@ def panel(video: Path, out: Path, shell_out: Path, report: dict) -> list[str]:
         problems.append(f"the body goes {-100 * report['lowest_skin_m']:.1f} cm under the floor")
     if report["mouse_chose"] != "FAST":
         problems.append("the mouse did not reach the panel's buttons")
-    if report["after_escape_elsewhere"] != {"capturing": True, "playing": False}:
+    if report["after_escape_elsewhere"] != {"capturing": True}:
         problems.append(f"Escape over the viewport: {report['after_escape_elsewhere']}")
     if report["left_after_cancel"]:
         problems.append(f"cancelling left {report['left_after_cancel']}")
-    if report["timer_gap_ms"]["p99"] > 1000:  # on a quiet machine it is below 100: see the figure above
+    # Below 100 on a quiet machine. Without a graphics card, drawing has to wait for what else runs.
+    if report["timer_gap_ms"]["p99"] > 1000 * max(1.0, report["load_per_core"]):
         problems.append("the window hung")
     if report["main_thread_ms"]["p99"] > 100:
         problems.append(f"Blender's main thread was busy: {report['main_thread_ms']}")

@@ -6,7 +6,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 
 import bpy
@@ -14,7 +14,9 @@ from session import OUT, addon, until, use
 
 ADDRESS, PORT = "http://127.0.0.1:8099/video", "8099"
 CLIENTS = OUT / "live_clients.txt"
-GONE_S = 1.0
+# What ends at once takes tenths of a second on an idle machine, and a drawing or two on a busy one; what waits for one
+# of the product's own time limits takes five seconds.
+GONE_S = 4.0
 report: dict = {}
 
 
@@ -28,11 +30,13 @@ def state():
     return module("live.live_state").state
 
 
-def camera() -> subprocess.Popen:
-    """Start the network camera."""
+def camera() -> Generator[float, None, subprocess.Popen]:
+    """Start the network camera, and wait until it answers."""
     script = str(Path(__file__).with_name("mjpeg_camera.py"))
-    CLIENTS.write_text("")
-    return subprocess.Popen([sys.executable, script, "/scope/pictures", PORT, str(CLIENTS)])
+    CLIENTS.unlink(missing_ok=True)
+    process = subprocess.Popen([sys.executable, script, "/scope/pictures", PORT, str(CLIENTS)])
+    yield from until(CLIENTS.exists, 60, "the network camera")
+    return process
 
 
 def clients() -> list[tuple[str, float]]:
@@ -41,8 +45,8 @@ def clients() -> list[tuple[str, float]]:
 
 
 def connection_closed(began: float, what: str) -> Iterator[float]:
-    """Check, by asking the camera, that nobody looked at it a second after something happened."""
-    yield from until(lambda: clients()[-1][0] == "left", 10, f"the connection to be closed after {what}")
+    """Check, by asking the camera, that nobody looked at it for long after something happened."""
+    yield from until(lambda: clients()[-1][0] == "left", 30, f"the connection to be closed after {what}")
     report.setdefault("connection_closed_s", {})[what] = seconds = round(clients()[-1][1] - began, 2)
     assert seconds < GONE_S, f"the connection was closed {seconds} s after {what}"
 
@@ -60,7 +64,7 @@ def start() -> Iterator[float]:
 
 
 def gone(worker, what: str) -> Iterator[float]:
-    """Check that a process ends within a second."""
+    """Check that a process ends at once."""
     began = time.monotonic()
     yield from until(lambda: not worker.alive, GONE_S, f"the process to end after {what}")
     report.setdefault("gone_s", {})[what] = round(time.monotonic() - began, 2)
@@ -69,14 +73,15 @@ def gone(worker, what: str) -> Iterator[float]:
 
 def moving() -> Iterator[float]:
     """Check that the body moves."""
-    seen = []
-    for _ in range(3):
-        yield from until(lambda: state().job.has_body, 5, "the body")
-        body = state().job._bodies[0].armature
-        seen.append(tuple(body.pose.bones["left_hip"].rotation_quaternion))
-        before = state().job.poses
-        yield from until(lambda before=before: state().job.poses > before, 5, "another pose")
-    assert len(set(seen)) == 3, seen
+    seen: set[tuple[float, ...]] = set()
+
+    def another() -> bool:
+        if state().job.has_body:
+            body = state().job._bodies[0].armature
+            seen.add(tuple(body.pose.bones["left_hip"].rotation_quaternion))
+        return len(seen) >= 3
+
+    yield from until(another, 30, "the body to move")
 
 
 def captures() -> list[bpy.types.Collection]:

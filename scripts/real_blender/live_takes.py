@@ -25,19 +25,21 @@ def recorded() -> Iterator[float]:
     yield from moving()
     settings = bpy.context.scene.scope_live
     settings.countdown_s, settings.with_scene = 1, True
+    pressed = time.monotonic()
     use(bpy.ops.scope.record_live)
     assert not state().job.recording
-    yield from until(lambda: state().job.recording, 5, "the end of the countdown")
+    yield from until(lambda: state().job.recording, 60, "the end of the countdown")
     began = time.monotonic()
-    yield from until(plays, 2, "the scene to play")
+    yield from until(plays, 60, "the scene to play")
     yield RECORDED_S
     picture("23_live_recording")
-    worker, recorded_s, began = state().job.worker, time.monotonic() - began, time.monotonic()
+    worker, stopped = state().job.worker, time.monotonic()
+    least_s = 0.5 * (stopped - began)
     use(bpy.ops.scope.stop_live)
-    yield from connection_closed(began, "Stop of a recording")
-    yield from until(lambda: not worker.alive, 30, "the recording")
-    report["recorded_and_gone_s"] = round(time.monotonic() - began, 2)
-    yield from until(lambda: state().job is None, 10, "the keys")
+    yield from connection_closed(stopped, "Stop of a recording")
+    yield from until(lambda: not worker.alive, 120, "the recording")
+    report["recorded_and_gone_s"] = round(time.monotonic() - stopped, 2)
+    yield from until(lambda: state().job is None, 60, "the keys")
     assert len(captures()) == 1, state().message
     assert not plays()
     person = next(o for o in captures()[0].all_objects if o.type == "ARMATURE")
@@ -45,7 +47,9 @@ def recorded() -> Iterator[float]:
     assert person.pose.bones["head"].custom_shape is not None
     first, last = person.animation_data.action.frame_range
     report["recorded_s"] = (last - first) / bpy.context.scene.render.fps
-    assert 0.5 * recorded_s < report["recorded_s"] < recorded_s + 1.0, (report["recorded_s"], recorded_s)
+    # On a busy machine, the end of the countdown is seen late, and the first pose comes late.
+    most_s = stopped - pressed + 1.0
+    assert least_s < report["recorded_s"] < most_s, (least_s, report["recorded_s"], most_s)
     yield 0.5
     picture("24_live_recorded")
     invoke(bpy.ops.ed.undo)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A network camera on this computer: JPEG pictures at 30 per second, again and again.
 
-Usage: ``mjpeg_camera.py FOLDER PORT CLIENTS``. A line is added to the file CLIENTS when a client comes, and when one
-has left: "came" or "left", and the time (seconds of the system's monotonic clock).
+Usage: ``mjpeg_camera.py FOLDER PORT CLIENTS``. The file CLIENTS is there once clients can come. A line is added to it
+when one has come, and when one has left: "came" or "left", and the time (seconds of the system's monotonic clock).
 """
 
 from __future__ import annotations
@@ -55,7 +55,9 @@ def main(folder: str, port: str, clients: str) -> None:
             """Say nothing."""
 
     enable_loopback()
-    ThreadingHTTPServer(("127.0.0.1", int(port)), Camera).serve_forever()
+    server = ThreadingHTTPServer(("127.0.0.1", int(port)), Camera)
+    Path(clients).touch()
+    server.serve_forever()
 
 
 if __name__ == "__main__":

@@ -68,8 +68,10 @@ def drag(joint: str, by: tuple[int, int], name: str = "") -> Iterator[float]:
     yield 1.5
     if name:
         picture(name)
+    count = len(listed())
     xdotool("mouseup", 1)
-    yield 2.5
+    yield from until(lambda: len(listed()) == count + 1, 30, f"the correction of {joint}")
+    yield 1.0
 
 
 def off(joint: str, target: tuple[float, float], area: bpy.types.Area | None = None) -> float:
@@ -193,13 +195,11 @@ def disabled() -> Iterator[float]:
     invoke(bpy.ops.scope.pin_limb, "INVOKE_DEFAULT")
     x, y = on_screen("head")
     xdotool(*move(x - 60, y), *move(x - 64, y))
-    yield 1.5
-    assert drawn("left_hip")
+    yield from until(lambda: drawn("left_hip"), 30, "the handles")
     name = next(a.module for a in bpy.context.preferences.addons if a.module.endswith(".scope"))
     bpy.ops.preferences.addon_disable(module=name)
     xdotool(*move(x - 60, y), *move(x - 64, y))
-    yield 1.5
-    assert not drawn("left_hip"), "the handles stay when the extension is disabled"
+    yield from until(lambda: not drawn("left_hip"), 30, "the handles to go with the extension")
 
 
 def drawn(joint: str, area: bpy.types.Area | None = None) -> bool:
@@ -227,24 +227,24 @@ def hidden_by_its_button() -> Iterator[float]:
         invoke(bpy.ops.scope.pin_limb, "INVOKE_DEFAULT")
         x, y = on_screen("head")
         xdotool(*move(x - 60, y), *move(x - 64, y))  # a tool ends at its next event
-        yield 1.5
-        assert tools() == expected, tools()
-        assert drawn("left_hip") == bool(expected)
+        yield from until(
+            lambda wanted=expected: tools() == wanted and drawn("left_hip") == bool(wanted), 30, f"{expected} tools"
+        )
 
 
 def dragged_in_side_view(joint: str, by: tuple[int, int]) -> Iterator[float]:
     """Drag a handle in the view from the side, which pins the joint in space."""
     use(bpy.ops.scope.side_view)
-    yield 2.0
+    yield 1.0
     area = next(a for a in viewport()["window"].screen.areas if a.type == "VIEW_3D" and a.spaces.active.lock_object)
-    assert drawn("left_hip")
-    assert drawn("left_hip", area)
+    yield from until(lambda: drawn("left_hip") and drawn("left_hip", area), 30, "the handles in both views")
     before, (x, y) = len(listed()), on_screen(joint, area)
     xdotool(*move(x - 3, y), *move(x, y), "mousedown", 1, "sleep", "0.3", *move(x + by[0] / 2, y + by[1] / 2))
     yield 2.0
     picture("pins_6_side_view")
     xdotool(*move(x + by[0], y + by[1]), "mouseup", 1)
-    yield 3.0
+    yield from until(lambda: len(listed()) > before, 30, "the correction in the side view")
+    yield 1.0
     assert [e["joint"] for e in listed()[before:]] == [joint], listed()
     report["dragged_in_side_view_px"] = off(joint, (x + by[0], y + by[1]), area)
     invoke(bpy.ops.ed.undo)
@@ -278,6 +278,7 @@ def dragged(was: tuple[float, float], by: tuple[int, int]) -> Iterator[float]:
         *move(x, y), "mousedown", 1, "sleep", "0.3", *move(x + 40, y), "key", "Escape", "sleep", "0.3", "mouseup", 1
     )
     yield 3.0
+    yield from until(lambda: off("left_wrist", target) < 2.5, 30, "the wrist to go back")
     assert len(listed()) == 1
     report["escaped_px"] = off("left_wrist", target)
     for strength in (0.0, 2.5, 1.0):
@@ -296,7 +297,8 @@ def dragged_while_busy(joint: str, by: tuple[int, int]) -> Iterator[float]:
     before, (x, y) = len(listed()), on_screen(joint)
     xdotool(*move(x - 3, y), *move(x, y), "mousedown", 1, *move(x + by[0], y + by[1]), "mouseup", 1)
     time.sleep(3.0)
-    yield 3.0
+    yield from until(lambda: len(listed()) > before, 30, "the correction of a drag that was over")
+    yield 1.0
     assert [e["joint"] for e in listed()[before:]] == [joint], listed()
     report["dragged_while_busy_px"] = off(joint, (x + by[0], y + by[1]))
     invoke(bpy.ops.ed.undo)

@@ -25,7 +25,10 @@ on_screen() { # a command, with a separate virtual screen
     local status=0
     Xvfb :7 -screen 0 1600x1000x24 >/dev/null 2>&1 &
     local screen=$!
-    sleep 2
+    until [ -S /tmp/.X11-unix/X7 ]; do # which it makes once it is ready
+        kill -0 $screen 2>/dev/null || { echo "run.sh: Xvfb has ended" >&2; return 1; }
+        sleep 0.1
+    done
     DISPLAY=:7 timeout -k 10 1500 "$@" >"$log" 2>&1 || status=$?
     kill $screen
     [ $status = 0 ] || tail -n 150 "$log" >&2

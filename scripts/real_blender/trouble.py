@@ -41,11 +41,16 @@ def nothing_left(when: str) -> None:
     assert not left, f"{when}, {left} are left"
 
 
-def begun(steps: int = 5) -> Iterator[float]:
-    """Start a capture that is in no cache, and wait until it is at work."""
+def begin() -> None:
+    """Start a capture that is in no cache."""
     shutil.rmtree(cache().root / "captures", ignore_errors=True)
     use(bpy.ops.scope.capture, "INVOKE_DEFAULT")
-    yield from until(lambda: addon().state.job is None or addon().state.job.progress.done > steps, 400, "the worker")
+
+
+def begun() -> Iterator[float]:
+    """Start a capture that is in no cache, and wait until it is at work."""
+    begin()
+    yield from until(lambda: addon().state.job is None or addon().state.job.progress.done > 5, 400, "the worker")
     assert addon().state.job is not None, addon().state.message
 
 
@@ -67,8 +72,10 @@ def failed(name: str, before: dict, says: str) -> None:
 def killed_worker() -> Iterator[float]:
     """Kill the worker, as the system does when memory runs out."""
     before = inventory()
+    bpy.context.scene.scope.quality = "BEST"  # so that it does not end before it is killed
     yield from begun()
     os.kill(addon().state.job.worker.pid, signal.SIGKILL)
+    bpy.context.scene.scope.quality = "FAST"
     yield from ended()
     failed("killed worker", before, "signal 9")
     picture("14_killed_worker")
@@ -100,7 +107,7 @@ def full_disk() -> Iterator[float]:
     shutil.copytree(kernels, cache().kernels)
     before = inventory()
     fill(leave=2**16)  # enough to begin with, not enough for a motion
-    yield from begun(1)
+    begin()
     yield from ended()
     failed("full disk", before, "space")
     picture("15_full_disk")
@@ -139,7 +146,7 @@ def closed(how: str) -> Iterator[float]:
     yield from until(lambda: other.poll() is not None, 300, "the other Blender to end")
     assert (OUT / f"closed_{how}").read_text() == "capturing", "the other Blender did not capture"
     assert other.returncode == (-9 if how == "crash" else 0), other.returncode
-    yield from until(lambda: not workers(), 10, "the worker to end")
+    yield from until(lambda: not workers(), 60, "the worker to end")
     nothing_left(f"after Blender's {how}")
     report[f"Blender's {how}"] = "nothing left"
 

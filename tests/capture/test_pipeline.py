@@ -6,7 +6,6 @@ import os
 import subprocess
 import sys
 import threading
-import time
 from dataclasses import replace
 
 import cv2
@@ -19,6 +18,8 @@ from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.errors import CancelledError, NoPersonError
 from scope.scope_addon.motion import Motion
 from scope.solver.loaders.body_file import load_body
+
+from ..job.processes import wait_for
 
 
 @pytest.fixture(scope="module")
@@ -188,12 +189,8 @@ def test_a_cancel_is_raised_and_leaves_no_thread(body):
 
     with pytest.raises(CancelledError):
         capture(SAMPLE, body, CaptureOptions(quality="fast"), cancel)
-    deadline = time.monotonic() + 60  # a solver that is not compiled yet is compiled to the end
-    while time.monotonic() < deadline and (
-        left := [t.name for t in threading.enumerate() if "scope-background" in t.name]
-    ):
-        time.sleep(0.02)
-    assert not left
+    # A solver that is not compiled yet is compiled to the end.
+    wait_for(lambda: not [t.name for t in threading.enumerate() if "scope-background" in t.name])
 
 
 def test_a_motion_is_the_same_after_saving_and_loading(sample, tmp_path):

@@ -83,6 +83,13 @@ def files(folder):
     return sorted(p.relative_to(folder.parent / "out").as_posix() for p in (folder.parent / "out").rglob("*"))
 
 
+def is_json(file):
+    try:
+        return bool(json.loads(file.read_text()))
+    except ValueError:
+        return False
+
+
 def workers(cluster):
     """Process ids of the workers."""
     with distributed.Client(cluster.scheduler_address, set_as_default=False) as client:
@@ -221,7 +228,14 @@ def test_footage_and_results_may_be_at_urls(cluster, folder, capsys):
 
 
 def test_a_lost_scheduler_is_a_sentence_and_finished_clips_are_kept(folder, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("scope.scope_addon.cluster.connection._TIMEOUT_S", 2.0)
+    class Impatient(distributed.Client):
+        """Gives up a scheduler that is lost after two seconds; connecting to it may take longer."""
+
+        async def _reconnect(self):
+            self._timeout = 2.0
+            await super()._reconnect()
+
+    monkeypatch.setattr("scope.scope_addon.cluster.connection.Client", Impatient)
     for name in ("a", "b"):
         (folder / f"{name}.mp4").write_text("hangs" if name == "b" else name)
     file = tmp_path / "scheduler.json"
@@ -235,7 +249,7 @@ def test_a_lost_scheduler_is_a_sentence_and_finished_clips_are_kept(folder, tmp_
         worker = subprocess.Popen([*dask, "worker", "--no-nanny", "--nthreads", "1", *options], **silent)
         stack.callback(worker.wait)
         stack.callback(worker.kill)
-        wait_for(file.exists)
+        wait_for(lambda: file.exists() and is_json(file))  # Dask does not write it at once
 
         def lose():
             wait_for(lambda: calls(folder / "b.mp4"))

@@ -8,7 +8,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import av
@@ -27,7 +26,8 @@ from .processes import runs, wait_for
 
 FRAMES = 31  # of the sample clip up to --end 1, both ends included
 
-# Replaces the capture: the clip's text decides the outcome, and every call is logged in the folder of the clips.
+# Replaces the capture: the clip's text decides the outcome, and every call is logged in the folder of the clips. What
+# "hangs" runs until its standard input ends.
 PROGRAM = """
 import json, sys, pathlib
 clip = pathlib.Path(sys.argv[2])
@@ -42,6 +42,8 @@ if text == "broken":
     print("scope: warning: slow\\nscope: it is not a video", file=sys.stderr); sys.exit(1)
 if text == "crash":
     import os; os.abort()
+if text == "hangs":
+    sys.stdin.read(); sys.exit(130)
 print("Blender says something")
 for path in outputs:
     pathlib.Path(path).write_text("result of " + text)
@@ -59,11 +61,16 @@ def folder(tmp_path):
     return clips
 
 
-def calls(folder):
+def calls_so_far(folder):
     log = folder / "calls.log"
     lines = log.read_text().splitlines() if log.exists() else []
-    log.unlink(missing_ok=True)
     return sorted(Path(json.loads(line)[1]).name for line in lines)
+
+
+def calls(folder):
+    found = calls_so_far(folder)
+    (folder / "calls.log").unlink(missing_ok=True)
+    return found
 
 
 def batch(folder, out, options=None, suffixes=(".npz", ".glb")):
@@ -72,6 +79,11 @@ def batch(folder, out, options=None, suffixes=(".npz", ".glb")):
 
 
 def test_a_report_that_takes_long_to_write_is_not_written_after_every_clip(folder, tmp_path, monkeypatch):
+    def one_by_one(runner, tasks):  # several clips that end while the report is written come as one outcome
+        for task in tasks:
+            yield {task.name: runner._capture(task)}
+
+    monkeypatch.setattr(LocalRunner, "outcomes", one_by_one)
     monkeypatch.setattr("scope.scope_addon.job.batch._QUICK_S", 0.0)
     monkeypatch.setattr("scope.scope_addon.job.batch._WRITING_SHARE", 1e-6)
     written = []
@@ -247,16 +259,20 @@ def test_names_are_unique_where_one_equals_another_clips_person(tmp_path):
 
 
 def test_an_interrupt_stops_the_running_clips_and_keeps_the_finished(folder, tmp_path):
+    (folder / "c.png").write_text("hangs")  # otherwise the third may end before the interrupt
+
     def interrupt(stage, done, total):
         if done == 2:
+            wait_for(lambda: len(calls_so_far(folder)) == 3)
             raise KeyboardInterrupt
 
     out = tmp_path / "out"
     with pytest.raises(KeyboardInterrupt):
         batch(folder, out).run(1, progress=interrupt)
     report = json.loads((out / REPORT_NAME).read_text())
-    assert len(report["files"]) == 2
-    calls(folder)
+    assert [entry["file"] for entry in report["files"]] == ["a.mp4", "b.mov"]
+    assert calls(folder) == ["a.mp4", "b.mov", "c.png"]
+    (folder / "c.png").write_text("nobody")
     batch(folder, out).run(1)
     assert "a.mp4" not in calls(folder)
 
@@ -312,12 +328,12 @@ def test_the_clips_of_a_killed_batch_end_and_leave_no_partial_file(tmp_path, at)
         "import os, pathlib, sys, time\n"
         "from scope.scope_addon import cli\n"
         "from scope.scope_addon.command_line import terminal\n"
-        "pid = pathlib.Path(sys.argv[2] + '.pid')\n"
+        "pid, parent = pathlib.Path(sys.argv[2] + '.pid'), os.getppid()\n"
         "def record(self, stage, done, total):\n"
         f"    if stage == {at!r} and done > 2 and not pid.exists():\n"
         "        pid.write_text(str(os.getpid()))\n"
-        "        until = time.monotonic() + 120\n"  # for the other clip, so that none ends before the kill
-        "        while len(list(pid.parent.glob('*.pid'))) < 2 and time.monotonic() < until: time.sleep(0.01)\n"
+        "        until = time.monotonic() + 300\n"  # for the kill, before which no clip may end
+        "        while os.getppid() == parent and time.monotonic() < until: time.sleep(0.001)\n"
         "terminal.ProgressBar.__call__ = record\n"
         "cli.run()\n"
     )
@@ -335,8 +351,8 @@ def test_the_clips_of_a_killed_batch_end_and_leave_no_partial_file(tmp_path, at)
     process.wait()
     pids = [int(p.read_text()) for p in clips.glob("*.pid")]
     wait_for(lambda: not any(runs(pid) for pid in pids))
-    results = {"a.npz", "b.npz", "a.overlay.mp4", "b.overlay.mp4"}
-    assert {p.name for p in out.iterdir()} <= {*results, REPORT_NAME}  # some, if clips ended before the kill arrived
+    # Some of them, where a clip ended before it noticed that its parent is gone.
+    assert {p.name for p in out.iterdir()} <= {"a.npz", "b.npz", "a.overlay.mp4", "b.overlay.mp4"}
     for path in out.glob("*.npz"):
         assert len(Motion.load(path)) == FRAMES
     for path in out.glob("*.mp4"):
@@ -377,7 +393,7 @@ def test_a_signal_whose_exception_is_lost_ends_the_batch_too(folder, tmp_path, m
 
     def runs_on(runner, task):
         signals.received.append(signal.SIGINT)
-        time.sleep(3)
+        wait_for(lambda: runner._processes._stopped)
         return {"status": "failed", "file": task.name, "message": ""}
 
     monkeypatch.setattr(LocalRunner, "_capture", runs_on)

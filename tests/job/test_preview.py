@@ -44,7 +44,8 @@ class NotReady:
     is_ready = False
 
 
-def test_the_file_is_complete_and_bottom_row_first(tmp_path):
+def test_the_file_is_complete_and_bottom_row_first(tmp_path, monkeypatch):
+    monkeypatch.setattr(preview, "INTERVAL_S", 600.0)
     image = np.zeros((100, 50, 3), np.uint8)
     image[50:] = 200  # the lower half
     sent = []

@@ -25,16 +25,16 @@ def test_frames_that_come_while_one_is_processed_are_dropped_and_counted():
 
     def before(index):
         if index == 1:  # the first frame has been given; it must be taken before the others come
-            go_on.wait(5)
+            go_on.wait(300)
         if index == 5:
             given.set()
-            go_on.wait(5)
+            go_on.wait(300)
 
     source = FakeSource([0.0, 0.1, 0.2, 0.3, 0.4], ends=True, before=before)
     with NewestFrame(source, FakeClock()) as reader:
         first = reader.take()
         go_on.set()
-        reader._thread.join(5)  # all have come while the first one was processed
+        reader._thread.join(300)  # all have come while the first one was processed
         rest = all_taken(reader)
     assert [first.index, *(p.index for p in rest)] == [0, 4]
     assert (reader.received, reader.dropped) == (5, 3)
@@ -43,7 +43,7 @@ def test_frames_that_come_while_one_is_processed_are_dropped_and_counted():
 def test_an_interrupted_source_is_opened_again_and_numbers_and_times_continue():
     said, clock = [], FakeClock()
     taken, next_one = [], threading.Semaphore(1)
-    source = FakeSource([50.0, 50.1], [7.0, 7.5], before=lambda _: next_one.acquire(timeout=5))
+    source = FakeSource([50.0, 50.1], [7.0, 7.5], before=lambda _: next_one.acquire(timeout=300))
     with NewestFrame(source, clock, reconnect_s=3.0, say=said.append) as reader:
         for _ in range(4):
             taken.append(reader.take())
@@ -96,7 +96,7 @@ def test_an_error_in_a_running_stream_is_said_and_survived():
 def test_stopping_does_not_wait_for_a_source_that_is_stalled():
     clock, stalled = FakeClock(), threading.Event()
     try:
-        with NewestFrame(FakeSource([0.0], before=lambda _: stalled.wait(30)), clock) as reader:
+        with NewestFrame(FakeSource([0.0], before=lambda _: stalled.wait(300)), clock) as reader:
             clock.stopped.set()
             assert reader.take() is None
         assert reader._thread.is_alive()
@@ -108,7 +108,7 @@ def test_pictures_of_another_shape_are_given_as_they_are():
     taken = []
     source = FakeSource(np.arange(5) / 10, ends=True, images=[WIDE, TALL, TALL[::2, ::2], WIDE[::2, ::2], WIDE])
     with NewestFrame(source, FakeClock(), received=taken.append) as reader:
-        reader._thread.join(5)
+        reader._thread.join(300)
     shapes = [(40, 60, 3), (60, 40, 3), (60, 40, 3), (20, 30, 3), (20, 30, 3)]
     assert [picture.image_rgb.shape for picture in taken] == shapes
 
@@ -122,7 +122,7 @@ def test_a_source_that_is_frozen_is_said_once_each_time():
         clock.time_s = 100.0 + times[index]
 
     with NewestFrame(FakeSource(times, images=images, before=before), clock, 0.0, said.append) as reader:
-        reader._thread.join(5)
+        reader._thread.join(300)
     assert said == ["fake has shown the same picture for 5 s; check whether it is frozen"] * 2
 
 
@@ -135,7 +135,7 @@ def test_a_computer_that_slept_says_so_and_shows_no_backlog():
 
     times = [k / 30 + 3600.0 * (k >= 2) for k in range(5)]
     with NewestFrame(FakeSource(times, before=before), clock, 0.0, said.append, taken.append) as reader:
-        reader._thread.join(5)
+        reader._thread.join(300)
         newest = all_taken(reader)
     assert said == ["nothing came from fake for 3600 s, as when a computer sleeps; it goes on"]
     assert [picture.index for picture in newest] == [4]

@@ -54,7 +54,8 @@ def test_a_stream_is_read_and_after_its_end_read_again(pictures):
                 taken.append(picture)
     assert len(taken) == 15
     assert taken[0].image_rgb.shape == pictures[0].shape
-    assert np.abs(taken[0].image_rgb.astype(int) - pictures[0]).mean() < 12  # JPEG, and its colours
+    first = pictures[taken[0].index % len(pictures)]  # on a busy machine, others have come before it is taken
+    assert np.abs(taken[0].image_rgb.astype(int) - first).mean() < 12  # JPEG, and its colours
     assert all(b.timestamp_s > a.timestamp_s for a, b in zip(taken, taken[1:], strict=False))
     assert said
     assert said[0].endswith("connecting again in 0.05 s")
@@ -67,7 +68,7 @@ def test_the_end_of_a_capture_closes_the_connection(pictures):
         with NewestFrame(open_source(address), clock, reconnect_s=0.05) as reader:
             assert reader.take() is not None
             clock.stopped.set()
-            assert left.wait(30)
+            assert left.wait(300)
 
 
 def test_a_stream_s_rotation_and_pixel_aspect_are_applied(tmp_path):
@@ -167,7 +168,7 @@ def test_a_server_s_timestamps_may_jump_and_its_rate_change(tmp_path):
     with served(tmp_path, "a.ts", b"".join(parts)) as address:
         began_s = clock.now()
         with NewestFrame(open_source(address), clock, received=taken.append) as reader:
-            reader._thread.join(30)
+            reader._thread.join(300)
         passed_s = clock.now() - began_s
     assert [which(picture.image_rgb)[0] for picture in taken] == list(range(36))
     times = np.array([picture.timestamp_s for picture in taken])
@@ -214,7 +215,7 @@ def test_a_stream_that_changes_its_resolution_keeps_the_first_one(tmp_path):
     taken = []
     with served(tmp_path, "a.ts", data) as address:
         with NewestFrame(open_source(address), Clock(), received=taken.append) as reader:
-            reader._thread.join(30)
+            reader._thread.join(300)
     assert {picture.image_rgb.shape for picture in taken} == {(96, 160, 3)}
     shown = [which(picture.image_rgb) for picture in taken]
     assert [k for k, _ in shown if k not in (11, 23)] == [k for k in range(36) if k not in (11, 23)]  # before a change

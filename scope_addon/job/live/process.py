@@ -91,8 +91,8 @@ class LiveProcess(WorkerProcess):
         :param coefficients: P of the body.
         :raises WorkerFailedError: it cannot be used.
         """
-        lines, self._newest = self._newest, {}
-        found = [parse_pose(lines[person], joints, coefficients) for person in sorted(lines)]
+        # Taken out one by one: the reading thread may be about to store a pose in this dictionary.
+        found = [parse_pose(self._newest.pop(person), joints, coefficients) for person in sorted(self._newest)]
         return [pose for pose in found if pose is not None]
 
     def _keep(self, line: bytes) -> None:

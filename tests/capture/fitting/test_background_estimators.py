@@ -16,7 +16,7 @@ class SlowBody:
         self.may_end, self.is_ready = threading.Event(), False
 
     def load(self):
-        assert self.may_end.wait(60)
+        assert self.may_end.wait(300)
         self.is_ready = True
 
 

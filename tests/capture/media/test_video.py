@@ -6,7 +6,6 @@ from __future__ import annotations
 import os
 import struct
 import threading
-import time
 import wave
 import zlib
 from fractions import Fraction
@@ -22,6 +21,7 @@ from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.errors import VideoError
 
+from ...job.processes import wait_for
 from .made_video import patch_track_header, with_time_table, write_video
 
 W, H = 64, 48
@@ -203,8 +203,9 @@ def test_decoding_runs_ahead_by_at_most_a_few_frames(tmp_path):
     video = open_video(write_video(tmp_path / "a.mp4", ramp(50)))
     frames = iter(video)
     next(frames)
-    time.sleep(0.2)
-    assert 1 <= video._decoders[0]._queue.qsize() <= 8
+    waiting = video._decoders[0]._queue
+    wait_for(waiting.full)
+    assert waiting.qsize() <= 8
     assert sum(1 for _ in frames) == 49
 
 

@@ -31,5 +31,5 @@ def test_opening_a_network_records_no_events(tmp_path: Path, networks: None) -> 
         environment[name] = str(folder)
     for direct in (True, False):
         program = PROGRAM.format(direct=direct)
-        subprocess.run([sys.executable, "-c", program], env=environment, check=True, timeout=120)
+        subprocess.run([sys.executable, "-c", program], env=environment, check=True, timeout=600)
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == []

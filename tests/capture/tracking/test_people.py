@@ -352,7 +352,7 @@ def test_tracking_does_not_wait_for_the_reference_network(monkeypatch: pytest.Mo
 
     class SlowNetwork(FakeLandmarks):
         def estimate(self, image: np.ndarray, regions: list[Region]) -> list[PoseEstimate]:
-            free.wait(60)
+            free.wait(300)
             return super().estimate(image, regions)
 
     networks = {True: SlowNetwork([person], is_reliable=True), False: FakeLandmarks([person])}

@@ -36,6 +36,6 @@ def test_nothing_starts_after_the_stop():
     while not processes._running:
         pass
     processes.stop()
-    thread.join(60)
+    thread.join(300)
     assert found[0][0] == STOPPED
     assert processes.run(["/no/such/program"]) == (STOPPED, "", "")

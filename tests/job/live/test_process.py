@@ -4,9 +4,11 @@
 import json
 import sys
 import textwrap
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scope.scope_addon.job.live import process as live_process
 from scope.scope_addon.job.live.process import LiveProcess, parse_pose
 from scope.scope_addon.job.live.request import LiveRequest
 from scope.scope_addon.job.messages import WorkerFailedError
@@ -89,6 +91,28 @@ def process(tmp_path):
     process.close()
     assert not process.alive
     assert not (tmp_path / "job").exists()
+
+
+def test_a_pose_that_comes_while_others_are_taken_is_not_lost(process, monkeypatch):
+    """Between finding where to store it and storing it, the reading thread may have to wait for the other one."""
+    taken = []
+
+    class Interrupted:
+        def __init__(self):
+            self.asked = 0
+
+        def __getitem__(self, _):
+            self.asked += 1
+            if self.asked == 2:
+                taken.extend(process.newest_poses(2, 3))
+            return b"1"
+
+    said = []
+    wait_for(lambda: said.extend(process.poll()) or said)  # all of the script's poses have come
+    monkeypatch.setattr(live_process, "_POSE", SimpleNamespace(match=lambda _: Interrupted()))
+    process._keep(line(person=1, frame=500))
+    taken += process.newest_poses(2, 3)
+    assert [(pose.person, pose.frame) for pose in taken] == [(0, 98), (1, 99), (1, 500)]
 
 
 def test_only_the_newest_pose_is_seen_and_commands_arrive(process):

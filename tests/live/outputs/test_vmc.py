@@ -84,7 +84,7 @@ def pose_of(body, Omega=None, R_world_root=R_WORLD_MODEL, pelvis=(0.0, 0.0, 0.95
 def receiver():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiving:
         receiving.bind(("127.0.0.1", 0))
-        receiving.settimeout(5)
+        receiving.settimeout(300)
         yield receiving
 
 

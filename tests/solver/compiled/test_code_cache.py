@@ -34,7 +34,7 @@ def run(folder, cache, before="", **environment):
     """Return which kernels came from disk, and what was written to stderr."""
     environment = dict(os.environ, **{"NUMBA_CACHE_DIR": str(cache), **environment})
     command = [sys.executable, "-c", before + RUN]
-    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=True, timeout=100)
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=True, timeout=600)
     results, hits = map(eval, done.stdout.splitlines())
     assert results == RESULTS
     return hits, done.stderr

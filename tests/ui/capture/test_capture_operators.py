@@ -135,7 +135,8 @@ def test_escape_cancels_only_over_the_panel(fake_worker, footage, x, y, window, 
 
 @pytest.mark.parametrize(("seconds", "asks"), [(3.0, False), (30.0, True)])
 def test_cancelling_asks_when_more_than_ten_seconds_are_done(monkeypatch, seconds, asks):
-    state.job, state.started = SimpleNamespace(cancelled=False, close=lambda: None), time.monotonic() - seconds
+    state.job, state.started = SimpleNamespace(cancelled=False, close=lambda: None), 100.0
+    monkeypatch.setattr(capture_operators, "time", SimpleNamespace(monotonic=lambda: 100.0 + seconds))
     questions = []
     manager = SimpleNamespace(invoke_confirm=lambda *_, **texts: questions.append(texts) or {"RUNNING_MODAL"})
     monkeypatch.setattr(capture_operators.bpy, "app", SimpleNamespace(background=False))

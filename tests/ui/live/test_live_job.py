@@ -26,8 +26,8 @@ from ..conftest import inventory
 def live(tmp_path, monkeypatch, standing):
     """Return a function that starts a live capture with a scripted process.
 
-    The script may use ``pose(index)``, ``send(event, **values)``, ``hear()``, which waits for a command, and
-    ``finish()``, which sends the motion ``standing``.
+    The script may use ``pose(index)``, ``send(event, **values)``, ``hear()``, which waits for a command,
+    ``wait_for(path)``, which waits for a file, and ``finish()``, which sends the motion ``standing``.
     """
     standing.save(tmp_path / "standing.npz")
     jobs = []
@@ -47,6 +47,9 @@ def live(tmp_path, monkeypatch, standing):
                     print(json.dumps({{"event": event}} | values), flush=True)
                 def hear():
                     return sys.stdin.readline().strip()
+                def wait_for(path):
+                    while not os.path.exists(path):
+                        time.sleep(0.01)
                 def pose(index, betas=(0.0,) * 10, person=0):
                     turned = [math.cos(0.1 * index), math.sin(0.1 * index), 0, 0]
                     send("pose", person=person, frame=index, presence="seen", rotations=[turned] + [[1, 0, 0, 0]] * 23,
@@ -69,11 +72,11 @@ def live(tmp_path, monkeypatch, standing):
 
 
 def until(job, condition):
-    wait_for(lambda: job.step() and condition(), 60)
+    wait_for(lambda: job.step() and condition())
 
 
 def to_end(job):
-    wait_for(lambda: not job.step(), 60)
+    wait_for(lambda: not job.step())
 
 
 def test_the_newest_pose_is_shown_and_stays_after_stop(live):
@@ -87,7 +90,7 @@ def test_the_newest_pose_is_shown_and_stays_after_stop(live):
     shown = tuple(armature.pose.bones["pelvis"].rotation_quaternion)
     pid = job.worker.pid
     job.stop()
-    wait_for(lambda: not runs(pid), 1.0)
+    wait_for(lambda: not runs(pid))
     to_end(job)
     left = bpy.data.objects["Live"]
     np.testing.assert_allclose(left.pose.bones["pelvis"].rotation_quaternion, shown, atol=1e-3)
@@ -261,14 +264,16 @@ def test_a_recorded_file_that_ends_by_itself_becomes_a_capture(live):
     assert bpy.context.scene.scope.capture is not None
 
 
-def test_a_file_that_ends_leaves_the_last_pose(live):
-    job = live('pose(1); time.sleep(0.5); send("ended")')
+def test_a_file_that_ends_leaves_the_last_pose(live, tmp_path):
+    job = live(f'pose(1); wait_for({str(tmp_path / "shown")!r}); send("ended")')
+    until(job, lambda: job.has_body)
+    (tmp_path / "shown").touch()
     to_end(job)
     assert "Live" in bpy.data.objects
 
 
 def test_a_recording_that_was_asked_for_too_late_leaves_the_last_pose(live):
-    job = live('pose(1); time.sleep(0.5); hear(); send("ended")')
+    job = live('pose(1); hear(); send("ended")')
     until(job, lambda: job.has_body)
     job.record()
     to_end(job)
@@ -320,7 +325,7 @@ def test_cancelling_leaves_the_scene_as_it_was(live, recording):
         job.record()
     pid = job.worker.pid
     job.cancel()
-    wait_for(lambda: not runs(pid), 1.0)
+    wait_for(lambda: not runs(pid))
     assert inventory() == before
     np.testing.assert_allclose([bone.matrix_basis for bone in rig.pose.bones], posed, atol=1e-5)
     assert bpy.context.view_layer.objects.active == bpy.data.objects["Armature"]
@@ -348,9 +353,11 @@ def test_a_recording_is_retargeted_to_the_rig_that_followed(live):
         ("os._exit(3)", "ended with status 3"),
     ],
 )
-def test_what_fails_leaves_the_scene_as_it_was(live, script, says):
+def test_what_fails_leaves_the_scene_as_it_was(live, tmp_path, script, says):
     before = inventory()
-    job = live(f"pose(1); time.sleep(0.3); {script}")
+    job = live(f"pose(1); wait_for({str(tmp_path / 'shown')!r}); {script}")
+    until(job, lambda: job.has_body)
+    (tmp_path / "shown").touch()
     with pytest.raises(WorkerFailedError, match=says):
         to_end(job)
     assert inventory() == before
@@ -358,10 +365,15 @@ def test_what_fails_leaves_the_scene_as_it_was(live, script, says):
     assert not job.worker.job_folder.exists()
 
 
-def test_an_interruption_is_said_until_poses_come_again(live, monkeypatch):
+def test_an_interruption_is_said_until_poses_come_again(live, tmp_path, monkeypatch):
     monkeypatch.setattr(live_job, "NOTICE_S", 0.0)
-    job = live('pose(1); time.sleep(0.5); send("notice", text="it was interrupted"); hear(); pose(2); hear()')
-    until(job, lambda: job.status.notice and job.poses == 1)
+    job = live(f"""
+        pose(1); wait_for({str(tmp_path / "shown")!r})
+        send("notice", text="it was interrupted"); hear(); pose(2); hear()
+    """)
+    until(job, lambda: job.poses == 1)
+    (tmp_path / "shown").touch()
+    until(job, lambda: job.status.notice)
     assert job.status.notice == "it was interrupted"
     job.record()  # a command, for which the script waits
     until(job, lambda: job.poses == 2)
