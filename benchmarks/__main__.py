@@ -31,7 +31,7 @@ ELSEWHERE = {  # imported where they are wanted: some need packages that others 
     "cluster": (".cluster", "cluster"),
     "live": (".live.live", "live"),
 }
-LIVE_PARTS = ("rate", "offline", "world", "hour")
+LIVE_PARTS = ("rate", "offline", "simulated", "world", "hour")
 
 
 def solver(quick: bool) -> dict[str, Any]:

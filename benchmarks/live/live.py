@@ -9,7 +9,7 @@ from typing import Any
 from ...solver import Body, load_body
 from ..report import table
 from .endurance import SLOW_RATE, observed, played
-from .offline import against_offline
+from .offline import against_offline, on_a_simulated_machine
 from .rate import MEDIAN_MS, P95_MS, rate, targets
 
 USUAL = ("rate", "offline")  # without a choice: the others take as long as is asked for
@@ -30,8 +30,9 @@ WORLD = ("time_s", "poses", "not_seen", "memory_mb", "height_m", "tilt_deg", "st
 def live(quick: bool, parts: Sequence[str] = (), minutes: float = 60.0) -> dict[str, Any]:
     """Measure the parts, print their tables as they come, and return the figures."""
     body, figures = load_body("scope"), {}
+    measurements = {"rate": _rate, "offline": _offline, "simulated": _simulated, "world": _world, "hour": _hour}
     for part in parts or USUAL:
-        figures[part] = {"rate": _rate, "offline": _offline, "world": _world, "hour": _hour}[part](body, quick, minutes)
+        figures[part] = measurements[part](body, quick, minutes)
     return figures
 
 
@@ -55,15 +56,25 @@ def _rate(_body: Body, quick: bool, _minutes: float) -> dict[str, Any]:
 
 def _offline(body: Body, quick: bool, _minutes: float) -> dict[str, Any]:
     found = against_offline(body, quick, lambda text: print(text, flush=True))
+    _print_compared(found, ("offline", "every_frame", "real_time", "there_and_back"))
+    return found
+
+
+def _simulated(body: Body, quick: bool, _minutes: float) -> dict[str, Any]:
+    found = on_a_simulated_machine(body, quick, lambda text: print(text, flush=True))
+    _print_compared(found, ("offline", "newest_frames", "even_frames"))
+    return found
+
+
+def _print_compared(found: dict[str, Any], ways: Sequence[str]) -> None:
     rows = [
         [f"{name}, {how.replace('_', ' ')}", *(of_clip[how].get(key) for key in MEASURES)]
         for name, of_clip in found.items()
-        for how in ("offline", "every_frame", "real_time", "there_and_back")
+        for how in ways
         if how in of_clip
     ]
     head = [name + ("" if target is None else f" (≤ {target:g})") for name, target in MEASURES.values()]
     print(table(("clip", *head), rows), end="\n\n", flush=True)
-    return found
 
 
 def _world(body: Body, _quick: bool, minutes: float) -> dict[str, Any]:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads a source in its own thread and keeps the newest frame only: those that come while it is not taken are dropped.
 
+Where not every frame can be processed, some are dropped as well so that the others follow each other evenly (`pace`).
+
 An interrupted stream is opened again after a pause, and frame numbers and times continue. Where a server changes the
 resolution while it runs, pictures keep the first one, so that what was estimated from them still holds.
 """
@@ -20,6 +22,7 @@ from numpy.typing import NDArray
 from ...solver.errors import ScopeError
 from ..errors import VideoError
 from .clock import Clock
+from .pace import Pace
 from .sources import Picture, Source
 from .sources.stream import STALLED_S
 
@@ -56,6 +59,7 @@ class NewestFrame:
         self._last_image: NDArray[Any] | None = None  # as it came
         self._changed_s, self._is_frozen = 0.0, False  # when it last differed from the one before
         self._arrived_s = 0.0  # of the last one
+        self._pace, self._taken_s = Pace(), 0.0  # when the last one was taken
         self.received = self.dropped = 0
         self._thread = threading.Thread(target=self._run, name="scope-live-source", daemon=True)
 
@@ -74,9 +78,12 @@ class NewestFrame:
     def take(self) -> Picture | None:
         """Wait for the next frame and return the newest one; None after the last, or when the clock is stopped.
 
+        The frame before counts as processed.
+
         :raises VideoError: the source cannot be read.
         """
         with self._changed:
+            self._pace.spend(self.now() - self._taken_s)
             while self._newest is None and not self._is_over:
                 if self._clock.stopped.is_set():  # the source may be stalled, and its thread with it
                     return None
@@ -84,6 +91,9 @@ class NewestFrame:
             if self._newest is None and self._error is not None:
                 raise self._error
             taken, self._newest = self._newest, None
+            if taken is not None:
+                self._pace.take(taken.timestamp_s)
+                self._taken_s = self.now()
             return taken
 
     def _run(self) -> None:
@@ -139,9 +149,10 @@ class NewestFrame:
         picture = replace(picture, index=index, timestamp_s=time_s, image_rgb=self._in_first_size(picture.image_rgb))
         self._received(picture)
         with self._changed:
-            self.dropped += self._newest is not None
+            is_due = self._pace.is_due(time_s)
+            self.dropped += self._newest is not None or not is_due
             self.received += 1
-            self._newest = picture
+            self._newest = picture if is_due else self._newest
             self._next_index, self._last_s = index + 1, time_s
             self._changed.notify_all()
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.errors import VideoError
 from scope.scope_addon.live.newest_frame import NewestFrame
+from scope.scope_addon.live.sources import Picture
 
 from .fake_source import FakeClock, FakeSource
 
@@ -140,3 +141,46 @@ def test_a_computer_that_slept_says_so_and_shows_no_backlog():
     assert said == ["nothing came from fake for 3600 s, as when a computer sleeps; it goes on"]
     assert [picture.index for picture in newest] == [4]
     assert [picture.timestamp_s for picture in taken] == pytest.approx(times)
+
+
+class Arrivals:
+    """In the place of the reader's condition: whoever waits for a frame gets the next one, at its time."""
+
+    def __init__(self, clock, rate):
+        self.clock, self.rate, self.given, self.reader = clock, rate, 0, None
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        pass
+
+    def notify_all(self):
+        pass
+
+    def wait(self, _seconds=None):
+        time_s = self.given / self.rate
+        self.clock.time_s = max(self.clock.time_s, time_s)
+        self.reader._give(Picture(self.given, time_s, time_s, WIDE), is_first=self.given == 0)
+        self.given += 1
+
+    def process(self, seconds):
+        """Let time pass for the frame that was taken."""
+        end_s = self.clock.time_s + seconds
+        while self.given / self.rate <= end_s:
+            self.wait()
+        self.clock.time_s = end_s
+
+
+def test_frames_are_given_evenly_where_not_every_one_can_be_processed():
+    """Each takes 20 ms where one comes every 17; the newest ones would be 17 or 33 ms apart."""
+    clock, taken = FakeClock(), []
+    clock.time_s = 0.0
+    arrivals = Arrivals(clock, 60)
+    reader = arrivals.reader = NewestFrame(FakeSource(), clock)
+    reader._changed = arrivals
+    while arrivals.given < 300:
+        taken.append(reader.take().index)
+        arrivals.process(0.02)
+    assert set(np.diff([index for index in taken if index > 30])) == {2}
+    assert reader.dropped == reader.received - len(taken)

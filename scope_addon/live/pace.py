@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which frames to process where not every one can be: every n-th, rather than whichever comes when there is time.
+
+A processor that takes 20 ms for a frame and gets one every 17 ms would process frames 17, 33 or 50 ms apart. Smoothing
+passes that on as jitter: velocities are known from the frames before, and each of these tells of another moment.
+
+The first seconds, in which size and floor are estimated as well, begin with the largest n.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+SLOWEST_S = 1 / 28  # between frames: n is not raised beyond it, so that no slow source becomes slower
+RECENT_S, FEWEST = 1.0, 8  # over which it is seen that frames take too long, and the least number of them
+CALM_S = 4.0  # the same, that they would be processed in time with a lower n
+LATE_SHARE, RARE_SHARE = 0.15, 0.08  # of the frames in these times, that take too long
+SPARE = 0.8  # of the time between two frames, which all but a few have to leave some of for n to be lowered
+_INTERVALS = 31  # of the source, whose median counts
+
+
+class Pace:
+    """Decides by the times that frames take, and by those of all frames, processed or not."""
+
+    def __init__(self) -> None:
+        self.every: int | None = None  # n; None before the frames' distance in time is known
+        self._intervals: deque[float] = deque(maxlen=_INTERVALS)
+        self._came_s: float | None = None
+        self._taken_s: float | None = None
+        self._took: deque[tuple[float, float]] = deque()  # frame times and seconds, since n was changed
+
+    def is_due(self, time_s: float) -> bool:
+        """Note that a frame came, and return whether it may be processed.
+
+        :param time_s: of the frame, later than the one before.
+        """
+        if self._came_s is not None:
+            self._intervals.append(time_s - self._came_s)
+        self._came_s = time_s
+        if self.every is None and len(self._intervals) >= FEWEST:
+            self.every = self._most
+        if self._taken_s is None or self.every is None or self.every == 1:
+            return True
+        return time_s - self._taken_s > (self.every - 0.5) * self._interval_s
+
+    def take(self, time_s: float) -> None:
+        """Note that the frame of this time is processed now."""
+        self._taken_s = time_s
+
+    def spend(self, seconds: float) -> None:
+        """Note how long the frame took that was taken last, and choose n."""
+        if self._taken_s is None or self.every is None:
+            return
+        self._took.append((self._taken_s, seconds))
+        while self._took[0][0] < self._taken_s - CALM_S:
+            self._took.popleft()
+        if self.every > self._most:  # the source has become slower
+            self._change(self._most)
+        elif self.every < self._most and self._share_above(self.every * self._interval_s, RECENT_S) > LATE_SHARE:
+            self._change(self.every + 1)
+        elif self._took[-1][0] - self._took[0][0] > CALM_S - 2 * SLOWEST_S:
+            for every in range(1, self.every):
+                if self._share_above(SPARE * every * self._interval_s, CALM_S) < RARE_SHARE:
+                    self._change(every)
+                    return
+
+    def _change(self, every: int) -> None:
+        self.every = every
+        self._took.clear()
+
+    @property
+    def _most(self) -> int:
+        """The largest n."""
+        return max(int(SLOWEST_S / self._interval_s), 1)
+
+    @property
+    def _interval_s(self) -> float:
+        return float(np.median(self._intervals))
+
+    def _share_above(self, seconds: float, recent_s: float) -> float:
+        """Return the share of the last frames that took longer; 0 where there are too few to tell."""
+        last_s = self._took[-1][0]
+        took = [each for time_s, each in self._took if time_s >= last_s - recent_s]
+        return float(np.mean(np.array(took) > seconds)) if len(took) >= FEWEST else 0.0
