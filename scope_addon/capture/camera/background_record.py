@@ -28,6 +28,7 @@ from .line_segments import Lines, Segments
 SAMPLES_HZ = 12.0  # hands tremble at up to 10 Hz, but by less than is visible here
 TRAVELLING_SHARE = 0.8  # mean share of inliers below which the camera travels: near corners pass by
 STATIC_DEG = 0.35  # largest rotation during a clip of a camera on a tripod
+REVEALING_S = 30.0  # from the first frame with edges on, edges that people hid in it are looked for
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,10 @@ class CameraMotion:
 
 @dataclass(frozen=True)
 class BackgroundRecord:
-    """The background of T frames; its edges were found in a few of them, first in one in which somebody is seen."""
+    """The background of T frames; its edges were found in a few of them, first in one in which somebody is seen.
+
+    As long as the camera has not rotated, the other ones have only edges that people hid in all of those before.
+    """
 
     times: NDArray[np.float64]  # (T,) seconds
     R_first_camera: NDArray[np.float64]  # (T, 3, 3) as followed; identity where not known
@@ -92,11 +96,31 @@ class BackgroundRecord:
         return self.edge_frames[0].segments if self.edge_frames else Segments.none()
 
     def lines(self, motion: CameraMotion, camera: Camera) -> Lines:
-        """Return the lines of `segments` in the first frame's axes."""
-        lines = self.segments.lines(camera)
-        if motion.is_static or not self.edge_frames:
-            return lines
-        return lines.rotated(motion.R_first_camera[self.edge_frames[0].row])
+        """Return the lines of the background in the first frame's axes.
+
+        Those of a static camera include what people hid at first and revealed by moving away.
+        """
+        if not self.edge_frames:
+            return Lines.none()
+        if motion.is_static:
+            return Segments.of_all([edge.segments for edge in self.edge_frames if self._is_new(edge)]).lines(camera)
+        return self.segments.lines(camera).rotated(motion.R_first_camera[self.edge_frames[0].row])
+
+    def _is_new(self, edge: FrameEdges) -> bool:
+        """Return whether none of a frame's edges were seen before.
+
+        They may have been where the camera had rotated, and after a window that was followed apart.
+        """
+        first = self.edge_frames[0]
+        if edge is first:
+            return True
+        is_early = self.times[edge.row] - self.times[first.row] <= REVEALING_S
+        return bool(is_early) and not is_rotated(self.R_first_camera[edge.row])
+
+
+def is_rotated(R: NDArray[np.float64]) -> bool:
+    """Return whether a rotation (3, 3) is larger than that of a camera on a tripod."""
+    return bool(np.degrees(np.linalg.norm(log(R))) >= STATIC_DEG)
 
 
 def joined_backgrounds(parts: Sequence[BackgroundRecord], firsts: Sequence[int]) -> BackgroundRecord:

@@ -8,6 +8,10 @@ the one with most support is refined. Rotations are chained over key frames only
 too few corners are left, so that errors accumulate over few links. If the camera also travels, near corners disagree,
 and the far ones decide, which are many; `heading_drift` removes the remaining error with the edges of buildings.
 
+Edges are detected in the first frame in which somebody is seen. Where the camera rotates, they are detected anew; where
+it does not, only those are added that people hid so far: a door behind somebody may be the only thing that tells which
+way is up.
+
 Sources: Fischler and Bolles 1981 (random sample consensus), Kabsch 1976 (rotation between two sets of directions).
 """
 
@@ -20,11 +24,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ....solver.rotations import log
 from ..perception.region import inside, surroundings
-from .background_record import SAMPLES_HZ, STATIC_DEG, BackgroundRecord, CameraMotion
+from .background_record import REVEALING_S, SAMPLES_HZ, BackgroundRecord, CameraMotion, is_rotated
 from .bars import find_bars
 from .heading_drift import EDGE_INTERVAL_S, EDGE_SIDE_PX, FrameEdges
+from .hidden_background import HiddenBackground
 from .intrinsics import Camera
 from .line_segments import Lines, Segments, find_segments
 
@@ -34,6 +38,7 @@ MIN_CORNERS = 24
 KEY_SHARE = 0.5  # of a key frame's corners; with fewer left, the next key frame begins
 INLIER_PX = 1.2  # in the working image
 MIN_INLIER_SHARE = 0.35  # of corners; a crowd or water that fills the picture gives no rotation
+REVEALED_SHARE = 0.01  # of the image: how much must have come into view
 
 
 class BackgroundTracker:
@@ -62,6 +67,7 @@ class BackgroundTracker:
         self._R_key_last = np.eye(3)
         self._inlier_shares: list[float] = []
         self._edge_frames: list[FrameEdges] = []  # the first one is the first frame in which somebody is seen
+        self._hidden = HiddenBackground((width, height))
         self.bars: list[NDArray[np.float64]] = []  # in that frame
 
     def add(
@@ -85,6 +91,7 @@ class BackgroundTracker:
         if people and not self._edge_frames:
             self.bars = find_bars(image_rgb)
             self._edge_frames.append(FrameEdges(row, find_segments(image_rgb, people, bars=self.bars)))
+            self._hidden.reveal(people)
         if time_s - self._last_used < 0.98 / SAMPLES_HZ and not (is_cut or is_sampled):
             self._rotations.append(None)
             return
@@ -97,6 +104,8 @@ class BackgroundTracker:
             return
         R_camera_key = None if is_cut else self._follow(image, boxes)
         if R_camera_key is None:  # a cut, or too few corners: start again at the last known rotation
+            if self._edge_frames:  # what is seen from now on may be something else
+                self._hidden.reveal([])
             self._R_first_key = self._R_first_key @ self._R_key_last
             self._begin_key(image, boxes)
             self._rotations.append(None)
@@ -106,6 +115,10 @@ class BackgroundTracker:
         self._rotations.append(R_first_camera)
         if self._is_edge_frame(R_first_camera):
             self._edge_frames.append(FrameEdges(row, find_segments(image_rgb, people, EDGE_SIDE_PX, self.bars)))
+        elif self._may_reveal_edges(R_first_camera, people):
+            segments = find_segments(image_rgb, people, bars=self.bars)
+            self._edge_frames.append(FrameEdges(row, segments.where(self._hidden.hides(segments.ends_px.mean(axis=1)))))
+            self._hidden.reveal(people)
         self._image = image
         if len(self._points) < max(KEY_SHARE * self._key_count, MIN_CORNERS):
             self._R_first_key = self._R_first_key @ self._R_key_last
@@ -133,7 +146,7 @@ class BackgroundTracker:
         return self._edge_frames[0].segments if self._edge_frames else Segments.none()
 
     def lines(self, motion: CameraMotion, camera: Camera) -> Lines:
-        """Return the lines of `segments` in the first frame's axes."""
+        """Return the lines of the background in the first frame's axes; see `BackgroundRecord.lines`."""
         return self.record().lines(motion, camera)
 
     def _is_edge_frame(self, R_first_camera: NDArray[np.float64]) -> bool:
@@ -141,7 +154,19 @@ class BackgroundTracker:
         if not self._edge_frames:
             return False
         elapsed_s = self._times[-1] - self._times[self._edge_frames[-1].row]
-        return elapsed_s >= EDGE_INTERVAL_S and _is_rotated(R_first_camera)
+        return elapsed_s >= EDGE_INTERVAL_S and is_rotated(R_first_camera)
+
+    def _may_reveal_edges(self, R_first_camera: NDArray[np.float64], people: Sequence[NDArray[Any]]) -> bool:
+        """Return whether people of the first edge frame have moved away from background that they hid in it.
+
+        The camera (3, 3) must not have rotated. Without anybody in the frame, somebody may have been missed.
+        """
+        if not self._edge_frames or not people or is_rotated(R_first_camera):
+            return False
+        elapsed_s = self._times[-1] - self._times[self._edge_frames[-1].row]
+        since_first_s = self._times[-1] - self._times[self._edge_frames[0].row]
+        is_due = elapsed_s >= EDGE_INTERVAL_S and since_first_s <= REVEALING_S
+        return is_due and self._hidden.share_in_view(people) >= REVEALED_SHARE
 
     def _follow(self, image: NDArray[np.uint8], boxes: Sequence[NDArray[np.float64]]) -> NDArray[np.float64] | None:
         """Return the rotation (3, 3) from the key frame's axes to the current camera's, or None if it is unknown."""
@@ -192,11 +217,6 @@ class BackgroundTracker:
         """Return a box x0, y0, x1, y1 in the working image, with a margin."""
         box: NDArray[np.float64] = box_px * self._scale + [-4.0, -4.0, 4.0, 4.0]
         return box
-
-
-def _is_rotated(R: NDArray[np.float64]) -> bool:
-    """Return whether a rotation (3, 3) is larger than that of a camera on a tripod."""
-    return bool(np.degrees(np.linalg.norm(log(R))) >= STATIC_DEG)
 
 
 def consensus_rotation(

@@ -52,6 +52,17 @@ class Segments:
         """Return no segments."""
         return cls(np.zeros((0, 2, 2)), np.zeros(0))
 
+    @classmethod
+    def of_all(cls, parts: Sequence[Segments]) -> Segments:
+        """Return the segments of several pictures of one background."""
+        ends, lengths = (np.concatenate(each) for each in zip(*((p.ends_px, p.lengths) for p in parts), strict=True))
+        order = np.argsort(-lengths, kind="stable")
+        return cls(ends[order], lengths[order])
+
+    def where(self, chosen: NDArray[np.bool_]) -> Segments:
+        """Return some of the segments, those for which ``chosen`` (N,) is True."""
+        return Segments(self.ends_px[chosen], self.lengths[chosen])
+
     def lines(self, camera: Camera) -> Lines:
         """Return the lines of the segments, in the camera's axes."""
         return Lines(plane_normals(camera.rays(self.ends_px)), self.lengths)
