@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import gc
+import importlib.util
 import os
 import shutil
 import sys
@@ -108,6 +109,13 @@ def shared() -> Path:
     if os.environ.get("SCOPE_WITHOUT_SHARED") or not (SHARED / "data").is_dir():
         missing(f"the tests on real clips need {SHARED / 'data'}", allowed_by="SCOPE_WITHOUT_SHARED")
     return SHARED
+
+
+@pytest.fixture(scope="session")
+def blender_module() -> None:
+    """Require Blender's module, which a CI that cannot have it says with ``SCOPE_WITHOUT_BLENDER``."""
+    if importlib.util.find_spec("bpy") is None:
+        missing("bpy is not installed, which writes scenes: pip install bpy", allowed_by="SCOPE_WITHOUT_BLENDER")
 
 
 @pytest.fixture(scope="session")

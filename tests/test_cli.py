@@ -35,6 +35,7 @@ BROKEN = {
 }
 
 
+@pytest.mark.usefixtures("blender_module")
 @pytest.mark.parametrize("name", BROKEN)
 def test_unreadable_footage_gives_one_sentence_status_1_and_no_file(tmp_path, capsys, name):
     content = BROKEN[name]
@@ -52,6 +53,7 @@ def test_unreadable_footage_gives_one_sentence_status_1_and_no_file(tmp_path, ca
     assert files_below(tmp_path) == before
 
 
+@pytest.mark.usefixtures("blender_module")
 @pytest.mark.parametrize(
     ("argv", "status", "says"),
     [
@@ -158,6 +160,7 @@ def test_an_interrupt_during_the_overlay_leaves_complete_files(tmp_path, capsys,
     assert files_below(tmp_path) == ["a.npz"]
 
 
+@pytest.mark.usefixtures("blender_module")
 def test_no_command_writes_into_scopes_own_folders(tmp_path, capfd, monkeypatch):
     def state():
         files = [p for name in ("assets", "scope_addon", "solver") for p in (SAMPLE.parents[2] / name).rglob("*")]
@@ -181,6 +184,7 @@ def test_no_command_writes_into_scopes_own_folders(tmp_path, capfd, monkeypatch)
 ANY_NAME = os.fsdecode(b"person \xe9") if sys.platform == "linux" else "person"  # elsewhere, names are Unicode
 
 
+@pytest.mark.usefixtures("blender_module")
 def test_a_picture_gives_a_motion_of_one_frame_and_only_json_on_stdout(tmp_path):
     import cv2
 

@@ -10,6 +10,7 @@ def batch(tmp_path, scheduler):
     return main(["batch", str(tmp_path), "--out", str(tmp_path / "out"), "--scheduler", scheduler])
 
 
+@pytest.mark.usefixtures("blender_module")
 @pytest.mark.parametrize(
     ("hidden", "says"),
     [
@@ -26,12 +27,14 @@ def test_a_cluster_needs_the_package_and_the_room(tmp_path, capsys, monkeypatch,
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.usefixtures("blender_module")
 def test_an_address_that_is_none_is_a_bad_argument(tmp_path, capsys):
     assert batch(tmp_path, "8786") == 2
     assert "--scheduler must be an address" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.usefixtures("blender_module")
 def test_a_url_without_a_cluster_is_a_bad_argument(tmp_path, capsys):
     assert main(["batch", "s3://bucket/clips", "--out", str(tmp_path / "out")]) == 2
     assert "footage and results at a URL need a cluster" in capsys.readouterr().err

@@ -20,6 +20,7 @@ def amass(tmp_path):
     return path
 
 
+@pytest.mark.usefixtures("blender_module")
 def test_the_outputs_and_the_report(amass, capfd):
     outputs = [amass.with_name(name) for name in ("out.glb", "out.bvh", "out.blend", "out.npz")]
     assert main(["import", str(amass), *(word for path in outputs for word in ("-o", str(path))), "--json"]) == 0
@@ -32,11 +33,13 @@ def test_the_outputs_and_the_report(amass, capfd):
     np.testing.assert_allclose(Motion.load(outputs[-1]).poses, MOTION.poses, atol=1e-5)
 
 
+@pytest.mark.usefixtures("blender_module")
 def test_without_an_output_a_glb_lies_beside_the_motion(amass):
     assert main(["import", str(amass), "--quiet"]) == 0
     assert amass.with_suffix(".glb").stat().st_size > 1000
 
 
+@pytest.mark.usefixtures("blender_module")
 @pytest.mark.parametrize(
     ("arguments", "status", "says"),
     [

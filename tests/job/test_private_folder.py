@@ -63,6 +63,7 @@ def test_what_others_prepared_is_not_used(caches, monkeypatch, kind):
     assert not any(found.iterdir())
 
 
+@pytest.mark.usefixtures("blender_module")
 def test_the_extensions_fallback_is_this_folder(caches):
     package("bpy")
     from scope.scope_addon.ui.preferences import user_folder

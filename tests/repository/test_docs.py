@@ -260,6 +260,7 @@ def test_every_command_would_be_accepted(words, folder):
         assert importlib.util.find_spec(words[2]) is not None
 
 
+@pytest.mark.usefixtures("blender_module")
 def test_the_first_capture_of_the_command_line_page_is_run(folder, capfd):
     page = (DOCS / "command_line.md").read_text("utf-8")
     words = shlex.split(re.search(r"## capture\n\n```sh\n\./scripts/(.+)", page)[1], comments=True)
@@ -281,6 +282,7 @@ def session() -> list:
     return [pytest.param(w, id=shlex.join(w)) for w in words if w[0] == "capture" and "--retarget" not in w]
 
 
+@pytest.mark.usefixtures("blender_module")
 @pytest.mark.parametrize("words", session())
 def test_the_captures_of_the_readme_are_run(words, folder):
     (folder / "walk.mp4").symlink_to(SAMPLE)
