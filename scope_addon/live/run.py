@@ -23,10 +23,10 @@ from ..capture.media.opencv_threads import opencv_in_one_thread
 from ..capture.perception.execution import Execution
 from ..capture.tracking.tracker import PeopleTracker
 from .clock import Clock
-from .newest_frame import NewestFrame
 from .people import LivePeople
 from .pose import LivePose, Presence
 from .sources import CAMERA_SIZE, Picture, Source
+from .sources.newest_frame import NewestFrame
 from .statistics import Statistics
 
 PROGRESS_S = 0.5  # between two lines of progress

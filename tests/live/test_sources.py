@@ -11,8 +11,8 @@ from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.errors import OfflineError, VideoError
 from scope.scope_addon.live.clock import Clock
-from scope.scope_addon.live.newest_frame import NewestFrame
 from scope.scope_addon.live.sources import is_stream, open_source
+from scope.scope_addon.live.sources.newest_frame import NewestFrame
 
 from ..capture.media.made_video import patch_track_header, write_video
 from .fake_source import FakeClock

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where frames come from: a camera, a stream, or a file that is played in real time."""
+"""Where frames come from: a camera, a stream, or a file that is played in real time; and which of them are taken."""
 
 from __future__ import annotations
 

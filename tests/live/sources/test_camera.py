@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 from scope.scope_addon.errors import VideoError
 from scope.scope_addon.live.clock import Clock
-from scope.scope_addon.live.newest_frame import NewestFrame
 from scope.scope_addon.live.sources import camera
 from scope.scope_addon.live.sources.camera import CameraSource, device_problem
+from scope.scope_addon.live.sources.newest_frame import NewestFrame
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="devices of Linux")
 CAPTURE, METADATA, HAS_OWN_ANSWER = 1, 0x00800000, 1 << 31  # of linux/videodev2.h

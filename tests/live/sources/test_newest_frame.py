@@ -6,10 +6,10 @@ import threading
 import numpy as np
 import pytest
 from scope.scope_addon.errors import VideoError
-from scope.scope_addon.live.newest_frame import NewestFrame
 from scope.scope_addon.live.sources import Picture
+from scope.scope_addon.live.sources.newest_frame import NewestFrame
 
-from .fake_source import FakeClock, FakeSource
+from ..fake_source import FakeClock, FakeSource
 
 WIDE, TALL = np.zeros((40, 60, 3), np.uint8), np.zeros((60, 40, 3), np.uint8)
 

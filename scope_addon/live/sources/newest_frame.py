@@ -19,12 +19,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ...solver.errors import ScopeError
-from ..errors import VideoError
-from .clock import Clock
+from ....solver.errors import ScopeError
+from ...errors import VideoError
+from ..clock import Clock
 from .pace import Pace
-from .sources import Picture, Source
-from .sources.stream import STALLED_S
+from .source import Picture, Source
+from .stream import STALLED_S
 
 _POLLING_INTERVAL_S = 0.2  # in which a waiting main thread reacts to Ctrl-C on every system
 SAME_SHAPE = 0.01  # relative difference of two pictures' width over height
