@@ -94,14 +94,19 @@ def in_real_time(body: Body, video: Path) -> tuple[Motion, dict[str, Any]]:
 
 def there_and_back_in_real_time(body: Body, video: Path, truth: Path, count: int) -> dict[str, Any]:
     """Return the figures of a clip of ``count`` frames that is played there and back in real time."""
-    clip = there_and_back_clip(LONG_S, source=video)
-    offline = capture(clip, body, CaptureOptions(quality=QUALITY)).motions[0]
     with tempfile.TemporaryDirectory() as folder:
-        looped = Path(folder) / "truth.npz"
-        there_and_back_truth(truth, count, len(offline), looped)
+        clip, offline, looped = _there_and_back(body, video, truth, count, Path(folder))
         motion, told = in_real_time(body, clip)
         slide_offline = _against_truth(offline, looped)["foot_slide_cm"]
         return _measured(motion, offline, body, looped) | told | {"offline_foot_slide_cm": slide_offline}
+
+
+def _there_and_back(body: Body, video: Path, truth: Path, count: int, folder: Path) -> tuple[Path, Motion, Path]:
+    """Return a clip of ``count`` frames there and back, its offline capture, and its truth, written to the folder."""
+    clip = there_and_back_clip(LONG_S, source=video)
+    offline, looped = capture(clip, body, CaptureOptions(quality=QUALITY)).motions[0], folder / "truth.npz"
+    there_and_back_truth(truth, count, len(offline), looped)
+    return clip, offline, looped
 
 
 def on_a_simulated_machine(body: Body, quick: bool, say: Callable[[str], None]) -> dict[str, Any]:
@@ -115,11 +120,8 @@ def on_a_simulated_machine(body: Body, quick: bool, say: Callable[[str], None]) 
             continue
         with open_video(video) as footage:
             count = sum(1 for _ in footage)
-        clip = there_and_back_clip(LONG_S, source=video)
-        offline = capture(clip, body, CaptureOptions(quality=QUALITY)).motions[0]
         with tempfile.TemporaryDirectory() as folder:
-            looped = Path(folder) / "truth.npz"
-            there_and_back_truth(truth, count, len(offline), looped)
+            clip, offline, looped = _there_and_back(body, video, truth, count, Path(folder))
             figures[name] = {"offline": _against_truth(offline, looped)}
             for title, pace in (("newest_frames", EveryFrame), ("even_frames", Pace)):
                 motion, told = simulated(body, clip, QUALITY, pace)
