@@ -82,9 +82,8 @@ def eye_light_of(rows: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
 
 def presence_of(rows: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
     """Return (T,) the presence of the faces of rows, less where they are seen from the side, but not where small."""
-    low, high = _FACE_PX
-    of_size = np.clip((rows[:, 1] - low) / (high - low), 0.0, 1.0)
-    found: NDArray[np.floating[Any]] = np.minimum(rows[:, 0] / np.maximum(of_size, 1e-3), 1.0)
+    of_size = np.maximum(_ramp(rows[:, 1], *_FACE_PX), 1e-3)
+    found: NDArray[np.floating[Any]] = np.minimum(rows[:, 0] / of_size, 1.0)
     return found
 
 
@@ -97,5 +96,5 @@ def with_expression(
     return out
 
 
-def _ramp(value: float, low: float, high: float) -> float:
-    return min(1.0, max(0.0, (value - low) / (high - low)))
+def _ramp(value: Any, low: float, high: float) -> Any:
+    return np.clip((value - low) / (high - low), 0.0, 1.0)
