@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from ....solver.body import Body
 
 _HELP = (
-    "Draw a line along something that is upright: a door or post in the footage, or somebody who stands in a view from "
-    "the side.  Esc: cancel"
+    "Draw a line along something upright: a door or post in the footage, or a standing person in a side view.  "
+    "Esc: cancel"
 )
 _NAVIGATION = ("MIDDLEMOUSE", "WHEEL", "TRACKPAD", "NUMPAD")  # how the types of events begin that move a view
 

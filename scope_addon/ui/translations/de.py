@@ -115,7 +115,7 @@ TEXTS = STAGES | {
     "Direction of the scene in which the view looks": "Richtung der Szene, in die die Ansicht blickt",
     "Drag a handle to where the joint is.  Scrub or play to go to other frames.  Esc or Enter: done": "Einen Griff dorthin ziehen, wo das Gelenk ist.  Scrubben oder abspielen für andere Bilder.  Esc oder Eingabe: fertig",
     "Drag handles on the body to where the joints are in this frame; the motion around is solved again": "Griffe am Körper dorthin ziehen, wo die Gelenke in diesem Bild sind; die Bewegung ringsum wird neu berechnet",
-    "Draw a line along something that is upright: a door or post in the footage, or somebody who stands in a view from the side.  Esc: cancel": "Eine Linie entlang von etwas Senkrechtem ziehen: im Filmmaterial Tür oder Pfosten, in einer Ansicht von der Seite jemand, der steht.  Esc: abbrechen",
+    "Draw a line along something upright: a door or post in the footage, or a standing person in a side view.  Esc: cancel": "Eine Linie entlang von etwas Senkrechtem ziehen: im Filmmaterial Tür oder Pfosten, in einer Ansicht von der Seite jemand, der steht.  Esc: abbrechen",
     "Draw a line in the footage or from a side along what is upright; the capture and its camera turn with it": "Im Filmmaterial oder von der Seite eine Linie entlang von etwas Senkrechtem ziehen; Erfassung und Kamera drehen sich mit",
     "Duration in seconds, at the end of the cycle, over which it is closed": "Dauer in Sekunden am Ende des Zyklus, über die er geschlossen wird",
     "End": "Ende",

@@ -115,7 +115,7 @@ TEXTS = STAGES | {
     "Direction of the scene in which the view looks": "Dirección de la escena hacia la que mira la vista",
     "Drag a handle to where the joint is.  Scrub or play to go to other frames.  Esc or Enter: done": "Arrastre un control hasta donde está la articulación.  Desplácese o reproduzca para ir a otros fotogramas.  Esc o Intro: terminar",
     "Drag handles on the body to where the joints are in this frame; the motion around is solved again": "Arrastrar controles del cuerpo hasta donde están las articulaciones en este fotograma; el movimiento cercano se recalcula",
-    "Draw a line along something that is upright: a door or post in the footage, or somebody who stands in a view from the side.  Esc: cancel": "Trace una línea a lo largo de algo vertical: en la filmación una puerta o un poste, en una vista lateral alguien de pie.  Esc: cancelar",
+    "Draw a line along something upright: a door or post in the footage, or a standing person in a side view.  Esc: cancel": "Trace una línea a lo largo de algo vertical: en la filmación una puerta o un poste, en una vista lateral alguien de pie.  Esc: cancelar",
     "Draw a line in the footage or from a side along what is upright; the capture and its camera turn with it": "Trazar en la filmación o de lado una línea a lo largo de algo vertical; la captura y su cámara giran con ella",
     "Duration in seconds, at the end of the cycle, over which it is closed": "Duración en segundos, al final del ciclo, durante la que este se cierra",
     "End": "Fin",

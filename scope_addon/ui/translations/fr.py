@@ -115,7 +115,7 @@ TEXTS = STAGES | {
     "Direction of the scene in which the view looks": "Direction de la scène dans laquelle la vue regarde",
     "Drag a handle to where the joint is.  Scrub or play to go to other frames.  Esc or Enter: done": "Tirez une poignée là où est l’articulation.  Déplacez-vous ou jouez pour changer de frame.  Échap ou Entrée : terminé",
     "Drag handles on the body to where the joints are in this frame; the motion around is solved again": "Tirer les poignées du corps là où sont les articulations dans cette frame ; le mouvement autour est recalculé",
-    "Draw a line along something that is upright: a door or post in the footage, or somebody who stands in a view from the side.  Esc: cancel": "Tracez une ligne le long d’un élément vertical : porte ou poteau dans le métrage, personne debout dans une vue de côté.  Échap : annuler",
+    "Draw a line along something upright: a door or post in the footage, or a standing person in a side view.  Esc: cancel": "Tracez une ligne le long d’un élément vertical : porte ou poteau dans le métrage, personne debout dans une vue de côté.  Échap : annuler",
     "Draw a line in the footage or from a side along what is upright; the capture and its camera turn with it": "Tracer dans le métrage ou de côté une ligne le long d’un élément vertical ; la capture et sa caméra tournent avec elle",
     "Duration in seconds, at the end of the cycle, over which it is closed": "Durée en secondes, à la fin du cycle, sur laquelle il est fermé",
     "End": "Fin",

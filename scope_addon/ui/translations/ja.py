@@ -115,7 +115,7 @@ TEXTS = STAGES | {
     "Direction of the scene in which the view looks": "ビューが向いているシーン内の方向",
     "Drag a handle to where the joint is.  Scrub or play to go to other frames.  Esc or Enter: done": "ハンドルを関節の位置にドラッグ。  再生やスクラブで他のフレームへ移動。  Esc か Enter：終了",
     "Drag handles on the body to where the joints are in this frame; the motion around is solved again": "ボディのハンドルを、このフレームの関節の位置にドラッグします。前後のモーションは再計算されます",
-    "Draw a line along something that is upright: a door or post in the footage, or somebody who stands in a view from the side.  Esc: cancel": "垂直なものに沿って線を引いてください。フッテージではドアや柱、横からのビューでは立っている人物です。  Esc：キャンセル",
+    "Draw a line along something upright: a door or post in the footage, or a standing person in a side view.  Esc: cancel": "垂直なものに沿って線を引いてください。フッテージではドアや柱、横からのビューでは立っている人物です。  Esc：キャンセル",
     "Draw a line in the footage or from a side along what is upright; the capture and its camera turn with it": "フッテージ内または横から、垂直なものに沿って線を引きます。キャプチャとカメラがそれに合わせて回転します",
     "Duration in seconds, at the end of the cycle, over which it is closed": "周期の終わりでつなぎ合わせる時間（秒）",
     "End": "終了",

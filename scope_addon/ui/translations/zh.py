@@ -115,7 +115,7 @@ TEXTS = STAGES | {
     "Direction of the scene in which the view looks": "视图在场景中的朝向",
     "Drag a handle to where the joint is.  Scrub or play to go to other frames.  Esc or Enter: done": "将手柄拖到关节所在位置。  拖动时间线或播放以转到其他帧。  Esc 或回车：完成",
     "Drag handles on the body to where the joints are in this frame; the motion around is solved again": "将身体上的手柄拖到此帧中关节的位置；其前后的动作会重新解算",
-    "Draw a line along something that is upright: a door or post in the footage, or somebody who stands in a view from the side.  Esc: cancel": "沿竖直物体画一条线：素材中的门或柱子，侧面视图中站立的人。  Esc：取消",
+    "Draw a line along something upright: a door or post in the footage, or a standing person in a side view.  Esc: cancel": "沿竖直物体画一条线：素材中的门或柱子，侧面视图中站立的人。  Esc：取消",
     "Draw a line in the footage or from a side along what is upright; the capture and its camera turn with it": "在素材中或从侧面沿竖直物体画一条线；捕捉及其摄像机随之旋转",
     "Duration in seconds, at the end of the cycle, over which it is closed": "循环末尾用于闭合的时长（秒）",
     "End": "结束",
