@@ -93,8 +93,11 @@ def test_ctrl_c_ends_a_capture_that_sends_its_poses_and_keeps_the_recording(tmp_
     assert 0.5 < bones["Hips"][1] < 1.3  # metres over the floor
     report = json.loads(out)
     assert (process.returncode, report["stopped"], report["outputs"]) == (0, True, [str(target)])
-    # Smoothing gives each pose a little later, so that those of the frames during the last delay are missing.
+    # Smoothing gives each pose a little later, so that those of the frames during the last delay are missing. A client
+    # may miss lines, also the last ones, so that what it got says which frames must be there, not which are all.
+    motion = Motion.load(target)
+    recorded = motion.timestamps[motion.valid]
+    assert 1 <= len(recorded) < report["poses"]
     times = np.array([json.loads(text)["time_s"] for text in sent[1:]])
-    missing = report["poses"] - Motion.load(target).valid.sum()
-    assert abs(missing - (times > times[-1] - DELAY_S).sum()) <= 1  # times are rounded
-    assert missing < report["poses"]
+    for time_s in times[times < times[-1] - DELAY_S]:
+        assert np.abs(recorded - time_s).min() < 1e-3  # lines give four decimals
