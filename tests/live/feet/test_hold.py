@@ -130,3 +130,19 @@ def test_after_a_pause_who_stood_on_the_floor_is_not_below_it(stepped, height_m,
     assert not support.rests.any()
     assert not support.on_floor.any()
     assert support.not_below == pytest.approx(np.full(6, weight), abs=0.1 * AFTER_A_PAUSE)
+
+
+def test_a_foot_that_is_held_where_the_image_does_not_show_it_is_let_go():
+    supported, omega, root, place, T_world_camera, times = stepping_person()
+    true = place(omega, root)[2][0, :4]
+    feet, away_m, is_held = FootHold(supported), [], True
+    for k in range(60):
+        # Fits stay where the feet are held; once nothing is held, they find the person 60 cm behind that place.
+        is_held = is_held and (k < 10 or feet.is_holding)
+        at = root[0] - 0.6 * line_of_sight(root[0]) if is_held else root[0]
+        frame = FittedFrame(omega[0], at, np.ones(len(omega[0])), true[:, :2] / true[:, 2:])
+        shown, _ = feet.hold(times[k], np.zeros(supported.P), frame, T_world_camera, True)
+        away_m.append(np.linalg.norm(place(shown[None], at[None])[2][0, :4] - true, axis=1).max())
+    assert min(away_m[:10]) > 0.5
+    assert max(away_m[-10:]) < 0.03
+    assert feet.is_holding
