@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A network camera on this computer: JPEG pictures at 30 per second, again and again.
+"""A network camera on this computer: JPEG pictures at 30 per second, there and back again and again.
 
 Usage: ``mjpeg_camera.py FOLDER PORT CLIENTS``. The file CLIENTS is there once clients can come. A line is added to it
 when one has come, and when one has left: "came" or "left", and the time (seconds of the system's monotonic clock).
@@ -34,6 +34,7 @@ def main(folder: str, port: str, clients: str) -> None:
             file.write(f"{what} {time.monotonic()}\n")
 
     pictures = [path.read_bytes() for path in sorted(Path(folder).glob("*.jpg"))]
+    pictures += pictures[-2:0:-1]  # there and back, so that nothing jumps where a round ends
 
     class Camera(BaseHTTPRequestHandler):
         def do_GET(self) -> None:
