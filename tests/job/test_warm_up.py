@@ -28,7 +28,7 @@ def test_a_capture_after_a_warm_up_compiles_nothing(tmp_path):
     folder.mkdir()
     worker = WorkerProcess(None, folder, None, [sys.executable, "-I"])
     messages = []
-    wait_for(lambda: messages.extend(worker.poll()) or worker.finished, 500)
+    wait_for(lambda: messages.extend(worker.poll()) or worker.finished)
     worker.wait()
     worker.close()
     assert messages[-1]["compiled"] >= 0

@@ -97,6 +97,6 @@ def test_a_stream_is_refused_without_the_network(folder):
 def test_a_source_that_is_not_there_is_an_error_of_one_sentence(folder):
     live = LiveProcess(LiveRequest("nowhere.mp4"), folder, None, [sys.executable, "-I"])
     with pytest.raises(WorkerFailedError, match=r"nowhere\.mp4"):
-        wait_for(lambda: live.poll() and False, 60)
+        wait_for(lambda: live.poll() and False)
     live.close()
     assert not folder.exists()
