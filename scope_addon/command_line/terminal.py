@@ -69,13 +69,18 @@ class ProgressBar:
 
 
 class ProgressLine:
-    """One line of text that is replaced by the next one, on a terminal; silent elsewhere."""
+    """One line of text that is replaced by the next one, on a terminal; silent elsewhere. Stops work after a signal."""
 
     def __init__(self, stream: TextIO, *, show: bool) -> None:
         self.stream, self.show = stream, show and stream.isatty()
 
     def __call__(self, text: str) -> None:
-        """Show a text."""
+        """Show a text.
+
+        :raises KeyboardInterrupt: a signal arrived, but its own KeyboardInterrupt was lost.
+        """
+        if signals.received:
+            raise KeyboardInterrupt
         if self.show:
             self.stream.write(f"{_CLEAR_LINE}{text[:100]}")
             self.stream.flush()

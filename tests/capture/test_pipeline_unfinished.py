@@ -60,7 +60,7 @@ def test_a_stopped_capture_continues_to_the_same_result(tmp_path, body, networks
     resumed = capture(SAMPLE, body, options, unfinished=folder).motions[0]
     after = len(runs) - before
     whole = capture(SAMPLE, body, options).motions[0]
-    assert len(runs) - before - after > before > 3 * after > 0
+    assert len(runs) - before - after > before > 2 * after > 0  # what was under way at the stop is run again
     assert_same(resumed, whole)
 
 

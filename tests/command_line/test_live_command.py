@@ -15,7 +15,9 @@ import pytest
 from scope.scope_addon import installed
 from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.cli import SAMPLE, main
+from scope.scope_addon.command_line import signals
 from scope.scope_addon.live.outputs.vmc import BONES
+from scope.scope_addon.live.people import LivePeople
 from scope.scope_addon.live.smoothing import DELAY_S
 from scope.scope_addon.motion import Motion
 
@@ -65,6 +67,27 @@ def test_the_extension_says_where_live_captures_are(capsys, monkeypatch):
     assert "Blender's extension captures live in its panel alone; use ./scripts/live" in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("networks")
+def test_a_signal_whose_exception_is_lost_ends_a_live_capture_too(tmp_path, monkeypatch, capfd):
+    """The exception is lost while a frame is processed, as in a callback of a weak reference."""
+    step = LivePeople.step
+
+    def losing(people, frame):
+        signals.received.append(signal.SIGINT)
+        return step(people, frame)
+
+    monkeypatch.setattr(LivePeople, "step", losing)
+    assert main(["live", str(SAMPLE), "--record", str(tmp_path / "take.npz"), "--json"]) == 0
+    report = json.loads(capfd.readouterr().out)
+    assert (report["stopped"], report["poses"], report["outputs"]) == (True, 1, [str(tmp_path / "take.npz")])
+
+
+def times_seen(lines):
+    """Return the times (n,) of the poses in which somebody is seen, of complete lines: the last one may be cut."""
+    poses = [json.loads(line) for line in lines if line.endswith(b"\n")]
+    return np.array([pose["time_s"] for pose in poses if pose["presence"] == "seen"])
+
+
 @pytest.mark.skipif(os.name == "nt", reason="SIGINT of POSIX")
 @pytest.mark.usefixtures("networks")
 def test_ctrl_c_ends_a_capture_that_sends_its_poses_and_keeps_the_recording(tmp_path):
@@ -80,8 +103,10 @@ def test_ctrl_c_ends_a_capture_that_sends_its_poses_and_keeps_the_recording(tmp_
         with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
             port = int(process.stderr.readline().rsplit(" ", 1)[1])
             with socket.create_connection(("127.0.0.1", port), timeout=300) as client, client.makefile("rb") as lines:
-                sent = [lines.readline() for _ in range(5)]
-                bones = {}
+                assert json.loads(lines.readline())["format"] == "scope live"
+                sent, bones = [], {}
+                while len(times_seen(sent)) < 4:
+                    sent.append(lines.readline())
                 while len(bones) < len(BONES):
                     messages = parsed(receiver.recv(65536))
                     bones |= {values[0]: values[1:] for name, values in messages if name == "/VMC/Ext/Bone/Pos"}
@@ -94,10 +119,11 @@ def test_ctrl_c_ends_a_capture_that_sends_its_poses_and_keeps_the_recording(tmp_
     report = json.loads(out)
     assert (process.returncode, report["stopped"], report["outputs"]) == (0, True, [str(target)])
     # Smoothing gives each pose a little later, so that those of the frames during the last delay are missing. A client
-    # may miss lines, also the last ones, so that what it got says which frames must be there, not which are all.
+    # may miss lines, also the last ones, so that what it got says which frames must be there, not which are all. The
+    # signal may come when the last pose has been sent, and not been recorded yet.
     motion = Motion.load(target)
     recorded = motion.timestamps[motion.valid]
     assert 1 <= len(recorded) < report["poses"]
-    times = np.array([json.loads(text)["time_s"] for text in sent[1:]])
+    times = times_seen(sent)[:-1]
     for time_s in times[times < times[-1] - DELAY_S]:
         assert np.abs(recorded - time_s).min() < 1e-3  # lines give four decimals

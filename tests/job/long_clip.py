@@ -9,7 +9,7 @@ import av
 from scope.scope_addon.cli import SAMPLE
 
 
-def played_again_and_again(path: Path, rounds: int = 20) -> str:
+def played_again_and_again(path: Path, rounds: int = 60) -> str:
     """Write the sample clip's packets in rounds of five seconds, and return the path."""
     with av.open(str(path), "w") as target:
         stream = None

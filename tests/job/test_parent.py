@@ -63,7 +63,7 @@ def test_what_the_parent_writes_is_heard(tmp_path):
     code = (
         "import sys, time\nfrom scope.scope_addon.job import parent\n"
         "parent.when_parent_ends(lambda: print('ended', flush=True), lambda piece: print(piece, flush=True))\n"
-        "print('begun', flush=True)\ntime.sleep(60)"
+        "print('begun', flush=True)\ntime.sleep(600)"
     )
     with subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as child:
         assert child.stdin is not None

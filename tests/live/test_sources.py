@@ -11,13 +11,20 @@ from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.errors import OfflineError, VideoError
 from scope.scope_addon.live.clock import Clock
-from scope.scope_addon.live.sources import is_stream, open_source
+from scope.scope_addon.live.sources import is_stream, newest_frame, open_source, stream
 from scope.scope_addon.live.sources.newest_frame import NewestFrame
 
 from ..capture.media.made_video import patch_track_header, write_video
 from .fake_source import FakeClock
 from .mjpeg_server import mjpeg_server
 from .stream_server import encoded, rtsp_server, sent_by_udp, served, served_as_hls, with_damage, without_first
+
+
+@pytest.fixture(autouse=True)
+def patient(monkeypatch):
+    """However long a busy computer does not run a server's thread, its stream does not count as interrupted."""
+    for module in (newest_frame, stream):
+        monkeypatch.setattr(module, "STALLED_S", 300.0)
 
 
 def test_a_file_is_paced_by_its_timestamps():
@@ -77,7 +84,7 @@ def test_a_stream_s_rotation_and_pixel_aspect_are_applied(tmp_path):
     path = write_video(tmp_path / "a.mp4", [image] * 4, codec="mjpg")  # each frame by itself
     patch_track_header(path, (0, 65536, 0, -65536, 0, 0, 0, 0, 1 << 30), width=320)
     with served(tmp_path, "a.mp4", path.read_bytes()) as address:
-        rotated = next(open_source(address).pictures(Clock())).image_rgb.astype(int)
+        rotated = next(open_source(address).pictures(FakeClock())).image_rgb.astype(int)
     assert rotated.shape == (320, 96, 3)
     assert rotated[:, 60:].mean() - rotated[:, :36].mean() > 150
 
@@ -100,7 +107,8 @@ def which(image):
 
 
 def all_pictures(address):
-    return list(open_source(address).pictures(Clock()))
+    """The pictures of a stream during which no time passes, so that nothing is shown because it has been waited for."""
+    return list(open_source(address).pictures(FakeClock()))
 
 
 @pytest.mark.parametrize("missed", [0, 4])
@@ -177,12 +185,16 @@ def test_a_server_s_timestamps_may_jump_and_its_rate_change(tmp_path):
 
 
 def test_a_transport_stream_in_datagrams_is_read():
+    """Datagrams may be lost, also on this computer, and pictures with them: until so many follow each other."""
+    following = []
     with sent_by_udp(encoded(moving(36))) as address:
-        shown = [which(picture.image_rgb) for picture in islice(open_source(address).pictures(Clock()), 12)]
-    assert max(off for _, off in shown) < 10
-    steps = np.diff([k for k, _ in shown]) % 36
-    assert (steps >= 1).all()
-    assert np.median(steps) == 1  # a datagram may be lost, also on this computer
+        for picture in islice(open_source(address).pictures(FakeClock()), 5000):
+            k, off = which(picture.image_rgb)
+            before = following if following and k == (following[-1] + 1) % 36 else []
+            following = [*before, k] if off < 10 else []
+            if len(following) == 12:
+                break
+    assert len(following) == 12
 
 
 def test_the_segments_of_a_playlist_are_read(tmp_path):
@@ -205,7 +217,7 @@ def test_a_playlist_does_not_open_files_of_this_computer(tmp_path):
 
 def test_an_rtsp_server_is_read_over_its_own_connection():
     with rtsp_server(encoded(moving(36))) as address:
-        shown = [which(picture.image_rgb) for picture in islice(open_source(address).pictures(Clock()), 20)]
+        shown = [which(picture.image_rgb) for picture in islice(open_source(address).pictures(FakeClock()), 20)]
     assert [k for k, _ in shown] == list(range(20))
     assert max(off for _, off in shown) < 10
 
@@ -214,7 +226,7 @@ def test_a_stream_that_changes_its_resolution_keeps_the_first_one(tmp_path):
     data = encoded(moving(12)) + encoded(moving(12, (80, 48), first=12)) + encoded(moving(12, first=24))
     taken = []
     with served(tmp_path, "a.ts", data) as address:
-        with NewestFrame(open_source(address), Clock(), received=taken.append) as reader:
+        with NewestFrame(open_source(address), FakeClock(), received=taken.append) as reader:
             reader._thread.join(300)
     assert {picture.image_rgb.shape for picture in taken} == {(96, 160, 3)}
     shown = [which(picture.image_rgb) for picture in taken]

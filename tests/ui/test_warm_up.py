@@ -2,7 +2,6 @@
 """The background process after enabling: once for an installation, ended with the extension or by a capture."""
 
 import sys
-import time
 from types import SimpleNamespace
 
 import bpy
@@ -10,6 +9,8 @@ import pytest
 from scope.scope_addon.job import start_worker
 from scope.scope_addon.ui import warm_up
 from scope.scope_addon.ui.preferences import cache
+
+from ..job.processes import wait_for
 
 
 @pytest.fixture
@@ -19,16 +20,12 @@ def process(tmp_path, monkeypatch):
     def use(code):
         monkeypatch.setattr(start_worker, "worker_command", lambda *_: ([sys.executable, "-c", code], None))
 
-    monkeypatch.setattr(warm_up, "_INTERVAL_S", 0.01)
     yield use
     warm_up.stop()
 
 
 def wait_for_end():
-    end = time.monotonic() + 60
-    while interval := warm_up.step():
-        assert time.monotonic() < end
-        time.sleep(interval)
+    wait_for(lambda: not warm_up.step())
 
 
 def test_it_runs_once_for_an_installation(process, tmp_path):
@@ -56,7 +53,7 @@ def test_progress_is_shown_only_while_something_is_compiled(process):
     earlier.parent.mkdir(parents=True)
     earlier.touch()
     layout = Layout()
-    process("import time; time.sleep(100)")
+    process("import time; time.sleep(600)")
     warm_up.draw(layout)
     warm_up.step()
     warm_up.draw(layout)
@@ -78,7 +75,7 @@ def test_after_a_failure_it_runs_again(process, tmp_path):
 
 
 def test_it_ends_with_the_extension(process):
-    process("import time; time.sleep(100)")
+    process("import time; time.sleep(600)")
     assert warm_up.step() is not None
     running = warm_up.WarmUp.process
     assert running.poll() is None
@@ -89,7 +86,7 @@ def test_it_ends_with_the_extension(process):
 def test_a_capture_ends_it_for_good(process, fake_worker, footage):
     import bpy
 
-    process("import time; time.sleep(100)")
+    process("import time; time.sleep(600)")
     fake_worker("finish()")
     assert warm_up.step() is not None
     running = warm_up.WarmUp.process

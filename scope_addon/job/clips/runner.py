@@ -54,11 +54,13 @@ class LocalRunner:
     def outcomes(self, tasks: Iterable[ClipTask]) -> Iterator[dict[str, Entry]]:
         """See `Runner.outcomes`."""
         futures: dict[Future[Entry], str] = {self._pool.submit(self._capture, task): task.name for task in tasks}
+        places = {future: place for place, future in enumerate(futures)}
         yield {}
         pending = set(futures)
         while pending:
             finished, pending = wait(pending, timeout=_WAIT_S, return_when=FIRST_COMPLETED)
-            yield {futures[future]: future.result() for future in finished}
+            # In the order of the clips, which the set of those that have ended together does not have.
+            yield {futures[future]: future.result() for future in sorted(finished, key=places.__getitem__)}
         self._pool.shutdown()
 
     def stop(self) -> None:

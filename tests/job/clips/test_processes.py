@@ -4,10 +4,20 @@
 import sys
 import threading
 
+import pytest
+from scope.scope_addon.job.clips import processes as module
 from scope.scope_addon.job.clips.processes import STOPPED, ClipProcesses
+
+from ..processes import wait_for
 
 # Ends when its standard input does, as a capture with --stop-with-stdin.
 WAITING = "import sys; print('begun', flush=True); sys.stdin.read(); sys.exit(130)"
+
+
+@pytest.fixture(autouse=True)
+def patient(monkeypatch):
+    """No process is killed because a busy computer has not even begun it."""
+    monkeypatch.setattr(module, "_GRACE_S", 600.0)
 
 
 def test_a_process_runs_to_its_end_while_it_is_wanted():
@@ -22,7 +32,7 @@ def test_a_process_that_is_not_wanted_any_more_ends():
 
 
 def test_a_process_that_ignores_the_end_of_its_input_is_killed(monkeypatch):
-    monkeypatch.setattr("scope.scope_addon.job.clips.processes._GRACE_S", 0.1)
+    monkeypatch.setattr(module, "_GRACE_S", 0.1)
     code = "import time; time.sleep(600)"
     status, _, _ = ClipProcesses().run([sys.executable, "-c", code], lambda: False)
     assert status != 0
@@ -33,8 +43,7 @@ def test_nothing_starts_after_the_stop():
     found = []
     thread = threading.Thread(target=lambda: found.append(processes.run([sys.executable, "-c", WAITING])))
     thread.start()
-    while not processes._running:
-        pass
+    wait_for(lambda: processes._running)
     processes.stop()
     thread.join(300)
     assert found[0][0] == STOPPED

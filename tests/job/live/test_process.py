@@ -122,10 +122,10 @@ def test_only_the_newest_pose_is_seen_and_commands_arrive(process):
         said.extend(message["text"] for message in process.poll())
         return len(said) >= count
 
-    wait_for(lambda: heard(1), 60)
+    wait_for(lambda: heard(1))
     assert [(pose.person, pose.frame) for pose in process.newest_poses(2, 3)] == [(0, 98), (1, 99)]
     assert process.newest_poses(2, 3) == []
     process.record()
     process.stop()
-    wait_for(lambda: heard(3), 60)
+    wait_for(lambda: heard(3))
     assert said == ["all sent", "record\n", "stop\n"]

@@ -18,6 +18,8 @@ from scope.scope_addon.live.sources import camera
 from scope.scope_addon.live.sources.camera import CameraSource, device_problem
 from scope.scope_addon.live.sources.newest_frame import NewestFrame
 
+from ..fake_source import FakeClock
+
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="devices of Linux")
 CAPTURE, METADATA, HAS_OWN_ANSWER = 1, 0x00800000, 1 << 31  # of linux/videodev2.h
 
@@ -107,7 +109,7 @@ def opened(device, monkeypatch):
 
 def test_a_camera_that_is_unplugged_and_plugged_in_again_goes_on(device, opened):
     opened += [(3, device.unlink), (2, lambda: None)]
-    said, taken, clock = [], [], Clock()
+    said, taken, clock = [], [], FakeClock()
 
     def say(text):
         said.append(text)

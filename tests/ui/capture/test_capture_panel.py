@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Settings in .blend files, dropped files, export buttons, the camera button, progress."""
 
-import time
 from types import SimpleNamespace
 
 import bpy
@@ -14,6 +13,8 @@ from scope.scope_addon.ui import drop
 from scope.scope_addon.ui.capture import capture_job
 from scope.scope_addon.ui.capture.capture_operators import end_capture, state
 from scope.scope_addon.ui.preferences import cache
+
+from ...job.processes import wait_for
 
 FINISH = "finish()"
 
@@ -318,8 +319,7 @@ def test_the_preview_is_shown_during_a_capture(fake_worker, footage):
     )
     bpy.context.scene.scope.footage = str(footage)
     state.job = job = CaptureJob(bpy.context.scene)
-    while job.step() and job.progress.done == 0:
-        time.sleep(0.01)
+    wait_for(lambda: job.step() and job.progress.done)
     icon = preview_picture._collection["frame"]
     assert tuple(icon.image_size) == (3, 2)
     assert icon.image_pixels[0] == int.from_bytes(bytes(range(4)), "little")

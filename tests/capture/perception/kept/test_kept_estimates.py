@@ -103,6 +103,7 @@ def test_nothing_is_kept_without_a_folder():
 def test_on_a_full_disk_nothing_is_kept_and_nothing_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A half-written zip file printed a traceback when it was destroyed."""
     resource, unraisable = pytest.importorskip("resource"), list[object]()
+    gc.collect()  # what other tests have left
     monkeypatch.setattr(sys, "unraisablehook", unraisable.append)
     before, kept = resource.getrlimit(resource.RLIMIT_FSIZE), KeptEstimates(tmp_path)
     resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))
