@@ -19,13 +19,13 @@ def scripts(text: str) -> set[str]:
 
 
 def test_every_script_of_the_local_run_is_in_the_hosted_one() -> None:
-    local = scripts((ROOT / ".ci" / "run").read_text())
+    local = scripts((ROOT / ".ci" / "run").read_text("utf-8"))
     assert {"./scripts/check", "./scripts/test", "./scripts/gate", "./scripts/fuzz"} <= local
-    assert local - PREPARES == scripts((ROOT / ".github" / "workflows" / "ci.yml").read_text())
+    assert local - PREPARES == scripts((ROOT / ".github" / "workflows" / "ci.yml").read_text("utf-8"))
 
 
 def test_all_that_is_run_exists() -> None:
-    assert [name for name in scripts((ROOT / ".ci" / "run").read_text()) if not (ROOT / name).is_file()] == []
+    assert [name for name in scripts((ROOT / ".ci" / "run").read_text("utf-8")) if not (ROOT / name).is_file()] == []
 
 
 # Sitecustomize of a Python without Blender's module.
@@ -40,7 +40,7 @@ PathFinder.find_spec = classmethod(
 
 def test_what_runs_without_blender_can_be_collected_without_it(tmp_path: Path) -> None:
     """On Windows and macOS; a test file that imports Blender's module would keep all the others from running."""
-    workflow = (ROOT / ".github" / "workflows" / "ci.yml").read_text()
+    workflow = (ROOT / ".github" / "workflows" / "ci.yml").read_text("utf-8")
     (arguments,) = re.findall(r"python -m pytest --numprocesses auto --dist loadfile\n((?: +--ignore.*\n)+)", workflow)
     (tmp_path / "sitecustomize.py").write_text(WITHOUT_BLENDER)
     environment = dict(os.environ, PYTHONPATH=str(tmp_path), CI="1")

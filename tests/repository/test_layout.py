@@ -74,7 +74,7 @@ def modules() -> list[Path]:
 def test_every_test_file_is_named_after_a_module():
     files = files_of_tests()
     assert len(files) > 50
-    lost = [str(path.relative_to(TESTS)) for path in files if module_of(path) is None]
+    lost = [path.relative_to(TESTS).as_posix() for path in files if module_of(path) is None]
     assert sorted(set(lost) - set(CROSS_CUTTING)) == [], "rename them after a module, or list them in CROSS_CUTTING"
 
 

@@ -104,7 +104,7 @@ def test_usd_counts_time_in_the_scenes_frames_and_lengths_in_metres(body, make_m
     build_scene([make_motion(body, 3, rate=29.97)], body, options=NEW_SCENE)
     path = tmp_path / "walk.usda"  # the text form of the same writer
     formats.write_usd(path)
-    header = path.read_text()[:2000]
+    header = path.read_text("utf-8")[:2000]
     assert float(re.search(r"timeCodesPerSecond = ([\d.]+)", header)[1]) == pytest.approx(30000 / 1001, rel=1e-6)
     assert re.search(r"metersPerUnit = 1\b", header)
     assert 'upAxis = "Z"' in header
@@ -330,7 +330,7 @@ def test_bvh_is_y_up_in_centimetres_and_one_file_a_person(body, make_motion, tmp
     written, _ = export_motions(motions, body, tmp_path / "pair.bvh", export_options=options)
     assert [p.name for p in written] == ["pair.person1.bvh", "pair.person2.bvh"]
     for path, motion in zip(written, motions, strict=True):
-        lines = path.read_text().splitlines()
+        lines = path.read_text("utf-8").splitlines()
         start = lines.index("MOTION")
         assert lines[start + 1] == "Frames: 3"
         rows = np.array([[float(v) for v in line.split()] for line in lines[start + 3 :]])
