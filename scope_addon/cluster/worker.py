@@ -55,11 +55,7 @@ def _problem(wanted: dict[str, Any]) -> str:
             return f"it has no folder {folder}; all machines need the footage under the same path"
     token = Path(attempts, TOKEN)
     with remote.store_errors(OutputError, attempts):
-        text = (
-            remote.read_text(f"{attempts}/{TOKEN}")
-            if is_url(attempts)
-            else token.is_file() and token.read_text("utf-8")
-        )
+        text = remote.read_text(f"{attempts}/{TOKEN}") if is_url(attempts) else token.is_file() and token.read_text()
     if text != wanted["token"]:
         return f"it does not see the output folder {wanted['out']}; all machines need it under the same path"
     settings = CaptureSettings(wanted["options"], tuple(wanted["suffixes"]), Extras(*wanted["extras"]))

@@ -10,6 +10,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
+from ..required import package
+
 ROOT = Path(__file__).resolve().parents[2]
 PREPARES = {"./scripts/setup", "./scripts/debian"}  # which the others call where they need it
 
@@ -26,6 +30,31 @@ def test_every_script_of_the_local_run_is_in_the_hosted_one() -> None:
 
 def test_all_that_is_run_exists() -> None:
     assert [name for name in scripts((ROOT / ".ci" / "run").read_text("utf-8")) if not (ROOT / name).is_file()] == []
+
+
+def test_actions_of_others_are_pinned_by_hash() -> None:
+    """A tag can be moved to other code."""
+    used = re.findall(r"uses: (\S+)", (ROOT / ".github" / "workflows" / "ci.yml").read_text("utf-8"))
+    assert len(used) >= 3
+    assert [action for action in used if not re.fullmatch(r"[\w-]+/[\w-]+@[0-9a-f]{40}", action)] == []
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the first bash there may be that of another Linux")
+def test_every_step_is_a_script_that_bash_can_read() -> None:
+    """With the values of the matrix filled in."""
+    jobs = package("yaml").safe_load((ROOT / ".github" / "workflows" / "ci.yml").read_text("utf-8"))["jobs"]
+    checked = 0
+    for job in jobs.values():
+        for entry in job["strategy"]["matrix"]["include"]:
+            for step in job["steps"]:
+                script = step.get("run", "")
+                for name, value in entry.items():
+                    script = script.replace(f"${{{{ matrix.{name} }}}}", value)
+                assert "${{" not in script
+                done = subprocess.run(["bash", "-n"], input=script, capture_output=True, text=True, check=False)
+                assert done.returncode == 0, done.stderr
+                checked += bool(script)
+    assert checked > 15
 
 
 # Sitecustomize of a Python without Blender's module.
