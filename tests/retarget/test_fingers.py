@@ -24,7 +24,7 @@ NAMES = {
     "SMPL-X": ("left_{finger}{k}", FINGERS, "123"),
 }
 # Bones that lie among them and are no phalanges.
-OTHERS = ("palm_01_l", "f_index_master_l", "hand_ik_l", "LeftHandIndex_end", "middle_metacarpal_l", "thumb_twist_l")
+OTHERS = ("palm_index_l", "f_index_master_l", "hand_ik_l", "LeftHandIndex_end", "middle_metacarpal_l", "thumb_twist_l")
 
 
 def hand(

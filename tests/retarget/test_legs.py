@@ -11,10 +11,14 @@ from scope.solver.rotations import exp
 FRAMES = 200
 
 
-def bent_legs(rng: np.random.Generator) -> tuple[np.ndarray, ...]:
-    """Return rotations of thigh and shin, and hip, knee and ankle, of legs that hang along -y of their bones."""
+def bent_legs(axis: int) -> tuple[np.ndarray, ...]:
+    """Return rotations of thigh and shin, and hip, knee and ankle, of legs that hang along -y of their bones.
+
+    :param axis: of the bones, about which their knees are bent.
+    """
+    rng = np.random.default_rng(5)
     thigh = exp(rng.normal(size=(FRAMES, 3)))
-    shin = thigh @ exp(np.stack([rng.uniform(0.05, 2.5, FRAMES), *np.zeros((2, FRAMES))], axis=1))
+    shin = thigh @ exp(np.outer(rng.uniform(0.05, 2.5, FRAMES), np.eye(3)[axis]))
     hip = rng.normal(size=(FRAMES, 3))
     knee = hip - 0.42 * thigh[:, :, 1]
     return thigh, shin, hip, knee, knee - 0.38 * shin[:, :, 1]
@@ -22,7 +26,7 @@ def bent_legs(rng: np.random.Generator) -> tuple[np.ndarray, ...]:
 
 @pytest.fixture
 def legs() -> tuple[np.ndarray, ...]:
-    return bent_legs(np.random.default_rng(5))
+    return bent_legs(axis=0)
 
 
 def test_the_ankle_reaches_its_goal_and_no_bone_changes_its_length(legs):
@@ -36,14 +40,15 @@ def test_the_ankle_reaches_its_goal_and_no_bone_changes_its_length(legs):
     np.testing.assert_allclose(np.swapaxes(new_shin, 1, 2) @ new_shin, np.tile(np.eye(3), (FRAMES, 1, 1)), atol=1e-12)
 
 
-def test_the_knee_bends_about_the_same_axis_of_the_bones_as_before(legs):
-    """A knee that bends about x of the bones must not turn into one that bends sideways."""
-    thigh, shin, hip, knee, ankle = legs
+@pytest.mark.parametrize(("axis", "other"), [(0, (2, 1)), (2, (1, 0))])
+def test_the_knee_bends_about_the_same_axis_of_the_bones_as_before(axis, other):
+    """A knee that bends forward must not turn into one that bends sideways, nor the reverse."""
+    thigh, shin, hip, knee, ankle = bent_legs(axis)
     goal = hip + 0.7 * (ankle - hip)
     new_thigh, new_shin = solve_leg(thigh, shin, (hip, knee, ankle), goal)
-    np.testing.assert_allclose(new_thigh[:, :, 0], new_shin[:, :, 0], atol=1e-9)  # one axis of both
+    np.testing.assert_allclose(new_thigh[:, :, axis], new_shin[:, :, axis], atol=1e-9)
     bend = np.swapaxes(new_thigh, 1, 2) @ new_shin
-    assert (bend[:, 2, 1] > 0).all()  # and bent to the same side
+    assert (bend[:, other[0], other[1]] > 0).all()  # and to the same side
 
 
 def test_a_leg_that_is_where_it_should_be_stays(legs):

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ WIDTH, HEIGHT = 32, 16
 PICTURE = np.random.default_rng(1).integers(0, 256, (HEIGHT, WIDTH, 3)).astype(np.uint8)
 
 
-def identity(path: Path, shape: list[object], kind: int = TensorProto.FLOAT, inputs: int = 1) -> Path:
+def identity(path: Path, shape: Sequence[str | int], kind: int = TensorProto.FLOAT, inputs: int = 1) -> Path:
     """Write a graph that returns what it is given."""
     names = [f"x{k}" for k in range(inputs)]
     given = [helper.make_tensor_value_info(name, kind, shape) for name in names]
