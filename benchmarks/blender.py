@@ -65,5 +65,5 @@ def _in_real_blender(part: str, file: str) -> dict[str, Any] | None:
     if done.returncode:
         print(f"{part}: not measured, see above", file=sys.stderr)
         return None
-    figures: dict[str, Any] = json.loads((REAL / file).read_text())
+    figures: dict[str, Any] = json.loads((REAL / file).read_text("utf-8"))
     return figures

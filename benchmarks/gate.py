@@ -61,7 +61,7 @@ class Figure:
 
 def read(path: Path = RECORD) -> dict[str, Figure]:
     """Return the recorded figures by name."""
-    return {name: Figure(**entry) for name, entry in json.loads(path.read_text()).items()}
+    return {name: Figure(**entry) for name, entry in json.loads(path.read_text("utf-8")).items()}
 
 
 def verdict(record: dict[str, Figure], found: dict[str, float]) -> tuple[list[tuple[Any, ...]], list[str]]:

@@ -138,7 +138,7 @@ def memory_mib(group: int) -> float:
     for folder in Path("/proc").glob("[0-9]*"):
         try:
             if os.getpgid(int(folder.name)) == group:
-                pages += int((folder / "statm").read_text().split()[1])
+                pages += int((folder / "statm").read_text("utf-8").split()[1])
         except OSError:  # it has ended
             continue
     return pages * os.sysconf("SC_PAGE_SIZE") / 2**20

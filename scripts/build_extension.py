@@ -115,7 +115,7 @@ def build(target: Target, folder: Path, website: str = "", *, kernels: bool = Tr
     stage(target, wheels, website)
     if kernels:
         add_kernels(STAGING, target.platform, target.python, wheels)
-    version = tomllib.loads((STAGING / "blender_manifest.toml").read_text())["version"]
+    version = tomllib.loads((STAGING / "blender_manifest.toml").read_text("utf-8"))["version"]
     archive, made = folder / target.file_name(version), source_time()
     bill = bill_of_materials(STAGING, wheels, target.platform, made)
     (STAGING / BILL).write_text(bill, "utf-8")
@@ -160,7 +160,7 @@ def download_wheels(target: Target) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     pins = folder / "requirements.txt"
     wanted = locked(target.python)
-    if not pins.is_file() or pins.read_text() != wanted or len(list(folder.glob("*.whl"))) != len(PACKAGES):
+    if not pins.is_file() or pins.read_text("utf-8") != wanted or len(list(folder.glob("*.whl"))) != len(PACKAGES):
         for old in folder.iterdir():
             old.unlink()
         request = folder / "request.txt"
@@ -177,7 +177,7 @@ def download_wheels(target: Target) -> list[Path]:
 
 def locked(python: str) -> str:
     """Return the entries of the shipped packages in a Python's lock, with their hashes."""
-    text = (ROOT / "scripts" / "requirements" / f"{python}.txt").read_text()
+    text = (ROOT / "scripts" / "requirements" / f"{python}.txt").read_text("utf-8")
     entries = re.findall(r"^(\S+?)==\S+(?:.*\\\n)*.*$", text, flags=re.M)
     blocks = re.findall(r"^\S+?==\S+(?:.*\\\n)*.*$", text, flags=re.M)
     found = {name: block for name, block in zip(entries, blocks, strict=True) if name in PACKAGES}
@@ -223,7 +223,7 @@ def stage(target: Target, wheels: list[Path], website: str = "") -> None:
 
 def manifest(target: Target, wheels: list[str], website: str = "") -> str:
     """Return the manifest of a target: that of the repository, with its Blenders, platform, wheels and website."""
-    top, tables = (ROOT / "blender_manifest.toml").read_text().split("\n[", 1)
+    top, tables = (ROOT / "blender_manifest.toml").read_text("utf-8").split("\n[", 1)
     first, end = target.blenders
     limits = f'blender_version_min = "{first}"' + (f'\nblender_version_max = "{end}"' if end else "")
     top, count = re.subn(r'^blender_version_min = ".*"$', limits, top, flags=re.M)
@@ -295,7 +295,7 @@ def check_listing(folder: Path, targets: list[Target]) -> None:
     """List the zips as an extension repository does: every one must be listed, and no Blender may fit two."""
     said = blender_extension("server-generate", "--repo-dir", str(folder))
     listing = folder / "index.json"
-    entries = json.loads(listing.read_text())["data"]
+    entries = json.loads(listing.read_text("utf-8"))["data"]
     found = sorted((e["platforms"], e["blender_version_min"], e.get("blender_version_max")) for e in entries)
     wanted = sorted(([target.platform], *target.blenders) for target in targets)
     if found != wanted or "duplicate" in said.lower() or "error" in said.lower():

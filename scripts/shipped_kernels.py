@@ -40,7 +40,7 @@ def add_kernels(staging: Path, target: str, python: str, wheels: Iterable[Path])
     wheels = [w for w in wheels if "abi3" in w.name or f"cp{python.replace('.', '')}" in w.name]
     kept, wanted = KEPT / target / python, _digest(staging, wheels)
     stated = kept / MADE_FROM
-    if not stated.is_file() or stated.read_text() != wanted:
+    if not stated.is_file() or stated.read_text("utf-8") != wanted:
         is_here = _THIS.get((platform.system(), platform.machine())) == target
         if not is_here or not (find_python(python) or _has_debian(python)):
             print(
@@ -125,7 +125,7 @@ def _numpy_wheel(python: str) -> Path:
     folder = KEPT / "numpy" / python
     if not list(folder.glob("*.whl")):
         folder.mkdir(parents=True, exist_ok=True)
-        lock = (ROOT / "scripts" / "requirements" / f"{python}.txt").read_text()
+        lock = (ROOT / "scripts" / "requirements" / f"{python}.txt").read_text("utf-8")
         found = re.search(r"^numpy==\S+(?:.*\\\n)*.*$", lock, flags=re.M)
         assert found, python
         request = folder / "request.txt"

@@ -35,7 +35,7 @@ def test_a_link_stays_and_its_target_is_written(link, tmp_path, earlier):
         target.write_text(earlier)
     write(check_output(link))
     assert link.is_symlink()
-    assert target.read_text() == "new"
+    assert target.read_text("utf-8") == "new"
     assert os.listdir(target.parent) == ["kept.npz"]
 
 
@@ -45,7 +45,7 @@ def test_a_link_to_a_link_stays_too(link, tmp_path):
     write(second)
     assert second.is_symlink()
     assert link.is_symlink()
-    assert (tmp_path / "disk" / "kept.npz").read_text() == "new"
+    assert (tmp_path / "disk" / "kept.npz").read_text("utf-8") == "new"
 
 
 def test_a_failure_keeps_the_target_of_a_link(link, tmp_path):
@@ -54,7 +54,7 @@ def test_a_failure_keeps_the_target_of_a_link(link, tmp_path):
     with pytest.raises(TypeError), atomic_path(link) as temporary:
         temporary.write_text(b"no text")
     assert link.is_symlink()
-    assert target.read_text() == "earlier"
+    assert target.read_text("utf-8") == "earlier"
     assert sorted(os.listdir(tmp_path)) == ["disk", "walk.npz"]
     assert os.listdir(target.parent) == ["kept.npz"]
 

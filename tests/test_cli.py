@@ -248,23 +248,6 @@ def test_hands_need_a_body_with_fingers(tmp_path, capsys):
     assert not out.exists()
 
 
-@pytest.mark.skipif(os.name == "nt", reason="needs the C library by its POSIX name")
-def test_output_of_c_libraries_is_not_part_of_the_report():
-    """Blender's version is in C's buffer when the command begins."""
-    code = (
-        "import ctypes\n"
-        "from scope.scope_addon.command_line.terminal import stdout_for_report\n"
-        "c = ctypes.CDLL(None)\n"
-        "c.puts(b'Blender 9.9')\n"
-        "with stdout_for_report() as stdout:\n"
-        "    c.puts(b'exporting')\n"
-        "    print('{}', file=stdout)\n"
-    )
-    buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=buffered)
-    assert (done.stdout, done.stderr) == ("{}\n", "Blender 9.9\nexporting\n")
-
-
 @pytest.mark.parametrize(
     "error",
     [

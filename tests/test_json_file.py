@@ -27,7 +27,7 @@ def test_another_file_is_not_overwritten(tmp_path, content):
     path.write_text(content)
     with pytest.raises(OutputError, match="is not a bone map, so it is not overwritten"):
         save_map(path, "bone map", bones={})
-    assert path.read_text() == content
+    assert path.read_text("utf-8") == content
     path.write_text("")
     save_map(path, "bone map", bones={})
 

@@ -101,7 +101,7 @@ def memory_mb() -> float:
     path = Path("/proc/self/statm")
     if not path.exists():
         return float("nan")
-    return int(path.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+    return int(path.read_text("utf-8").split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
 def played(body: Body, minutes: float, say: Callable[[dict[str, float]], None]) -> dict[str, Any]:

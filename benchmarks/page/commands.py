@@ -82,7 +82,7 @@ def run(command: Command, folder: Path, say: Callable[[str], None]) -> Outcome:
     arguments = [sys.executable, "-m", SCRIPTS[command.script], *command.arguments, "--json", str(path)]
     since = time.monotonic()
     done = subprocess.run(arguments, capture_output=True, text=True, cwd=ROOT, check=False)
-    figures = json.loads(path.read_text()) if path.is_file() else {}
+    figures = json.loads(path.read_text("utf-8")) if path.is_file() else {}
     return Outcome(command, done.stdout, done.stderr, figures, time.monotonic() - since, done.returncode)
 
 

@@ -46,7 +46,7 @@ def written_into_the_extension(work: Path) -> list[str]:
 
 def panel(video: Path, out: Path, shell_out: Path, report: dict) -> list[str]:
     """Return the report of the session in the window."""
-    report |= json.loads((out / "report.json").read_text())
+    report |= json.loads((out / "report.json").read_text("utf-8"))
     shell(["capture", str(video), "--quality", "fast", "--quiet", "-o", str(shell_out / "panel.npz")])
     distance = report["window_from_shell_mm"] = apart(out / "motion.npz", shell_out / "panel.npz")
     problems = missing(out, report["exports"])
@@ -72,8 +72,8 @@ def headless(clips: Path, out: Path, shell_out: Path, report: dict) -> list[str]
     """Check Blender's command line: one clip, and a folder with a broken file, an image of a wall and a clip."""
     arguments = ["batch", str(clips), "--out", str(shell_out / "batch"), "--quality", "fast", "--quiet", "--again"]
     status = shell([*arguments, "--formats", "npz"])
-    theirs = json.loads((out / "batch.json").read_text())
-    ours = json.loads((shell_out / "batch" / "scope-batch.json").read_text())
+    theirs = json.loads((out / "batch.json").read_text("utf-8"))
+    ours = json.loads((shell_out / "batch" / "scope-batch.json").read_text("utf-8"))
     problems = missing(out, ["command.npz", "command.glb", "batch/walk.npz", "batch/walk.glb"])
     if problems:
         return problems
@@ -103,7 +103,7 @@ def main(video: Path, work: Path, parts: list[str]) -> int:
         problems += headless((work / "clips").resolve(), work / "out", shell_out, report)
     for part in ("undo", "trouble", "stored", "pins", "details", "live", "first", "startup", "reload", "walk"):
         if part in parts:
-            report[part] = json.loads((work / "out" / f"{part}.json").read_text())
+            report[part] = json.loads((work / "out" / f"{part}.json").read_text("utf-8"))
     print(json.dumps(report, indent=1))
     for problem in problems:
         print(f"blender: {problem}", file=sys.stderr)

@@ -184,11 +184,11 @@ def rigs() -> None:
 def exported() -> None:
     """Export a rig and then captures: everything starts at 0 s, has the take's name, and is what was asked for."""
     use(bpy.ops.scope.export, filepath=str(OUT / "rig.bvh"), format="BVH", which="RIG")
-    assert "DEF-" in (OUT / "rig.bvh").read_text()
+    assert "DEF-" in (OUT / "rig.bvh").read_text("utf-8")
     select("first")
     for kind, suffix in (("FBX", "fbx"), ("GLB", "glb"), ("BVH", "bvh"), ("NPZ", "npz")):
         use(bpy.ops.scope.export, filepath=str(OUT / f"first.{suffix}"), format=kind)
-    text = (OUT / "first.bvh").read_text()
+    text = (OUT / "first.bvh").read_text("utf-8")
     assert "DEF-" not in text, "the rig was exported again"
     longest = max(abs(float(word)) for line in text.splitlines() if "OFFSET" in line for word in line.split()[1:])
     assert 20.0 < longest < 100.0, f"a BVH in centimetres has no bone of {longest}"

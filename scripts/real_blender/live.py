@@ -163,7 +163,7 @@ def closed(how: str) -> Iterator[float]:
     other = subprocess.Popen(["blender", "--python", script, "--", FOOTAGE, str(OUT), how, ADDRESS])
     yield from until(lambda: other.poll() is not None, 400, "the other Blender to end")
     ended = time.monotonic()
-    does = (OUT / f"live_{how}").read_text()
+    does = (OUT / f"live_{how}").read_text("utf-8")
     assert does == "capturing", does
     assert other.returncode == (-9 if how == "crash" else 0), other.returncode
     yield from connection_closed(ended, f"Blender's {how}")

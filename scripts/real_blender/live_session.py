@@ -41,7 +41,7 @@ def camera() -> Generator[float, None, subprocess.Popen]:
 
 def clients() -> list[tuple[str, float]]:
     """Return what the camera says of its clients: "came" or "left", and when."""
-    return [(what, float(when)) for what, when in map(str.split, CLIENTS.read_text().splitlines())]
+    return [(what, float(when)) for what, when in map(str.split, CLIENTS.read_text("utf-8").splitlines())]
 
 
 def connection_closed(began: float, what: str) -> Iterator[float]:

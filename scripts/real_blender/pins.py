@@ -121,7 +121,7 @@ def pressed() -> Iterator[float]:
     browser.chmod(0o755)
     os.environ["BROWSER"] = str(browser)
     yield from press(DOCUMENTATION, opened.exists)
-    page = opened.read_text().strip()
+    page = opened.read_text("utf-8").strip()
     assert Path(page.removeprefix("file://")).is_file(), page
     found = []
     for place in (RAW, STRONG, NORMAL):

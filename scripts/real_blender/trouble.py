@@ -144,7 +144,7 @@ def closed(how: str) -> Iterator[float]:
     script = str(Path(__file__).with_name("closed.py"))
     other = subprocess.Popen(["blender", "--python", script, "--", FOOTAGE, str(OUT), how])
     yield from until(lambda: other.poll() is not None, 300, "the other Blender to end")
-    assert (OUT / f"closed_{how}").read_text() == "capturing", "the other Blender did not capture"
+    assert (OUT / f"closed_{how}").read_text("utf-8") == "capturing", "the other Blender did not capture"
     assert other.returncode == (-9 if how == "crash" else 0), other.returncode
     yield from until(lambda: not workers(), 60, "the worker to end")
     nothing_left(f"after Blender's {how}")

@@ -45,7 +45,7 @@ def main(seed: int, steps: int) -> int:
             process.send_signal(signal.SIGABRT)  # faulthandler prints where it hangs
             status, ended = process.wait(), f"no end within {LONGEST_S:.0f} s"
     results = FOLDER / "results.json"
-    report = json.loads(results.read_text()) if results.is_file() else {"seed": seed, "failures": []}
+    report = json.loads(results.read_text("utf-8")) if results.is_file() else {"seed": seed, "failures": []}
     if status and not report["failures"]:
         report["failures"] = [f"Blender ended with {ended}"]
     (OUT / "walk.json").write_text(json.dumps(report))

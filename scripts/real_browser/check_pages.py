@@ -116,7 +116,7 @@ def check_page(folder: Path, page: Path, wanted: dict[str, Any] | None) -> dict[
 def main() -> int:
     """Check the pages named on the command line; return 1 if one has a problem."""
     folder, pages = Path(sys.argv[1]), [Path(name) for name in sys.argv[2:]]
-    expected = json.loads((folder / "expected.json").read_text())
+    expected = json.loads((folder / "expected.json").read_text("utf-8"))
     found, status = {}, 0
     for page in pages:
         try:

@@ -92,7 +92,7 @@ def made_run(report: dict[str, Any]) -> Run:
 def expect(folder: Path) -> None:
     """Write the page of the made motion, and what the pages must show."""
     body, of_page = load_body("scope"), people_of(folder)
-    report: dict[str, Any] = json.loads((folder / "captured.json").read_text())
+    report: dict[str, Any] = json.loads((folder / "captured.json").read_text("utf-8"))
     warnings = ["made.mp4 cuts to another scene at 2.0 s and at 3.5 s: </script><script>alert(1)</script>"]
     clip = CapturedClip(SAMPLE, of_page[MADE], body, report | {"people": 2, "warnings": warnings}, "made & 'two'")
     write_capture_page(folder / MADE, clip)
@@ -106,7 +106,7 @@ def expect(folder: Path) -> None:
 def compare(folder: Path) -> list[str]:
     """Return what the browser shows differently."""
     body, problems = load_body("scope"), []
-    found = json.loads((folder / "found.json").read_text())
+    found = json.loads((folder / "found.json").read_text("utf-8"))
     for name, people in people_of(folder).items():
         of_page = found[name]
         worst = 0.0

@@ -29,6 +29,7 @@ from ..options import Options, Priors, default_priors
 from ..residuals.registry import SHAPE_PRIOR
 from ..state import ClipFit, Fit, State, Status
 from ..temporal import Temporal, with_previous
+from ..validation import check_type
 from .frame_solver import fit_tree
 from .report import Outcome, cost_by_term, make_fit
 
@@ -70,12 +71,20 @@ def fit_clip(
 
     :return: the frames' fits and the shape they share.
     :raises ShapeError: when there is no frame, or when an array does not fit the body.
+    :raises InvalidValueError: a value that no fit can use.
     """
+    for k, m in enumerate(measurements):
+        check_type(m, Measurements, f"measurements[{k}]")
+    for k, state in enumerate(init or ()):
+        check_type(state, State, f"init[{k}]")
     if len(measurements) == 0:
         raise ShapeError("A clip needs at least one frame of measurements, but got none.")
     if init is not None and len(init) != len(measurements):
         raise ShapeError(f"There must be one initial state a frame, {len(measurements)}, but got {len(init)}.")
     priors = default_priors(body) if priors is None else priors
+    check_type(priors, Priors, "priors")
+    check_type(options, Options, "options")
+    check_type(temporal, (Temporal, type(None)), "temporal")
     tree = make_tree(body)
     if init is None:
         init = fit_in_order(tree, measurements, priors, options, temporal)

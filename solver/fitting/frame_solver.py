@@ -21,6 +21,7 @@ from ..options import Options, Priors, Stage, default_priors
 from ..residuals.registry import SHAPE_PRIOR
 from ..rotations import nearest_rotation, orthonormalize
 from ..state import Fit, State, Status
+from ..validation import check_type
 from .initialize import initial_state
 from .report import Outcome, cost_by_term, make_fit
 
@@ -41,6 +42,7 @@ def fit(
     :param priors: `default_priors(body)` unless given: the learned joint prior, joint limits, the population's shape.
     :return: the state and how it was reached; whatever values were measured, see `Status`.
     :raises ShapeError: when an array does not fit the body.
+    :raises InvalidValueError: a value that no fit can use.
     """
     return FrameSolver(body, priors, options).fit(measurements, init)
 
@@ -91,9 +93,14 @@ class FrameSolver:
         """Fit one frame, as `fit` does, with the priors and options of the constructor unless others are given.
 
         :raises ShapeError: when an array does not fit the body.
+        :raises InvalidValueError: a value that no fit can use.
         """
         priors = self.priors if priors is None else priors
         options = self.options if options is None else options
+        check_type(measurements, Measurements, "measurements")
+        check_type(init, (State, type(None)), "init")
+        check_type(priors, Priors, "priors")
+        check_type(options, Options, "options")
         tree, memory, work = self.tree, self._memory, self._memory.work
         packed = self._pack(priors)
         terms, count, self._layout = fill_terms(tree, measurements, packed, self._layout)

@@ -91,7 +91,10 @@ def subtract_gram(C, W, X, x, x_row, count) -> None:  # type: ignore[no-untyped-
 
 @kernel
 def subtract_gram_below(C, W, X, x, x_row, count, first) -> None:  # type: ignore[no-untyped-def]
-    """`subtract_gram` of an X whose column first + j is zero above row 3 (j // 3), for j below `count`."""
+    """`subtract_gram` of an X whose column first + j is zero above row 3 (j // 3), for j below `count`.
+
+    `first` and `count` are multiples of four: tiles are skipped as a whole.
+    """
     for a in range(0, W, 4):
         a_skip = 3 * ((a - first) // 3) if first <= a < first + count else 0
         b = a

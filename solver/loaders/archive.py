@@ -24,10 +24,10 @@ from .regular_file import in_one_line
 
 LARGEST_ARRAY = 1 << 28  # bytes unpacked; SMPL-X's 400 shape directions in float64 have 100 million
 
-# What zipfile and numpy's header reader raise on damaged files.
-_UNREADABLE: tuple[type[Exception], ...] = (OSError, EOFError, LookupError, ValueError, TypeError, ArithmeticError)
-_UNREADABLE += (RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error, struct.error)
-_UNREADABLE += (SyntaxError, tokenize.TokenError)  # a header that is no Python literal
+# What zipfile, zlib and numpy raise on damaged or hostile files.
+UNREADABLE: tuple[type[Exception], ...] = (OSError, EOFError, LookupError, ValueError, TypeError, ArithmeticError)
+UNREADABLE += (RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error, struct.error)
+UNREADABLE += (SyntaxError, tokenize.TokenError)  # a header that is no Python literal
 _HEADER_READERS: dict[tuple[int, int], Any] = {
     (1, 0): np.lib.format.read_array_header_1_0,
     (2, 0): np.lib.format.read_array_header_2_0,
@@ -41,7 +41,7 @@ def npz_keys(path: Path) -> set[str]:
     try:
         with zipfile.ZipFile(path) as archive:
             return {name.removesuffix(".npy") for name in archive.namelist()}
-    except _UNREADABLE:
+    except UNREADABLE:
         return set()
 
 
@@ -69,7 +69,7 @@ def read_members(path: Path, wanted: Collection[str], shape_of: str) -> tuple[di
                         shape, _, _ = _read_header(file, key)
     except ModelFileError as cause:
         raise ModelFileError(f"{path} cannot be used as a body: {cause}") from None
-    except _UNREADABLE as cause:
+    except UNREADABLE as cause:
         raise ModelFileError(f"{path} is not a readable body file ({in_one_line(cause)}); download it again") from cause
     return arrays, shape
 

@@ -4,9 +4,7 @@
 from __future__ import annotations
 
 import io
-import tokenize
 import zipfile
-import zlib
 from collections.abc import Collection
 from pathlib import Path
 from typing import Any
@@ -15,15 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from .archive import UNREADABLE
 from .regular_file import check_regular, in_one_line
 
 LARGEST_BYTES = 4 << 30  # unpacked; an hour of SMPL+H motion at 60 fps takes a quarter of this
-
-# What zipfile, zlib and numpy raise on damaged or hostile files.
-_BROKEN = (
-    *(OSError, ValueError, LookupError, EOFError, RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error),
-    *(TypeError, ArithmeticError, SyntaxError, tokenize.TokenError),  # a header that is no Python literal
-)
 
 
 def read_npz(
@@ -53,5 +46,5 @@ def read_npz(
             return {key: file[key] for key in file.files if wanted is None or key in wanted}
     except FileNotFoundError as cause:
         raise error(f"{path} does not exist; choose an existing {what}") from cause
-    except _BROKEN as cause:
+    except UNREADABLE as cause:
         raise error(f"{path} is not a readable {what} ({in_one_line(cause)}); choose another file") from cause

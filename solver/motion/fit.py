@@ -104,8 +104,11 @@ def fit_motion(
     if not 0.0 <= overlap < window:
         raise InvalidValueError(f"The overlap of windows must lie in 0..{window} s, but is {overlap} s.")
     check_type(motion, MotionPrior, "motion")
+    check_type(stands, (StandingPoints, type(None)), "stands")
     check_weight(focal_weight, "focal_weight")
     priors = default_priors(body) if priors is None else priors
+    check_type(priors, Priors, "priors")
+    check_type(options, Options, "options")
     tree = make_tree(body)
     shape = _checked_shape(shape, tree, focal)
     if init is None:

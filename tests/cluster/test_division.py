@@ -29,23 +29,23 @@ clip = pathlib.Path(sys.argv[2])
 given = dict(each.split("=", 1) for each in sys.argv if each.startswith("--windows"))
 with open(clip.with_suffix(".calls"), "a") as log:
     log.write(json.dumps({"pid": os.getpid(), "parent": os.getppid(), "windows": given.get("--windows", "")}) + "\\n")
-windows, count = given.get("--windows", ""), int(clip.read_text())
+windows, count = given.get("--windows", ""), int(clip.read_text("utf-8"))
 if windows == "count" and count > 1:
     print(json.dumps({"windows": count})); sys.exit()
 if ":" in windows:
     first, end = map(int, windows.split(":"))
     hung, failing = clip.with_suffix(".hangs"), clip.with_suffix(".fails")
-    if hung.exists() and first <= int(hung.read_text()) < end:
+    if hung.exists() and first <= int(hung.read_text("utf-8")) < end:
         hung.unlink()
         sys.stdin.read(); sys.exit(130)
-    if failing.exists() and first <= int(failing.read_text()) < end:
+    if failing.exists() and first <= int(failing.read_text("utf-8")) < end:
         print("scope: it cannot be decoded", file=sys.stderr); sys.exit(1)
     outputs = [pathlib.Path(given["--windows-folder"], f"window{k:05d}.npz") for k in range(first, end)]
     for k, path in enumerate(outputs):
         path.write_text(f"{first + k} ")
     print(json.dumps({"frames": 3 * len(outputs), "outputs": [str(p) for p in outputs], "warnings": []})); sys.exit()
 folder = given.get("--windows-folder")
-found = "".join(p.read_text() for p in sorted(pathlib.Path(folder).iterdir())) if folder else "whole"
+found = "".join(p.read_text("utf-8") for p in sorted(pathlib.Path(folder).iterdir())) if folder else "whole"
 outputs = [sys.argv[i + 1] for i, a in enumerate(sys.argv) if a == "-o"]
 for path in outputs:
     pathlib.Path(path).write_text(found)
@@ -61,7 +61,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def result(folder: Path, name: str) -> str:
-    return (folder.parent / "out" / f"{name}.npz").read_text()
+    return (folder.parent / "out" / f"{name}.npz").read_text("utf-8")
 
 
 def test_windows_become_tasks_of_at_most_some_windows() -> None:

@@ -35,7 +35,7 @@ def test_footage_and_results_are_mirrored_by_their_names(store, tmp_path):
     assert (folder / "below" / "a.mp4").read_bytes() == b""
     folder = mirror_results("memory://bucket/clips/out", tmp_path / "out")
     assert files(folder) == ["old.mp4", REPORT_NAME]
-    assert (folder / REPORT_NAME).read_text() == "{}"
+    assert (folder / REPORT_NAME).read_text("utf-8") == "{}"
 
 
 def test_names_that_lead_elsewhere_are_left_out(store, tmp_path, monkeypatch):

@@ -47,7 +47,7 @@ def test_clips_on_s3_are_captured_once_although_a_worker_is_killed(store, tmp_pa
 
     def calls(name):
         log = tmp_path / f"{name}.calls"
-        return [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
+        return [json.loads(line) for line in log.read_text("utf-8").splitlines()] if log.exists() else []
 
     with started(n_workers=2, processes=True) as cluster:
         argv = ["batch", "s3://studio/clips", "--out", "s3://studio/out", "--formats", "npz", "--recursive"]

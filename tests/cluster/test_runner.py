@@ -24,14 +24,14 @@ pytestmark = pytest.mark.skipif(os.name == "nt", reason="sends signals to worker
 PROGRAM = """
 import json, os, pathlib, sys
 clip = pathlib.Path(sys.argv[2])
-text = clip.read_text()
+text = clip.read_text("utf-8")
 with open(clip.with_suffix(".calls"), "a") as log:
     log.write(json.dumps({"pid": os.getpid(), "parent": os.getppid(), "arguments": sys.argv[1:]}) + "\\n")
 if text == "nobody":
     print("scope: no person found", file=sys.stderr); sys.exit(3)
 if text == "broken":
     print("scope: it is not a video", file=sys.stderr); sys.exit(1)
-if text == "hangs" and len(clip.with_suffix(".calls").read_text().splitlines()) == 1:
+if text == "hangs" and len(clip.with_suffix(".calls").read_text("utf-8").splitlines()) == 1:
     sys.stdin.read(); sys.exit(130)
 if text == "kills":
     os.kill(os.getppid(), 9); sys.stdin.read(); sys.exit(130)
@@ -64,7 +64,7 @@ def folder(tmp_path):
 
 def calls(clip):
     log = clip.with_suffix(".calls")
-    return [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
+    return [json.loads(line) for line in log.read_text("utf-8").splitlines()] if log.exists() else []
 
 
 def run(cluster, folder, *options, program=PROGRAM):
@@ -75,7 +75,7 @@ def run(cluster, folder, *options, program=PROGRAM):
         [*argv, "--scheduler", str(getattr(cluster, "scheduler_address", cluster))],
         program=[sys.executable, "-c", program],
     )
-    report = json.loads((out / REPORT_NAME).read_text()) if (out / REPORT_NAME).exists() else None
+    report = json.loads((out / REPORT_NAME).read_text("utf-8")) if (out / REPORT_NAME).exists() else None
     return status, report
 
 
@@ -85,7 +85,7 @@ def files(folder):
 
 def is_json(file):
     try:
-        return bool(json.loads(file.read_text()))
+        return bool(json.loads(file.read_text("utf-8")))
     except ValueError:
         return False
 
@@ -111,7 +111,7 @@ def test_every_clip_has_its_outcome_and_a_second_run_captures_what_has_changed(c
     assert found["b.mp4"][1] == "it is not a video"
     outputs = ["a.glb", "a.npz", "below", "below/d.glb", "below/d.npz"]
     assert files(folder) == sorted([*outputs, REPORT_NAME])
-    assert (folder.parent / "out" / "below" / "d.npz").read_text() == "result of d"
+    assert (folder.parent / "out" / "below" / "d.npz").read_text("utf-8") == "result of d"
     staged, shown = (calls(folder / "below" / "d.mp4")[0]["arguments"][k] for k in (6, -1))
     assert ".scope-attempts" in staged
     assert f"-o {folder.parent}/out/below/d.npz" in shown  # what a page about the capture shows
@@ -127,7 +127,7 @@ def test_every_clip_has_its_outcome_and_a_second_run_captures_what_has_changed(c
     status, report = run(cluster, folder)
     assert report["counts"] == {"done": 2, "skipped": 0, "no_person": 1, "failed": 1}
     assert [len(calls(folder / name)) for name in ("a.mp4", "b.mp4", "c.png", "below/d.mp4")] == [2, 2, 1, 2]
-    assert (folder.parent / "out" / "a.npz").read_text() == "result of changed"
+    assert (folder.parent / "out" / "a.npz").read_text("utf-8") == "result of changed"
 
 
 def test_a_clip_of_a_killed_worker_is_captured_by_another_and_its_process_ends(cluster, folder):
@@ -219,11 +219,11 @@ def test_footage_and_results_may_be_at_urls(cluster, folder, capsys):
     program = [sys.executable, "-c", PROGRAM.replace('clip.with_suffix(".calls")', 'pathlib.Path("/dev/null")')]
     for counts in ({"done": 2, "skipped": 0}, {"done": 0, "skipped": 2}):
         assert main(argv, program=program) == 1
-        report = json.loads((out / REPORT_NAME).read_text())
+        report = json.loads((out / REPORT_NAME).read_text("utf-8"))
         assert report["counts"] == {**counts, "no_person": 0, "failed": 1}
         assert report["folder"] == folder.as_uri()
         assert files(folder) == ["a.npz", "below", "below/d.npz", REPORT_NAME]
-        assert (out / "below" / "d.npz").read_text() == "result of d"
+        assert (out / "below" / "d.npz").read_text("utf-8") == "result of d"
     assert capsys.readouterr().err.splitlines()[-1].endswith(f"report in {out.as_uri()}/{REPORT_NAME}")
 
 

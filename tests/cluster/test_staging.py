@@ -35,7 +35,7 @@ def test_results_are_renamed_and_replace_earlier_ones(out):
     for text in ("first", "second"):
         folder, content = attempt(staging, text, text)
         assert staging.publish(folder, ["below/a.npz"], content)
-        assert (out / "below" / "a.npz").read_text() == text
+        assert (out / "below" / "a.npz").read_text("utf-8") == text
     staging.close()
     assert names(out) == ["below/a.npz"]
     assert not (out / ".scope-attempts").exists()
@@ -55,7 +55,7 @@ def test_a_result_that_is_not_what_the_worker_wrote_is_not_published(out, damage
     else:
         file.write_text({"changed": "BETTER", "cut": ""}[damage])
     assert not staging.publish(folder, ["below/a.npz"], content)
-    assert (out / "below" / "a.npz").read_text() == "good"
+    assert (out / "below" / "a.npz").read_text("utf-8") == "good"
 
 
 def test_an_attempt_that_was_given_up_can_not_be_published(out):
@@ -81,7 +81,7 @@ def test_results_may_be_on_another_disk(out, tmp_path, monkeypatch):
 
     monkeypatch.setattr(os, "replace", across)
     assert staging.publish(folder, ["below/a.npz"], content)
-    assert (out / "below" / "a.npz").read_text() == "good"
+    assert (out / "below" / "a.npz").read_text("utf-8") == "good"
 
 
 def test_folders_of_batches_that_were_killed_are_removed_and_those_of_others_stay(out):

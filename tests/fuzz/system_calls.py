@@ -194,7 +194,7 @@ def _text(thread: int, address: int) -> str:
 
 
 def _process_of(thread: int) -> int:
-    lines = Path(f"/proc/{thread}/status").read_text().splitlines()
+    lines = Path(f"/proc/{thread}/status").read_text("utf-8").splitlines()
     return int(next(line.split()[1] for line in lines if line.startswith("Tgid:")))
 
 

@@ -154,14 +154,14 @@ def test_a_batch_keeps_what_it_had(tmp_path, temporary):
                 failed += Batch(clips, out, program, {}, [".npz"]).run(1)["exit_status"]
             except ScopeError as error:
                 said.append(str(error))
-        found = {p.name: p.read_text() for p in out.iterdir()} if out.is_dir() else {}
+        found = {p.name: p.read_text("utf-8") for p in out.iterdir()} if out.is_dir() else {}
         assert set(found) <= {"a.npz", REPORT_NAME}, f"after a fault at call {n}"
         assert found.get("a.npz", "result") == "result"
         assert all(json.loads(text) for name, text in found.items() if name.endswith(".json"))
         assert list(temporary.iterdir()) == [], f"after a fault at call {n}"
         report = Batch(clips, out, program, {}, [".npz"]).run(1)
         assert report["exit_status"] == 0, f"after a fault at call {n}"
-        assert (out / "a.npz").read_text() == "result"
+        assert (out / "a.npz").read_text("utf-8") == "result"
         if len(calls) < n:
             break
         for path in out.iterdir():

@@ -283,7 +283,7 @@ def captured(redirection: str, folder: Path) -> subprocess.CompletedProcess[str]
     """Run a command line that captures nothing, but writes a file, with a shell's redirections."""
     command = shlex.join([sys.executable, "-c", MOTION, "capture", "-o", "a.npz", "--json"])
     done = shell(redirection.replace("COMMAND", command), folder)
-    assert (folder / "a.npz").read_text() == "motion"  # and no message
+    assert (folder / "a.npz").read_text("utf-8") == "motion"  # and no message
     return done
 
 

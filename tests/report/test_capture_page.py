@@ -168,7 +168,7 @@ def test_a_page_that_cannot_be_written_leaves_the_earlier_one(body, footage, tmp
     monkeypatch.setattr(Path, "write_bytes", full)
     with pytest.raises(OutputError, match="No space left"):
         write_capture_page(out, clip(body, footage))
-    assert out.read_text() == "earlier"
+    assert out.read_text("utf-8") == "earlier"
     assert sorted(os.listdir(tmp_path)) == ["footage.mp4", "out.html"]
 
 

@@ -12,7 +12,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_versions_are_those_that_run():
-    stated = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    stated = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["version"]
     said = machine.versions().split(", ")
     assert {f"Scope {stated}", f"Python {platform.python_version()}", f"numpy {np.__version__}"} <= set(said)
 

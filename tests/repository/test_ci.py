@@ -10,6 +10,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
+from ..required import package
+
 ROOT = Path(__file__).resolve().parents[2]
 PREPARES = {"./scripts/setup", "./scripts/debian"}  # which the others call where they need it
 
@@ -19,13 +23,38 @@ def scripts(text: str) -> set[str]:
 
 
 def test_every_script_of_the_local_run_is_in_the_hosted_one() -> None:
-    local = scripts((ROOT / ".ci" / "run").read_text())
+    local = scripts((ROOT / ".ci" / "run").read_text("utf-8"))
     assert {"./scripts/check", "./scripts/test", "./scripts/gate", "./scripts/fuzz"} <= local
-    assert local - PREPARES == scripts((ROOT / ".github" / "workflows" / "ci.yml").read_text())
+    assert local - PREPARES == scripts((ROOT / ".github" / "workflows" / "ci.yml").read_text("utf-8"))
 
 
 def test_all_that_is_run_exists() -> None:
-    assert [name for name in scripts((ROOT / ".ci" / "run").read_text()) if not (ROOT / name).is_file()] == []
+    assert [name for name in scripts((ROOT / ".ci" / "run").read_text("utf-8")) if not (ROOT / name).is_file()] == []
+
+
+def test_actions_of_others_are_pinned_by_hash() -> None:
+    """A tag can be moved to other code."""
+    used = re.findall(r"uses: (\S+)", (ROOT / ".github" / "workflows" / "ci.yml").read_text("utf-8"))
+    assert len(used) >= 3
+    assert [action for action in used if not re.fullmatch(r"[\w-]+/[\w-]+@[0-9a-f]{40}", action)] == []
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the first bash there may be that of another Linux")
+def test_every_step_is_a_script_that_bash_can_read() -> None:
+    """With the values of the matrix filled in."""
+    jobs = package("yaml").safe_load((ROOT / ".github" / "workflows" / "ci.yml").read_text("utf-8"))["jobs"]
+    checked = 0
+    for job in jobs.values():
+        for entry in job["strategy"]["matrix"]["include"]:
+            for step in job["steps"]:
+                script = step.get("run", "")
+                for name, value in entry.items():
+                    script = script.replace(f"${{{{ matrix.{name} }}}}", value)
+                assert "${{" not in script
+                done = subprocess.run(["bash", "-n"], input=script, capture_output=True, text=True, check=False)
+                assert done.returncode == 0, done.stderr
+                checked += bool(script)
+    assert checked > 15
 
 
 # Sitecustomize of a Python without Blender's module.
@@ -40,7 +69,7 @@ PathFinder.find_spec = classmethod(
 
 def test_what_runs_without_blender_can_be_collected_without_it(tmp_path: Path) -> None:
     """On Windows and macOS; a test file that imports Blender's module would keep all the others from running."""
-    workflow = (ROOT / ".github" / "workflows" / "ci.yml").read_text()
+    workflow = (ROOT / ".github" / "workflows" / "ci.yml").read_text("utf-8")
     (arguments,) = re.findall(r"python -m pytest --numprocesses auto --dist loadfile\n((?: +--ignore.*\n)+)", workflow)
     (tmp_path / "sitecustomize.py").write_text(WITHOUT_BLENDER)
     environment = dict(os.environ, PYTHONPATH=str(tmp_path), CI="1")

@@ -17,7 +17,7 @@ CALLED_BY_BLENDER = {"draw_item"}
 
 def functions(path: Path) -> list[ast.FunctionDef | ast.AsyncFunctionDef]:
     """Every function of a file, methods and inner functions included."""
-    tree = ast.parse(path.read_text())
+    tree = ast.parse(path.read_text("utf-8"))
     return [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
 
 
@@ -32,7 +32,7 @@ def test_functions_are_short_and_take_few_parameters() -> None:
     assert len(files) > 300
     wrong = []
     for path in files:
-        here = str(path.relative_to(ROOT))
+        here = path.relative_to(ROOT).as_posix()
         for function in functions(path) if here not in KERNELS else []:
             where = f"{here}:{function.lineno} {function.name}"
             lines = (function.end_lineno or function.lineno) - function.lineno + 1
@@ -51,5 +51,5 @@ def test_the_exceptions_exist() -> None:
 def test_files_stay_readable() -> None:
     for top in ("solver", "scope_addon", "tools", "benchmarks", "tests"):
         for path in (ROOT / top).rglob("*.py"):
-            lines = len(path.read_text().splitlines())
+            lines = len(path.read_text("utf-8").splitlines())
             assert lines <= FILE_LINES, f"{path.relative_to(ROOT)} has {lines} lines"

@@ -169,8 +169,9 @@ def test_every_term_of_the_glossary_is_defined_once():
     assert [term for term, count in Counter(terms).items() if count > 1] == []
 
 
-def test_the_readme_is_short():
-    assert len((ROOT / "README.md").read_text("utf-8").splitlines()) <= 120
+@pytest.mark.parametrize(("name", "lines"), [("README.md", 120), ("CHANGELOG.md", 40)])
+def test_what_is_read_first_is_short(name, lines):
+    assert len((ROOT / name).read_text("utf-8").splitlines()) <= lines
 
 
 def test_the_solvers_reference_is_up_to_date():
@@ -193,7 +194,7 @@ def test_folders_of_others_are_not_searched_for_pages(tmp_path):
     assert pages_under(tmp_path) == [tmp_path / "a.md", tmp_path / "docs" / "b.md"]
 
 
-@pytest.mark.parametrize("page", ALL_PAGES, ids=lambda p: str(p.relative_to(ROOT)))
+@pytest.mark.parametrize("page", ALL_PAGES, ids=lambda p: p.relative_to(ROOT).as_posix())
 def test_every_link_leads_somewhere(page):
     for target in _LINK.findall(without_code(page.read_text("utf-8"))):
         if re.match(r"[a-z]+:", target):
@@ -206,7 +207,7 @@ def test_every_link_leads_somewhere(page):
             assert anchor in anchors(file), target
 
 
-@pytest.mark.parametrize("page", ALL_PAGES, ids=lambda p: str(p.relative_to(ROOT)))
+@pytest.mark.parametrize("page", ALL_PAGES, ids=lambda p: p.relative_to(ROOT).as_posix())
 def test_every_file_that_is_named_exists(page):
     text = _BLOCK.sub("", page.read_text("utf-8"))
     tops = "assets|benchmarks|docs|scope_addon|scripts|solver|tests|tools"

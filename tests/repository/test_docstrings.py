@@ -83,7 +83,7 @@ def modules() -> dict[Path, list[Function]]:
 @cache
 def public_functions() -> dict[str, Function]:
     return {
-        f"{path.relative_to(ROOT).with_suffix('')}:{f.name}": f
+        f"{path.relative_to(ROOT).with_suffix('').as_posix()}:{f.name}": f
         for path, functions in modules().items()
         for f in functions
         if is_public(f.name) and not f.is_compiled

@@ -83,7 +83,7 @@ def sources(folder: str) -> list[Path]:
 def imported(path: Path) -> list[tuple[int, str]]:
     """(level, module) of every import statement in a file, also inside functions."""
     out = []
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
         if isinstance(node, ast.Import):
             out += [(0, alias.name) for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
@@ -113,5 +113,7 @@ def test_no_operator_of_the_panel_opens_a_rigs_file():
             if isinstance(node, ast.ImportFrom):
                 assert not reads_files & {alias.name for alias in node.names}, path
     importers = ("import_scene", "libraries.load", "wm.append", "wm.link")
-    readers = [path.stem for path in sources("scope_addon") if any(name in path.read_text() for name in importers)]
+    readers = [
+        path.stem for path in sources("scope_addon") if any(name in path.read_text("utf-8") for name in importers)
+    ]
     assert readers == ["completeness", "rig_file"]  # the first reads what Scope has just written

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from functools import cache
 from pathlib import Path
 
@@ -58,13 +59,15 @@ ROOMS = {
 }
 SHARED = ("errors", "installed", "motion", "atomic_write", "footage", "counts", "json_file", "review_spans", "__init__")
 LARGEST_FOLDER = 14  # Python files
+NOT_DRAWN = {"scope_addon/options", "scope_addon/files", "scope_addon/cli"}  # in docs/architecture.md, which says so
+PIPELINE = {"scope_addon/capture/stages", "scope_addon/capture/options"}  # a part of the box of that name
 CAPTURE_FILES = 3  # directly in scope_addon/capture, beside its rooms
 
 
 def modules() -> list[str]:
     """Every module of the product, as a path without its suffix; a package is its folder."""
     paths = (p.relative_to(ROOT).with_suffix("") for top in PRODUCT for p in (ROOT / top).rglob("*.py"))
-    return sorted(str(p.parent if p.name == "__init__" else p) for p in paths)
+    return sorted((p.parent if p.name == "__init__" else p).as_posix() for p in paths)
 
 
 @cache
@@ -85,7 +88,7 @@ def imported(module: str) -> frozenset[str]:
     package = path.is_dir()
     base = module.split("/") if package else module.split("/")[:-1]
     found = set()
-    for node in ast.walk(ast.parse((path / "__init__.py" if package else path.with_suffix(".py")).read_text())):
+    for node in ast.walk(ast.parse((path / "__init__.py" if package else path.with_suffix(".py")).read_text("utf-8"))):
         if isinstance(node, ast.ImportFrom) and node.level:
             target = "/".join([*base[: len(base) - node.level + 1], *filter(None, (node.module or "").split("."))])
             for alias in node.names:
@@ -143,6 +146,34 @@ def test_no_module_imports_itself_through_others() -> None:
 
     for module in modules():
         visit(module, ())
+
+
+def room_drawn(name: str) -> str:
+    """The room that a box of the drawing stands for; `pipeline` is the folder with the list of stages."""
+    special = {"solver": "solver", "pipeline": "scope_addon/capture", "cli": "scope_addon/command_line"}
+    folders = (f"{top}/{name}" for top in ("scope_addon", "scope_addon/capture"))
+    return special.get(name) or next(folder for folder in folders if folder in ROOMS)
+
+
+def test_the_drawing_of_the_rooms_is_the_table() -> None:
+    """Each row's rooms can be reached along the arrows, and nothing else can."""
+    page = (ROOT / "docs" / "architecture.md").read_text("utf-8")
+    drawing = page.partition("```mermaid\n")[2].partition("```")[0]
+    boxes = re.sub(r'\["[^"]*"\]', "", drawing)
+    arrows: dict[str, set[str]] = {}
+    for start, end in re.findall(r"^ +(\w+) --> (\w+)$", boxes, re.MULTILINE):
+        arrows.setdefault(room_drawn(start), set()).add(room_drawn(end))
+    drawn = {*arrows, *(end for ends in arrows.values() for end in ends)}
+    rooms = {name for name in ROOMS if name.count("/") == 1 or name.rpartition("/")[0] == "scope_addon/capture"} | {
+        "solver"
+    }
+    assert drawn == rooms - PIPELINE - NOT_DRAWN
+
+    def along(start: str) -> set[str]:
+        return {start}.union(*(along(end) for end in arrows.get(start, ())))
+
+    for name in drawn:
+        assert along(name) == reachable(name) & drawn, name
 
 
 def test_folders_stay_small() -> None:

@@ -132,7 +132,7 @@ def test_the_wheel_requires_only_numpy_and_numba(wheel):
 def test_the_extras_contain_every_package_of_a_missing_module():
     from scope.scope_addon.installed import EXTRAS
 
-    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["optional-dependencies"]
     assert set(EXTRAS.values()) == set(extras)
     assert set(EXTRAS) == {*CAPTURE_MODULES, "pythonosc", "distributed"}
 

@@ -94,7 +94,7 @@ def test_what_is_written_is_read_and_other_files_are_kept(tmp_path):
     other.write_text('{"name": "a game"}')
     with pytest.raises(OutputError, match="not an expression map, so it is not overwritten"):
         save_expression_map(written, other)
-    assert other.read_text() == '{"name": "a game"}'
+    assert other.read_text("utf-8") == '{"name": "a game"}'
 
 
 def test_controls_are_written_and_read(tmp_path):

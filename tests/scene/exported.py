@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reading exported files with Blender's importers."""
 
+import json
+import struct
 from pathlib import Path
 
 import bpy
@@ -71,3 +73,11 @@ def corresponding(mesh: bpy.types.Object, body, betas: np.ndarray) -> np.ndarray
     match = nearest_indices(rest, world)
     assert np.abs(rest - world[match]).max() < 1e-4
     return match
+
+
+def glb_json(path: Path) -> dict:
+    """Return the JSON of a binary glTF."""
+    data = path.read_bytes()
+    assert data[:4] == b"glTF"
+    length = struct.unpack("<I", data[12:16])[0]
+    return json.loads(data[20 : 20 + length])

@@ -133,9 +133,9 @@ def test_every_blender_since_4_2_fits_one_zip_of_a_platform(builder):
 
 
 def test_the_manifest_names_licences_and_holders_of_all_that_the_zip_contains(builder):
-    manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text())
+    manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text("utf-8"))
     assert manifest["license"][0] == "SPDX:GPL-3.0-or-later"
-    third_party = (ROOT / "THIRD_PARTY.md").read_text()
+    third_party = (ROOT / "THIRD_PARTY.md").read_text("utf-8")
     for licence in ("Apache-2.0", "BSD-2-Clause", "BSD-3-Clause", "MIT", "LGPL-2.1-or-later", "GPL-2.0-or-later"):
         assert f"SPDX:{licence}" in manifest["license"]
         assert licence in third_party
@@ -148,7 +148,7 @@ def test_the_manifest_names_licences_and_holders_of_all_that_the_zip_contains(bu
 
 
 def test_every_permission_has_a_reason_that_the_platform_accepts():
-    permissions = tomllib.loads((ROOT / "blender_manifest.toml").read_text())["permissions"]
+    permissions = tomllib.loads((ROOT / "blender_manifest.toml").read_text("utf-8"))["permissions"]
     assert set(permissions) == {"files", "camera", "network"}
     for reason in permissions.values():
         assert 10 < len(reason) <= 64, reason
@@ -169,7 +169,7 @@ def test_six_zips_with_empty_wheels(with_empty_wheels, monkeypatch, capsys, tmp_
         names = file.namelist()
     assert not any("numpy" in n or "/tests/" in n or n.startswith(("tests/", "tools/", ".")) for n in names)
     assert set(builder.GUIDE) <= set(names)
-    manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text())
+    manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text("utf-8"))
     for folder in (p.strip("/") for p in manifest["build"]["paths_exclude_pattern"] if p.endswith("/")):
         assert not any(n.startswith(f"{folder}/") or f"/{folder}/" in n for n in names), folder
     senders = [p.strip("/") for p in manifest["build"]["paths_exclude_pattern"] if "/live/" in p]
@@ -267,7 +267,7 @@ def test_two_zips_for_one_blender_are_refused(with_empty_wheels, monkeypatch):
 
 def test_no_shipped_module_uses_the_network_or_has_the_metadata_of_an_old_add_on():
     network = {"socket", "ssl", "urllib", "http", "ftplib", "smtplib", "xmlrpc", "requests", "webbrowser", "pip"}
-    left_out = tomllib.loads((ROOT / "blender_manifest.toml").read_text())["build"]["paths_exclude_pattern"]
+    left_out = tomllib.loads((ROOT / "blender_manifest.toml").read_text("utf-8"))["build"]["paths_exclude_pattern"]
     modules = [
         path
         for name in ("solver", "scope_addon")

@@ -42,7 +42,7 @@ def test_code_made_elsewhere_is_shipped(shipped, staging):
     code = keep(shipped, staging, WHEELS[:1])
     (staging / "scope_addon/ui/panel.py").write_text("# changed, but it compiles nothing\n")
     assert shipped.add_kernels(staging, "windows-x64", "3.13", WHEELS)
-    assert (staging / "assets" / "kernels" / code).read_text() == "code"
+    assert (staging / "assets" / "kernels" / code).read_text("utf-8") == "code"
 
 
 @pytest.mark.parametrize("changed", ["solver/fit.py", "scope_addon/capture/overlay/draw.py"])

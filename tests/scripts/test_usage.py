@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
-PARTS = set(re.findall(r"^    ([a-z |]+)\) ", (SCRIPTS / "real_blender" / "run.sh").read_text(), re.M))
+PARTS = set(re.findall(r"^    ([a-z |]+)\) ", (SCRIPTS / "real_blender" / "run.sh").read_text("utf-8"), re.M))
 
 
 def run(name, *arguments):

@@ -31,6 +31,7 @@ from scope.solver import (
     fit_batch,
     fit_clip,
     fit_clips,
+    fit_motion,
     load_joint_prior,
     make_tree,
     rotations,
@@ -294,6 +295,50 @@ SETTINGS_REFUSED = {
 @pytest.mark.parametrize(("make", "message"), SETTINGS_REFUSED.values(), ids=SETTINGS_REFUSED)
 def test_settings_that_cannot_be_used_are_refused(make, message):
     with pytest.raises(InputError, match=message):
+        make()
+
+
+ARGUMENTS_REFUSED = {
+    "no measurements": (lambda: fit(BODY, untyped(None)), "measurements must be Measurements, but is None"),
+    "state": (lambda: fit(BODY, SEEN, init=untyped("rest")), "init must be State or None, but is the text 'rest'"),
+    "priors": (lambda: fit(BODY, SEEN, priors=untyped("weak")), "priors must be Priors, but is the text 'weak'"),
+    "options": (
+        lambda: fit(BODY, SEEN, priors=Priors(), options=untyped(50)),
+        "options must be Options, but is a",
+    ),
+    "frame of a clip": (
+        lambda: fit_clip(BODY, [SEEN, untyped(None)], priors=Priors()),
+        r"measurements\[1\] must be Measurements, but is None",
+    ),
+    "state of a clip": (
+        lambda: fit_clip(BODY, [SEEN], priors=Priors(), init=[untyped(0)]),
+        r"init\[0\] must be State, but is",
+    ),
+    "priors of a clip": (lambda: fit_clip(BODY, [SEEN], priors=untyped("weak")), "priors must be Priors"),
+    "options of a clip": (
+        lambda: fit_clip(BODY, [SEEN], priors=Priors(), options=untyped("fast")),
+        "options must be Options, but is the text 'fast'",
+    ),
+    "temporal": (
+        lambda: fit_clip(BODY, [SEEN], priors=Priors(), temporal=untyped(1.0)),
+        "temporal must be Temporal or None, but is a",
+    ),
+    "priors of a motion": (lambda: fit_motion(BODY, [SEEN], [0.0], priors=untyped("weak")), "priors must be Priors"),
+    "options of a motion": (
+        lambda: fit_motion(BODY, [SEEN], [0.0], priors=Priors(), options=untyped("fast")),
+        "options must be Options",
+    ),
+    "standing points": (
+        lambda: fit_motion(BODY, [SEEN], [0.0], priors=Priors(), stands=untyped([3])),
+        "stands must be StandingPoints or None, but is a",
+    ),
+}
+
+
+@pytest.mark.parametrize(("make", "message"), ARGUMENTS_REFUSED.values(), ids=ARGUMENTS_REFUSED)
+def test_arguments_of_other_kinds_are_refused(make, message):
+    """They raised AttributeErrors of the solver's own code."""
+    with pytest.raises(InvalidValueError, match=message):
         make()
 
 

@@ -128,7 +128,7 @@ def test_writing_twice_gives_the_same_bytes(tmp_path):
 def test_files_are_small_and_carry_their_licence(body):
     assert BUILT_IN[body.name].stat().st_size < 2e6
     assert "CC0 1.0" in body.license
-    assert body.license in (BUILT_IN[body.name].parent / "LICENSE.md").read_text()
+    assert body.license in (BUILT_IN[body.name].parent / "LICENSE.md").read_text("utf-8")
 
 
 # People --------------------------------------------------------------------------------------------------------------

@@ -131,7 +131,7 @@ def _convolutions_run(graph: bytes, images: np.ndarray, with_mask: bool | None, 
     options.enable_profiling, options.profile_file_prefix = True, str(folder / "profile")
     session = onnxruntime.InferenceSession(graph, options, providers=["CPUExecutionProvider"])
     session.run(None, {"input": images} | ({} if with_mask is None else {"with_mask": np.array(with_mask)}))
-    events = json.loads(Path(session.end_profiling()).read_text())
+    events = json.loads(Path(session.end_profiling()).read_text("utf-8"))
     return sum("Conv" in event.get("args", {}).get("op_name", "") for event in events)
 
 
@@ -206,7 +206,7 @@ def test_second_build_does_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     for network in some:
         model_bytes(network)
     assert build_networks(tmp_path, DOWNLOADS) == [network.name for network in some]
-    assert "Apache License" in (tmp_path / "LICENSE-mediapipe.txt").read_text()
+    assert "Apache License" in (tmp_path / "LICENSE-mediapipe.txt").read_text("utf-8")
     assert build_networks(tmp_path, DOWNLOADS) == []
     (tmp_path / "pose_detection.onnx").write_bytes(b"cut short")
     assert build_networks(tmp_path, DOWNLOADS) == ["pose_detection"]

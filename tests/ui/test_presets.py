@@ -18,7 +18,7 @@ def test_a_preset_brings_the_settings_back(monkeypatch, tmp_path):
     assert bpy.ops.scope.add_capture_preset(name="everybody") == {"FINISHED"}
     (stored,) = Path(tmp_path).rglob("everybody.py")
     settings.quality, settings.people = "FAST", "LARGEST"
-    exec(compile(stored.read_text(), stored, "exec"), {})
+    exec(compile(stored.read_text("utf-8"), stored, "exec"), {})
     assert (settings.quality, settings.people) == ("BEST", "ALL")
 
 

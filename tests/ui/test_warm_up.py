@@ -32,10 +32,10 @@ def test_it_runs_once_for_an_installation(process, tmp_path):
     process(f"import sys; open({str(tmp_path / 'said')!r}, 'a').write(sys.stdin.readline())")
     for _ in range(3):
         wait_for_end()
-    assert (tmp_path / "said").read_text() == '{"warm_up": true}\n'
+    assert (tmp_path / "said").read_text("utf-8") == '{"warm_up": true}\n'
     assert cache().clear() == 0
     wait_for_end()
-    assert (tmp_path / "said").read_text().count("\n") == 1
+    assert (tmp_path / "said").read_text("utf-8").count("\n") == 1
 
 
 class Layout:
@@ -71,7 +71,7 @@ def test_after_a_failure_it_runs_again(process, tmp_path):
     process(f"import sys; open({str(tmp_path / 'said')!r}, 'a').write(sys.stdin.readline()); sys.exit(1)")
     for _ in range(2):
         wait_for_end()
-    assert (tmp_path / "said").read_text().count("\n") == 2
+    assert (tmp_path / "said").read_text("utf-8").count("\n") == 2
 
 
 def test_it_ends_with_the_extension(process):

@@ -69,7 +69,7 @@ def _write(path: Path, data: bytes) -> None:
 
 def _read_stamp(path: Path) -> dict[str, dict[str, str]]:
     try:
-        stamp = json.loads(path.read_text())
+        stamp = json.loads(path.read_text("utf-8"))
     except (OSError, ValueError):
         return {}
     return stamp if isinstance(stamp, dict) else {}

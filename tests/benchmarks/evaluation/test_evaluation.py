@@ -34,7 +34,7 @@ def test_a_data_set_is_captured_compared_and_kept(dataset, tmp_path, capsys, mon
     out = capsys.readouterr().out
     assert "3DPW, test split: the 24 joints of SMPL's skeleton" in out
     assert "8 of 16 frames were captured; 1 of 2 people were not found; joints: those of the body 'scope'" in out
-    found = json.loads((tmp_path / "figures.json").read_text())
+    found = json.loads((tmp_path / "figures.json").read_text("utf-8"))
     figures = found["protocols"]["3dpw"]["figures"]
     assert 10 < figures["pa_mpjpe"] < figures["mpjpe"] < 150
     assert 50 < figures["pck"] <= 100
@@ -45,7 +45,7 @@ def test_a_data_set_is_captured_compared_and_kept(dataset, tmp_path, capsys, mon
 
     monkeypatch.setattr(run, "capture", never)
     assert main([*command, "--json", str(tmp_path / "again.json")]) == 0
-    assert json.loads((tmp_path / "again.json").read_text()) == found
+    assert json.loads((tmp_path / "again.json").read_text("utf-8")) == found
     with pytest.raises(AssertionError, match="captured again"):
         main([*command, "--again"])
     with pytest.raises(AssertionError, match="captured again"):  # its record is gone, and nothing half done is kept

@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[3]
 def test_every_command_is_a_script(quick):
     for command in commands.commands(quick):
         assert (ROOT / "scripts" / command.script).is_file()
-        assert f"-m {SCRIPTS[command.script]}" in (ROOT / "scripts" / command.script).read_text()
+        assert f"-m {SCRIPTS[command.script]}" in (ROOT / "scripts" / command.script).read_text("utf-8")
         assert ("--quick" in command.arguments) == (quick and command.script == "bench")
 
 

@@ -99,7 +99,7 @@ def test_real_cameras(shared, number):
     ok, picture = cv2.VideoCapture(str(folder / f"cam{number}.mp4")).read()
     assert ok
     height, width = picture.shape[:2]
-    truth = json.loads((folder / f"calibration_cam{number}.json").read_text())["intrinsics"][0][0]
+    truth = json.loads((folder / f"calibration_cam{number}.json").read_text("utf-8"))["intrinsics"][0][0]
     assumed = 1.2 * truth  # so that what was assumed is no help
     estimate = focal_from_edges(find_segments(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), []), width, height, assumed)
     if number == 4:

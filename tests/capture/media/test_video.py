@@ -7,7 +7,6 @@ import os
 import struct
 import threading
 import wave
-import zlib
 from fractions import Fraction
 from pathlib import Path
 
@@ -15,32 +14,14 @@ import av
 import cv2
 import numpy as np
 import pytest
-from scope.scope_addon.capture.media.frame_rate import exact_fps
 from scope.scope_addon.capture.media.frame_readers import PyavReader
 from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.errors import VideoError
 
 from ...job.processes import wait_for
+from .corner_picture import H, W, corner_image, corners, encode
 from .made_video import patch_track_header, with_time_table, write_video
-
-W, H = 64, 48
-
-
-def corner_image(width: int = W, height: int = H) -> np.ndarray:
-    """Create an RGB image: red top left, green top right, blue bottom left, white bottom right."""
-    image = np.full((height, width, 3), 255, np.uint8)
-    image[: height // 2, : width // 2] = (255, 0, 0)
-    image[: height // 2, width // 2 :] = (0, 255, 0)
-    image[height // 2 :, : width // 2] = (0, 0, 255)
-    return image
-
-
-def corners(image: np.ndarray) -> str:
-    """Name the colours of the corners (top left, top right, bottom left, bottom right) by their first letters."""
-    names: dict[tuple[int, ...], str] = {(1, 0, 0): "r", (0, 1, 0): "g", (0, 0, 1): "b", (1, 1, 1): "w"}
-    points = [image[6, 6], image[6, -7], image[-7, 6], image[-7, -7]]
-    return "".join(names.get(tuple(int(c > 128) for c in p), "?") for p in points)
 
 
 def ramp(count: int) -> list[np.ndarray]:
@@ -85,24 +66,6 @@ def test_the_container_rate_is_exact(tmp_path, rate):
     video = open_video(path)
     assert video.fps == rate
     np.testing.assert_allclose([f.timestamp_s for f in video], [float(i / rate) for i in range(10)], atol=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("fps", "expected"),
-    [
-        (30000 / 1001, Fraction(30000, 1001)),
-        (29.97, Fraction(2997, 100)),
-        (29.9701, Fraction(30000, 1001)),
-        (23.97602, Fraction(24000, 1001)),
-        (12.5, Fraction(25, 2)),
-        (29.8, Fraction(149, 5)),
-        (0.0, None),
-        (float("nan"), None),
-        (90000.0, None),
-    ],
-)
-def test_exact_fps(fps, expected):
-    assert exact_fps(fps) == expected
 
 
 def test_a_variable_rate_keeps_presentation_times(tmp_path):
@@ -212,28 +175,6 @@ def test_decoding_runs_ahead_by_at_most_a_few_frames(tmp_path):
 # Pictures
 
 
-def exif_block(orientation: int, focal_35mm: int | None = None, endian: str = "<") -> bytes:
-    """Build a TIFF directory with an orientation and, in its EXIF directory, a focal length."""
-    entry = struct.Struct(endian + "HHIHH")
-    main = [entry.pack(0x0112, 3, 1, orientation, 0)]
-    inner = b""
-    if focal_35mm:
-        main.append(struct.pack(endian + "HHII", 0x8769, 4, 1, 8 + 2 + 24 + 4))
-        inner = struct.pack(endian + "H", 1) + entry.pack(0xA405, 3, 1, focal_35mm, 0) + b"\0\0\0\0"
-    head = b"II*\0" if endian == "<" else b"MM\0*"
-    return head + struct.pack(endian + "IH", 8, len(main)) + b"".join(main) + b"\0\0\0\0" + inner
-
-
-def encode(suffix: str, image: np.ndarray) -> bytes:
-    code = cv2.COLOR_RGBA2BGRA if image.shape[2] == 4 else cv2.COLOR_RGB2BGR
-    return cv2.imencode(suffix, cv2.cvtColor(image, code))[1].tobytes()
-
-
-def jpeg_with_exif(image: np.ndarray, tiff: bytes) -> bytes:
-    data, segment = encode(".jpg", image), b"Exif\0\0" + tiff
-    return data[:2] + b"\xff\xe1" + struct.pack(">H", len(segment) + 2) + segment + data[2:]
-
-
 @pytest.mark.parametrize("suffix", [".jpg", ".png", ".webp", ".tiff", ".bmp"])
 def test_a_picture_is_one_frame(tmp_path, suffix):
     path = tmp_path / f"picture{suffix}"
@@ -244,53 +185,6 @@ def test_a_picture_is_one_frame(tmp_path, suffix):
     assert (video.width, video.height, video.frame_count, video.focal_35mm) == (65, 49, 1, None)
     assert [(f.index, f.timestamp_s) for f in frames] == [(0, 0.0)]
     assert corners(frames[0].image_rgb) == "rgbw"
-
-
-# Where each corner must come to lie, from the EXIF standard: orientation -> position of row 0 and column 0.
-UPRIGHT = {1: "rgbw", 2: "grwb", 3: "wbgr", 4: "bwrg", 5: "rbgw", 6: "brwg", 7: "wgbr", 8: "gwrb"}
-
-
-@pytest.mark.parametrize("endian", ["<", ">"])
-@pytest.mark.parametrize("orientation", range(1, 9))
-def test_exif_orientation_and_focal_length(tmp_path, orientation, endian):
-    path = tmp_path / "a.jpg"
-    path.write_bytes(jpeg_with_exif(corner_image(), exif_block(orientation, 26, endian)))
-    video = open_video(path)
-    image = next(iter(video)).image_rgb
-    assert corners(image) == UPRIGHT[orientation]
-    assert (video.width, video.height) == image.shape[1::-1] == ((W, H) if orientation < 5 else (H, W))
-    assert video.focal_35mm == 26
-    theirs = cv2.cvtColor(cv2.imread(str(path)), cv2.COLOR_BGR2RGB)
-    np.testing.assert_array_equal(image, theirs)
-
-
-def test_orientation_of_png_webp_and_tiff(tmp_path):
-    block = exif_block(6)
-    png = encode(".png", corner_image())
-    cut = png.index(b"IDAT") - 4
-    chunk = struct.pack(">I", len(block)) + b"eXIf" + block
-    (tmp_path / "a.png").write_bytes(png[:cut] + chunk + struct.pack(">I", zlib.crc32(chunk[4:])) + png[cut:])
-    webp = encode(".webp", corner_image())
-    block += b"\0" * (len(block) % 2)
-    extended = b"VP8X" + struct.pack("<II", 10, 8) + struct.pack("<I", W - 1)[:3] + struct.pack("<I", H - 1)[:3]
-    body = b"WEBP" + extended + webp[12:] + b"EXIF" + struct.pack("<I", len(block)) + block
-    (tmp_path / "a.webp").write_bytes(b"RIFF" + struct.pack("<I", len(body)) + body)
-    tiff = bytearray(encode(".tiff", corner_image()))
-    start = struct.unpack_from("<I", tiff, 4)[0]
-    count = struct.unpack_from("<H", tiff, start)[0]
-    entries = [bytes(tiff[start + 2 + 12 * i : start + 14 + 12 * i]) for i in range(count)]
-    entries = sorted([*entries, struct.pack("<HHIHH", 0x0112, 3, 1, 6, 0)], key=lambda e: struct.unpack("<H", e[:2])[0])
-    struct.pack_into("<I", tiff, 4, len(tiff))
-    (tmp_path / "a.tiff").write_bytes(tiff + struct.pack("<H", count + 1) + b"".join(entries) + b"\0\0\0\0")
-    for name in ("a.png", "a.webp", "a.tiff"):
-        assert corners(next(iter(open_video(tmp_path / name))).image_rgb) == "brwg", name
-
-
-def test_damaged_exif_counts_as_absent(tmp_path):
-    for i, block in enumerate((b"II*\0", b"II*\0\xff\xff\xff\xff", b"", exif_block(6)[:12], exif_block(99), b"XX" * 9)):
-        path = tmp_path / f"{i}.jpg"
-        path.write_bytes(jpeg_with_exif(corner_image(), block))
-        assert corners(next(iter(open_video(path))).image_rgb) == "rgbw"
 
 
 def test_sixteen_bits_grey_and_alpha(tmp_path):

@@ -104,7 +104,7 @@ def test_a_failing_writer_leaves_the_old_file_and_no_other(body, make_motion, tm
     with pytest.raises(OutputError, match="disk full"):
         export_motions([make_motion(body, 1)], body, path)
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
-    assert path.read_text() == "before"
+    assert path.read_text("utf-8") == "before"
     assert [s.name for s in bpy.data.scenes] == ["Scene"]
 
 

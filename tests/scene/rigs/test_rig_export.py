@@ -22,7 +22,8 @@ from scope.scope_addon.scene.rigs.rig_file import check_rig
 from scope.solver.errors import InputError
 
 from ...edit.walking import BODY, NAMES, motion_of, walk
-from ..made_rigs import ARMS, FRAMES, build_rig, names_of, seen, truth
+from ...retarget.naming_schemes import names_of
+from ..made_rigs import ARMS, FRAMES, build_rig, seen, truth
 
 
 def save_rig(path, scheme="mixamo", armatures=1, animated=False):

@@ -1,18 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Retargeting: the rig as evaluated by Blender against forward kinematics of the motion."""
 
-import json
-
 import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.errors import UsageError
-from scope.scope_addon.retarget.bone_map import BoneMap, load_bone_map, save_bone_map
+from scope.scope_addon.retarget.bone_map import BoneMap
 from scope.scope_addon.scene.rigs.rig_retarget import RetargetOptions, guess_bone_map, retarget
 from scope.solver.errors import InputError
 
 from ...edit.walking import BODY, NAMES, RATE, motion_of, walk
-from ..made_rigs import ARMS, FBX, FRAMES, LEGS, SCHEMES, build_rig, captured, seen, truth
+from ...retarget.naming_schemes import SCHEMES
+from ..made_rigs import ARMS, FBX, FRAMES, LEGS, build_rig, captured, seen, truth
 
 
 @pytest.fixture
@@ -219,39 +218,6 @@ def test_in_place_stays_on_the_spot(source):
     rig, bone_of = build_rig("unreal")
     run(source, rig, root="in-place")
     assert np.ptp(seen(rig, [bone_of["pelvis"]])[:, 0, :2], axis=0).max() < 1e-3
-
-
-def test_a_map_is_read_as_it_was_saved(tmp_path):
-    rig, _ = build_rig("mixamo")
-    found = guess_bone_map(rig)
-    save_bone_map(found, tmp_path / "map.json")
-    assert load_bone_map(tmp_path / "map.json").parts == found.parts
-
-
-def _legs_and(pelvis):
-    """A map of all required parts."""
-    bones = {"a": "left_hip", "b": "left_knee", "c": "right_hip", "d": "right_knee", "PELVIS": "pelvis"}
-    text = json.dumps({"format": "scope bone map", "version": 1, "bones": bones})
-    return text.replace("PELVIS", pelvis)
-
-
-def test_a_map_that_an_editor_has_marked_as_unicode_is_read(tmp_path):
-    (tmp_path / "map.json").write_text(_legs_and("Hüfte"), encoding="utf-8-sig")
-    assert load_bone_map(tmp_path / "map.json").bone("pelvis") == "Hüfte"
-
-
-@pytest.mark.parametrize(
-    "text",
-    ["", "[]", "{" * 5000, "[" * 100000, '{"format": "scope bone map", "version": 1, "bones": {"a": 3}}',
-     '{"format": "scope bone map", "version": 1, "bones": {"a": "tail"}}',
-     '{"format": "scope bone map", "version": 1, "bones": {}}', '{"format": 1}', _legs_and(r"\ud800"),
-     _legs_and(r"a\u0000")],
-)  # fmt: skip
-def test_hostile_maps_are_refused(tmp_path, text):
-    path = tmp_path / "map.json"
-    path.write_text(text)
-    with pytest.raises(InputError, match="map.json"):
-        load_bone_map(path)
 
 
 def test_an_unusable_rig_or_map_is_reported(source):

@@ -159,6 +159,6 @@ def test_a_changed_source_makes_code_stale(folder):
 
 def test_folders_whose_sources_do_not_count_have_no_kernels():
     for name in WITHOUT_KERNELS:
-        sources = [path.read_text() for path in (SOLVER / name).rglob("*.py")]
+        sources = [path.read_text("utf-8") for path in (SOLVER / name).rglob("*.py")]
         assert sources
         assert not any("compiled.kernel" in text or "njit" in text for text in sources)

@@ -80,7 +80,7 @@ def test_one_file_its_import_and_one_line_add_a_residual(tmp_path):
     (copied / "__init__.py").touch()
     (copied / "solver" / "residuals" / "toy.py").write_text(RESIDUAL)
     registry = copied / "solver" / "residuals" / "registry.py"
-    text = registry.read_text()
+    text = registry.read_text("utf-8")
     text = text.replace('    "floor": floor,\n', '    "floor": floor,\n    "toy": toy,\n')
     # To compile these takes long; the prior of the joints is asked for.
     for name in ("pose_prior", "joint_limits", "joint_flow", "foot_contact", "floor", "outline"):

@@ -43,7 +43,7 @@ def test_saving_a_bone_map_overwrites_bone_maps_only(rig, tmp_path):
     bpy.ops.scope.guess_bones()
     saved, other, empty = (tmp_path / name for name in ("bones.json", "package.json", "empty.json"))
     bpy.ops.scope.save_bone_map(filepath=str(saved.with_suffix("")))  # the suffix is added
-    text = saved.read_text()
+    text = saved.read_text("utf-8")
     other.write_text(before := '{"name": "a game", "bones": {}}')
     empty.touch()
     with pytest.raises(RuntimeError, match=r"package\.json is not a bone map, so it is not overwritten"):
@@ -51,12 +51,12 @@ def test_saving_a_bone_map_overwrites_bone_maps_only(rig, tmp_path):
     (tmp_path / "notes.json").write_bytes(b"\xff\xfe not JSON")
     with pytest.raises(RuntimeError, match="not a bone map"):
         bpy.ops.scope.save_bone_map(filepath=str(tmp_path / "notes"))
-    assert other.read_text() == before
+    assert other.read_text("utf-8") == before
     pairs = bpy.context.scene.scope_retarget.pairs
     pairs.remove(len(pairs) - 1)
     for path in (saved, empty):
         bpy.ops.scope.save_bone_map(filepath=str(path))
-        assert 0 < len(path.read_text()) < len(text)
+        assert 0 < len(path.read_text("utf-8")) < len(text)
     assert bpy.ops.scope.save_bone_map.get_rna_type().properties["check_existing"].default is True
     with pytest.raises(RuntimeError, match="no name"):
         bpy.ops.scope.save_bone_map(filepath=f"{tmp_path}/")

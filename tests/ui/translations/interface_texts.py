@@ -32,13 +32,19 @@ _LAYOUT_TEXTS = {"text", "placeholder", "title", "message", "confirm_text"}
 Message = tuple[str, str]  # context and text
 
 
+def stage_texts() -> set[str]:
+    """Return what the progress of a capture says."""
+    source = (ROOT / "job" / "progress" / "job_progress.py").read_text(encoding="utf-8")
+    return _STAGES | {text for _, text in _of_source(ast.parse(source)) if any(map(str.isalpha, text))}
+
+
 def interface_texts() -> set[Message]:
     """Return the context and text of everything to translate."""
-    found = {(DEFAULT, text) for text in _JOINTS | _CORRECTIONS | _STAGES}
+    found = {(DEFAULT, text) for text in _JOINTS | _CORRECTIONS | stage_texts()}
     for module in ui._MODULES:
         for cls in module.CLASSES:
             found |= set(_of_class(cls))
-    for path in [*(ROOT / "ui").rglob("*.py"), ROOT / "job" / "progress" / "job_progress.py"]:
+    for path in (ROOT / "ui").rglob("*.py"):
         found |= set(_of_source(ast.parse(path.read_text(encoding="utf-8"))))
     return {(context, text) for context, text in found if any(map(str.isalpha, text)) and text not in UNTRANSLATED}
 

@@ -84,7 +84,7 @@ def test_a_file_of_something_else_is_ignored(tmp_path, arrays):
 def test_a_folder_that_cannot_be_written_is_no_error(tmp_path):
     (tmp_path / "file").write_text("")
     keep(tmp_path / "file")
-    assert (tmp_path / "file").read_text() == ""
+    assert (tmp_path / "file").read_text("utf-8") == ""
 
 
 def test_no_more_than_so_much_is_kept(tmp_path, monkeypatch):

@@ -87,7 +87,7 @@ def test_windows_found_with_other_options_or_networks_are_not_taken(
         observed_times.clear()
         stop(windows_of, other, tmp_path, 150)
         assert observed_times[0] == pytest.approx(begins_at_s)
-    calibration.write_text(calibration.read_text().replace("500, 130", "400, 130"))
+    calibration.write_text(calibration.read_text("utf-8").replace("500, 130", "400, 130"))
     observed_times.clear()
     stop(windows_of, given, tmp_path, 150)
     assert observed_times[0] == 0.0

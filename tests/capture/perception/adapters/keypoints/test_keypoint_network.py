@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keypoint adapters on small graphs that detect coloured spots at known pixels, in various regions and sizes."""
+"""What all keypoint networks share: channels, normalization, the set of keypoints, and the next region."""
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 
@@ -17,44 +16,7 @@ from scope.scope_addon.capture.perception.region import Region
 from scope.solver.errors import ModelFileError
 
 from ....small_graphs import fixed, heatmaps, simcc
-
-# (x, y) of the red, green and blue spot in an image of odd size
-SPOTS = np.array([[140.0, 77.0], [171.0, 201.0], [211.0, 133.0]])
-REGIONS = {
-    "larger": Region((170.3, 141.8), 301.0, 0.0),
-    "enlarged": Region((176.0, 138.0), 190.0, 0.0),
-    "turned": Region((170.3, 141.8), 340.0, 0.6),
-    "over the edge": Region((160.0, 100.0), 330.0, 0.0),
-}
-
-
-def spots(sigma: float = 5.0) -> np.ndarray:
-    y, x = np.mgrid[:281, :357]
-    near = [np.exp(-((x - u) ** 2 + (y - v) ** 2) / (2 * sigma**2)) for u, v in SPOTS]
-    return np.round(255 * np.stack(near, axis=-1)).astype(np.uint8)
-
-
-def unit_colours(path: Path, **more: object) -> None:
-    """Write a JSON that scales pixels to 0..1, as the small graphs need."""
-    path.with_suffix(".json").write_text(json.dumps({"mean": 0, "std": 255, **more}))
-
-
-@pytest.mark.parametrize("region", REGIONS.values(), ids=REGIONS)
-@pytest.mark.parametrize("graph", [simcc, heatmaps], ids=["simcc", "heatmap"])
-@pytest.mark.parametrize("size", [(192, 256), (288, 384)], ids=str)
-def test_known_pixels_are_found(tmp_path: Path, graph: object, region: Region, size: tuple[int, int]) -> None:
-    path = graph(tmp_path / "m.onnx", 17, *size)  # type: ignore[operator]
-    unit_colours(path)
-    network = KeypointNetwork(path, threads=1)
-    assert network.keypoint_set.name == "coco17"
-    (seen,) = network.estimate(spots(), [region])
-    for k, name in enumerate(COCO_17):
-        j = KEYPOINT_NAMES.index(name)
-        np.testing.assert_allclose(seen.keypoints_px[j], SPOTS[k % 3], atol=1.0 if graph is heatmaps else 0.8)
-        assert seen.visibility[j] > 0.4
-    assert seen.presence == 1.0
-    assert not seen.world_landmarks.any()
-    assert seen.disagreement == 0.0
+from .spots_in_picture import REGIONS, SPOTS, spots, unit_colours
 
 
 def test_channel_order_and_square_inputs(tmp_path: Path) -> None:
@@ -73,50 +35,6 @@ def test_normalization_is_that_of_imagenet(tmp_path: Path) -> None:
     resized = np.asarray(cv2.resize(image, (192, 256)), np.uint8)
     outputs = network._graph.run(resized, network._normalization)
     assert all(o.max() == pytest.approx(1.0, abs=0.02) and o.min() > 0.97 for o in outputs)
-
-
-@pytest.mark.parametrize("how", ["dark", "quarter"])
-@pytest.mark.parametrize("udp", [False, True])
-def test_heatmap_peaks_between_cells(tmp_path: Path, how: str, udp: bool) -> None:
-    """Gaussians with known sub-cell centres: DARK finds them exactly, the quarter offset roughly."""
-    rng = np.random.default_rng(3)
-    middle = rng.uniform([6, 6], [41, 57], (17, 2))
-    y, x = np.mgrid[:64, :48]
-    maps = [np.exp(-((x - u) ** 2 + (y - v) ** 2) / (2 * 2.0**2)) for u, v in middle]
-    path = fixed(tmp_path / "m.onnx", 192, 256, {"heatmaps": np.stack(maps)[None].astype(np.float32)})
-    path.with_suffix(".json").write_text(json.dumps({"decode": how, "udp": udp}))
-    network = KeypointNetwork(path, threads=1)
-    points, scores = network._decode(network._graph.trial_outputs, network._graph)
-    pixels = middle * ([191 / 47, 255 / 63] if udp else 4.0)
-    assert np.abs(points - pixels).max() < (0.05 if how == "dark" else 1.1)
-    assert scores.min() > 0.9
-
-
-def numbered(count: int) -> tuple[np.ndarray, np.ndarray]:
-    return np.stack([np.arange(count), 1000 - np.arange(count)], axis=1).astype(float), np.linspace(0.5, 1, count)
-
-
-@pytest.mark.parametrize("name", KEYPOINT_SETS)
-def test_keypoint_orders(name: str) -> None:
-    points, scores = numbered(KEYPOINT_SETS[name].count)
-    ours, confidence = KEYPOINT_SETS[name].to_blazepose(points, scores)
-    at = dict(zip(KEYPOINT_NAMES, ours[:, 0], strict=True))
-    known = dict(zip(KEYPOINT_NAMES, confidence, strict=True))
-    assert at["nose"] == 0
-    assert (at["left_shoulder"], at["right_shoulder"], at["right_ankle"]) == (5, 6, 16)
-    assert known["right_ankle"] == scores[16]
-    if name == "coco17":
-        assert {n for n, c in known.items() if c > 0} == set(COCO_17)
-    if name == "halpe26":
-        assert (at["left_heel"], at["right_heel"]) == (24, 25)
-        assert at["right_foot_index"] == pytest.approx(0.85 * 21 + 0.15 * 23)
-        assert known["left_thumb"] == 0
-    if name == "wholebody133":
-        assert (at["left_heel"], at["right_heel"]) == (19, 22)
-        assert at["left_foot_index"] == pytest.approx(0.85 * 17 + 0.15 * 18)
-        assert (at["right_eye_outer"], at["left_eye_outer"], at["mouth_left"]) == (59, 68, 77)
-        assert (at["left_index"], at["right_pinky"], at["right_thumb"]) == (96, 129, 115)
-        assert min(known.values()) > 0
 
 
 @pytest.mark.parametrize("name", ["halpe26", "wholebody133"])

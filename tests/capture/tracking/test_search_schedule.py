@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""When the detector searches, counted in seconds of footage at several frame rates."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.perception.landmark_network import PoseEstimate
+from scope.scope_addon.capture.perception.region import Region
+from scope.scope_addon.capture.tracking.frame_clock import FrameClock
+from scope.scope_addon.capture.tracking.search_schedule import SearchSchedule
+from scope.scope_addon.capture.tracking.tracked_target import TrackedTarget
+
+IMAGE = np.zeros((480, 640, 3), np.uint8)
+RATES = (15, 30, 60)
+
+
+def person(side_px: float, seen_s: float = 0.0) -> TrackedTarget:
+    region = Region((320.0, 240.0), side_px, 0.0)
+    keypoints = np.random.default_rng(1).normal(scale=0.2 * side_px, size=(33, 2)) + 300.0
+    estimate = PoseEstimate(keypoints, np.ones(33), np.ones(33), np.zeros((33, 3)), 0.99, region, region)
+    return TrackedTarget(0, estimate, np.zeros(2), seen_s)
+
+
+def searches(people: int | None, fps: float, seconds: float, live=(), lost=(), start_s: float = 10.0) -> list[float]:
+    """Return the times of the searches, seconds after the first frame."""
+    clock = FrameClock()
+    schedule, found = SearchSchedule(clock, people), []
+    for t in range(round(seconds * fps)):
+        clock.advance(start_s + t / fps)
+        if schedule.is_due(IMAGE, live, lost):
+            schedule.begin(IMAGE, live, lost)
+            found.append(t / fps)
+    return found
+
+
+@pytest.mark.parametrize("fps", RATES)
+def test_every_frame_is_searched_while_nobody_is_tracked(fps: int) -> None:
+    assert len(searches(None, fps, 2.0)) == 2 * fps
+    just_lost = [person(300.0, seen_s=10.0)]
+    assert len(searches(2, fps, 0.4, live=[person(300.0)], lost=just_lost)) == round(0.4 * fps)
+
+
+@pytest.mark.parametrize("fps", RATES)
+def test_a_large_person_alone_is_looked_beside_every_two_thirds_of_a_second(fps: int) -> None:
+    gaps = np.diff(searches(None, fps, 10.0, live=[person(300.0)]))
+    np.testing.assert_allclose(gaps, 20 / 30, atol=0.51 / fps)
+
+
+@pytest.mark.parametrize("fps", RATES)
+def test_newcomers_are_looked_for_more_often_while_people_are_missing(fps: int) -> None:
+    live = [person(300.0)]
+    np.testing.assert_allclose(np.diff(searches(3, fps, 10.0, live=live)), 8 / 30, atol=0.51 / fps)
+    complete = searches(1, fps, 12.0, live=live)
+    assert np.diff([t for t in complete if t < 2.0]).max() < 0.4  # in the opening
+    np.testing.assert_allclose(np.diff([t for t in complete if t > 3.0]), 20 / 30, atol=0.51 / fps)
+
+
+def test_somebody_small_may_be_in_the_background() -> None:
+    """Before the most prominent person comes; so the search is as frequent as for a person who was lost."""
+    np.testing.assert_allclose(np.diff(searches(None, 30, 10.0, live=[person(150.0)])), 4 / 30, atol=0.02)
+
+
+def test_small_people_are_searched_once_a_second_and_only_where_nobody_is_tracked() -> None:
+    clock = FrameClock()
+    schedule, times = SearchSchedule(clock, None), []
+    for t in range(150):
+        clock.advance(t / 30)
+        assert not schedule.begin_small(IMAGE, [person(300.0)], [])
+        if schedule.begin_small(IMAGE, [], []):
+            times.append(t / 30)
+    np.testing.assert_allclose(times, [0, 1, 2, 3, 4], atol=0.02)
+    clock.advance(6.0)
+    assert not schedule.begin_small(IMAGE, [], [person(300.0)])  # a plain detection would find them again
+
+
+def test_the_search_beside_people_becomes_rare_until_their_number_changes() -> None:
+    clock = FrameClock()
+    schedule, times = SearchSchedule(clock, 4), []
+    for t in range(600):
+        clock.advance(t / 30)
+        live = [person(300.0)] * (1 if t < 450 else 2)
+        if schedule.begin_parts(live):
+            times.append(t)
+    gaps = np.diff([t for t in times if t < 450])
+    assert list(gaps[:4]) == [8, 16, 32, 64]  # frames; it doubles
+    assert gaps.max() == 64
+    after = [t for t in times if t >= 450]
+    assert np.diff(after)[0] == 8
+    assert not schedule.begin_parts([])
+    assert not schedule.begin_parts([person(300.0)] * 4)
+    assert not SearchSchedule(clock, None).begin_parts([person(300.0)])
+
+
+def test_after_forgetting_the_next_frame_is_searched() -> None:
+    clock = FrameClock()
+    clock.advance(0.0)
+    schedule, live = SearchSchedule(clock, None), [person(300.0)]
+    schedule.begin(IMAGE, live, [])
+    clock.advance(1 / 30)
+    assert not schedule.is_due(IMAGE, live, [])
+    schedule.forget()
+    assert schedule.is_due(IMAGE, live, [])

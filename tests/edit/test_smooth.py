@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Amounts of smoothing: the raw and the finished motion exactly, and the filter's own gain in between and beyond."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scope.scope_addon.edit.clip import Clip, clip_from_motion
+from scope.scope_addon.edit.smooth import smoothed
+from scope.scope_addon.errors import UsageError
+from scope.scope_addon.motion import Motion
+from scope.solver.rotations import exp, log
+
+from .walking import BODY, NAMES, angle, motion_of, walk
+
+ELBOW = NAMES.index("left_elbow")
+
+
+def shaking(hz: float, seconds: float = 6.0) -> Motion:
+    """Return a motion whose left elbow moves by a sinusoid of 0.1 radians, raw and finished alike."""
+    still = walk(seconds, speed=0.0)
+    rotations = np.tile(np.eye(3), still.rotations.shape[:2] + (1, 1))
+    rotations[:, ELBOW] = exp(np.outer(0.1 * np.sin(2 * np.pi * hz * still.times), [0.0, 0.0, 1.0]))
+    root = np.tile(still.root[0], (len(still.times), 1))
+    return motion_of(Clip(still.times, rotations, root))
+
+
+def amplitude(clip: Clip) -> float:
+    angles = log(clip.rotations[:, ELBOW])[:, 2]
+    inner = slice(len(angles) // 4, -len(angles) // 4)
+    return float(np.sqrt(2) * angles[inner].std())
+
+
+def test_strength_zero_is_the_raw_motion_and_one_the_finished() -> None:
+    motion = motion_of(walk(), noise=0.05)
+    for strength, raw in ((0, True), (1, False)):
+        found, expected = smoothed(BODY, motion, strength), clip_from_motion(BODY, motion, raw=raw)
+        np.testing.assert_array_equal(found.rotations, expected.rotations)
+        np.testing.assert_array_equal(found.root, expected.root)
+
+
+def test_more_strength_leaves_less_of_a_quick_movement_and_all_of_a_slow_one() -> None:
+    """The filter at strength 1 is 4.5 Hz; the finished motion adds back what it took there."""
+    quick = [amplitude(smoothed(BODY, shaking(6.0), s)) for s in (0.0, 1.0, 2.0, 3.0)]
+    assert quick[0] == pytest.approx(0.1, rel=0.02)
+    assert quick[1] == pytest.approx(0.1, rel=0.02)  # the finished motion has it
+    assert quick[1] > 1.2 * quick[3]
+    slow = [amplitude(smoothed(BODY, shaking(0.3), s)) for s in (0.0, 1.0, 3.0)]
+    np.testing.assert_allclose(slow, 0.1, rtol=0.05)
+
+
+def test_smoothing_has_no_delay() -> None:
+    motion = motion_of(walk(), noise=0.0)
+    found, before = smoothed(BODY, motion, 3.0), clip_from_motion(BODY, motion, raw=True)
+    knee = NAMES.index("left_knee")
+    a, b = (log(c.rotations[:, knee])[:, 0] - 0.4 for c in (found, before))
+    lags = range(-5, 6)
+    best = max(lags, key=lambda lag: float((a[10:-10] * np.roll(b, lag)[10:-10]).sum()))
+    assert best == 0
+
+
+def test_noise_falls_with_the_strength() -> None:
+    true = walk()
+    motion = motion_of(true, noise=0.05)
+    errors = [float(angle(smoothed(BODY, motion, s).rotations, true.rotations).mean()) for s in (0.0, 0.5, 1.0)]
+    assert errors[0] > errors[1] > errors[2]
+
+
+@pytest.mark.parametrize("strength", [-0.1, np.nan, np.inf])
+def test_what_is_no_strength_is_refused(strength: float) -> None:
+    with pytest.raises(UsageError, match="0 or more"):
+        smoothed(BODY, motion_of(walk(0.5)), strength)
+
+
+@pytest.mark.parametrize("frames", [1, 2])
+def test_a_clip_too_short_to_smooth_stays(frames: int) -> None:
+    clip = walk(1.0)
+    short = motion_of(Clip(clip.times[:frames], clip.rotations[:frames], clip.root[:frames]))
+    np.testing.assert_array_equal(smoothed(BODY, short, 2.0).root, clip_from_motion(BODY, short, raw=True).root)

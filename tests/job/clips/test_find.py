@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which files of a folder are clips, and that each clip's results have a name of their own."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from scope.scope_addon.job.clips.find import find_clips
+
+
+def found_in(folder: Path, *, recursive: bool = False, several_people: bool = False) -> dict[str, Path]:
+    return find_clips(folder, folder / "out", recursive=recursive, several_people=several_people)
+
+
+def test_videos_images_and_sequences_are_found_and_results_are_not(tmp_path):
+    (tmp_path / "below" / "deep").mkdir(parents=True)
+    for name in ("a.mp4", "a.mov", "b.mp4", "b.overlay.mp4", "below/c.mp4", "below/deep/d.mp4", ".hidden.mp4"):
+        (tmp_path / name).write_text("x")
+    for folder, names in {
+        "walk": [f"frame{i:03}.png" for i in range(3)],
+        "photos": ["tree_1.png", "house_2.png"],
+        "out": ["old.mp4"],
+    }.items():
+        (tmp_path / folder).mkdir()
+        for name in names:
+            (tmp_path / folder / name).write_text("x")
+    flat = found_in(tmp_path)
+    assert list(flat) == ["a.mov", "a.mp4", "b", "walk"]
+    assert flat["walk"] == tmp_path / "walk"
+    below = ["below/c", "below/deep/d", "photos/house_2", "photos/tree_1"]
+    assert list(found_in(tmp_path, recursive=True)) == ["a.mov", "a.mp4", "b", *below, "walk"]
+
+
+def test_unreadable_pictures_are_clips_too(tmp_path):
+    (tmp_path / "IMG_0001.HEIC").write_bytes(b"heic")
+    (tmp_path / "IMG_0002.avif").write_bytes(b"avif")
+    found = found_in(tmp_path)
+    assert sorted(found) == ["IMG_0001", "IMG_0002"]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows keeps its pipes in no folder")
+def test_a_pipe_is_not_a_clip_and_a_broken_link_is(tmp_path):
+    os.mkfifo(tmp_path / "pipe.mp4")
+    (tmp_path / "gone.mp4").symlink_to(tmp_path / "nowhere.mp4")
+    found = found_in(tmp_path)
+    assert sorted(found) == ["gone.mp4"]
+
+
+def test_names_that_differ_only_in_case_are_the_same(tmp_path):
+    clips = tmp_path / "clips"
+    clips.mkdir()
+    for name in ("Walk.mov", "walk.mp4", "Run.mp4"):
+        (clips / name).write_text("x")
+    assert list(found_in(clips)) == ["Run", "Walk.mov", "walk.mp4"]
+
+
+def test_names_are_unique_where_one_equals_another_without_suffix(tmp_path):
+    clips = tmp_path / "clips"
+    (clips / "b.mp4").mkdir(parents=True)
+    for i in range(3):
+        (clips / "b.mp4" / f"frame{i:03}.png").write_text("x")
+    names = ["A.mp4.mp4.mov", "a.mov", "a.mp4", "a.mp4.mp4", "b.mp4.mov", "c.mp4.mov"]
+    for name in names:
+        (clips / name).write_text("x")
+    found = found_in(clips)
+    assert {name: path.name for name, path in found.items()} == {n: n for n in [*names[:5], "b.mp4"]} | {
+        "c.mp4": "c.mp4.mov"
+    }
+
+
+def test_names_are_unique_where_one_equals_another_clips_person(tmp_path):
+    clips = tmp_path / "clips"
+    clips.mkdir()
+    for name in ("walk.mp4", "walk.person2.mp4", "run.person1.mp4"):
+        (clips / name).write_text("x")
+    short = ["run.person1", "walk", "walk.person2"]
+    assert list(found_in(clips)) == short
+    several = found_in(clips, several_people=True)
+    assert list(several) == [*short[:2], "walk.person2.mp4"]

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A rig's rest pose in the body's T-pose: heading, arms of an A-pose, and feet that point outwards."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
+from scope.scope_addon.retarget.rest_alignment import heading_alignment, rest_alignment
+from scope.scope_addon.retarget.skeleton import Skeleton
+from scope.solver.rotations import exp
+
+from ..edit.walking import BETAS, BODY, NAMES
+from .made_skeletons import MAPPED, VERTICAL, body_rig
+
+REST = BODY.rest_joints(BETAS) @ R_WORLD_MODEL.T
+INDEX = {name: i for i, name in enumerate(NAMES)}
+ROW = {name: b for b, name in enumerate(MAPPED)}
+
+
+def aligned(rig: Skeleton) -> tuple[np.ndarray, np.ndarray]:
+    F = heading_alignment(rig, ROW)
+    return rest_alignment(rig, MAPPED, ROW, REST, INDEX, F), F
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.4, -2.5])
+def test_the_heading_is_taken_from_the_hips(heading: float) -> None:
+    F = heading_alignment(body_rig(heading=heading), ROW)
+    left = F @ exp(heading * VERTICAL) @ (REST[INDEX["left_hip"]] - REST[INDEX["right_hip"]])
+    assert left[1] == pytest.approx(0.0, abs=1e-9)
+    assert left[0] > 0
+    np.testing.assert_allclose(F @ VERTICAL, VERTICAL, atol=1e-12)
+
+
+@pytest.mark.parametrize("arms_down", [-0.3, 0.0, 0.8, 1.4])
+def test_arms_of_any_rest_pose_are_turned_to_the_t_pose(arms_down: float) -> None:
+    rig = body_rig(scale=1.4, heading=0.7, arms_down=arms_down)
+    A, F = aligned(rig)
+    for side in ("left", "right"):
+        for part, end in (("shoulder", "elbow"), ("elbow", "wrist")):
+            a, b = f"{side}_{part}", f"{side}_{end}"
+            found = A[ROW[a]] @ F @ (rig.heads[ROW[b]] - rig.heads[ROW[a]])
+            np.testing.assert_allclose(found, 1.4 * (REST[INDEX[b]] - REST[INDEX[a]]), atol=1e-9)
+
+
+def test_trunk_and_head_keep_the_posture_they_were_built_in() -> None:
+    A, _ = aligned(body_rig(arms_down=0.8))
+    for part in ("pelvis", "spine1", "spine2", "spine3", "neck", "head"):
+        np.testing.assert_array_equal(A[ROW[part]], np.eye(3))
+
+
+def test_feet_are_turned_about_the_vertical_alone() -> None:
+    """Soles stay flat, whatever the rig's ankle has to the ball in height."""
+    rig = body_rig()
+    heads = rig.heads.copy()
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        ankle, ball = ROW[f"{side}_ankle"], ROW[f"{side}_foot"]
+        heads[ball] = heads[ankle] + exp(sign * 0.5 * VERTICAL) @ (heads[ball] - heads[ankle]) + [0.0, 0.0, 0.02]
+    splayed = Skeleton(rig.names, rig.parents, rig.carriers, heads, rig.tails, rig.rotations, rig.floor)
+    A, _ = aligned(splayed)
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        np.testing.assert_allclose(A[ROW[f"{side}_ankle"]], exp(-sign * 0.5 * VERTICAL), atol=1e-3)

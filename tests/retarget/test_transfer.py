@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Motion on another skeleton: the body's own as a rig, in other proportions, headings and rest poses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scope.scope_addon.retarget.transfer import transfer
+from scope.solver.rotations import exp
+
+from ..edit.walking import BETAS, BODY, NAMES, walk
+from .made_skeletons import MAPPED, VERTICAL, body_rig, direction, same_names, turn_between
+
+LIMBS = [(f"{s}_{a}", f"{s}_{b}") for s in ("left", "right") for a, b in
+         (("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist"))]  # fmt: skip
+CLIP = walk(2.0)
+JOINTS = CLIP.joints(BODY, BETAS)[:, [NAMES.index(name) for name in MAPPED]]
+
+
+@pytest.mark.parametrize("feet", [False, True])
+@pytest.mark.parametrize("seed", range(3))
+def test_the_bodys_own_skeleton_moves_as_the_body_whatever_the_axes_of_its_bones(feet: bool, seed: int) -> None:
+    pose = transfer(CLIP, BODY, BETAS, body_rig(seed=seed), same_names(), feet=feet)
+    np.testing.assert_allclose(pose.heads, JOINTS, atol=2e-3)  # a stretched leg is bent by a hair
+    assert pose.facing == pytest.approx(0.0, abs=1e-3)
+
+
+def test_a_rig_of_another_size_takes_steps_of_its_own_size() -> None:
+    pose = transfer(CLIP, BODY, BETAS, body_rig(scale=1.7), same_names(), feet=False)
+    np.testing.assert_allclose(pose.heads, 1.7 * JOINTS, atol=1e-9)
+
+
+@pytest.mark.parametrize("heading", [0.5, 2.0, -3.0])
+def test_a_rig_that_was_built_to_face_elsewhere_faces_where_the_body_does(heading: float) -> None:
+    straight = transfer(CLIP, BODY, BETAS, body_rig(), same_names(), feet=False)
+    turned = transfer(CLIP, BODY, BETAS, body_rig(heading=heading), same_names(), feet=False)
+    np.testing.assert_allclose(turned.heads, straight.heads, atol=1e-9)
+    assert exp(turned.facing * VERTICAL) == pytest.approx(exp(-heading * VERTICAL), abs=1e-3)
+
+
+@pytest.mark.parametrize("feet", [False, True])
+def test_limbs_of_a_rig_in_an_a_pose_point_where_the_bodys_do(feet: bool) -> None:
+    pose = transfer(CLIP, BODY, BETAS, body_rig(scale=0.6, heading=1.0, arms_down=0.8), same_names(), feet=feet)
+    for first, second in LIMBS:
+        off = turn_between(direction(pose.heads, first, second, MAPPED), direction(JOINTS, first, second, MAPPED))
+        assert off.max() < np.radians(0.01 if not feet or "shoulder" in first or "elbow" in first else 3.0)
+
+
+def test_no_bone_of_the_rig_changes_its_length() -> None:
+    rig = body_rig(scale=1.3, arms_down=0.5)
+    pose = transfer(CLIP, BODY, BETAS, rig, same_names())
+    children = np.flatnonzero(rig.carriers >= 0)
+    lengths = np.linalg.norm(pose.heads[:, children] - pose.heads[:, rig.carriers[children]], axis=-1)
+    at_rest = np.linalg.norm(rig.heads[children] - rig.heads[rig.carriers[children]], axis=-1)
+    np.testing.assert_allclose(lengths, np.broadcast_to(at_rest, lengths.shape), atol=1e-9)

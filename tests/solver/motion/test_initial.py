@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Points that several cameras see, triangulated against where they are."""
+
+import numpy as np
+import pytest
+from scope.solver import Keypoints2D, Keypoints3D, Measurements, rotations
+from scope.solver.motion.initial import triangulated
+from scope.solver.motion.views import View
+
+K = np.array([[800.0, 0, 320], [0, 800, 240], [0, 0, 1]])
+POINTS = 12
+CAMERAS = [
+    (np.eye(3), np.array([0.0, 0.0, 4.0])),
+    (rotations.exp(np.array([0.0, 0.9, 0.0])), np.array([0.2, 0.1, 4.5])),
+    (rotations.exp(np.array([0.3, -0.7, 0.1])), np.array([-0.3, 0.0, 5.0])),
+]
+
+
+def seen(world: np.ndarray, camera: int, index: np.ndarray, noise: float = 0.0, confidence: float = 1.0) -> View:
+    R, t = CAMERAS[camera]
+    points = world[index] @ R.T + t
+    pixels = (points / points[:, 2:] @ K.T)[:, :2]
+    pixels += noise * np.random.default_rng(camera).normal(size=pixels.shape)
+    found = Keypoints2D(index, pixels, np.full(len(index), confidence))
+    return View(Measurements(K, keypoints2d=found), R, t)
+
+
+@pytest.fixture
+def world() -> np.ndarray:
+    return np.random.default_rng(4).uniform(-1, 1, (POINTS, 3))
+
+
+def test_exact_rays_meet_in_the_points(world: np.ndarray) -> None:
+    every = np.arange(POINTS)
+    found = triangulated([seen(world, c, every) for c in range(3)], POINTS).keypoints3d
+    np.testing.assert_array_equal(found.indices, every)
+    np.testing.assert_allclose(found.points, world, atol=1e-9)
+
+
+def test_points_that_one_camera_sees_or_whose_rays_are_parallel_are_left_out(world: np.ndarray) -> None:
+    first, second = np.arange(8), np.arange(4, POINTS)
+    found = triangulated([seen(world, 0, first), seen(world, 1, second)], POINTS).keypoints3d
+    np.testing.assert_array_equal(found.indices, np.arange(4, 8))
+    twice = [seen(world, 0, first), seen(world, 0, first)]  # two cameras in one place
+    assert len(triangulated(twice, POINTS).keypoints3d.indices) == 0
+
+
+def test_nothing_seen_and_nan_count_for_nothing(world: np.ndarray) -> None:
+    every = np.arange(POINTS)
+    views = [seen(world, 0, every), seen(world, 1, every)]
+    views.append(View(Measurements(K, keypoints2d=Keypoints2D(every, np.full((POINTS, 2), np.nan), np.ones(POINTS)))))
+    views.append(seen(world + 5.0, 2, every, confidence=0.0))
+    np.testing.assert_allclose(triangulated(views, POINTS).keypoints3d.points, world, atol=1e-9)
+
+
+def test_the_error_in_the_image_is_minimized(world: np.ndarray) -> None:
+    """No small displacement of a point brings the rays nearer: the gradient of the squared pixel errors is zero."""
+    every = np.arange(POINTS)
+    views = [seen(world, c, every, noise=0.5) for c in range(3)]
+    found = triangulated(views, POINTS).keypoints3d.points
+
+    def cost(points: np.ndarray) -> float:
+        total = 0.0
+        for view in views:
+            p = points @ np.asarray(view.R_camera_world).T + view.t_camera_world
+            pixels = (p / p[:, 2:] @ K.T)[:, :2]
+            total += float(((pixels - view.measurements.keypoints2d.pixels) ** 2).sum())
+        return total
+
+    best = cost(found)
+    assert best < cost(world)
+    rng = np.random.default_rng(8)
+    assert all(cost(found + 2e-3 * rng.normal(size=found.shape)) > best for _ in range(20))
+
+
+def test_3d_keypoints_of_a_camera_are_moved_to_the_world(world: np.ndarray) -> None:
+    R, t = CAMERAS[2]
+    given = Measurements(keypoints3d=Keypoints3D(np.array([3]), world[[3]] @ R.T + t, np.ones(1)))
+    found = triangulated([View(given, R, t)], POINTS).keypoints3d
+    np.testing.assert_array_equal(found.indices, [3])
+    np.testing.assert_allclose(found.points, world[[3]], atol=1e-12)

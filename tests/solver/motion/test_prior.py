@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The tables of a motion's prior: one number for all joints or each, kernels turned off, and standing since when."""
+
+import math
+
+import numpy as np
+import pytest
+from scope.solver import InvalidValueError, ShapeError
+from scope.solver.motion.prior import MotionPrior, StandingPoints
+
+
+def test_weights_and_kernels_have_their_rows() -> None:
+    prior = MotionPrior([1.0, 2.0, 3.0], 4.0, 5.0, robust_joints=[10.0, 20.0, math.inf], robust_root_position=math.inf)
+    table = prior.packed(3)
+    np.testing.assert_array_equal(table[:, 0], [4.0, 1.0, 2.0, 3.0, 5.0])
+    np.testing.assert_allclose(table[:, 1], [1 / 4e4, 1 / 10, 1 / 20, 0.0, 0.0])
+    np.testing.assert_array_equal(MotionPrior(7.0).packed(2)[1:3, 0], [7.0, 7.0])
+
+
+@pytest.mark.parametrize(
+    ("prior", "error"),
+    [
+        (lambda: MotionPrior([1.0, 2.0]).packed(3), ShapeError),
+        (lambda: MotionPrior([1.0, -2.0, 0.0]).packed(3), InvalidValueError),
+        (lambda: MotionPrior(robust_joints=0.0).packed(3), InvalidValueError),
+        (lambda: MotionPrior(contact=-1.0), InvalidValueError),
+        (lambda: MotionPrior(robust_root_rotation=math.nan), InvalidValueError),
+    ],
+)
+def test_what_is_no_weight_is_refused(prior, error) -> None:
+    with pytest.raises(error, match="MotionPrior"):
+        prior()
+
+
+def test_a_point_stands_between_frames_as_surely_as_in_the_less_sure_one() -> None:
+    given = StandingPoints([4, 2], [[1.0, 0.2], [0.5, 0.9], [0.8, 0.0]])
+    indices, both = given.packed(points=6, frames=3)
+    np.testing.assert_array_equal(indices, [4, 2])
+    np.testing.assert_array_equal(both, [[0.0, 0.0], [0.5, 0.2], [0.5, 0.0]])
+    assert StandingPoints().packed(6, 3)[1].shape == (3, 0)
+    with pytest.raises(ShapeError):
+        given.packed(points=4, frames=3)
+    with pytest.raises(ShapeError):
+        given.packed(points=6, frames=4)
