@@ -15,7 +15,12 @@ from ..processes import wait_for
 def test_clips_that_have_ended_while_nobody_looked_come_in_their_order(monkeypatch: pytest.MonkeyPatch) -> None:
     """One at a time ends after the other; the last one of them may not be noted yet when the others are taken."""
     ended = list[str]()
-    monkeypatch.setattr(LocalRunner, "_capture", lambda _, task: ended.append(task.name) or {"name": task.name})
+
+    def capture(_: LocalRunner, task: Any) -> dict[str, str]:
+        ended.append(task.name)
+        return {"name": task.name}
+
+    monkeypatch.setattr(LocalRunner, "_capture", capture)
     names = [f"clip {number}" for number in range(40)]
     tasks: Any = [SimpleNamespace(name=name) for name in names]
     outcomes = LocalRunner([], 1).outcomes(tasks)
