@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scope.scope_addon.edit.clip import Clip, clip_from_motion
@@ -47,6 +49,15 @@ def test_more_strength_leaves_less_of_a_quick_movement_and_all_of_a_slow_one() -
     assert quick[1] > 1.2 * quick[3]
     slow = [amplitude(smoothed(BODY, shaking(0.3), s)) for s in (0.0, 1.0, 3.0)]
     np.testing.assert_allclose(slow, 0.1, rtol=0.05)
+
+
+@pytest.mark.parametrize(("strength", "share"), [(0.5, 0.5), (2.0, 1.0), (3.0, 1.0)])
+def test_what_the_finished_motion_adds_stays_and_fades_out_below_strength_one(strength: float, share: float) -> None:
+    """Here a place that differs from the raw motion's, as that of a foot that is held does."""
+    motion, shift = motion_of(walk(2.0), noise=0.02), np.array([0.03, -0.02, 0.05])
+    moved = replace(motion, trans=motion.trans + shift)
+    added = smoothed(BODY, moved, strength).root - smoothed(BODY, motion, strength).root
+    np.testing.assert_allclose(added, np.broadcast_to(share * shift, added.shape), atol=1e-6)
 
 
 def test_smoothing_has_no_delay() -> None:

@@ -31,3 +31,11 @@ def test_the_inside_of_a_box_is_seen_through_its_open_top_alone() -> None:
     closed = seen_from_outside(larger, inside, np.concatenate([walls, lid]) + 8)
     assert len(closed) == len(inside)  # what only hides is no part of the answer
     assert not closed.any()
+
+
+def test_the_back_of_a_sheet_is_not_seen() -> None:
+    """A triangle that lies on a larger one shows its upper side alone."""
+    sheet = np.array([[-1.0, -1, 0], [1, -1, 0], [0, 1, 0]]) * SIDE_M
+    both = np.concatenate([sheet, 5 * sheet - [0, 0, 1e-4]])
+    assert seen_from_outside(both, np.array([[0, 1, 2]]), np.array([[3, 4, 5]])).all()
+    assert not seen_from_outside(both, np.array([[2, 1, 0]]), np.array([[3, 4, 5]])).any()
