@@ -51,6 +51,7 @@ def solve(shot: Shot, tracks: Iterable[Track], progress: Progress, heights_m: Se
     known = [(each.track, each.body) for each in prepared]
     if shot.ablation.stance and not shot.is_still:
         prepared, fits = ground_all(shot, prepared, fits)
+    return_freed_memory()
     people, placed = [], []
     for track, body in known:
         raw, finished = refine(shot, prepared.pop(0), fits.pop(0), progress)
