@@ -55,7 +55,7 @@ class FrameSequence:
         )
         # The fingers of hands that are not seen are smoothed before they are stored in single precision.
         precision = np.float32 if prepared.hands is None else np.float64
-        self._rotations = np.tile(np.eye(3, dtype=precision), (T, body.K + 1, 1, 1))
+        self._rotations: NDArray[np.floating[Any]] = np.tile(np.eye(3).astype(precision), (T, body.K + 1, 1, 1))
         self._root, self._valid, self._cost = np.zeros((T, 3)), np.zeros(T, bool), np.zeros(T)
         self._iterations = 0
         self._last: Fit | None = None

@@ -62,6 +62,7 @@ def solve(shot: Shot, tracks: Iterable[Track], progress: Progress, heights_m: Se
     world = find_world(placed, shot.lines)
     motions: list[Motion] = []
     while people:
+        return_freed_memory()
         motions.append(finish(shot, people.pop(0), placed.pop(0), world, len(motions)))
     return Solved(motions, shot.path, iterations)
 
@@ -96,6 +97,7 @@ def ground_all(
     """Add to each person's measurements the distance and lean that follow from floor, feet and balance."""
     placed = [place(shot, each.track, fit) for each, fit in zip(prepared, fits, strict=True)]
     world = find_world(placed, shot.lines)
+    return_freed_memory()
     grounded, starts = [], []
     for k, (each, fit) in enumerate(zip(prepared, fits, strict=True)):
         stance = stance_on_floor(placed[k], world.floor_from_camera(k), shot.ablation.balance)
