@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..solver.loaders.npz import read_npz
 from ..solver.loaders.regular_file import in_one_line
-from .atomic_write import atomic_path, reason
+from .atomic_write import reason, write_npz
 from .errors import MotionFileError, OutputError
 
 
@@ -120,18 +120,19 @@ class Motion:
         """
         path = Path(path)
         try:
-            with atomic_path(path) as temporary:
-                # In one piece: where the disk is full, a ZipFile would raise again when it is destroyed.
-                temporary.write_bytes(self.to_bytes())
+            write_npz(path, self._arrays(), compressed=True)
         except OSError as error:
             raise OutputError(f"cannot write {path}: {reason(error)}") from error
 
     def to_bytes(self) -> bytes:
         """Return the content of the motion file."""
         file = io.BytesIO()
-        arrays = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self) if f.name not in _GROUPS}
-        np.savez_compressed(file, **arrays, **self.corrections, **self.face)
+        np.savez_compressed(file, **self._arrays())
         return file.getvalue()
+
+    def _arrays(self) -> dict[str, NDArray[Any]]:
+        arrays = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self) if f.name not in _GROUPS}
+        return arrays | self.corrections | self.face
 
     @classmethod
     def load(cls, path: str | Path, content: bytes | None = None) -> Motion:

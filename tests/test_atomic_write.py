@@ -7,9 +7,12 @@ import os
 import socket
 import subprocess
 import sys
+import tracemalloc
 
+import numpy as np
 import pytest
-from scope.scope_addon.atomic_write import atomic_path
+from scope.scope_addon import atomic_write
+from scope.scope_addon.atomic_write import atomic_path, write_npz
 from scope.scope_addon.errors import OutputError
 from scope.scope_addon.scene.export.output_paths import check_output
 
@@ -168,3 +171,48 @@ def test_writing_to_a_device_is_an_error(tmp_path):
     path.symlink_to("/dev/null")
     with pytest.raises(OutputError, match="it is a link to /dev/null, and that is a device"):
         check_output(path)
+
+
+@pytest.mark.parametrize(("compressed", "save"), [(False, np.savez), (True, np.savez_compressed)])
+@pytest.mark.parametrize("piece", [1, 3000, 1 << 23])
+def test_an_archive_is_numpys_own_however_it_is_written(tmp_path, monkeypatch, compressed, save, piece):
+    monkeypatch.setattr(atomic_write, "_PIECE", piece)
+    grid = np.arange(6000.0).reshape(60, 100)
+    arrays = {
+        "grid": grid,
+        "fortran": np.asfortranarray(grid),
+        "part": grid[::3, 5:],
+        "names": np.array(["left_hip", "é"]),
+        "text": np.array("walk"),
+        "none": np.zeros((0, 3), np.float32),
+    }
+    save(tmp_path / "expected.npz", **arrays)
+    write_npz(tmp_path / "walk.npz", arrays, compressed)
+    assert (tmp_path / "walk.npz").read_bytes() == (tmp_path / "expected.npz").read_bytes()
+
+
+def test_an_archive_is_not_held_in_memory(tmp_path):
+    arrays = {f"a{k}": np.full(1 << 22, k, np.uint8) for k in range(16)}
+    tracemalloc.start()
+    write_npz(tmp_path / "walk.npz", arrays)
+    highest = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert (tmp_path / "walk.npz").stat().st_size > 1 << 26
+    assert highest < 1 << 25
+
+
+def test_an_archive_that_the_disk_refuses_is_one_error(tmp_path, monkeypatch, capfd):
+    """Nothing is printed when the archive is destroyed, and the earlier file stays."""
+    path = tmp_path / "walk.npz"
+    path.write_bytes(b"earlier")
+    monkeypatch.setattr(atomic_write, "_PIECE", 1)
+
+    def full_disk(self, file):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(atomic_write._MovedFile, "move_to", full_disk)
+    with pytest.raises(OSError, match="No space left"):
+        write_npz(path, {"a": np.zeros(3), "b": np.ones(3)})
+    assert path.read_bytes() == b"earlier"
+    assert os.listdir(tmp_path) == ["walk.npz"]
+    assert capfd.readouterr().err == ""

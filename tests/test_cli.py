@@ -127,7 +127,7 @@ def test_a_failed_write_keeps_the_earlier_result(tmp_path, capsys, monkeypatch):
     def full_disk(*args, **kwargs):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(np, "savez_compressed", full_disk)
+    monkeypatch.setattr(np.lib.format, "write_array", full_disk)
     status, _, err = run(capsys, "capture", picture, "-o", tmp_path / "out.npz")
     assert status == 1
     assert "No space left" in err

@@ -22,6 +22,7 @@ from ...scope_addon.capture.camera.line_segments import Lines
 from ...scope_addon.capture.media.video import open_video
 from ...scope_addon.capture.options import CaptureOptions
 from ...scope_addon.capture.perception.observation import Observation
+from ...scope_addon.capture.stages.freed_memory import return_freed_memory
 from ...scope_addon.capture.stages.solve import solve
 from ...scope_addon.capture.tracking.left_right import repair_left_right
 from ...scope_addon.capture.tracking.people import PeopleBuilder
@@ -48,11 +49,12 @@ def replay(frames: int, people: int) -> dict[str, float]:
     for k in range(frames):
         builder.add(k, k / fps, [(p, moved(seen[k % len(seen)], p * APART_PX)) for p in range(people)])
     peaks["tracking"] = peak_mib()
-    tracks = [repair_left_right(track, camera) for track in builder.build(people)]
+    tracks = builder.build(people)
     del builder, tracker
-    peaks["left and right"] = peak_mib()
+    return_freed_memory()
+    repaired = (repair_left_right(tracks.pop(0), camera) for _ in range(people))
     shot = Shot(body, camera, CameraPath.static(frames), Lines.none(), Fraction(fps), size, SAMPLE.name)
-    motions = solve(shot, tracks, lambda *_: None).motions
+    motions = solve(shot, repaired, lambda *_: None).motions
     peaks["solver"] = peak_mib()
     with tempfile.TemporaryDirectory() as folder:
         for k, motion in enumerate(motions):

@@ -14,6 +14,7 @@ from .media.video import Video, open_video
 from .options import CaptureOptions, check_options
 from .stages.clock import Progress, StageClock
 from .stages.footage import Footage, Listeners, Watch
+from .stages.freed_memory import return_freed_memory
 from .stages.observe import observe
 from .stages.repair import repair
 from .stages.report import make_report
@@ -54,9 +55,10 @@ def capture(
     clock = StageClock()
     with open_video(Path(path), options.wanted) as video:
         footage, tracks = observe(video, body, options, clock, Listeners(progress, watch), unfinished, windows)
+    return_freed_memory()  # of the networks
     with clock.stage("solver"):
-        tracks = [repair(track, footage.camera, options.ablation) for track in tracks]
-        solved = solve(_shot(video, body, options, footage), tracks, progress, options.heights_m)
+        repaired = (repair(tracks.pop(0), footage.camera, options.ablation) for _ in range(len(tracks)))
+        solved = solve(_shot(video, body, options, footage), repaired, progress, options.heights_m)
         motions = [replace(motion, timestamps=footage.timestamps) for motion in solved.motions]
     rates = clock.rates(len(footage.timestamps))
     return Capture(motions, make_report(video, body, options, footage, solved, rates))

@@ -53,7 +53,9 @@ class FrameSequence:
         self._cold, self._warm = (
             replace(ROBUST, stages=stages(prepared.weights)) for stages in (cold_stages, warm_stages)
         )
-        self._rotations = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
+        # The fingers of hands that are not seen are smoothed before they are stored in single precision.
+        precision = np.float32 if prepared.hands is None else np.float64
+        self._rotations: NDArray[np.floating[Any]] = np.tile(np.eye(3).astype(precision), (T, body.K + 1, 1, 1))
         self._root, self._valid, self._cost = np.zeros((T, 3)), np.zeros(T, bool), np.zeros(T)
         self._iterations = 0
         self._last: Fit | None = None

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,6 +24,7 @@ from ..world.shot import FittedPerson, Shot
 from ..world.stance import stance_on_floor
 from ..world.world_frame import SharedWorld, find_world
 from .clock import Progress
+from .freed_memory import return_freed_memory
 
 
 @dataclass(frozen=True)
@@ -35,32 +36,38 @@ class Solved:
     iterations: float
 
 
-def solve(shot: Shot, tracks: Sequence[Track], progress: Progress, heights_m: Sequence[float] = ()) -> Solved:
+def solve(shot: Shot, tracks: Iterable[Track], progress: Progress, heights_m: Sequence[float] = ()) -> Solved:
     """Fit each person separately, estimate the world they share, and transform the motions to it.
 
     For a clip of an hour, each list below takes hundreds of megabytes, so it is deleted as soon as possible.
 
+    :param tracks: the most prominent person's first; an iterator that keeps none saves 40 MB each.
     :param heights_m: known statures of the first people, metres.
     """
     prepared = prepare(shot, tracks, heights_m)
+    return_freed_memory()
     fits = [to_single_precision(fit_track(each, progress)) for each in prepared]
     shot, iterations = replace(shot, path=find_camera_path(shot, prepared[0], fits[0])), fits[0].iterations
-    people = [FittedPerson(each.track, fit, each.body) for each, fit in zip(prepared, fits, strict=True)]
+    known = [(each.track, each.body) for each in prepared]
     if shot.ablation.stance and not shot.is_still:
         prepared, fits = ground_all(shot, prepared, fits)
-    placed = []
-    for k, person in enumerate(people):
+    return_freed_memory()
+    people, placed = [], []
+    for track, body in known:
         raw, finished = refine(shot, prepared.pop(0), fits.pop(0), progress)
-        people[k] = replace(person, fit=raw)
-        placed.append(place(shot, person.track, finished, smoothing=False))
+        people.append(FittedPerson(track, raw, body))
+        placed.append(place(shot, track, finished, smoothing=False))
+        del raw, finished
+    return_freed_memory()
     world = find_world(placed, shot.lines)
     motions: list[Motion] = []
     while people:
+        return_freed_memory()
         motions.append(finish(shot, people.pop(0), placed.pop(0), world, len(motions)))
     return Solved(motions, shot.path, iterations)
 
 
-def prepare(shot: Shot, tracks: Sequence[Track], heights_m: Sequence[float]) -> list[PreparedTrack]:
+def prepare(shot: Shot, tracks: Iterable[Track], heights_m: Sequence[float]) -> list[PreparedTrack]:
     """Lift every track to 3D and set up its priors."""
     out = []
     for k, track in enumerate(tracks):
@@ -90,6 +97,7 @@ def ground_all(
     """Add to each person's measurements the distance and lean that follow from floor, feet and balance."""
     placed = [place(shot, each.track, fit) for each, fit in zip(prepared, fits, strict=True)]
     world = find_world(placed, shot.lines)
+    return_freed_memory()
     grounded, starts = [], []
     for k, (each, fit) in enumerate(zip(prepared, fits, strict=True)):
         stance = stance_on_floor(placed[k], world.floor_from_camera(k), shot.ablation.balance)
@@ -108,6 +116,8 @@ def refine(
     if shot.is_still:
         return start, start
     finished = fit_clip(prepared, start, shot.path, progress) if shot.smoothing else start
+    del start
+    return_freed_memory()
     raw = to_single_precision(fit_each_frame(prepared, finished, progress))
     raw = replace(raw, joint_sigma_m=finished.joint_sigma_m, height_sigma_m=finished.height_sigma_m)
     return raw, to_single_precision(finished) if shot.smoothing else raw

@@ -61,11 +61,11 @@ def raise_feet(
 
     def bend(
         rotations: NDArray[np.floating[Any]], root: NDArray[np.floating[Any]], shift: NDArray[np.floating[Any]]
-    ) -> tuple[NDArray[np.float64]]:
+    ) -> tuple[NDArray[np.floating[Any]]]:
         poses = body.forward_kinematics(rotations, root - pelvis_at_rest, placed.betas)
-        return (move_feet(body, rotations, poses, shift[..., None] * up),)
+        return (move_feet(body, rotations, poses, shift[..., None] * up).astype(rotations.dtype, copy=False),)
 
-    rotations = by_blocks(bend, placed.rotations, placed.root, shift)[0].astype(placed.rotations.dtype)
+    rotations = by_blocks(bend, placed.rotations, placed.root, shift)[0]
     return replace(placed, rotations=rotations, root=placed.root + rise[:, None] * up)
 
 

@@ -91,7 +91,7 @@ class KeptEstimates:
             if not self._wrote:
                 self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             keys = np.frombuffer(b"".join(self._new), np.uint8).reshape(-1, _KEY_BYTES)
-            write_npz(path, keys=keys, values=np.stack(list(self._new.values())))
+            write_npz(path, {"keys": keys, "values": np.stack(list(self._new.values()))})
             self._wrote = True
             self._bytes += path.stat().st_size
         except (OSError, ScopeError):

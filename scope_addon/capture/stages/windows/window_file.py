@@ -99,7 +99,7 @@ def save_window(folder: Path, record: WindowRecord, size: tuple[int, int]) -> Pa
         "text": np.frombuffer(text, np.uint8),
         **_people_arrays(record.tracklets),
     }
-    write_npz(path, **{name: _as_declared(name, value) for name, value in arrays.items()})
+    write_npz(path, {name: _as_declared(name, value) for name, value in arrays.items()})
     return path
 
 
