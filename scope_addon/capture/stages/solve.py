@@ -43,14 +43,17 @@ def solve(shot: Shot, tracks: Sequence[Track], progress: Progress, heights_m: Se
     :param heights_m: known statures of the first people, metres.
     """
     prepared = prepare(shot, tracks, heights_m)
-    fits = [to_single_precision(fit_track(each, progress)) for each in prepared]
+    count = len(prepared)
+    fits = [
+        to_single_precision(fit_track(each, progress_of_person(progress, k, count))) for k, each in enumerate(prepared)
+    ]
     shot, iterations = replace(shot, path=find_camera_path(shot, prepared[0], fits[0])), fits[0].iterations
     people = [FittedPerson(each.track, fit, each.body) for each, fit in zip(prepared, fits, strict=True)]
     if shot.ablation.stance and not shot.is_still:
         prepared, fits = ground_all(shot, prepared, fits)
     placed = []
     for k, person in enumerate(people):
-        raw, finished = refine(shot, prepared.pop(0), fits.pop(0), progress)
+        raw, finished = refine(shot, prepared.pop(0), fits.pop(0), progress_of_person(progress, k, count))
         people[k] = replace(person, fit=raw)
         placed.append(place(shot, person.track, finished, smoothing=False))
     world = find_world(placed, shot.lines)
@@ -58,6 +61,21 @@ def solve(shot: Shot, tracks: Sequence[Track], progress: Progress, heights_m: Se
     while people:
         motions.append(finish(shot, people.pop(0), placed.pop(0), world, len(motions)))
     return Solved(motions, shot.path, iterations)
+
+
+def progress_of_person(progress: Progress, number: int, count: int) -> Progress:
+    """Return what reports the progress of the ``number``-th of ``count`` people, from 0, as that of all together.
+
+    A stage without steps has one for each person if there are several.
+    """
+
+    def report(stage: str, done: int, total: int) -> None:
+        if total > 0:
+            progress(stage, number * total + done, count * total)
+        else:
+            progress(stage, number, count if count > 1 else 0)
+
+    return report
 
 
 def prepare(shot: Shot, tracks: Sequence[Track], heights_m: Sequence[float]) -> list[PreparedTrack]:
