@@ -66,9 +66,7 @@ def test_hostile_metadata_count_as_absent(path: Path) -> None:
     assert (read_exif(data), animation_length(data)) == (Exif(), 1)
 
 
-@pytest.mark.parametrize(
-    "path", sorted(filter(is_of_earlier_captures, CORPUS.iterdir())), ids=lambda path: path.name
-)
+@pytest.mark.parametrize("path", sorted(filter(is_of_earlier_captures, CORPUS.iterdir())), ids=lambda path: path.name)
 def test_hostile_times_of_earlier_captures_count_as_absent(tmp_path: Path, path: Path) -> None:
     """They have times that no sum holds, numbers that no float holds, names that UTF-8 lacks, or nest without end."""
     (tmp_path / "times.json").write_bytes(path.read_bytes())
