@@ -60,7 +60,8 @@ def save_map(path: Path, what: str, **content: Any) -> None:
     text = json.dumps({"format": f"scope {what}", "version": 1, **content}, indent=2, ensure_ascii=False)
     try:
         with atomic_path(path) as temporary:
-            temporary.write_text(text + "\n", encoding="utf-8")
+            # Half of a surrogate pair, which JSON's escapes can hold and UTF-8 cannot, is written as such an escape.
+            temporary.write_text(text + "\n", encoding="utf-8", errors="backslashreplace")
     except OSError as error:
         raise OutputError(f"cannot write {path}: {reason(error)}") from error
 

@@ -120,6 +120,26 @@ def find_capture(path: Path) -> None:
     assert found is None or 0 <= float(found.report.get("fps", {}).get("total", 0.0))  # which the panel shows
 
 
+def load_times(path: Path) -> None:
+    """Load the times of earlier captures, show a capture's remaining time by them, and keep those of this one."""
+    from scope.scope_addon.job.progress.job_progress import STAGES, JobProgress
+    from scope.scope_addon.job.progress.stage_times import load_stage_times, save_stage_times
+
+    folder = path.with_name("times")
+    folder.mkdir(exist_ok=True)
+    shutil.copy(path, folder / "times.json")
+    now = [0.0]
+    progress = JobProgress(lambda: now[0], load_stage_times(folder, KEY))
+    for stage in STAGES:
+        for done in range(0, 600, 30):
+            now[0] += 0.5
+            progress.update(stage, done, 600)
+            assert len(progress.lines()) < 3
+    save_stage_times(folder, KEY, progress.seconds, progress.frames)
+    kept = load_stage_times(folder, KEY)
+    assert not kept or kept["solving"] == progress.seconds["solving"] / progress.frames
+
+
 def read_batch_report(path: Path) -> None:
     from scope.scope_addon.job.batch import REPORT_NAME, Batch
 
@@ -222,6 +242,14 @@ def cached_reports(folder: Path) -> list[bytes]:
     (folder / "captures" / KEY).mkdir(parents=True, exist_ok=True)
     (folder / "captures" / KEY / "person1.npz").touch()
     return [json.dumps({"motions": ["person1.npz"], "report": {"fps": {"total": 9.5}}}).encode()]
+
+
+def times(folder: Path) -> list[bytes]:
+    from scope.scope_addon.job.progress.stage_times import save_stage_times
+
+    for kind in ("other", KEY):
+        save_stage_times(folder, kind, {"finding the person": 9.0, "solving": 0.5, "writing": 0.25}, 100)
+    return [(folder / "times.json").read_bytes()]
 
 
 def batch_reports(_: Path) -> list[bytes]:

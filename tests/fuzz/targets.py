@@ -282,5 +282,6 @@ TARGETS = {
     "estimates": Target(own.find_estimates, (".npz",), own.estimates),
     "window": Target(own.load_window, (".npz",), own.windows),
     "cached_report": Target(own.find_capture, (".json",), own.cached_reports),
+    "times": Target(own.load_times, (".json",), own.times),
     "batch_report": Target(own.read_batch_report, (".json",), own.batch_reports),
 }

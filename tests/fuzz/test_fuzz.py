@@ -9,9 +9,11 @@ from pathlib import Path
 import pytest
 from scope.scope_addon.capture.media.stills.exif import Exif, animation_length, read_exif
 from scope.scope_addon.capture.media.stills.heif import read_layout
+from scope.scope_addon.job.progress.stage_times import load_stage_times
 from scope.solver.errors import ScopeError
 
 from .fuzz import CORPUS, check, inputs, random_inputs
+from .own_targets import KEY
 from .targets import TARGETS
 
 COUNT = {
@@ -40,8 +42,14 @@ def is_metadata(path: Path) -> bool:
     return path.name.startswith(("heif-", "exif-"))
 
 
+def is_of_earlier_captures(path: Path) -> bool:
+    return path.name.startswith("times-")
+
+
 @pytest.mark.parametrize(
-    "path", [path for path in sorted(CORPUS.iterdir()) if not is_metadata(path)], ids=lambda path: path.name
+    "path",
+    [path for path in sorted(CORPUS.iterdir()) if not (is_metadata(path) or is_of_earlier_captures(path))],
+    ids=lambda path: path.name,
 )
 def test_past_findings_are_refused(path: Path) -> None:
     """Each once crashed, hung, took all memory, ran code or gave a message of several lines."""
@@ -56,6 +64,14 @@ def test_hostile_metadata_count_as_absent(path: Path) -> None:
     data = path.read_bytes()
     assert read_layout(data) is None
     assert (read_exif(data), animation_length(data)) == (Exif(), 1)
+
+
+@pytest.mark.parametrize("path", sorted(filter(is_of_earlier_captures, CORPUS.iterdir())), ids=lambda path: path.name)
+def test_hostile_times_of_earlier_captures_count_as_absent(tmp_path: Path, path: Path) -> None:
+    """They have times that no sum holds, numbers that no float holds, names that UTF-8 lacks, or nest without end."""
+    (tmp_path / "times.json").write_bytes(path.read_bytes())
+    assert load_stage_times(tmp_path, KEY) == {}
+    check("times", tmp_path / "times.json")
 
 
 @pytest.mark.parametrize("name", TARGETS)

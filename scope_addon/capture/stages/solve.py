@@ -46,15 +46,18 @@ def solve(shot: Shot, tracks: Iterable[Track], progress: Progress, heights_m: Se
     """
     prepared = prepare(shot, tracks, heights_m)
     return_freed_memory()
-    fits = [to_single_precision(fit_track(each, progress)) for each in prepared]
+    count = len(prepared)
+    fits = [
+        to_single_precision(fit_track(each, progress_of_person(progress, k, count))) for k, each in enumerate(prepared)
+    ]
     shot, iterations = replace(shot, path=find_camera_path(shot, prepared[0], fits[0])), fits[0].iterations
     known = [(each.track, each.body) for each in prepared]
     if shot.ablation.stance and not shot.is_still:
         prepared, fits = ground_all(shot, prepared, fits)
     return_freed_memory()
     people, placed = [], []
-    for track, body in known:
-        raw, finished = refine(shot, prepared.pop(0), fits.pop(0), progress)
+    for k, (track, body) in enumerate(known):
+        raw, finished = refine(shot, prepared.pop(0), fits.pop(0), progress_of_person(progress, k, count))
         people.append(FittedPerson(track, raw, body))
         placed.append(place(shot, track, finished, smoothing=False))
         del raw, finished
@@ -65,6 +68,21 @@ def solve(shot: Shot, tracks: Iterable[Track], progress: Progress, heights_m: Se
         return_freed_memory()
         motions.append(finish(shot, people.pop(0), placed.pop(0), world, len(motions)))
     return Solved(motions, shot.path, iterations)
+
+
+def progress_of_person(progress: Progress, number: int, count: int) -> Progress:
+    """Return what reports the progress of the ``number``-th of ``count`` people, from 0, as that of all together.
+
+    A stage without steps has one for each person if there are several.
+    """
+
+    def report(stage: str, done: int, total: int) -> None:
+        if total > 0:
+            progress(stage, number * total + done, count * total)
+        else:
+            progress(stage, number, count if count > 1 else 0)
+
+    return report
 
 
 def prepare(shot: Shot, tracks: Iterable[Track], heights_m: Sequence[float]) -> list[PreparedTrack]:

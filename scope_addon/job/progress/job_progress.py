@@ -26,6 +26,7 @@ FIRST_ONLY = (COMPILING,)
 BUILDING = "building the scene"  # after the worker has ended
 
 _FINDING = "finding the person"  # the stage whose speed those after it are estimated by
+_SHAPE = "finding the shape"  # the first stage for each person; of several people it says how many
 _MEASURED_S, _MEASURED_STEPS = 4.0, 12  # of a stage, before its speed is believed
 _STEADY = 1.5  # largest ratio between the speeds of the last two thirds of that time
 _MOST_MARKS = 512
@@ -45,7 +46,9 @@ class JobProgress:
         self._stage_start = clock()
         self._stage_first = 0  # frames done when the stage began
         self._marks: list[tuple[float, int]] = []  # of this stage: times, and what was done then
-        self._repeated = False  # whether stages run for a second person
+        self._repeated = False  # whether a stage runs a second time
+        self._people = 1  # whom the stages after finding them run for, one after the other
+        self._reached: dict[str, tuple[float, float]] = {}  # of each stage: its share that is done, and seconds for it
         self.seconds: dict[str, float] = {}  # of each stage that has ended
         self.frames = 0  # of the footage, as far as known
         self.stage, self.done, self.total = "starting", 0, 0
@@ -61,6 +64,10 @@ class JobProgress:
         self.done, self.total = done, total
         if stage == _FINDING:
             self.frames = total
+        elif stage == _SHAPE:
+            self._people = max(1, total)
+        if total > 0:
+            self._reached[stage] = (min(1.0, done / total), self._spent(stage))
         self._marks.append((now, done))
         if len(self._marks) > _MOST_MARKS:
             del self._marks[1:-1:2]
@@ -87,17 +94,36 @@ class JobProgress:
         """Estimated remaining time of the job; None until it is known to about a half.
 
         It is what the stage still takes at its own speed, and what those after it took in an earlier capture of the
-        same kind, or else their usual part of the time that finding the person takes. The time before a stage's first
+        same kind, or else their usual part of the time that finding the person takes. Of several people, the last
+        stages are less regular: there it may be off by another 4 % of the job. The time before a stage's first
         frame, as for loading the networks, says nothing about what is left.
         """
         if self.stage not in STAGES or self.stage == "starting":
             return None
+        names = list(STAGES)
+        if self._people > 1 and self.stage != _FINDING:
+            parts = [self._left_of_everybody(name) for name in names[names.index(_FINDING) + 1 :]]
+            return None if None in parts else sum(filter(None, parts))
         here = self._left_in_stage()
         if here is None or (self._repeated and not self._earlier):
             return None
-        names = list(STAGES)
         after = [self._expected(name) for name in names[names.index(self.stage) + 1 :]]
         return None if None in after else here + sum(filter(None, after))
+
+    def _spent(self, stage: str) -> float:
+        """Return the seconds of a stage so far, for all people."""
+        return self.seconds.get(stage, 0.0) + (self._clock() - self._stage_start if stage == self.stage else 0.0)
+
+    def _left_of_everybody(self, stage: str) -> float | None:
+        """Return what a stage still takes for all people: as expected, or as it took for those who have it behind them.
+
+        The latter counts only without an earlier capture, which also knows what is done between two people.
+        """
+        done, seconds = self._reached.get(stage, (0.0, 0.0))
+        if done * self._people >= 1.0 and not self._earlier:
+            return max(0.0, seconds * (1.0 - done) / done - (self._spent(stage) - seconds))
+        expected = self._expected(stage)
+        return None if expected is None else max(0.0, expected - self._spent(stage))
 
     def _left_in_stage(self) -> float | None:
         if self.total > 0 and (speed := self._steady_speed()) is not None:

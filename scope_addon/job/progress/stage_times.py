@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -20,6 +19,7 @@ _SETTINGS = (
     "threads",
 )  # on which the time of a frame depends
 _MOST_KINDS = 50
+_LONGEST_S = 86_400.0  # that a stage may take for a frame
 
 
 def kind_of(values: Mapping[str, Any]) -> str:
@@ -64,5 +64,5 @@ def _read(folder: Path) -> dict[str, Any]:
 
 def _are_times(times: object) -> bool:
     return isinstance(times, dict) and all(
-        type(x) in (int, float) and math.isfinite(x) and x >= 0 for x in times.values()
+        type(seconds) in (int, float) and 0 <= seconds <= _LONGEST_S for seconds in times.values()
     )

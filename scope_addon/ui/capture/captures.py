@@ -12,7 +12,7 @@ import bpy
 from bpy.props import StringProperty
 
 from ..captured_person import captured_armature
-from ..reporting import iface_
+from ..reporting import iface_, tip_
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -110,8 +110,11 @@ class SCOPE_OT_show_capture(bpy.types.Operator):
 
     @classmethod
     def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
-        """Return the whole name, which the list may have no room for."""
-        return str(properties.name)
+        """Return the whole name, which the list may have no room for, and where to change it.
+
+        Blender opens the text field of an entry on a double click, and hands a button no second click.
+        """
+        return f"{properties.name}\n{tip_('Rename it with Object > Motion Capture > Rename Take')}"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Select it in the list."""

@@ -90,6 +90,11 @@ class SCOPE_OT_rename_take(ReportingOperator):
         outcome: set[str] = context.window_manager.invoke_props_dialog(self)
         return outcome
 
+    def draw(self, _context: bpy.types.Context) -> None:
+        """Draw the name, which is typed over at once."""
+        self.layout.activate_init = True
+        self.layout.prop(self, "name", text="")
+
     def work(self, context: bpy.types.Context) -> str:
         """Rename everything whose name begins with the take's.
 

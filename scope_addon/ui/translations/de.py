@@ -315,6 +315,7 @@ TEXTS = STAGES | {
     "Remove keys within a maximum error": "Schlüsselbilder innerhalb eines Höchstfehlers entfernen",
     "Remove the correction; the motion around it is again what it was without it": "Die Korrektur entfernen; die Bewegung ringsum wird wieder wie ohne sie",
     "Remove the selected entry": "Den gewählten Eintrag entfernen",
+    "Rename it with Object > Motion Capture > Rename Take": "Umbenennen mit Objekt > Bewegungserfassung > Take umbenennen",
     "Rename the capture with its objects and actions; exported animation has the same name": "Die Erfassung mit ihren Objekten und Aktionen umbenennen; exportierte Animation heißt ebenso",
     "Repeat": "Wiederholen",
     "Repeat the curves; each cycle starts where the previous one ended": "Die Kurven wiederholen; jeder Zyklus beginnt, wo der vorige endete",

@@ -315,6 +315,7 @@ TEXTS = STAGES | {
     "Remove keys within a maximum error": "Eliminar claves dentro de un error máximo",
     "Remove the correction; the motion around it is again what it was without it": "Eliminar la corrección; el movimiento cercano vuelve a ser el que era sin ella",
     "Remove the selected entry": "Eliminar la entrada seleccionada",
+    "Rename it with Object > Motion Capture > Rename Take": "Para renombrarla: Objeto > Captura de movimiento > Renombrar toma",
     "Rename the capture with its objects and actions; exported animation has the same name": "Renombrar la captura con sus objetos y acciones; la animación exportada lleva el mismo nombre",
     "Repeat": "Repetir",
     "Repeat the curves; each cycle starts where the previous one ended": "Repetir las curvas; cada ciclo empieza donde terminó el anterior",

@@ -315,6 +315,7 @@ TEXTS = STAGES | {
     "Remove keys within a maximum error": "Supprimer des clés dans la limite d’une erreur maximale",
     "Remove the correction; the motion around it is again what it was without it": "Supprimer la correction ; le mouvement autour redevient ce qu’il était sans elle",
     "Remove the selected entry": "Supprimer l’entrée sélectionnée",
+    "Rename it with Object > Motion Capture > Rename Take": "Pour la renommer : Objet > Capture de mouvement > Renommer la prise",
     "Rename the capture with its objects and actions; exported animation has the same name": "Renommer la capture avec ses objets et actions ; l’animation exportée porte le même nom",
     "Repeat": "Répéter",
     "Repeat the curves; each cycle starts where the previous one ended": "Répéter les courbes ; chaque cycle commence là où le précédent finit",

@@ -315,6 +315,7 @@ TEXTS = STAGES | {
     "Remove keys within a maximum error": "最大誤差の範囲内でキーを削除",
     "Remove the correction; the motion around it is again what it was without it": "修正を削除します。前後のモーションは修正前の状態に戻ります",
     "Remove the selected entry": "選択した項目を削除",
+    "Rename it with Object > Motion Capture > Rename Take": "名前の変更は「オブジェクト > モーションキャプチャ > テイク名を変更」",
     "Rename the capture with its objects and actions; exported animation has the same name": "キャプチャの名前を、そのオブジェクトとアクションとともに変更します。エクスポートするアニメーションも同じ名前です",
     "Repeat": "リピート",
     "Repeat the curves; each cycle starts where the previous one ended": "カーブを繰り返します。各周期は前の周期の終わりから始まります",

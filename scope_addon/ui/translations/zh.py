@@ -315,6 +315,7 @@ TEXTS = STAGES | {
     "Remove keys within a maximum error": "在最大误差内移除关键帧",
     "Remove the correction; the motion around it is again what it was without it": "移除修正；其前后的动作恢复为修正前的状态",
     "Remove the selected entry": "移除选中项",
+    "Rename it with Object > Motion Capture > Rename Take": "重命名：物体 > 动作捕捉 > 重命名镜次",
     "Rename the capture with its objects and actions; exported animation has the same name": "重命名捕捉及其物体和动作；导出的动画使用相同名称",
     "Repeat": "重复",
     "Repeat the curves; each cycle starts where the previous one ended": "重复曲线；每个循环从上一个结束处开始",

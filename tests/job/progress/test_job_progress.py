@@ -12,6 +12,7 @@ import pytest
 from scope.scope_addon.job.progress.job_progress import BUILDING, STAGES, JobProgress
 
 MEASURED = json.loads((Path(__file__).parent / "measured_progress.json").read_text("utf-8"))
+OF_SEVERAL = 0.04  # of a capture of several people, by which the estimate may be off besides
 LAST_S = 2.0  # of a capture, in which the estimate does not matter any more
 
 
@@ -41,12 +42,13 @@ def of_each_frame(messages):
 @pytest.mark.parametrize("name", MEASURED)
 def test_the_remaining_time_is_right_to_about_a_half_whenever_it_is_shown(name, again):
     found, _ = replayed(MEASURED[name], of_each_frame(MEASURED[name]) if again else None)
-    ratios = [estimate / left for _, left, estimate in found if estimate is not None and left > LAST_S]
-    assert 0.6 < min(ratios)
-    assert max(ratios) < 1.6
+    estimates = [(left, estimate) for _, left, estimate in found if estimate is not None and left > LAST_S]
+    margin = OF_SEVERAL * MEASURED[name][-1][0] if "people" in name else 0.0
+    assert [(left, x) for left, x in estimates if not 0.6 * left - margin < x < 1.6 * left + margin] == []
+    ratios = [estimate / left for left, estimate in estimates]
     assert abs(np.median(ratios) - 1) < 0.3
     shown = [estimate is not None for _, _, estimate in found]
-    assert np.mean(shown) > (0.45 if again else 0.3)
+    assert np.mean(shown) > (0.4 if again else 0.3)
 
 
 @pytest.mark.parametrize("name", MEASURED)
@@ -55,9 +57,11 @@ def test_captures_have_the_stages_whose_shares_the_bar_shows(name):
     assert set(stages) | {"starting"} == set(STAGES)
     _, progress = replayed(MEASURED[name])
     assert progress.fraction == pytest.approx(1.0 - STAGES["writing"])
-    end, took = MEASURED[name][-1][0], progress.seconds
-    for stage, share in STAGES.items():
-        assert abs(took.get(stage, 0.0) / end - share) < 0.12, stage
+    # How long the networks take to load does not depend on the footage.
+    took, loading = progress.seconds, STAGES["starting"]
+    end = MEASURED[name][-1][0] - took["starting"]
+    for stage in list(STAGES)[1:]:
+        assert abs(took.get(stage, 0.0) / end - STAGES[stage] / (1.0 - loading)) < 0.12, stage
 
 
 def test_start_up_is_not_extrapolated():
@@ -86,6 +90,17 @@ def test_a_stage_that_slows_down_has_no_remaining_time_until_it_is_steady():
         now[0] += 0.5
         progress.update("finding the person", k, 1000)
     assert progress.seconds_left == pytest.approx(0.5 * 700 * 1.3, rel=0.1)
+
+
+@pytest.mark.parametrize("name", [name for name in MEASURED if "people" in name])
+@pytest.mark.parametrize("again", [False, True], ids=["first", "again"])
+def test_several_people_have_a_remaining_time_in_all_stages_for_each_of_them(name, again):
+    found, _ = replayed(MEASURED[name], of_each_frame(MEASURED[name]) if again else None)
+    begin = next(t for t, stage, _, _ in MEASURED[name] if stage == "finding the shape")
+    ratios = [(t, left, estimate) for t, left, estimate in found if t >= begin and left > LAST_S]
+    assert len(ratios) > 20
+    assert all(estimate is not None for _, _, estimate in ratios)
+    assert 0.5 < np.median([estimate / left for _, left, estimate in ratios]) < 1.5
 
 
 def test_stages_of_a_second_person_have_no_remaining_time_without_an_earlier_capture():

@@ -27,7 +27,7 @@ def test_kinds_that_were_not_captured_for_long_are_forgotten(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "kinds", [3, [], {"kind": 3}, {"kind": {"solving": "x"}}, {"kind": {"solving": -1}}, {"kind": {"solving": 1e999}}]
+    "kinds", [3, [], {"kind": 3}, *({"kind": {"solving": time}} for time in ("x", -1, 1e999, 1e308, None, [0.1]))]
 )
 def test_damaged_times_are_none(tmp_path, kinds):
     content = {"format": "scope stage times", "version": 1, "kinds": kinds}

@@ -219,7 +219,8 @@ def test_long_names_are_told_apart_in_a_narrow_sidebar(two):
         assert narrow["prop"] == []
         [(text, properties)] = narrow["operator"]
         assert properties.name == name  # the tooltip and what a click shows
-        assert bpy.types.SCOPE_OT_show_capture.description(bpy.context, properties) == name
+        tip = bpy.types.SCOPE_OT_show_capture.description(bpy.context, properties)
+        assert tip == f"{name}\nRename it with Object > Motion Capture > Rename Take"
         assert "…" in text
         assert text.startswith(LONG[0][:4])
         assert 10 < len(text) < 30
