@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Shots of the takes that the lifter was not trained on: a section of each, with a random body and a random camera.
 
-The joint prior was trained on all of them but one: it is split by performer (`assets/prior/README.md`).
+The joint prior was trained on all of them but one: it is split by performer (`assets/prior/README.md`). Some choices
+were made by looking at these shots.
 """
 
 from __future__ import annotations

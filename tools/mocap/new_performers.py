@@ -4,9 +4,9 @@
 They test, and nothing may be chosen or trained by them. They come out of three packages, pinned and downloaded when
 they are wanted; none of their data is part of this project:
 
-- climbers: holosoma-retargeting (Apache-2.0), joint positions of five climbs over boxes, 120 frames/s. Four climbs share
-  the lengths of all limbs, the fifth has others; each of these skeletons is taken for one performer
-- fencer: assimp-testmodels (Debian, BSD-3-Clause; this file "free for any purpose"), 43 optical markers, 120 frames/s
+- climbers: holosoma-retargeting (Apache-2.0), joint positions of five climbs over boxes, 120 frames/s. Four climbs
+  share the lengths of all limbs, the fifth has others; each of these skeletons is taken for one performer
+- fencer: assimp-testmodels (Debian, BSD-3-Clause; this file "free for any purpose"), 43 markers, 120 frames/s
 - boxer: assimp-testmodels, a BVH file of 100 frames/s
 - patients: gaitkit (MIT), example gaits of one person with Parkinson's disease (ODC-By 1.0) and one after a stroke
   (CC BY 4.0): hips, knees, ankles, feet and shoulders. Their arms were not recorded; they hang
