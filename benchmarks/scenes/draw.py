@@ -21,7 +21,7 @@ from .kinds import CHILDREN, CLOTHES, SEED, Kind, kind_of, split_of
 from .people import Person, Points
 from .scene import NEW_PERFORMERS, STATIC, TEST, TRAVELLING, Block, Scene
 
-SCENES, SCENES_OF_NEW_PERFORMERS = 60, 18
+SCENES, SCENES_OF_NEW_PERFORMERS = 60, 24
 NEW_SEED = 12  # of scenes of new performers
 FPS, SECONDS = 15.0, 1.2
 STRIDE = 2  # frames of a recording between two of the clip
