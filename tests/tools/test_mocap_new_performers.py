@@ -6,6 +6,7 @@ from __future__ import annotations
 import io
 import tarfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -41,7 +42,12 @@ Frame Time: 0.01
 
 def standing(knee_deg: float = 0.0, elbow_deg: float = 0.0, turn_deg: float = 0.0) -> dict[str, np.ndarray]:
     """Return the joints of somebody who stands facing +z with hanging arms, bends knees and elbows, and turns."""
-    joints = {"pelvis": [0.0, 1.0, 0.0], "chest": [0.0, 1.2, 0.0], "neck": [0.0, 1.5, 0.0], "head_end": [0.0, 1.7, 0.0]}
+    joints: dict[str, Any] = {
+        "pelvis": [0.0, 1.0, 0.0],
+        "chest": [0.0, 1.2, 0.0],
+        "neck": [0.0, 1.5, 0.0],
+        "head_end": [0.0, 1.7, 0.0],
+    }
     for side, x in (("left", 0.1), ("right", -0.1)):
         knee, elbow = np.radians(knee_deg), np.radians(elbow_deg)
         joints[f"{side}_hip"], joints[f"{side}_knee"] = [x, 0.95, 0.0], [x, 0.53, 0.0]
