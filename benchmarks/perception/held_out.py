@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Shots of the takes that the lifter was not trained on: a section of each, with a random body and a random camera.
 
-The joint prior was trained on all of them but one: it is split by performer (`assets/prior/README.md`).
+The joint prior was trained on all of them but one: it is split by performer (`assets/prior/README.md`). Some choices
+were made by looking at these shots.
 """
 
 from __future__ import annotations
@@ -47,6 +48,7 @@ class Take:
     valid: NDArray[np.bool_]  # (T,) bool
     betas: NDArray[np.floating[Any]]  # (P,)
     fps: float
+    performer: str = ""
 
 
 def held_out_takes(path: Path) -> list[Take]:
@@ -58,11 +60,14 @@ def all_takes(path: Path) -> list[Take]:
     """Read all takes of a file written by ``tools.mocap.fit_body``."""
     with np.load(path) as data:
         arrays = {key: data[key] for key in ("poses", "trans", "valid")}
-        start, names, betas, fps = (data[f"take_{key}"] for key in ("start", "name", "betas", "fps"))
+        keys = ("start", "name", "betas", "fps", "subject")
+        start, names, betas, fps, performers = (data[f"take_{key}"] for key in keys)
     takes = []
     for k in range(len(names)):
         rows = {key: array[start[k] : start[k + 1]] for key, array in arrays.items()}
-        takes.append(Take(k, str(names[k]), **rows, betas=betas[k], fps=round(float(fps[k]), 1)))
+        takes.append(
+            Take(k, str(names[k]), **rows, betas=betas[k], fps=round(float(fps[k]), 1), performer=str(performers[k]))
+        )
     return takes
 
 

@@ -26,6 +26,7 @@ from ..frames import CACHE, DATA, ROOT
 from .held_out import draw_shot, held_out_takes
 
 RENDERS, MOTIONS = CACHE / "renders", ROOT / "build" / "mocap" / "motions.npz"
+NEW_PERFORMERS = MOTIONS.with_name("new_performers.npz")
 SAME = ("joints_cam", "betas", "intrinsics", "frame_index")  # between two versions of a clip's ground truth
 SAME_M = 1e-3
 
@@ -47,6 +48,22 @@ def fitted_motions() -> Path:
         command = ("scope.tools.mocap.fit_body", str(DATA / "mocap"), "-o", str(MOTIONS))
         subprocess.run([sys.executable, "-m", *command], check=True, stdout=subprocess.DEVNULL)
     return MOTIONS
+
+
+def fitted_new_performers() -> Path:
+    """Return the file of the performers that nothing was trained on, fitted by the default body, made if it is missing.
+
+    :raises subprocess.CalledProcessError: when a package with their recordings cannot be downloaded; it says why.
+    """
+    if not NEW_PERFORMERS.is_file():
+        print(
+            "downloading the recordings of new performers, and fitting the body to them, once",
+            file=sys.stderr,
+            flush=True,
+        )
+        command = ("scope.tools.mocap.new_performers", "-o", str(NEW_PERFORMERS))
+        subprocess.run([sys.executable, "-m", *command], check=True, stdout=subprocess.DEVNULL)
+    return NEW_PERFORMERS
 
 
 def render_missing(body: Body) -> None:

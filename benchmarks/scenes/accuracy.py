@@ -25,8 +25,8 @@ from ..frames import DATA
 from ..perception.depth_flips import FITS, DepthFlips, depth_flips, flips_table, total
 from ..report import table
 from .people import LIMB_JOINTS
-from .scene import FOLDER
-from .statistics import Estimate, mean_over_people
+from .scene import FOLDER, NEW_PERFORMERS, SPLITS
+from .statistics import Estimate, mean_over_people, mean_over_performers
 
 HIPS = [LIMB_JOINTS.index("left_hip"), LIMB_JOINTS.index("right_hip")]
 FOUND_PX = 0.15  # of the picture's longer side: the most that a captured person's hips may be off, median
@@ -67,7 +67,7 @@ def scenes(quick: bool) -> dict[str, Any]:
     if not clips:
         print(f"{FOLDER} has no clips: run ./scripts/bench scenes without --quick", file=sys.stderr)
     figures: dict[str, Any] = {}
-    for split in ("development", "test"):
+    for split in SPLITS:
         of_split = [truth for truth in clips if truth.name.startswith(split)]
         if of_split:
             figures[split] = _measure(split, of_split, quick)
@@ -102,7 +102,14 @@ def _tables(split: str, by_variant: dict[str, list[Result]]) -> dict[str, Any]:
         flips[name] = {fit: total(r.flips[fit] for r in results if r.flips) for fit in FITS}
         print(flips_table(f"{split}, {name}", flips[name]), end="\n\n", flush=True)
     people = {name: [_figures(r) for r in results] for name, results in by_variant.items()}
-    return {"groups": found, "variants": variants, "more_than_default": more, "flips": flips, "people": people}
+    figures: dict[str, Any] = {"groups": found, "variants": variants, "more_than_default": more, "flips": flips}
+    figures["people"] = people
+    if split == NEW_PERFORMERS:
+        figures["performers"] = {name: by_performer(results) for name, results in by_variant.items()}
+        for name, rows in figures["performers"].items():
+            columns = (f"{split}, {name}: performers", "people", "MPJPE-root mm", "PA-MPJPE mm", "found", "size off, %")
+            print(table(columns, [_row(who, row) for who, row in rows.items()]), end="\n\n", flush=True)
+    return figures
 
 
 def evaluate_scene(
@@ -138,6 +145,7 @@ def _result(body: Body, clip: str, motion: Motion | None, truth: Truth, k: int) 
     frames["height_px"] = np.ptp(pixels[..., 1], axis=1)
     person = {key: truth[key][k].item() for key in ("stature_m", "mass_index", "loose_m")}
     person |= {key: truth[key].item() for key in ("camera", "surroundings")} | {"people": len(truth["limbs"])}
+    person["take"] = str(truth["takes"][k])
     result = Result(clip, np.full(T, np.nan), np.full(T, np.nan), np.nan, frames, person)
     if motion is not None:
         rows = np.flatnonzero(motion.valid & (motion.frames < T))
@@ -225,6 +233,34 @@ def groups(results: list[Result]) -> dict[str, dict[str, Estimate]]:
             "size_off": mean_over_people([100 * abs(r.size - 1) for r, rows in inside]),
         }
     return found
+
+
+def by_performer(results: list[Result]) -> dict[str, dict[str, Estimate]]:
+    """Return the figures of people who move as each performer does, and of all, for whom performers are drawn.
+
+    A performer's recordings are named PERFORMER_NUMBER.
+    """
+    rows = {"all, performers drawn": results}
+    rows |= {name: [r for r in results if _performer(r) == name] for name in sorted({_performer(r) for r in results})}
+    found = {}
+    for name, of in rows.items():
+        visible = [r.frames["hidden"] < len(LIMB_JOINTS) for r in of]
+        values = {
+            "mpjpe_root": [_mean(r.mpjpe_root[rows]) for r, rows in zip(of, visible, strict=True)],
+            "pa_mpjpe": [_mean(r.pa_mpjpe[rows]) for r, rows in zip(of, visible, strict=True)],
+            "found": [_mean(np.isfinite(r.mpjpe_root[rows]) * 1.0) for r, rows in zip(of, visible, strict=True)],
+            "size_off": [100 * abs(r.size - 1) for r in of],
+        }
+        if of is results:
+            who = [_performer(r) for r in of]
+            found[name] = {key: mean_over_performers(each, who) for key, each in values.items()}
+        else:
+            found[name] = {key: mean_over_people(each) for key, each in values.items()}
+    return found
+
+
+def _performer(result: Result) -> str:
+    return str(result.person["take"]).rpartition("_")[0]
 
 
 def _mean(values: NDArray[np.float64]) -> float:

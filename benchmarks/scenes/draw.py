@@ -2,7 +2,8 @@
 """Random scenes, reproducible by their number. `kinds.py` chooses the properties that groups are made of.
 
 Two of three scenes are for testing: their first person moves as in a recording that the lifting network was not trained
-on, and no choice may be made by their results. The others, for development, use the other recordings.
+on, and no choice may be made by their results. The others, for development, use the other recordings. Further scenes
+for testing show performers that nothing was trained on (`tools.mocap.new_performers`), each as often as any other.
 """
 
 from __future__ import annotations
@@ -16,11 +17,12 @@ from ...solver.rotations import exp
 from ...tools.readme_pictures.view import level_camera
 from ...tools.train_lifter.split import is_held_out
 from ..perception.held_out import Take, draw_section, floor_under, states_and_pelvis
-from .kinds import CHILDREN, CLOTHES, SEED, Kind, is_test, kind_of
+from .kinds import CHILDREN, CLOTHES, SEED, Kind, kind_of, split_of
 from .people import Person, Points
-from .scene import STATIC, TRAVELLING, Block, Scene
+from .scene import NEW_PERFORMERS, STATIC, TEST, TRAVELLING, Block, Scene
 
-SCENES = 60
+SCENES, SCENES_OF_NEW_PERFORMERS = 60, 24
+NEW_SEED = 12  # of scenes of new performers
 FPS, SECONDS = 15.0, 1.2
 STRIDE = 2  # frames of a recording between two of the clip
 MOST_BETA, BETA_SPREAD = 4.0, 1.5  # wider than the default body's population
@@ -36,17 +38,20 @@ EVERY_VERTEX, EVERY_FRAME = 40, 4  # that a camera is tested with
 TRIES, TRIES_EACH, CAMERAS_EACH = 400, 20, 20  # of all recordings, of each, and of each drawn person
 
 
-def draw_scene(body: Body, takes: Sequence[Take], number: int) -> Scene:
+def draw_scene(body: Body, takes: Sequence[Take], number: int, split: str | None = None) -> Scene:
     """Return the scene of that number.
 
-    :param takes: all recordings, as of `all_takes`.
+    :param takes: all recordings, as of `all_takes`, of ``shared/data`` or of new performers.
+    :param split: ``NEW_PERFORMERS``; None: as the number says.
     :raises ValueError: when no camera was found that has the first person in its picture.
     """
-    rng = np.random.default_rng([SEED, number])
-    own = [take for take in takes if bool(is_held_out(np.array(take.number))) == is_test(number)]
-    kind = kind_of(number, len(own))
+    split = split_of(number) if split is None else split
+    rng = np.random.default_rng([NEW_SEED if split == NEW_PERFORMERS else SEED, number])
+    own = recordings_of(takes, split)
+    kind = kind_of(number, split, len(own))
     for attempt in range(TRIES):
-        take = own[(kind.recording + attempt // TRIES_EACH) % len(own)]
+        chosen = own[(kind.recording + attempt // TRIES_EACH) % len(own)]
+        take = chosen[rng.integers(len(chosen))] if len(chosen) > 1 else chosen[0]
         first = draw_person(rng, body, take, kind.is_child, kind.wears_loose)
         if first is None:
             continue
@@ -59,10 +64,18 @@ def draw_scene(body: Body, takes: Sequence[Take], number: int) -> Scene:
                 continue
             people.append(_beside(rng, body, first, second))
         for _ in range(CAMERAS_EACH):
-            scene = _film(rng, body, tuple(people), number, kind)
+            scene = _film(rng, body, tuple(people), number, split, kind)
             if scene is not None:
                 return scene
     raise ValueError(f"no camera was found for scene {number}: the limits are too narrow")
+
+
+def recordings_of(takes: Sequence[Take], split: str) -> list[list[Take]]:
+    """Return the recordings as which first persons of a split move: each by itself, or those of each new performer."""
+    if split == NEW_PERFORMERS:
+        return [[take for take in takes if take.performer == name] for name in sorted({t.performer for t in takes})]
+    held_out = split == TEST
+    return [[take] for take in takes if bool(is_held_out(np.array(take.number))) == held_out]
 
 
 def draw_person(
@@ -112,7 +125,9 @@ def _beside(rng: np.random.Generator, body: Body, first: Person, second: Person)
     return _moved(second, 6.0 * toward)
 
 
-def _film(rng: np.random.Generator, body: Body, people: tuple[Person, ...], number: int, kind: Kind) -> Scene | None:
+def _film(
+    rng: np.random.Generator, body: Body, people: tuple[Person, ...], number: int, split: str, kind: Kind
+) -> Scene | None:
     """Draw a camera, and what stands in front of the first person; None if the person is not well in the picture."""
     first, frames = people[0], len(people[0])
     width, height = kind.size
@@ -137,7 +152,7 @@ def _film(rng: np.random.Generator, body: Body, people: tuple[Person, ...], numb
     if kind.has_block and block is None:
         return None
     rest = (kind.size, FPS, kind.camera, kind.surroundings, block, int(rng.integers(1 << 31)))
-    scene = Scene(number, is_test(number), people, intrinsics, poses, *rest)
+    scene = Scene(number, split, people, intrinsics, poses, *rest)
     if block is not None and scene.hidden(first, body).mean() > MOST_HIDDEN:
         return None
     return scene if _well_inside(body, scene) else None

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from .scene import INDOORS, OUTDOORS, PANNING, STATIC, TRAVELLING
+from .scene import DEVELOPMENT, INDOORS, NEW_PERFORMERS, OUTDOORS, PANNING, SPLITS, STATIC, TEST, TRAVELLING
 
 SEED = 11
 TEST_OF = 3  # every third scene is for development, the others are for testing
@@ -27,7 +27,7 @@ Value = TypeVar("Value")
 class Kind:
     """What is the same in all tries to draw a scene."""
 
-    recording: int  # of the first person, into those of the split
+    recording: int  # of the first person, into the recordings of the split, or into the new performers
     size: tuple[int, int]  # width, height
     camera: str
     surroundings: str
@@ -37,23 +37,23 @@ class Kind:
     has_block: bool
 
 
-def is_test(number: int) -> bool:
-    """Return whether a scene is for testing."""
-    return number % TEST_OF != 0
+def split_of(number: int) -> str:
+    """Return whether a numbered scene of the recordings in ``shared/data`` is for testing or for development."""
+    return TEST if number % TEST_OF != 0 else DEVELOPMENT
 
 
-def kind_of(number: int, recordings: int) -> Kind:
-    """Return the kind of a scene.
+def kind_of(number: int, split: str, recordings: int) -> Kind:
+    """Return the kind of a scene. Scenes of new performers are numbered by themselves.
 
     Every property takes each of its values once, in random order, before it takes them again in another order.
 
-    :param recordings: how many recordings the scene's split has.
+    :param recordings: how many recordings, or new performers, the scene's split has.
     """
     passed = (number - 1) // TEST_OF + 1  # scenes for development before this one
-    turn = number - passed if is_test(number) else number // TEST_OF
+    turn = {DEVELOPMENT: number // TEST_OF, TEST: number - passed, NEW_PERFORMERS: number}[split]
 
     def pick(which: int, values: Sequence[Value]) -> Value:
-        rng = np.random.default_rng([SEED, which, is_test(number), turn // len(values)])
+        rng = np.random.default_rng([SEED, which, SPLITS.index(split), turn // len(values)])
         return values[rng.permutation(len(values))[turn % len(values)]]
 
     return Kind(

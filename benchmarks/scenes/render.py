@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Render the scenes that build/bench/scenes lacks: ``python -m scope.benchmarks.scenes.render [NUMBER …]``.
 
-Without numbers, those for testing come first. Runs as a separate process, because Blender's module prints on standard
-output and can hang at exit. A clip is kept until its scene changes.
+Without numbers, those for testing come first, and those of new performers last. Runs as a separate process, because
+Blender's module prints on standard output and can hang at exit. A clip is kept until its scene changes.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import subprocess
 import sys
 from functools import partial
 from pathlib import Path
@@ -21,10 +22,10 @@ from ...solver import Body, load_body
 from ...tools.render_sample.clip import affected_box, blend_into
 from ...tools.render_sample.stage import encode, pose_person, render_part, render_to
 from ..perception.held_out import all_takes
-from ..perception.render_shots import fitted_motions, render_if_changed
-from .draw import SCENES, draw_scene
-from .kinds import is_test
-from .scene import FOLDER, STATIC, Scene, write_truth
+from ..perception.render_shots import fitted_motions, fitted_new_performers, render_if_changed
+from .draw import SCENES, SCENES_OF_NEW_PERFORMERS, draw_scene
+from .kinds import split_of
+from .scene import FOLDER, NEW_PERFORMERS, STATIC, TEST, Scene, write_truth
 from .surroundings import build_scene, move_camera
 
 SAMPLES, SAMPLES_EMPTY = 2, 8
@@ -39,14 +40,15 @@ def video_and_truth(name: str) -> tuple[Path, Path]:
     return FOLDER / f"{name}.mp4", FOLDER / f"{name}_truth.npz"
 
 
-def render_missing(body: Body, numbers: list[int], threads: int = 0) -> None:
+def render_missing(body: Body, numbers: list[int], threads: int = 0, split: str | None = None) -> None:
     """Render what is not there or not true any more.
 
     :param threads: of Cycles; 0 for as many as there are cores.
+    :param split: as of `draw_scene`.
     """
-    takes = all_takes(fitted_motions())
+    takes = all_takes(fitted_new_performers() if split == NEW_PERFORMERS else fitted_motions())
     for number in numbers:
-        scene = draw_scene(body, takes, number)
+        scene = draw_scene(body, takes, number, split)
 
         def render(path: Path, scratch: Path, scene: Scene = scene) -> None:
             encode(_pictures(body, scene, scratch, threads), path, scene.size, round(scene.fps), KBIT_PER_S)
@@ -99,9 +101,19 @@ def _render(scene: Scene, path: Path, part: tuple[float, float, float, float] | 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description="Render the scenes that are missing.")
     parser.add_argument("numbers", nargs="*", type=int, metavar="NUMBER")
+    parser.add_argument("--new-performers", action="store_true", help="scenes of new performers alone")
     parser.add_argument("--threads", type=int, default=0, help="of Cycles; 0 for as many as there are cores")
     arguments = parser.parse_args()
-    in_order = sorted(range(SCENES), key=lambda number: (not is_test(number), number))
-    render_missing(load_body("scope"), arguments.numbers or in_order, arguments.threads)
+    in_order = sorted(range(SCENES), key=lambda number: (split_of(number) != TEST, number))
+    if not arguments.new_performers:
+        render_missing(load_body("scope"), arguments.numbers or in_order, arguments.threads)
+    if arguments.new_performers or not arguments.numbers:
+        of_new = arguments.numbers or list(range(SCENES_OF_NEW_PERFORMERS))
+        try:
+            render_missing(load_body("scope"), of_new, arguments.threads, NEW_PERFORMERS)
+        except subprocess.CalledProcessError:  # it has said why: no connection to a package index, or no apt-get
+            if arguments.new_performers:
+                raise
+            print("the scenes of new performers were left out", file=sys.stderr, flush=True)
     sys.stderr.flush()
     os._exit(0)

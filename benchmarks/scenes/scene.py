@@ -19,6 +19,7 @@ FOLDER = CACHE / "scenes"  # of the clips and their ground truth
 STATIC, PANNING, TRAVELLING = "static", "panning", "travelling"
 SKIN_SPACING_M = 0.03  # between vertices: a ray that passes all of them farther away meets no skin
 INDOORS, OUTDOORS = "indoors", "outdoors"
+DEVELOPMENT, TEST, NEW_PERFORMERS = SPLITS = ("development", "test", "new_performers")
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ class Scene:
     """People in front of a camera; the first person is the one that the scene is about."""
 
     number: int
-    is_test: bool
+    split: str  # DEVELOPMENT, TEST or NEW_PERFORMERS
     people: tuple[Person, ...]
     intrinsics: Points  # (3, 3) pixels
     world_from_camera: Points  # (T, 4, 4)
@@ -61,7 +62,7 @@ class Scene:
     @property
     def name(self) -> str:
         """The name of the scene's files."""
-        return f"{'test' if self.is_test else 'development'}_{self.number:02d}"
+        return f"{self.split}_{self.number:02d}"
 
     def to_camera(self, points_world: Points) -> Points:
         """Transform points (T, ..., 3) of all frames to the camera frame, metres."""
@@ -141,5 +142,5 @@ def write_truth(path: Path, body: Body, scene: Scene) -> None:
         fps=scene.fps,
         camera=scene.camera,
         surroundings=scene.surroundings,
-        test=scene.is_test,
+        test=scene.split != DEVELOPMENT,
     )

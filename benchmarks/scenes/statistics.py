@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Means over people, with confidence intervals by the bootstrap over people."""
+"""Means over people, with confidence intervals by the bootstrap over people, or over who performed their motions."""
 
 from __future__ import annotations
 
@@ -35,4 +35,24 @@ def mean_over_people(values: Sequence[float] | NDArray[np.float64]) -> Estimate:
         return Estimate(float(found.mean()) if len(found) else np.nan, np.nan, np.nan, len(found))
     drawn = np.random.default_rng(SEED).integers(len(found), size=(RESAMPLES, len(found)))
     low, high = np.quantile(found[drawn].mean(axis=1), [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
+    return Estimate(float(found.mean()), float(low), float(high), len(found))
+
+
+def mean_over_performers(values: Sequence[float] | NDArray[np.float64], performers: Sequence[str]) -> Estimate:
+    """Return the mean of one value a person, with an interval that whole performers are drawn for.
+
+    People who move as the same performer does resemble each other, so performers are drawn with replacement, each with
+    all of their people. With fewer than two performers, the interval is NaN.
+
+    :param values: (n,), NaN where a person has no value; ``performers``: n names.
+    """
+    found, names = np.asarray(values, float), np.asarray(performers)
+    names, found = names[np.isfinite(found)], found[np.isfinite(found)]
+    of = [found[names == name] for name in np.unique(names)]
+    if len(of) < 2:
+        return Estimate(float(found.mean()) if len(found) else np.nan, np.nan, np.nan, len(found))
+    sums, counts = np.array([each.sum() for each in of]), np.array([len(each) for each in of])
+    drawn = np.random.default_rng(SEED).integers(len(of), size=(RESAMPLES, len(of)))
+    means = sums[drawn].sum(axis=1) / counts[drawn].sum(axis=1)
+    low, high = np.quantile(means, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
     return Estimate(float(found.mean()), float(low), float(high), len(found))

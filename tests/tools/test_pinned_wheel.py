@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from scope.scope_addon.errors import SetupError
-from scope.tools.pinned_wheel import PinnedWheel
+from scope.tools.pinned_wheel import PinnedDebian, PinnedSource, PinnedWheel
 
 CONTENT = b"a wheel"
 WHEEL = PinnedWheel("made-up==1.0", "made_up-1.0-py3-none-any.whl", hashlib.sha256(CONTENT).hexdigest())
@@ -43,3 +43,28 @@ def test_what_pip_says_is_passed_on(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(subprocess, "run", lambda *_, **__: failed)
     with pytest.raises(SetupError, match="no matching distribution"):
         WHEEL.fetch(tmp_path)
+
+
+@pytest.mark.parametrize(("kind", "client"), [(PinnedSource, "pip"), (PinnedDebian, "apt-get")])
+def test_other_packages_come_by_their_own_clients_into_the_folder(
+    kind: type[PinnedWheel], client: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package = kind("made-up=1.0", "made-up_1.0_all.deb", WHEEL.sha256)
+
+    def run(command: list[str], cwd: Path, **_: object) -> subprocess.CompletedProcess[str]:
+        assert client in command
+        assert command[-1] == package.requirement
+        (Path(cwd) / package.file_name).write_bytes(CONTENT)
+        return subprocess.CompletedProcess(command, 0, "", "")
+
+    monkeypatch.setattr(subprocess, "run", run)
+    assert package.fetch(tmp_path / "new").read_bytes() == CONTENT
+
+
+def test_a_client_that_is_not_there_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def run(*_: object, **__: object) -> None:
+        raise FileNotFoundError("apt-get")
+
+    monkeypatch.setattr(subprocess, "run", run)
+    with pytest.raises(SetupError, match="apt-get"):
+        PinnedDebian("made-up=1.0", "made-up_1.0_all.deb", WHEEL.sha256).fetch(tmp_path)

@@ -7,5 +7,8 @@
 - ``deepmimic.py``: DeepMimic's humanoid motions (JSON)
 - ``library.py``: the archives as a list of takes
 - ``retarget.py``: the correspondence between a source's skeleton and the body's parts
+- ``bvh.py``, ``markers.py``: joint positions of .bvh files, and joint centres from optical markers
+- ``joint_centres.py``: takes from joint positions alone
+- ``new_performers.py``: performers that nothing was trained on, for tests
 - ``fit_body.py``: poses, translations and shapes of the body for all takes; ``python -m scope.tools.mocap.fit_body``
 """

@@ -34,8 +34,9 @@ ROBUST = Options(robust_keypoints2d=0.01, robust_keypoints3d=0.1, robust_orienta
 _CLIP_KEYPOINTS2D, _CLIP_DIRECTIONS, _CLIP_FLOOR = 2.0, 0.7, 3.0
 _RESTING_PLACE = 5e5  # 1/m²; with 1e5, feet still drift by 0.7 cm in the sample, with 1e6 other errors grow
 # Typical accelerations, rad/s², and of the root's position, m/s²: the root mean square at 30 frames per second of each
-# performer of the recordings that also train the joint prior, and the median of these. One weight for all joints would
-# tell a fast crouch by a trunk that arches, because four joints of the spine share its rotation.
+# performer, or of each recording whose performer has no name, of all 149 recordings, and the median of these. One
+# weight for all joints would tell a fast crouch by a trunk that arches, because four joints of the spine share its
+# rotation.
 _USUAL = {"hip": 35.0, "knee": 41.0, "ankle": 56.0, "foot": 107.0, "spine1": 19.0, "spine2": 11.3, "spine3": 12.9}
 _USUAL |= {"neck": 20.0, "head": 10.2, "collar": 9.6, "shoulder": 33.0, "elbow": 24.5, "wrist": 30.0, "hand": 11.8}
 _USUAL_ROOT, _USUAL_ROOT_POSITION = 20.3, 3.8

@@ -36,6 +36,7 @@ def truth(body):
         "fps": np.array(30.0),
         "camera": np.array("static"),
         "surroundings": np.array("indoors"),
+        "takes": np.array(["fencer_0", "climber_a_3"]),
     }
 
 
@@ -134,3 +135,12 @@ def test_variants_are_compared_where_both_found_the_person(body, truth, monkeypa
     other = evaluate(body, truth, [motion(body, wrong), motion(body, truth["limbs_cam"][1])], monkeypatch)
     more = accuracy.more_than(default, other)
     assert (more.people, more.mean) == (1, pytest.approx(10.0))
+
+
+def test_people_are_told_apart_by_their_performers(body, truth, monkeypatch):
+    captured = [motion(body, truth["limbs_cam"][k]) for k in range(2)]
+    rows = accuracy.by_performer(evaluate(body, truth, captured, monkeypatch))
+    assert list(rows) == ["all, performers drawn", "climber_a", "fencer"]
+    assert rows["all, performers drawn"]["mpjpe_root"].people == 2
+    assert rows["fencer"]["found"].mean == 1.0
+    assert rows["climber_a"]["size_off"].mean == pytest.approx(100 * abs(body.stature(np.zeros(body.P)) / 1.4 - 1))

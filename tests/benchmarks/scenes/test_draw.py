@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scope.benchmarks.perception.held_out import Take
 from scope.benchmarks.scenes.draw import APART_M, FPS, MOST_HIDDEN, STRIDE, draw_person, draw_scene, look_at
-from scope.benchmarks.scenes.scene import STATIC
+from scope.benchmarks.scenes.scene import DEVELOPMENT, NEW_PERFORMERS, STATIC, TEST
 
 NUMBERS = (1, 3, 4, 6)
 
@@ -42,8 +44,16 @@ def test_a_number_gives_the_same_scene_again(body, takes, scenes):
 
 def test_the_splits_share_no_recording_of_the_first_person(scenes):
     for scene in scenes:
-        assert scene.is_test == (scene.number % 3 != 0)
-        assert (scene.people[0].take in ("take9", "take19")) == scene.is_test
+        assert scene.split == (DEVELOPMENT if scene.number % 3 == 0 else TEST)
+        assert (scene.people[0].take in ("take9", "take19")) == (scene.split == TEST)
+
+
+def test_scenes_of_new_performers_show_each_of_them(body, takes):
+    known = [replace(take, performer="one" if k < 2 else "two", name=f"take{k}") for k, take in enumerate(takes)]
+    found = [draw_scene(body, known, number, NEW_PERFORMERS) for number in range(4)]
+    assert [scene.name for scene in found] == [f"new_performers_{number:02d}" for number in range(4)]
+    performers = ["one" if scene.people[0].take in ("take0", "take1") else "two" for scene in found]
+    assert sorted(performers[:2]) == sorted(performers[2:]) == ["one", "two"]
 
 
 def test_the_first_person_is_in_the_picture_and_nobody_too_near(body, scenes):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scope.benchmarks.scenes.draw import look_at
 from scope.benchmarks.scenes.people import LIMB_JOINTS, Person
-from scope.benchmarks.scenes.scene import OUTDOORS, STATIC, Block, Scene, write_truth
+from scope.benchmarks.scenes.scene import OUTDOORS, STATIC, TEST, Block, Scene, write_truth
 from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
 
 
@@ -23,7 +23,7 @@ def scene(body):
     K = np.array([[600.0, 0, 319.5], [0, 600, 239.5], [0, 0, 1]])
     pose = look_at(np.array([0.0, -4.0, 0.9]), np.array([0.0, 0.0, 0.9]))
     block = Block(np.array([-1.0, -1.5, 0.0]), np.array([1.0, -1.0, 0.5]))
-    return Scene(1, True, (person,), K, np.tile(pose, (2, 1, 1)), (640, 480), 30.0, STATIC, OUTDOORS, block, 0)
+    return Scene(1, TEST, (person,), K, np.tile(pose, (2, 1, 1)), (640, 480), 30.0, STATIC, OUTDOORS, block, 0)
 
 
 def test_what_the_box_hides(body, scene):

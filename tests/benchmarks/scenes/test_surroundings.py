@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scope.benchmarks.scenes.draw import look_at
 from scope.benchmarks.scenes.people import Person
-from scope.benchmarks.scenes.scene import INDOORS, OUTDOORS, STATIC, Block, Scene
+from scope.benchmarks.scenes.scene import INDOORS, OUTDOORS, STATIC, TEST, Block, Scene
 from scope.benchmarks.scenes.surroundings import build_scene, move_camera
 from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
 from scope.tools.render_sample.stage import pose_person, render_to
@@ -25,7 +25,7 @@ def scene_of(body, surroundings, seed=0):
     K = np.array([[110.0, 0, 63.5], [0, 110, 47.5], [0, 0, 1]])
     pose = look_at(np.array([-1.0, -3.0, 1.3]), np.array([0.0, 0.0, 0.9]))
     block = Block(np.array([-1.4, 0.5, 0.0]), np.array([-0.9, 1.0, 0.5]))
-    return Scene(1, True, (person,), K, pose[None], SIZE, 30.0, STATIC, surroundings, block, seed)
+    return Scene(1, TEST, (person,), K, pose[None], SIZE, 30.0, STATIC, surroundings, block, seed)
 
 
 def test_the_person_is_drawn_where_the_ground_truth_says(body, tmp_path):
