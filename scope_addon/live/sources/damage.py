@@ -13,7 +13,7 @@ that were joined look the same, but continue with a key frame.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .h264_headers import FrameNumbers
 
@@ -36,7 +36,7 @@ class Damage:
         self._until_loss = 0  # packets; 0: none is announced
         self._is_broken = self._has_key = self._has_begun = False
 
-    def see(self, packet: av.Packet) -> None:
+    def see(self, packet: av.Packet[Any]) -> None:
         """Note a packet that is going to be decoded."""
         if self._numbers is not None:
             if self._numbers.has_gap(bytes(packet)):
@@ -51,7 +51,7 @@ class Damage:
             self._until_loss = _ANNOUNCED
         self._has_key = self._has_key or packet.is_keyframe
 
-    def fail(self, packet: av.Packet) -> bool:
+    def fail(self, packet: av.Packet[Any]) -> bool:
         """Note that a packet could not be decoded; return whether a picture is missing therefore."""
         if self._numbers is not None and not self._numbers.has_picture(bytes(packet)):
             return False
