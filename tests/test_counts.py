@@ -21,6 +21,14 @@ def test_one_is_in_the_singular(arguments, text):
 
 def test_a_live_capture_of_one_frame_is_summed_up_in_the_singular():
     latency = {"median": 40.0, "p95": 60.0}
-    report = {"poses": 1, "poses_per_second": 30.0, "latency_ms": latency, "dropped": 0, "frames": 1, "outputs": []}
+    report = {
+        "poses": 1,
+        "poses_per_second": 30.0,
+        "latency_ms": latency,
+        "dropped": 0,
+        "damaged": 0,
+        "frames": 1,
+        "outputs": [],
+    }
     assert _summary(report).startswith("1 pose, 30/s")
     assert _summary(report).endswith("0 of 1 frame dropped")

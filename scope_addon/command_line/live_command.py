@@ -158,5 +158,6 @@ def _summary(report: Mapping[str, Any]) -> str:
     return (
         f"{counted(report['poses'], 'pose')}, {report['poses_per_second']:g}/s, latency {latency['median']:.0f} ms"
         f" (p95 {latency['p95']:.0f} ms), {report['dropped']} of {counted(report['frames'], 'frame')} dropped"
+        + (f", {report['damaged']} more damaged and left out" if report["damaged"] else "")
         + "".join(f"; wrote {path}" for path in report["outputs"])
     )

@@ -79,12 +79,14 @@ class LiveProgress:
     p95_ms: float
     dropped: int
     received: int
+    damaged: int = 0  # left out, and not among those received
 
     def __str__(self) -> str:
         """Return a line for a terminal."""
         return (
             f"{self.presence.value}, {self.rate:.1f} poses/s, latency {self.median_ms:.0f} ms"
             f" (p95 {self.p95_ms:.0f} ms), {self.dropped} of {self.received} frames dropped"
+            + (f", {self.damaged} damaged" if self.damaged else "")
         )
 
 
@@ -133,6 +135,7 @@ def run_live(
         "source": source.name,
         "frames": reader.received,
         "dropped": reader.received - statistics.poses,
+        "damaged": reader.damaged,
         "poses": statistics.poses,
         "poses_per_second": round(statistics.rate, 1),
         "latency_ms": {"median": round(median_ms, 1), "p95": round(p95_ms, 1)},
@@ -204,6 +207,6 @@ def _loop(
         if now_s - shown_s >= PROGRESS_S:
             shown_s = now_s
             median_ms, p95_ms = statistics.latency_ms()
-            rate, counts = statistics.recent_rate, (reader.dropped, reader.received)
+            rate, counts = statistics.recent_rate, (reader.dropped, reader.received, reader.damaged)
             presence = min((pose.presence for pose in found), key=list(Presence).index)  # of whoever is seen best
             listeners.progress(LiveProgress(presence, rate, median_ms, p95_ms, *counts))

@@ -32,7 +32,7 @@ class FakeSource:
     """Plays each of several lists of timestamps; between two of them, it is interrupted.
 
     :param before: called before each picture with its place in the list; may wait.
-    :param images: of each list's pictures.
+    :param images: of each list's pictures; False for one that is damaged.
     """
 
     name = "fake"
@@ -52,7 +52,7 @@ class FakeSource:
             for index, time_s in enumerate(self.runs.pop(0)):
                 self.before(index)
                 image = self.images[index] if self.images else np.zeros((4, 4, 3), np.uint8)
-                yield Picture(index, time_s, clock.now(), image)
+                yield None if image is False else Picture(index, time_s, clock.now(), image)
             if self.error:
                 raise self.error
         finally:

@@ -12,12 +12,14 @@ from contextlib import contextmanager, suppress
 from fractions import Fraction
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from itertools import count
 from socketserver import StreamRequestHandler, ThreadingTCPServer
 from threading import Event, Thread
 
 import av
 
 DATAGRAM = 7 * 188
+_WITHOUT_SCENE_CUTS = {"libx264": {"sc_threshold": "0"}, "libx265": {"x265-params": "scenecut=0:log-level=none"}}
 FRAGMENTED = {"movflags": "frag_every_frame+empty_moov+default_base_moof"}
 
 
@@ -44,7 +46,8 @@ def encoded(images, codec="mpeg2video", kind="mpegts", group=10, begins_s=0.0, r
         stream = container.add_stream(codec, rate=rate)
         stream.height, stream.width = images[0].shape[:2]
         stream.pix_fmt = "yuvj420p" if codec == "mjpeg" else "yuv420p"
-        stream.gop_size, stream.max_b_frames = group, 0
+        stream.bit_rate = 4_000_000
+        stream.gop_size, stream.max_b_frames, stream.options = group, 0, _WITHOUT_SCENE_CUTS.get(codec, {})
         for k, image in enumerate(images):
             frame = av.VideoFrame.from_ndarray(image, format="rgb24")
             frame.time_base, frame.pts = Fraction(1, rate), round(begins_s * rate) + k
@@ -53,16 +56,28 @@ def encoded(images, codec="mpeg2video", kind="mpegts", group=10, begins_s=0.0, r
     return target.getvalue()
 
 
-def without_first(data, count, kind="mp4"):
+def without_first(data, number, kind="mp4"):
     """Return a stream as somebody gets it who comes too late for its first packets."""
+    return without(data, range(number), kind)
+
+
+def without(data, numbers, kind="mpegts"):
+    """Return a stream without its packets of these numbers, of whose loss it says nothing itself."""
     target = io.BytesIO()
     with av.open(io.BytesIO(data)) as source, av.open(target, "w", format=kind, options=FRAGMENTED) as container:
         stream = container.add_stream_from_template(source.streams.video[0])
         for k, packet in enumerate(source.demux(video=0)):
-            if packet.dts is not None and k >= count:
+            if packet.dts is not None and k not in numbers:
                 packet.stream = stream
                 container.mux(packet)
     return target.getvalue()
+
+
+def nal_units(data):
+    """Return the NAL units of each packet of an H.264 stream."""
+    with av.open(io.BytesIO(data)) as source:
+        packets = [bytes(packet) for packet in source.demux(video=0) if packet.dts is not None]
+    return [[unit.rstrip(b"\0") for unit in packet.split(b"\0\0\1")[1:]] for packet in packets]
 
 
 def with_damage(data, numbers, kind="mpegts"):
@@ -139,10 +154,46 @@ def served_as_hls(folder, parts, seconds):
         yield address
 
 
+def rtp_of_transport_stream(data):
+    """Return a transport stream as RTP packets, and its media description."""
+    packets = [_rtp(33, k, 90 * k, True, piece) for k, piece in enumerate(datagrams(data))]
+    return packets, "m=video 0 RTP/AVP 33\r\na=control:track0\r\n"
+
+
+def rtp_of_h264(data, rate=30):
+    """Return the RTP packets of each picture of an H.264 stream, and its media description."""
+    pictures, numbers = [], count()
+    for k, units in enumerate(nal_units(data)):
+        payloads = [payload for unit in units for payload in _payloads(unit)]
+        ends = [False] * (len(payloads) - 1) + [True]
+        parts = zip(ends, payloads, strict=True)
+        pictures.append([_rtp(96, next(numbers), 90000 // rate * k, end, payload) for end, payload in parts])
+    description = "m=video 0 RTP/AVP 96\r\na=rtpmap:96 H264/90000\r\na=fmtp:96 packetization-mode=1\r\n"
+    return pictures, description + "a=control:track0\r\n"
+
+
+def _payloads(unit):
+    """Return a NAL unit, in fragments if it is too large for a packet (RFC 6184, 5.6 and 5.8)."""
+    if len(unit) <= DATAGRAM:
+        return [unit]
+    parts = [unit[at : at + DATAGRAM] for at in range(1, len(unit), DATAGRAM)]
+    flags = [0x80, *[0] * (len(parts) - 2), 0x40]  # of the first and the last one
+    heads = [bytes([unit[0] & 0xE0 | 28, flag | unit[0] & 31]) for flag in flags]
+    return [head + part for head, part in zip(heads, parts, strict=True)]
+
+
+def _rtp(kind, number, time, ends, payload):
+    """Return an RTP packet; ``ends``: it is the last one of a picture."""
+    return struct.pack(">BBHII", 0x80, (0x80 if ends else 0) | kind, number, time, 1) + payload
+
+
 @contextmanager
-def rtsp_server(data):
-    """Serve a transport stream by RTSP, once to each client; gives the address."""
-    sdp = "v=0\r\no=- 0 0 IN IP4 127.0.0.1\r\ns=test\r\nt=0 0\r\nm=video 0 RTP/AVP 33\r\na=control:track0\r\n"
+def rtsp_server(packets, media):
+    """Serve RTP packets by RTSP, once to each client; gives the address.
+
+    :param media: their description in SDP.
+    """
+    sdp = f"v=0\r\no=- 0 0 IN IP4 127.0.0.1\r\ns=test\r\nt=0 0\r\n{media}"
     replies = {
         "OPTIONS": "Public: OPTIONS, DESCRIBE, SETUP, PLAY, TEARDOWN\r\n",
         "DESCRIBE": f"Content-Type: application/sdp\r\nContent-Length: {len(sdp)}\r\n",
@@ -166,8 +217,7 @@ def rtsp_server(data):
                     return
 
         def play(self):
-            for number, piece in enumerate(datagrams(data)):
-                rtp = struct.pack(">BBHII", 0x80, 33, number, 90 * number, 1) + piece
+            for rtp in packets:
                 self.wfile.write(struct.pack(">cBH", b"$", 0, len(rtp)) + rtp)
 
     with ThreadingTCPServer(("127.0.0.1", 0), Handler) as server, _running(server) as port:

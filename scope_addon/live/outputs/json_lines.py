@@ -2,7 +2,8 @@
 """Poses as lines of JSON on a TCP socket, for several clients.
 
 Each client first gets one line that describes the body, then one line per pose. A client that reads too slowly misses
-poses; it never delays the capture or other clients.
+poses; it never delays the capture or other clients. At the end, clients get what is queued for them, but the end does
+not wait for those that do not read it.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import json
 import socket
 import threading
+import time
 from collections import deque
 from contextlib import suppress
 from typing import Any
@@ -24,6 +26,7 @@ MOST_CLIENTS = 16
 _QUEUED_LINES = 2  # per client and person; older ones are dropped
 _SEND_BUFFER_BYTES = 32768  # some eight poses: what the system queues for a slow client is delay as well
 _SEND_TIMEOUT_S = 10.0  # after which a client that reads nothing is disconnected
+_CLOSING_S = 0.4  # for which the end waits for all clients together; with the time for a source, less than a second
 
 
 class JsonServer:
@@ -74,8 +77,13 @@ class JsonServer:
         with suppress(OSError):  # wakes the accepting thread, which closing alone does not
             self._socket.shutdown(socket.SHUT_RDWR)
         self._socket.close()
-        for client in self._clients:
-            client.close()
+        with self._lock:
+            clients = list(self._clients)
+        for client in clients:
+            client.finish()
+        end_s = time.monotonic() + _CLOSING_S
+        for client in clients:
+            client.close(end_s - time.monotonic())
 
     def _accept(self) -> None:
         while True:
@@ -97,8 +105,8 @@ class _Client:
     def __init__(self, connection: socket.socket, header: bytes, queued_lines: int) -> None:
         self._connection, self._header = connection, header
         self._lines: deque[bytes] = deque(maxlen=queued_lines)
-        self._ready = threading.Semaphore(0)
-        self.is_gone = False
+        self._changed = threading.Condition()
+        self._is_finishing = self.is_gone = False
         with suppress(OSError):
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_BYTES)
@@ -107,21 +115,36 @@ class _Client:
         self._thread.start()
 
     def queue(self, data: bytes) -> None:
-        self._lines.append(data)
-        self._ready.release()
+        """Queue a line; if there are too many, the oldest one is dropped."""
+        with self._changed:
+            self._lines.append(data)
+            self._changed.notify()
 
-    def close(self) -> None:
-        self.is_gone = True
-        self._ready.release()
+    def finish(self) -> None:
+        """Disconnect when the queued lines have been sent."""
+        with self._changed:
+            self._is_finishing = True
+            self._changed.notify()
+
+    def close(self, wait_s: float) -> None:
+        """Wait until the client is disconnected, but not for long, and then disconnect it."""
+        self._thread.join(max(wait_s, 0.0))
+        if self._thread.is_alive():
+            with suppress(OSError):  # wakes the thread, which closing alone does not
+                self._connection.shutdown(socket.SHUT_RDWR)
 
     def _run(self) -> None:
         with self._connection, suppress(OSError):
             self._connection.sendall(self._header)
-            while not self.is_gone:
-                self._ready.acquire()
-                with suppress(IndexError):  # dropped, since a newer line took its place
-                    self._connection.sendall(self._lines.popleft())
+            while (data := self._next()) is not None:
+                self._connection.sendall(data)
         self.is_gone = True
+
+    def _next(self) -> bytes | None:
+        """Wait for a line and return it; None after the last one."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._lines or self._is_finishing)
+            return self._lines.popleft() if self._lines else None
 
 
 def line(values: dict[str, Any]) -> bytes:

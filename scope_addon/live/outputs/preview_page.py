@@ -3,7 +3,8 @@
 
 The installed OpenCV has no windows. The page is served to this computer alone, under an address that cannot be guessed,
 because it shows what a camera sees. Pictures are drawn and encoded in threads of their own, the newest ones only, and
-only while a browser asks for them; each is the one to which its poses belong, so that they coincide.
+only while a browser asks for them; each is the one to which its poses belong, so that they coincide. At the end, the
+newest one is still shown: browsers wait for what follows a picture before they show it.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import secrets
 import threading
 from collections import deque
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
@@ -33,6 +35,8 @@ INTERVAL_S = 0.05  # between two pictures
 _KEPT_S = 0.5  # for which pictures wait for their poses; a pose that is older has none
 _MOST_KEPT = 12  # pictures; at 720p, 33 MB
 _QUALITY = 80  # of the JPEG pictures
+_CLOSING_S = 0.4  # for which the end waits for browsers
+_POLLING_INTERVAL_S = 0.1  # in which the server sees that it is to end
 _LEFT, _RIGHT, _MIDDLE, _JOINT = (255, 140, 40), (40, 150, 255), (235, 235, 235), (255, 255, 255)
 _PAGE = (
     '<!DOCTYPE html><html lang="en"><meta charset="utf-8"><title>Scope live</title>'
@@ -64,7 +68,9 @@ class PreviewPage:
             ) from error
         self._server.daemon_threads = True
         self.address = f"http://127.0.0.1:{self._server.server_port}/{token}"
-        self._thread = threading.Thread(target=self._server.serve_forever, name="scope-live-preview", daemon=True)
+        self._thread = threading.Thread(
+            target=self._server.serve_forever, args=(_POLLING_INTERVAL_S,), name="scope-live-preview", daemon=True
+        )
         self._thread.start()
 
     def __enter__(self) -> PreviewPage:
@@ -76,6 +82,8 @@ class PreviewPage:
             self._changed.notify_all()
         self._server.shutdown()
         self._server.server_close()
+        with self._changed:
+            self._changed.wait_for(lambda: not self._viewers, _CLOSING_S)
 
     def begin(self, people: LivePeople, size: tuple[int, int]) -> None:
         """Note by which session the camera is known."""
@@ -92,26 +100,33 @@ class PreviewPage:
             self._poses[pose.person] = pose
             self._changed.notify_all()
 
-    def pictures(self) -> Iterator[bytes]:
-        """Yield JPEG pictures until the capture ends."""
+    @contextmanager
+    def viewed(self) -> Iterator[None]:
+        """Keep pictures meanwhile, for a browser."""
         with self._changed:  # a browser may ask twice at the same time
             self._viewers += 1
         try:
-            shown = -np.inf
-            while not self._is_over.wait(INTERVAL_S):
-                with self._changed:
-                    while not self._is_over.is_set() and self._newest_s() <= shown:
-                        self._changed.wait(1.0)
-                    poses = list(self._poses.values())
-                picture = self._picture_of(poses)
-                if picture is not None and not self._is_over.is_set():
-                    shown = max(pose.timestamp_s for pose in poses)
-                    yield self._drawn(picture, poses)
+            yield
         finally:
             with self._changed:
                 self._viewers -= 1
                 if not self._viewers:
                     self._pictures.clear()
+                self._changed.notify_all()
+
+    def pictures(self) -> Iterator[bytes]:
+        """Yield JPEG pictures until the capture ends, the newest one last."""
+        shown, is_over = -np.inf, False
+        while not is_over:
+            is_over = self._is_over.wait(INTERVAL_S)
+            with self._changed:
+                while not self._is_over.is_set() and self._newest_s() <= shown:
+                    self._changed.wait(1.0)
+                poses = list(self._poses.values())
+            picture, newest = self._picture_of(poses), max((pose.timestamp_s for pose in poses), default=-np.inf)
+            if picture is not None and newest > shown:
+                shown = newest
+                yield self._drawn(picture, poses)
 
     def _newest_s(self) -> float:
         return max((pose.timestamp_s for pose in self._poses.values()), default=-np.inf)
@@ -182,9 +197,11 @@ def _handler(page: PreviewPage, token: str) -> type[BaseHTTPRequestHandler]:
             self.send_header("Content-Type", f"multipart/x-mixed-replace; boundary={_BOUNDARY}")
             self.send_header("Cache-Control", "no-store")
             self.end_headers()
-            for jpeg in page.pictures():
-                head = f"--{_BOUNDARY}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(jpeg)}\r\n\r\n"
-                self.wfile.write(head.encode() + jpeg + b"\r\n")
+            with page.viewed():
+                for jpeg in page.pictures():
+                    head = f"--{_BOUNDARY}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(jpeg)}\r\n\r\n"
+                    self.wfile.write(head.encode() + jpeg + b"\r\n")
+                self.wfile.write(f"--{_BOUNDARY}--\r\n".encode())
 
         def log_message(self, *_: object) -> None:
             """Print nothing."""

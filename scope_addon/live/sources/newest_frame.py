@@ -5,6 +5,8 @@ Where not every frame can be processed, some are dropped as well so that the oth
 
 An interrupted stream is opened again after a pause, and frame numbers and times continue. Where a server changes the
 resolution while it runs, pictures keep the first one, so that what was estimated from them still holds.
+
+Frames that the source leaves out because they were damaged on their way are counted, and a sentence says so.
 """
 
 from __future__ import annotations
@@ -28,6 +30,7 @@ from .stream import STALLED_S
 
 _POLLING_INTERVAL_S = 0.2  # in which a waiting main thread reacts to Ctrl-C on every system
 SAME_SHAPE = 0.01  # relative difference of two pictures' width over height
+DAMAGE_SAID_S = 10.0  # between two sentences about damaged frames
 _CLOSING_S = 0.5  # for which the end of the capture waits for the source to be closed
 
 
@@ -60,7 +63,8 @@ class NewestFrame:
         self._changed_s, self._is_frozen = 0.0, False  # when it last differed from the one before
         self._arrived_s = 0.0  # of the last one
         self._pace, self._taken_s = Pace(), 0.0  # when the last one was taken
-        self.received = self.dropped = 0
+        self._damage_said_s = -np.inf
+        self.received = self.dropped = self.damaged = 0
         self._thread = threading.Thread(target=self._run, name="scope-live-source", daemon=True)
 
     def __enter__(self) -> NewestFrame:
@@ -114,10 +118,13 @@ class NewestFrame:
         before = self.received
         try:
             # Closing it closes the camera or the connection, on every way out.
-            with closing(cast("Generator[Picture, None, None]", self._source.pictures(self._clock))) as pictures:
+            with closing(cast("Generator[Picture | None, None, None]", self._source.pictures(self._clock))) as pictures:
                 for picture in pictures:
                     if self._clock.stopped.is_set():
                         return True
+                    if picture is None:
+                        self._note_damage()
+                        continue
                     self._give(picture, is_first=self.received == before)
             problem = f"{self._source.name} has ended"
         except ScopeError as error:
@@ -155,6 +162,16 @@ class NewestFrame:
             self._newest = picture if is_due else self._newest
             self._next_index, self._last_s = index + 1, time_s
             self._changed.notify_all()
+
+    def _note_damage(self) -> None:
+        """Count a damaged frame, and say it, though not again and again."""
+        self.damaged += 1
+        if self.now() - self._damage_said_s > DAMAGE_SAID_S:
+            self._damage_said_s = self.now()
+            self._say(
+                f"data of {self._source.name} was lost or damaged on its way; its pictures are left out until the next"
+                " key frame"
+            )
 
     def _say_pause(self, seconds: float) -> None:
         """Say that nothing came for a while, if the source itself has not noticed: maybe the computer slept."""

@@ -34,8 +34,10 @@ class Source(Protocol):
     fps: Fraction  # nominal
     focal_35mm: float | None
 
-    def pictures(self, clock: Clock) -> Iterator[Picture]:
+    def pictures(self, clock: Clock) -> Iterator[Picture | None]:
         """Open the source and yield its frames as they come; their number begins with 0, their time anywhere.
+
+        None stands for a frame that was damaged on its way and is left out.
 
         :raises VideoError: the source cannot be opened, or fails.
         """

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -17,6 +16,7 @@ from ...capture.media.frame_readers import upright
 from ...capture.media.image_size import check_size
 from ...errors import VideoError
 from ..clock import Clock
+from .damage import Damage
 from .source import DEFAULT_FPS, Picture
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ _FORMATS = (
 )
 STALLED_S = 5.0  # without data, after which a stream counts as interrupted
 KEY_FRAME_S = 10.0  # for which a stream that is joined in the middle is left out until its next key frame
-DAMAGED_S = 1.0  # for which damaged pictures are left out; a stream without others is better than none
+DAMAGED_S = 4.0  # for which damaged pictures are left out, as key frames of most cameras are not farther apart
 UNREADABLE_S = KEY_FRAME_S + STALLED_S  # without a picture, after which a stream counts as interrupted
 
 
@@ -47,7 +47,7 @@ class StreamSource:
         self.fps = DEFAULT_FPS
         self.focal_35mm: float | None = None
 
-    def pictures(self, clock: Clock) -> Iterator[Picture]:
+    def pictures(self, clock: Clock) -> Iterator[Picture | None]:
         """See `Source`.
 
         :raises VideoError: it cannot be opened, carries no video, or was interrupted.
@@ -60,20 +60,26 @@ class StreamSource:
             if stream is None:
                 raise VideoError(f"{self.name} carries no video; check the address")
             stream.thread_type = "SLICE"  # decoding in several frames' threads delays each of them
+            if stream.codec_context.name == "h264":  # in several threads, it does not notice damage
+                stream.codec_context.thread_count = 1
             if stream.average_rate and 1 <= stream.average_rate <= 240:
                 self.fps = Fraction(stream.average_rate)
             try:
-                for index, frame in enumerate(self._frames(container, stream, clock)):
+                index = 0
+                for frame in self._frames(container, stream, clock):
+                    if frame is None:
+                        yield None
+                        continue
                     now_s = clock.now()
                     yield Picture(index, now_s, now_s, self._image(frame, float(stream.sample_aspect_ratio or 1)))
+                    index += 1
             except (av.error.FFmpegError, OSError, ValueError) as error:
                 raise VideoError(f"{self.name} was interrupted ({_reason(error)})") from error
 
-    def _frames(self, container: InputContainer, stream: VideoStream, clock: Clock) -> Iterator[av.VideoFrame]:
-        """Yield what can be decoded, from the first key frame on.
+    def _frames(self, container: InputContainer, stream: VideoStream, clock: Clock) -> Iterator[av.VideoFrame | None]:
+        """Yield what can be decoded, from the first key frame on; None for a frame that is damaged and left out.
 
-        Frames before it continue pictures that never came, and some decoders show them on grey. A packet that was
-        damaged on its way costs its own frame only, whether it cannot be decoded or only in part.
+        Frames before it continue pictures that never came, and some decoders show them on grey.
 
         :raises VideoError: nothing could be decoded for a while.
         """
@@ -81,20 +87,34 @@ class StreamSource:
 
         has_begun, began_s = False, clock.now()
         seen_s = intact_s = began_s
+        damage = Damage(stream.codec_context.name, stream.codec_context.extradata)
+        held: list[av.VideoFrame] = []  # until it is known whether they are damaged
         for packet in container.demux(stream):
             now_s = clock.now()
             has_begun = has_begun or packet.is_keyframe or now_s - began_s > KEY_FRAME_S  # streams may have none
             frames: list[av.VideoFrame] = []
             if has_begun:
-                with suppress(av.error.InvalidDataError):
+                damage.see(packet)
+                yield from [None if damage.is_broken else frame for frame in held]
+                held = []
+                try:
                     frames = packet.decode()
+                    is_missing = damage.is_hidden(frames) and packet.dts is not None
+                except av.error.InvalidDataError:
+                    is_missing = damage.fail(packet)
+                if is_missing:
+                    yield None
             if frames:
                 seen_s = now_s
             elif now_s - seen_s > UNREADABLE_S:
                 raise VideoError(f"{self.name} was interrupted (no picture could be decoded for {UNREADABLE_S:g} s)")
-            intact = [frame for frame in frames if not frame.is_corrupt]
-            intact_s = now_s if intact else intact_s
-            yield from intact if now_s - intact_s <= DAMAGED_S else frames
+            for frame in frames:
+                is_intact = not damage.is_in(frame)
+                intact_s = now_s if is_intact else intact_s
+                if is_intact and damage.is_doubtful:
+                    held.append(frame)
+                else:
+                    yield frame if is_intact or now_s - intact_s > DAMAGED_S else None
 
     def _open(self) -> InputContainer:
         import av

@@ -3,11 +3,13 @@
 
 import json
 import socket
+import threading
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scope.scope_addon.errors import OutputError
+from scope.scope_addon.live.outputs import json_lines
 from scope.scope_addon.live.outputs.json_lines import JsonServer
 
 from ...job.processes import wait_for
@@ -64,6 +66,57 @@ def test_a_client_that_reads_nothing_neither_delays_nor_grows_and_others_get_the
     files[1].close()
     slow.close()
     quick.close()
+
+
+def numbered(body, number):
+    return replace(pose_of(body), index=number)
+
+
+def test_the_end_gives_clients_what_is_queued(body, monkeypatch):
+    monkeypatch.setattr(json_lines, "_CLOSING_S", 300)  # this computer may be busy
+    for first in range(0, 40, 2):
+        with JsonServer(body, "127.0.0.1", 0) as serving:
+            (client,), (file,) = connected(serving, 1)
+            file.readline()
+            serving.send(numbered(body, first), 0.0)
+            serving.send(numbered(body, first + 1), 0.0)
+        assert [json.loads(text)["frame"] for text in file] == [first, first + 1]
+        file.close()
+        client.close()
+
+
+def test_a_client_that_reads_slowly_gets_the_last_pose_at_the_end(body, monkeypatch):
+    monkeypatch.setattr(json_lines, "_CLOSING_S", 300)
+    lines = []
+    with JsonServer(body, "127.0.0.1", 0) as serving:
+        (client,), (file,) = connected(serving, 1)
+        file.readline()
+
+        def read():
+            wait_for(lambda: serving._socket.fileno() < 0)  # until the server closes
+            lines.extend(file)
+
+        reader = threading.Thread(target=read)
+        reader.start()
+        wait_for(lambda: serving.send(numbered(body, 1), 0.0) or len(serving._clients[0]._lines) == 2)
+        serving.send(numbered(body, 2), 0.0)  # more than the system's buffers hold wait
+    reader.join(300)
+    assert json.loads(lines[-1])["frame"] == 2
+    file.close()
+    client.close()
+
+
+def test_the_end_does_not_wait_for_a_client_that_does_not_read(body, monkeypatch):
+    monkeypatch.setattr(json_lines, "_SEND_TIMEOUT_S", 10_000)
+    with JsonServer(body, "127.0.0.1", 0) as serving:
+        (stuck, other), files = connected(serving, 2)
+        files[0].readline()
+        wait_for(lambda: serving.send(numbered(body, 1), 0.0) or len(serving._clients[0]._lines) == 2)
+        (client, _) = serving._clients
+    client._thread.join(300)  # its connection is closed, too
+    assert client.is_gone
+    for each in (*files, stuck, other):
+        each.close()
 
 
 def test_clients_that_left_are_forgotten(server, body):

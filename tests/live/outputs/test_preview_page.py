@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
+from scope.scope_addon.live.outputs import preview_page
 from scope.scope_addon.live.outputs.preview_page import PreviewPage
 from scope.scope_addon.live.pose import Presence
 from scope.scope_addon.live.smoothing import DELAY_S
@@ -25,6 +26,15 @@ from .test_vmc import pose_of
 CAMERA = Camera(pinhole(320, 240, 300.0), np.zeros(5), "of the test")
 
 
+def read_picture(response):
+    """Return the next picture (240, 320, 3) that a browser gets."""
+    head = b""
+    while not head.endswith(b"\r\n\r\n"):
+        head += response.read(1)
+    jpeg = response.read(int(re.search(rb"Content-Length: (\d+)", head)[1]))
+    return cv2.cvtColor(cv2.imdecode(np.frombuffer(jpeg, np.uint8), 1), cv2.COLOR_BGR2RGB)
+
+
 def first_picture(page, pose, pictures):
     """Return the first picture (240, 320, 3) that a browser gets."""
     page.begin(SimpleNamespace(sessions=[SimpleNamespace(camera=CAMERA)]), (320, 240))
@@ -34,11 +44,7 @@ def first_picture(page, pose, pictures):
         for picture in pictures:
             page.receive(picture)
         page.send(pose, 0.0)
-        head = b""
-        while not head.endswith(b"\r\n\r\n"):
-            head += response.read(1)
-        jpeg = response.read(int(re.search(rb"Content-Length: (\d+)", head)[1]))
-    return cv2.cvtColor(cv2.imdecode(np.frombuffer(jpeg, np.uint8), 1), cv2.COLOR_BGR2RGB)
+        return read_picture(response)
 
 
 @pytest.fixture
@@ -88,6 +94,19 @@ def test_another_address_shows_nothing_and_nothing_is_kept_without_a_browser(bod
         urllib.request.urlopen(page.address, timeout=300)
 
 
+def test_the_end_shows_the_newest_picture(body, pose, monkeypatch):
+    monkeypatch.setattr(preview_page, "_CLOSING_S", 300)  # this computer may be busy
+    monkeypatch.setattr(preview_page, "INTERVAL_S", 300)  # until the next picture, unless the capture ends before
+    with PreviewPage(body) as page, urllib.request.urlopen(page.address + ".mjpeg", timeout=300) as response:
+        page.begin(SimpleNamespace(sessions=[SimpleNamespace(camera=CAMERA)]), (320, 240))
+        wait_for(lambda: page._viewers)
+        page.receive(shades(2.0 - DELAY_S, 90))
+        page.send(pose, 0.0)
+        page.__exit__(None, None, None)
+        assert abs(int(read_picture(response)[5, 5, 0]) - 90) <= 2
+        assert response.read() == b"\r\n--picture--\r\n"  # without which browsers wait with the picture
+
+
 def test_a_browser_that_stays_does_not_keep_the_capture_from_ending(body, pose):
     page = PreviewPage(body)
     with urllib.request.urlopen(page.address + ".mjpeg", timeout=300) as response:
@@ -95,4 +114,4 @@ def test_a_browser_that_stays_does_not_keep_the_capture_from_ending(body, pose):
         ending.start()
         ending.join(300)
         assert not ending.is_alive()
-        assert response.read() == b""
+        assert response.read() == b"--picture--\r\n"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.errors import VideoError
 from scope.scope_addon.live.sources import Picture
-from scope.scope_addon.live.sources.newest_frame import NewestFrame
+from scope.scope_addon.live.sources.newest_frame import DAMAGE_SAID_S, NewestFrame
 
 from ..fake_source import FakeClock, FakeSource
 
@@ -112,6 +112,23 @@ def test_pictures_of_another_shape_are_given_as_they_are():
         reader._thread.join(300)
     shapes = [(40, 60, 3), (60, 40, 3), (60, 40, 3), (20, 30, 3), (20, 30, 3)]
     assert [picture.image_rgb.shape for picture in taken] == shapes
+
+
+def test_damaged_frames_are_counted_and_said_not_again_and_again():
+    said, taken, clock = [], [], FakeClock()
+    waits = {5: 0.5 * DAMAGE_SAID_S, 8: DAMAGE_SAID_S}
+
+    def before(index):
+        clock.time_s += waits.get(index, 0.0)
+
+    images = [False if k in (3, 4, 5, 8) else WIDE for k in range(10)]
+    source = FakeSource(np.arange(10) / 10, ends=True, images=images, before=before)
+    with NewestFrame(source, clock, say=said.append, received=taken.append) as reader:
+        reader._thread.join(300)
+    assert (reader.received, reader.damaged) == (6, 4)
+    assert [picture.timestamp_s for picture in taken] == pytest.approx([0.0, 0.1, 0.2, 0.6, 0.7, 0.9])
+    said = [text for text in said if text.startswith("data of fake was lost or damaged on its way; its pictures")]
+    assert len(said) == 2
 
 
 def test_a_source_that_is_frozen_is_said_once_each_time():

@@ -41,6 +41,33 @@ def test_frames_that_take_too_long_are_processed_evenly(rate, took_s, every):
     assert set(steps) == {every}
 
 
+@pytest.mark.parametrize(("rate", "took_s", "every"), [(60, 0.06, 4), (60, 0.045, 3), (30, 0.06, 2), (120, 0.045, 6)])
+def test_a_slow_machine_processes_evenly_what_is_hardly_less(rate, took_s, every):
+    frames = processed(rate, 20, lambda _: took_s)
+    assert set(steps_after(frames, rate, 3.0)) == {every}
+    assert len(frames) > 20 / (1.25 * took_s) - 10
+
+
+def test_a_slow_machine_whose_times_vary_does_not_waver():
+    """As where one network more is asked in most frames, and now and then in none for a while."""
+    pace, random, chosen = Pace(), np.random.default_rng(0), []
+
+    def took_s(now_s):
+        chosen.append(pace.every)
+        network_s = 0.0 if now_s % 3.0 < 0.15 else 0.042
+        return 0.0185 * np.exp(random.normal(0, 0.12)) + network_s
+
+    processed(60, 30, took_s, pace)
+    assert set(chosen[60:]) == {4}
+
+
+def test_a_slow_machine_that_becomes_faster_processes_more_frames_again():
+    pace = Pace()
+    frames = processed(60, 20, lambda now_s: 0.06 if now_s < 8.0 else 0.02, pace)
+    assert set(np.diff(frames[(frames > 3 * 60) & (frames < 8 * 60)])) == {4}
+    assert set(steps_after(frames, 60, 8.0 + CALM_S + 1.0)) == {2}
+
+
 def test_the_first_seconds_begin_evenly():
     """As soon as it is known how far apart frames are: the first one takes long."""
     frames = processed(60, 3, lambda s: 0.3 if s == 0.0 else 0.012)
