@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ...scope_addon.capture.perception.face.expression_network import EXPRESSION_POINTS, ExpressionNetwork
 from ...scope_addon.capture.perception.face.face_landmarks import FaceNetwork
 from ...scope_addon.capture.perception.region import Region
 from ..render_faces.truth import FOLDER, SIZE
@@ -52,7 +53,7 @@ def _is_whole(kept: Path, count: int) -> bool:
 
 
 def _observe(folder: Path, count: int, scale: float, out: Path) -> None:
-    network, rows = FaceNetwork(1), []
+    network, expressions, rows = FaceNetwork(1), ExpressionNetwork(), []
     for t in range(count):
         image = cv2.imread(str(folder / f"{t:04d}.png"))
         if image is None:
@@ -66,7 +67,7 @@ def _observe(folder: Path, count: int, scale: float, out: Path) -> None:
             estimate = network.estimate(rgb, region)
             region = estimate.next_region
         landmarks = estimate.landmarks / scale
-        expression = network.expression(estimate)
+        expression = expressions.estimate(estimate.landmarks[EXPRESSION_POINTS, :2])
         rows.append((landmarks.astype(np.float32), estimate.presence, expression, estimate.eye_light))
     landmarks, presence, weights, light = (np.array(column) for column in zip(*rows, strict=True))
     np.savez(out, landmarks=landmarks, presence=presence, weights=weights, eye_light=light)

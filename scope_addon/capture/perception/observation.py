@@ -38,7 +38,8 @@ class Observation:
     ``acquired``: the person was not tracked from the previous frame; ``appearance``: see `appearance`, in some frames;
     ``reference_landmarks``: pending result of the heavy network, to replace ``world_landmarks``, in few frames. Order:
     `KEYPOINT_NAMES`. ``hands`` (2, 21, 6), if requested: pixels, confidence and world landmarks of the left and right
-    hand, see `hand_tracker`; zeros where not seen, the confidence negative where `tentative_hands` decides later.
+    hand, see `hand_tracker`; zeros where not seen, the confidence negative where `tentative_hands` decides later. The
+    tracker fills a hand in up to a third of a second later, if it is found again, so the array has to be kept itself.
     ``face``, if requested: see `face_record`. ``mask``: the person's outline, in few frames.
     """
 
@@ -50,6 +51,6 @@ class Observation:
     acquired: bool
     appearance: NDArray[np.float64] | None = None
     reference_landmarks: PendingReference | None = None
-    hands: NDArray[np.float64] | None = None
+    hands: NDArray[np.float32] | None = None
     mask: PersonMask | None = None
     face: NDArray[np.float64] | None = None

@@ -70,7 +70,7 @@ class Tracklet:
     sides_px: list[float] = field(default_factory=list)  # of the region
     appearance: NDArray[np.float64] = field(default_factory=lambda: np.zeros(APPEARANCE_SIZE))  # sum over the frames
     references: list[tuple[int, PendingReference]] = field(default_factory=list)  # each with its row
-    hands: list[NDArray[np.float32]] = field(default_factory=list)  # (2, 21, 6); empty if hands are not looked for
+    hands: list[NDArray[np.float32]] = field(default_factory=list)  # (2, 21, 6), see `Observation`; empty if not wanted
     masks: list[tuple[int, PersonMask]] = field(default_factory=list)  # each with its row
     faces: list[NDArray[np.float32]] = field(default_factory=list)  # (RECORD,); empty if faces are not looked for
 
@@ -91,7 +91,7 @@ class Tracklet:
         if o.mask is not None:
             self.masks.append((row, o.mask))
         if o.hands is not None:
-            self.hands.append(np.where(np.isfinite(o.hands), o.hands, 0.0).astype(np.float32))
+            self.hands.append(o.hands)
         if o.face is not None:
             self.faces.append(o.face.astype(np.float32))
 

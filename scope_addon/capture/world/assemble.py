@@ -14,8 +14,8 @@ from ...kinematics.frame_blocks import by_blocks
 from ...motion import Motion
 from ..fitting.hand_measurements import HAND_KEYPOINT_NAMES
 from ..perception.landmark_network import KEYPOINT_NAMES
-from ..tracking.face.expression_fit import fitted
 from ..tracking.face.expression_motion import expression_motion
+from ..tracking.face.expressions import with_expressions
 from ..tracking.track import Track
 from .camera_path import CameraPath
 from .placement import PlacedTrack, raw_motion
@@ -88,7 +88,7 @@ def assemble_motion(
 
 def _face(track: Track, times: NDArray[np.float64], smoothing: bool) -> dict[str, NDArray[Any]]:
     """Return the motion file's arrays about the face; none if it was not looked for."""
-    return {} if track.face is None else expression_motion(fitted(track.face, times), times, smoothing)
+    return {} if track.face is None else expression_motion(with_expressions(track.face, times), times, smoothing)
 
 
 def _keypoints2d(track: Track) -> NDArray[np.floating[Any]]:

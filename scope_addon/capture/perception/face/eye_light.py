@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -33,7 +35,7 @@ def eye_light(image_rgb: NDArray[np.uint8], landmarks: NDArray[np.float64]) -> f
             continue
         eye = _brightness(image_rgb, (a + b) / 2, _HALF * width)
         spots = [[_brightness(image_rgb, landmarks[k, :2], _SPOT * width) for k in place] for place in places]
-        skin = min(float(np.median(place)) for place in spots)
+        skin = min(_middle(np.array(place)) for place in spots)
         if np.isfinite([eye, skin]).all() and skin > _DARK:
             found.append(eye / skin)
     return max(found, default=1.0)
@@ -45,4 +47,13 @@ def _brightness(image: NDArray[np.uint8], center: NDArray[np.float64], half: flo
     height, width = image.shape[:2]
     rows, columns = (slice(max(int(a), 0), max(int(b), 0)) for a, b in ((top, bottom), (left, right)))
     part = image[rows, columns, 1] if top < height and left < width else image[:0, 0, 1]
-    return float(np.median(part)) if part.size else float("nan")
+    return _middle(part.ravel()) if part.size else float("nan")
+
+
+def _middle(values: NDArray[Any]) -> float:
+    """Return the median of values (n,), n > 0, NaN if one is; `np.median` takes four times as long for so few."""
+    low, high = (len(values) - 1) // 2, len(values) // 2
+    ordered = np.sort(values)  # NaN comes last
+    if ordered[-1] != ordered[-1]:
+        return float("nan")
+    return (float(ordered[low]) + float(ordered[high])) / 2

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .....solver.names import EXPRESSIONS
-from .face_landmarks import EXPRESSION_POINTS, FaceEstimate
+from .expression_network import EXPRESSION_POINTS
+from .face_landmarks import FACE_POINTS, FaceEstimate
 from .gaze import gaze, head_axes
 
 # Landmarks that are kept: the outline of the face, brows, eyes, irises, nose and lips.
@@ -35,12 +36,12 @@ _FACING = (0.2, 0.6)  # cosine of the angle between the face's direction and the
 _SCALE = 1.5  # side of a region over the face's
 
 
-def record(estimate: FaceEstimate | None, weights: NDArray[np.float64] | None) -> NDArray[np.float64]:
+def record(estimate: FaceEstimate | None, weights: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
     """Return the row (RECORD,) of a face; zeros if there is none.
 
     Its numbers: confidence, size in pixels, weights, gaze, landmarks, and the light around the eyes.
 
-    :param weights: (52,) of the expressions; None: they and the gaze stay 0, to be fitted to the landmarks.
+    :param weights: (52,) of the expressions; None: they and the gaze stay 0, for `with_expressions` to find.
     """
     row = np.zeros(RECORD)
     if estimate is None:
@@ -73,6 +74,13 @@ def landmarks_of(rows: NDArray[np.floating[Any]], numbers: NDArray[np.int64]) ->
     :param numbers: (n,) of the contours, or of those that the expression network takes.
     """
     return rows[:, _POINTS].reshape(len(rows), len(_KEPT), 3)[:, np.searchsorted(_KEPT, numbers)]
+
+
+def kept_landmarks(row: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+    """Return the landmarks (478, 3) of a row (RECORD,), in pixels, and depth in pixels; 0 those that are not kept."""
+    landmarks = np.zeros((FACE_POINTS, 3))
+    landmarks[_KEPT] = row[_POINTS].reshape(len(_KEPT), 3)
+    return landmarks
 
 
 def eye_light_of(rows: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:

@@ -38,6 +38,7 @@ SURE_PX, MOST_NOISE = 64.0, 8.0  # size of a face below which errors grow, with 
 LARGEST_GAZE = 2.0  # w_max of the units that turn the eyes: eyes turn farther than the body's keys at 1
 _TIME_TOLERANCE_S = 0.005  # of their sum
 _ROUNDS, _SWEEPS = 4, 30
+_STILL = 1e-6  # change of the weights in a sweep after which no other follows
 _TURN_RIDGE = 0.03  # on G, in squared radians
 _BLOCK = 2048  # frames that are solved at once: they fit into a processor's cache
 
@@ -79,15 +80,13 @@ def load_response() -> FaceResponse:
 
 
 def fitted(rows: NDArray[np.floating[Any]], times: NDArray[np.float64]) -> NDArray[np.floating[Any]]:
-    """Return rows whose weights and gaze are fitted to the landmarks; those of short clips stay the networks'.
+    """Return rows whose weights and gaze are fitted to the landmarks.
 
-    :param rows: (T, RECORD) see `face_record`.
+    :param rows: (T, RECORD) see `face_record`, for which `is_known`.
     :param times: (T,) seconds.
     :raises ModelFileError: the response of the landmarks is missing or damaged.
     """
     seen = np.flatnonzero(rows[:, 0] > 0)
-    if not is_known(len(seen), float(np.diff(times, prepend=times[:1])[seen].sum())):
-        return rows
     response = load_response()
     confidence, size, *_ = parts(rows[seen])
     faces = aligned(landmarks_of(rows[seen], response.landmarks).astype(float), response.reference, response.shares)
@@ -99,13 +98,15 @@ def fitted(rows: NDArray[np.floating[Any]], times: NDArray[np.float64]) -> NDArr
     return out
 
 
-def is_known(frames: float, seconds: float) -> bool:
+def is_known(rows: NDArray[np.floating[Any]], times: NDArray[np.float64]) -> bool:
     """Return whether a face was seen for long enough that the person's face at rest is known.
 
-    :param frames: in which it was seen.
-    :param seconds: since the frame before, added up over these.
+    :param rows: (T, RECORD) see `face_record`.
+    :param times: (T,) seconds; those since the frame before are added up over the frames in which it was seen.
     """
-    return frames >= LEAST_FRAMES and seconds >= LEAST_S - _TIME_TOLERANCE_S
+    seen = rows[:, 0] > 0
+    seconds = float(np.diff(times, prepend=times[:1])[seen].sum())
+    return int(seen.sum()) >= LEAST_FRAMES and seconds >= LEAST_S - _TIME_TOLERANCE_S
 
 
 def fit_units(
@@ -158,10 +159,19 @@ def _descend(
     :param normal: (U, U) H.
     :param target: (T, U) g.
     """
+    weights, g = np.ascontiguousarray(w.T), np.ascontiguousarray(target.T)  # a unit's numbers lie together
+    before, diagonal = np.empty_like(weights), np.diag(normal).tolist()
     for _ in range(_SWEEPS):
-        for u in range(len(normal)):
-            step = (target[:, u] - w @ normal[:, u]) / normal[u, u]
-            np.clip(w[:, u] + step, 0.0, largest[u], out=w[:, u])
+        before[:] = weights
+        for u, most in enumerate(largest.tolist()):
+            best = g[u] - normal[u] @ weights
+            best /= diagonal[u]
+            best += weights[u]
+            np.maximum(best, 0.0, out=best)
+            np.minimum(best, most, out=weights[u])
+        if np.abs(weights - before).max() <= _STILL:
+            break
+    w[:] = weights.T
 
 
 def _directions(tangents: NDArray[np.float64]) -> NDArray[np.float64]:

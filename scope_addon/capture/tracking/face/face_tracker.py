@@ -17,14 +17,13 @@ from ...perception.face.face_record import record
 from ...perception.face.face_region import HEAD, region_from_body
 from ...perception.observation import Observation
 from ...perception.region import Region
+from ...perception.sessions import network_path
 from ..frame_clock import PATIENCE_S, is_search_due
-from .expression_fit import is_known
 
 PRESENCE_THRESHOLD = 0.5
 MAX_DISTANCE = 0.35  # between the face and where the body's head predicts it, in sides of the predicted region
 MIN_SIZE, MAX_SIZE = 0.5, 1.6  # side of the face's region over that of the predicted one
 SMALLEST_REGION_PX = 24.0
-RESERVE = 2.0  # times what `is_known` requires is seen before the fit is relied on: frames can still be rejected
 
 
 @dataclass
@@ -35,58 +34,48 @@ class _Face:
     head_px: NDArray[np.float64]
     seen_s: float  # when it was last seen; if never, when it was first looked for
     searched_s: float  # when it was last looked for
-    frames: int = 0  # in which it was seen
-    duration_s: float = 0.0  # of these frames
 
 
 class FaceTracker:
     """Tracks the faces of the people whom `PeopleTracker` tracks; frames are given in order.
 
-    :param threads: of the landmark network.
+    :param threads: of the network.
     :param folder: of the networks; None: the built-in ones.
-    :param execution: what the networks run on.
-    :raises SetupError: a network is missing.
+    :param execution: what the network runs on.
+    :raises SetupError: the network is missing.
     """
 
     def __init__(self, threads: int, folder: Path | None = None, execution: Execution | None = None) -> None:
         self._network = FaceNetwork(threads, folder, execution)
+        network_path("face_expression")  # `with_expressions` may need it: if it is missing, say so now
         self._faces: dict[int, _Face] = {}
-        self._time_s: float | None = None
 
     def another(self) -> FaceTracker:
         """Return a tracker with the same networks that has seen nothing."""
         tracker = copy.copy(self)
-        tracker._faces, tracker._time_s = {}, None
+        tracker._faces = {}
         return tracker
 
     def step(
         self, image_rgb: NDArray[np.uint8], observations: Sequence[tuple[int, Observation]], time_s: float
     ) -> list[tuple[int, Observation]]:
-        """Add ``face`` to the observations of one frame.
-
-        The expression network runs only at first: a face that is seen for longer gets its expressions from `fitted`.
+        """Add ``face`` to the observations of one frame: its landmarks, from which `with_expressions` finds the rest.
 
         :param image_rgb: (H, W, 3).
         :param observations: tracklet number and observation of each person.
         :param time_s: when the frame is shown.
         """
         before, self._faces = self._faces, {}
-        interval_s = 0.0 if self._time_s is None else time_s - self._time_s
-        self._time_s = time_s
         found = []
         for number, person in observations:
             head = person.keypoints_px[list(HEAD)].mean(axis=0)
             face = before.get(number) or _Face(None, head, time_s, time_s - PATIENCE_S)
             estimate = self._find(image_rgb, face, person, head, time_s)
             face.region, face.head_px = (estimate.next_region if estimate else None), head
-            weights = None
             if estimate:
-                if not is_known(face.frames / RESERVE, face.duration_s / RESERVE):
-                    weights = self._network.expression(estimate)
                 face.seen_s = time_s
-                face.frames, face.duration_s = face.frames + 1, face.duration_s + interval_s
             self._faces[number] = face
-            found.append((number, replace(person, face=record(estimate, weights))))
+            found.append((number, replace(person, face=record(estimate))))
         return found
 
     def _find(

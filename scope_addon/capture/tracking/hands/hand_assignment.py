@@ -19,10 +19,14 @@ UNSURE_WRIST_DISTANCE = 1.2  # where the body's wrist is uncertain
 SURE_WRIST = 0.5
 MAX_SIZE = 2.0  # of the hand, in the hand lengths of the body
 SAME_HAND = 0.35  # mean distance of the keypoints, in sizes of the hand, below which two hands are one
+# The same where the network is sure that one is a left hand and the other a right one: hands that touch are so near.
+SAME_PLACE = 0.15
+SURE_SIDE = 0.9  # probability; of a hand behind the other one, which the network imagines, it says up to 0.83
 DISAGREEMENT_THRESHOLD = 0.3
 CERTAIN_PRESENCE = 0.95  # from which a hand is none that the network imagines
 MIN_SIDE_PROBABILITY = 0.15  # of the right side
 SAME_WRIST, OTHER_WRIST = 0.3, 1.0  # distances of the body's two wrists from a hand of the wrong side, in hand lengths
+FOLLOWED_WRIST = 0.5  # the first of them for a hand that was this one in the frame before or after
 
 Key = tuple[int, int]  # tracklet number, and 0 for the left hand or 1 for the right one
 
@@ -38,12 +42,18 @@ class Least(NamedTuple):
 DETECTED = Least(0.5, 0.5)  # of a hand whose palm was detected, or that was seen in the frame before
 PREDICTED = Least(0.6, 0.8)  # of one that is only predicted from the body
 TENTATIVE = Least(0.2, 0.2)  # of one that may be believed later, see `tentative_hands`
+FOLLOWED_BACK = Least(0.2, 0.2, 0.42)  # the same of a hand that is followed back from where it was found again
 # The same of hands in a second look, which finds small ones in the skin of a forearm.
 SECOND, SECOND_TENTATIVE = Least(0.6, np.inf, 0.42), Least(0.2, np.inf, 0.42)
 
 
 def assigned(
-    estimate: HandEstimate, person: Observation, scale: float, side: int, least: Least = DETECTED
+    estimate: HandEstimate,
+    person: Observation,
+    scale: float,
+    side: int,
+    least: Least = DETECTED,
+    same_wrist: float = SAME_WRIST,
 ) -> HandEstimate | None:
     """Return a hand as this hand of the person; None if it cannot be.
 
@@ -56,6 +66,7 @@ def assigned(
 
     :param scale: pixels per metre at the person's distance.
     :param side: 0 left, 1 right.
+    :param same_wrist: distance up to which the wrist is this one, in hand lengths, for a hand of the other side.
     """
     sure = person.keypoints_confidence[WRISTS[side]] >= SURE_WRIST
     length = HAND_LENGTH_M * scale
@@ -70,7 +81,7 @@ def assigned(
     probability = estimate.left if side == 0 else 1.0 - estimate.left
     if probability >= MIN_SIDE_PROBABILITY:
         return estimate
-    if not sure or distance > SAME_WRIST or other < OTHER_WRIST:
+    if not sure or distance > same_wrist or other < OTHER_WRIST:
         return None
     mirrored = estimate.world_landmarks * np.array([1.0, 1.0, -1.0])
     return replace(estimate, world_landmarks=mirrored, left=1.0 - estimate.left)
@@ -97,13 +108,16 @@ def without_duplicates(
     keys = sorted(found, key=distance)
     for k, key in enumerate(keys):
         estimate = unique[key]
-        if estimate is not None and any(_is_same_hand(estimate, unique[other]) for other in keys[:k]):
+        if estimate is not None and any(is_same_hand(estimate, unique[other]) for other in keys[:k]):
             unique[key] = None
     return unique
 
 
-def _is_same_hand(a: HandEstimate, b: HandEstimate | None) -> bool:
+def is_same_hand(a: HandEstimate, b: HandEstimate | None) -> bool:
+    """Return whether two estimates, of which the second may be none, are of one hand."""
     if b is None:
         return False
     distance = np.linalg.norm(a.keypoints_px - b.keypoints_px, axis=1).mean()
-    return bool(distance < SAME_HAND * min(a.size_px, b.size_px))
+    are_opposite = max(a.left, b.left) >= SURE_SIDE and min(a.left, b.left) <= 1.0 - SURE_SIDE
+    limit = SAME_PLACE if are_opposite else SAME_HAND
+    return bool(distance < limit * min(a.size_px, b.size_px))

@@ -7,98 +7,64 @@ import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...perception.execution import Execution
 from ...perception.hand_landmarks import HAND_POINTS, HandEstimate, HandNetwork
-from ...perception.hand_region import HAND_LENGTH_M, SIDES, WRISTS, pixels_per_metre, region_from_body
+from ...perception.hand_region import SIDES, pixels_per_metre, region_from_body
 from ...perception.observation import Observation
 from ...perception.palm_detector import SCORE_THRESHOLD, PalmDetector
 from ...perception.region import Region
 from ..frame_clock import EAGER_S, FRAME_S, PATIENCE_S, is_search_due
 from .hand_assignment import (
-    CERTAIN_PRESENCE,
     DETECTED,
+    FOLLOWED_BACK,
+    FOLLOWED_WRIST,
     PREDICTED,
+    SAME_WRIST,
     SECOND,
     SECOND_TENTATIVE,
     SURE_WRIST,
     TENTATIVE,
     Key,
     Least,
-    assigned,
     without_duplicates,
 )
-from .hand_color import is_like, palm_color
+from .hand_sight import Found, Sight, better, followed_regions
+from .tentative_hands import SUPPORT_S
 
+AGAIN_PRESENCE = 0.03  # the same where a hand is looked for that was found in the frame after
 FIRST_PRESENCE = 0.1  # in a rough region, from which the better one of the landmarks is looked at
-FAR_MOTION = 0.35  # of the wrist in a frame, in hand lengths, from which the region that does not move is tried as well
 SEARCH_SCALE = 2.3  # side of the square in which a palm is searched, in sides of the predicted region
 CLOSER_SCALE, SMALLER_SCALE = 1.5, 0.7  # of the square and the region of a second look, likewise
 UNSURE_SCORE = 0.2  # of a palm in a second look
 MOST_PALMS = 2
 SMALLEST_HAND_PX = 12.0
+LARGER_SCALE = 1.3  # of a region by the body in which a hand is looked for that was found later
 _MARGIN = 0.3  # of a region's side, by which its centre may be outside the image
-
-
-class _Found(NamedTuple):
-    """An estimate that may be this hand, whether the network is sure of it, and the palm's colour."""
-
-    estimate: HandEstimate
-    is_sure: bool
-    color: NDArray[np.float64] | None
 
 
 @dataclass
 class _Hand:
     """The state of one hand of one person: what was found in the frame before, if anything, and the body's wrist."""
 
-    found: _Found | None
+    found: Found | None
     wrist_px: NDArray[np.float64]
     seen_s: float  # when it was last surely seen; if never, when it was first looked for
     searched_s: float  # when it was last looked for
     color: NDArray[np.float64] | None = None  # of the palm, when it was last surely seen
 
 
-@dataclass(frozen=True)
-class _Sight:
-    """Where one hand is looked for: ``scale`` in pixels per metre, ``side`` 0 left, 1 right, ``color`` of the palm."""
+@dataclass
+class _Missed:
+    """A frame in which a hand was not surely found, and its row in the array that the observation has."""
 
-    image_rgb: NDArray[np.uint8]
-    person: Observation
-    side: int
-    scale: float
-    color: NDArray[np.float64] | None
-
-    @property
-    def wrist_px(self) -> NDArray[np.float64]:
-        """The body's wrist (2,)."""
-        wrist: NDArray[np.float64] = self.person.keypoints_px[WRISTS[self.side]]
-        return wrist
-
-    @property
-    def wrist_confidence(self) -> float:
-        """Of the body's wrist."""
-        return float(self.person.keypoints_confidence[WRISTS[self.side]])
-
-    @property
-    def hand_px(self) -> float:
-        """Length of the hand in pixels."""
-        return HAND_LENGTH_M * self.scale
-
-    def judge(self, estimate: HandEstimate, sure: Least, tentative: Least) -> _Found | None:
-        """Return an estimate if it may be this hand, see `assigned`; unless it is certain, in the hand's colour."""
-        color = palm_color(self.image_rgb, estimate.keypoints_px)
-        if estimate.presence < CERTAIN_PRESENCE and not is_like(color, self.color):
-            return None
-        for is_sure, least in ((True, sure), (False, tentative)):
-            hand = assigned(estimate, self.person, self.scale, self.side, least)
-            if hand is not None:
-                return _Found(hand, is_sure, color)
-        return None
+    time_s: float
+    sight: Sight
+    found: Found | None
+    row: NDArray[np.float32]
 
 
 class HandTracker:
@@ -114,18 +80,22 @@ class HandTracker:
         self._network = HandNetwork(threads, folder, execution)
         self._palms = PalmDetector(threads, folder, execution)
         self._hands: dict[Key, _Hand] = {}
+        self._missed: dict[Key, list[_Missed]] = {}
         self._time_s = 0.0
 
     def another(self) -> HandTracker:
         """Return a tracker with the same networks that has seen nothing."""
         tracker = copy.copy(self)
-        tracker._hands, tracker._time_s = {}, 0.0
+        tracker._hands, tracker._missed, tracker._time_s = {}, {}, 0.0
         return tracker
 
     def step(
         self, image_rgb: NDArray[np.uint8], observations: Sequence[tuple[int, Observation]], time_s: float | None = None
     ) -> list[tuple[int, Observation]]:
         """Add ``hands`` to the observations of one frame; tentative ones as in `tentative_hands`.
+
+        A hand that is surely found after frames in which it was not is followed back through the last third of a
+        second, and written into the arrays of these frames.
 
         :param image_rgb: (H, W, 3).
         :param observations: tracklet number and observation of each person.
@@ -142,28 +112,74 @@ class HandTracker:
         }
         found = {key: self._find(sight, self._hands[key]) for key, sight in sights.items()}
         kept = without_duplicates({key: hand and hand.estimate for key, hand in found.items()}, people)
-        found = {key: hand if kept[key] is not None else None for key, hand in found.items()}
+        for key, sight in sights.items():
+            if found[key] is not None and kept[key] is None:
+                beside = self._beside(sight, [other for other in kept.values() if other is not None])
+                found[key], kept[key] = beside, beside and beside.estimate
         for key, hand in found.items():
             state = self._hands[key]
             state.found, state.wrist_px = hand, sights[key].wrist_px
             if hand is not None and hand.is_sure:
                 state.seen_s, state.color = now, hand.color
-        return [(n, replace(o, hands=_as_array([found[n, s] for s in range(len(SIDES))]))) for n, o in observations]
+        rows = {n: _as_array([found[n, s] for s in range(len(SIDES))]) for n, _ in observations}
+        before, self._missed = self._missed, {}
+        for key, sight in sights.items():
+            hand = found[key]
+            missed = [m for m in before.get(key, []) if now - m.time_s <= SUPPORT_S + 0.005]
+            if hand is not None and hand.is_sure:
+                self._look_back(missed, hand, sight)
+            elif sight.hand_px >= SMALLEST_HAND_PX:
+                others = [h.estimate for other, h in found.items() if other != key and h is not None]
+                seen = replace(sight.around_wrist(), others=others)
+                self._missed[key] = [*missed, _Missed(now, seen, hand, rows[key[0]][key[1]])]
+        return [(n, replace(o, hands=rows[n])) for n, o in observations]
 
-    def _sight(self, image_rgb: NDArray[np.uint8], person: Observation, key: Key) -> _Sight:
+    def _beside(self, sight: Sight, others: Sequence[HandEstimate]) -> Found | None:
+        """Look for a hand where another one was found: beside the others, which it may touch."""
+        predicted = region_from_body(sight.person.keypoints_px, sight.scale, sight.side)
+        if sight.hand_px < SMALLEST_HAND_PX or not _is_in_image(predicted, sight.image_rgb):
+            return None
+        return self._search(replace(sight, others=others), predicted, look_again=False)
+
+    def _look_back(self, missed: Sequence[_Missed], hand: Found, sight: Sight) -> None:
+        """Follow a hand that was surely found back through the frames before in which it was not; see `_Missed`."""
+        for each in reversed(missed):
+            found = each.found or self._found_back(each.sight, hand, sight)
+            if found is None:
+                return
+            each.row[:] = found.row
+            hand, sight = found, each.sight
+
+    def _found_back(self, sight: Sight, later: Found, later_sight: Sight) -> Found | None:
+        """Look for a hand in the frame before one in which it was found, there and around the body's wrist."""
+        if not min(sight.image_rgb.shape[:2]):
+            return None
+        least = DETECTED if later.is_sure else PREDICTED
+        both = min(sight.wrist_confidence, later_sight.wrist_confidence) >= SURE_WRIST
+        motion = sight.wrist_px - later_sight.wrist_px if both else np.zeros(2)
+        followed = [(region, least) for region in followed_regions(later.estimate, motion, sight.hand_px)]
+        found = self._first_sure(sight, followed, FOLLOWED_BACK, FOLLOWED_WRIST, AGAIN_PRESENCE)
+        if found is not None and found.is_sure:
+            return found
+        predicted = region_from_body(sight.person.keypoints_px, sight.scale, sight.side)
+        larger = replace(predicted, side_px=LARGER_SCALE * predicted.side_px)
+        rough = [(region, SECOND) for region in (predicted, larger)]
+        return better(found, self._first_sure(sight, rough, SECOND_TENTATIVE, least_first=AGAIN_PRESENCE))
+
+    def _sight(self, image_rgb: NDArray[np.uint8], person: Observation, key: Key) -> Sight:
         scale = pixels_per_metre(person.keypoints_px, person.world_landmarks)
         known = self._hands.get(key)
-        return _Sight(image_rgb, person, key[1], scale, known.color if known else None)
+        return Sight(image_rgb, person, key[1], scale, known.color if known else None)
 
-    def _find(self, sight: _Sight, hand: _Hand) -> _Found | None:
+    def _find(self, sight: Sight, hand: _Hand) -> Found | None:
         """Look for the hand where it was a frame ago, otherwise where the body's pose predicts it."""
         followed = None
         if hand.found is not None:
             least = DETECTED if hand.found.is_sure else PREDICTED
             motion = sight.wrist_px - hand.wrist_px if sight.wrist_confidence >= SURE_WRIST else np.zeros(2)
-            for region in _followed(hand.found.estimate, motion, sight.hand_px):
-                estimate = self._network.estimate(sight.image_rgb, region)
-                followed = _better(followed, sight.judge(estimate, least, TENTATIVE))
+            for region in followed_regions(hand.found.estimate, motion, sight.hand_px):
+                estimate = sight.estimate(self._network, region)
+                followed = better(followed, sight.judge(estimate, least, TENTATIVE, FOLLOWED_WRIST))
                 if followed is not None and followed.is_sure:
                     return followed
         if not is_search_due(self._time_s, hand.seen_s, hand.searched_s):
@@ -173,9 +189,9 @@ class HandTracker:
         if sight.hand_px < SMALLEST_HAND_PX or not _is_in_image(predicted, sight.image_rgb):
             return followed
         just_lost = self._time_s - hand.seen_s <= EAGER_S
-        return _better(self._search(sight, predicted, look_again=just_lost), followed)
+        return better(self._search(sight, predicted, look_again=just_lost), followed)
 
-    def _search(self, sight: _Sight, predicted: Region, look_again: bool) -> _Found | None:
+    def _search(self, sight: Sight, predicted: Region, look_again: bool) -> Found | None:
         """Find the hand whose palm is nearest to the predicted region, or without a palm, any hand in that region.
 
         Where the network is sure of none although the body's wrist is seen, it may look again: for palms in a smaller
@@ -189,9 +205,9 @@ class HandTracker:
         closer, smaller = (replace(predicted, side_px=k * predicted.side_px) for k in (CLOSER_SCALE, SMALLER_SCALE))
         palms = self._palms_near(sight, predicted, closer, UNSURE_SCORE)
         again = self._first_sure(sight, [(region, SECOND) for region in (*palms, smaller)], SECOND_TENTATIVE)
-        return _better(found, again)
+        return better(found, again)
 
-    def _palms_near(self, sight: _Sight, predicted: Region, square: Region, threshold: float) -> list[Region]:
+    def _palms_near(self, sight: Sight, predicted: Region, square: Region, threshold: float) -> list[Region]:
         """Return the hands' regions by the palms in a square that are nearest to the predicted region."""
         palms = sorted(
             self._palms.detect(sight.image_rgb, square, threshold),
@@ -199,50 +215,38 @@ class HandTracker:
         )
         return [palm.region for palm in palms[:MOST_PALMS]]
 
-    def _first_sure(self, sight: _Sight, regions: Sequence[tuple[Region, Least]], tentative: Least) -> _Found | None:
+    def _first_sure(
+        self,
+        sight: Sight,
+        regions: Sequence[tuple[Region, Least]],
+        tentative: Least,
+        same_wrist: float = SAME_WRIST,
+        least_first: float = FIRST_PRESENCE,
+    ) -> Found | None:
         """Return the hand in the first region, each with what it requires, in which there surely is one.
 
         Otherwise the best tentative one. Each is estimated twice: the landmarks give a better region.
         """
         found = None
         for region, least in regions:
-            first = self._network.estimate(sight.image_rgb, region)
-            if first.presence < FIRST_PRESENCE:
+            first = sight.estimate(self._network, region)
+            if first.presence < least_first:
                 continue
-            second = self._network.estimate(sight.image_rgb, first.next_region)
+            second = sight.estimate(self._network, first.next_region)
             for estimate in (second, first):
-                found = _better(found, sight.judge(estimate, least, tentative))
+                found = better(found, sight.judge(estimate, least, tentative, same_wrist))
                 if found is not None and found.is_sure:
                     return found
         return found
 
 
-def _followed(estimate: HandEstimate, motion_px: NDArray[np.float64], hand_px: float) -> list[Region]:
-    """Return where a hand that was seen a frame ago may be: moved with the body's wrist, and at its place of then."""
-    region = estimate.next_region
-    if np.linalg.norm(motion_px) < FAR_MOTION * hand_px:
-        return [region]
-    x, y = np.asarray(region.center_px) + motion_px
-    return [replace(region, center_px=(float(x), float(y))), region]
-
-
-def _better(a: _Found | None, b: _Found | None) -> _Found | None:
-    """Return the sure one of two findings, or the one with more presence."""
-    both = [found for found in (a, b) if found is not None]
-    return max(both, key=lambda found: (found.is_sure, found.estimate.presence), default=None)
-
-
-def _as_array(hands: Sequence[_Found | None]) -> NDArray[np.float64]:
+def _as_array(hands: Sequence[Found | None]) -> NDArray[np.float32]:
     """Return (2, 21, 6) pixels, confidence and world landmarks of both hands; zeros where one was not found.
 
     The confidence of a tentative hand is negative.
     """
-    out = np.zeros((len(hands), HAND_POINTS, 6))
-    for row, hand in zip(out, hands, strict=True):
-        if hand is not None:
-            row[:, :2], row[:, 3:] = hand.estimate.keypoints_px, hand.estimate.world_landmarks
-            row[:, 2] = hand.estimate.presence if hand.is_sure else -hand.estimate.presence
-    return out
+    nothing = np.zeros((HAND_POINTS, 6), np.float32)
+    return np.array([nothing if hand is None else hand.row for hand in hands])
 
 
 def _is_in_image(region: Region, image_rgb: NDArray[np.uint8]) -> bool:

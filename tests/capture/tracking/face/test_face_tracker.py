@@ -15,10 +15,8 @@ from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.capture.tracking.face import face_tracker
-from scope.scope_addon.capture.tracking.face.expression_fit import fitted
 from scope.scope_addon.capture.tracking.face.face_tracker import FaceTracker
 from scope.solver.loaders.body_file import load_body
-from scope.solver.names import EXPRESSIONS
 
 IMAGE = np.zeros((800, 800, 3), np.uint8)
 SHAPE = np.random.default_rng(0).uniform(-0.5, 0.5, (FACE_POINTS, 3))
@@ -47,7 +45,7 @@ class FakeNetwork:
     """Sees the faces (x, y, size) whose middle is inside the inner half of a region."""
 
     def __init__(self, *_):
-        self.faces, self.calls, self.expressions = [], 0, 0
+        self.faces, self.calls = [], 0
 
     def estimate(self, _image, region):
         self.calls += 1
@@ -55,10 +53,6 @@ class FakeNetwork:
             if np.abs(np.subtract((x, y), region.center_px)).max() < region.side_px / 4:
                 return FaceEstimate(size * SHAPE + [x, y, 0], 0.99, region)
         return FaceEstimate(region.side_px * SHAPE + [*region.center_px, 0], 0.01, region)
-
-    def expression(self, _estimate):
-        self.expressions += 1
-        return np.linspace(0, 1, len(EXPRESSIONS))
 
 
 @pytest.fixture
@@ -77,10 +71,11 @@ def middle(x, y, scale=500.0):
 
 def test_a_face_is_found_and_then_followed_with_one_run_of_the_network(tracker):
     tracker._network.faces = [(*middle(300, 200), 92.0)]
-    confidence, size, weights, _, _ = face_of(tracker, {7: person(300, 200)})[7]
+    confidence, size, weights, gaze, _ = face_of(tracker, {7: person(300, 200)})[7]
     assert size[0] == pytest.approx(92, abs=1)
     assert confidence[0] > 0
-    np.testing.assert_allclose(weights[0], np.linspace(0, 1, 52))
+    assert not weights.any()
+    assert not gaze.any()  # both are found later, see `with_expressions`
     assert tracker._network.calls == 2
     tracker._network.faces = [(*middle(360, 200), 92.0)]  # farther than it would be seen from where it was
     assert face_of(tracker, {7: person(360, 200)}, 1 / 30)[7][0][0] > 0
@@ -101,22 +96,6 @@ def test_a_lost_face_is_looked_for_less_often(tracker):
     for k in range(60):
         face_of(tracker, {1: person(300, 200)}, k / 30)
     assert 30 < tracker._network.calls < 60  # two runs each: ten eager frames, then every fourth
-
-
-@pytest.mark.parametrize("fps", [5, 30])
-def test_the_expression_network_runs_until_expressions_can_be_fitted(tracker, fps):
-    tracker._network.faces = [(*middle(300, 200), 92.0)]
-    rows = []
-    for k in range(10 * fps):
-        ((_, seen),) = tracker.step(IMAGE, [(1, person(300, 200))], k / fps)
-        rows.append(seen.face)
-    times, rows = np.arange(len(rows)) / fps, np.array(rows)
-    assert 2 * fps < tracker._network.expressions < 5 * fps
-    for count in (fps, 3 * fps, len(rows)):  # whatever part of them a track consists of, no expression is missing
-        _, _, weights, gaze, _ = parts(fitted(rows[:count], times[:count]))
-        assert (gaze != 0).any(axis=(1, 2)).all()
-        assert weights[:, 1].all() or count >= 2 * fps
-    assert not parts(rows)[2][-1].any()
 
 
 def test_a_head_too_small_is_not_looked_at(tracker):

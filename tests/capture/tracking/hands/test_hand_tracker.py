@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scope.scope_addon.capture.media.video_range import VideoRange
@@ -16,6 +18,7 @@ from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.capture.tracking.hands import hand_tracker
 from scope.scope_addon.capture.tracking.hands.hand_tracker import HandTracker
+from scope.scope_addon.capture.tracking.people import PeopleBuilder
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker
 from scope.solver.loaders.body_file import load_body
 from scope.solver.rotations import exp
@@ -90,8 +93,8 @@ def test_each_hand_goes_to_its_own_side_and_then_needs_one_call_per_frame(follow
     left, right = hand_at((300, 500)), hand_at((700, 500), left=0.05)
     tracker = follow([left, right])
     (_, found), *_ = tracker.step(IMAGE, [(0, person())])
-    assert np.array_equal(found.hands[0, :, :2], left.keypoints_px)
-    assert np.array_equal(found.hands[1, :, :2], right.keypoints_px)
+    assert np.array_equal(found.hands[0, :, :2], left.keypoints_px.astype(np.float32))
+    assert np.array_equal(found.hands[1, :, :2], right.keypoints_px.astype(np.float32))
     palms, calls = tracker._palms.calls, tracker._network.calls
     assert seen(tracker, person()).all()
     assert tracker._palms.calls == palms
@@ -130,7 +133,7 @@ def test_a_hand_is_followed_with_the_wrist_where_it_moves_far_in_a_frame(follow)
     hands[0] = hand_at((300 + 2 * LENGTH, 500))
     palms = tracker._palms.calls
     (_, found), *_ = tracker.step(IMAGE, [(0, person(left_wrist=(300 + 2 * LENGTH, 500)))])
-    assert np.array_equal(found.hands[0, :, :2], hands[0].keypoints_px)
+    assert np.array_equal(found.hands[0, :, :2], hands[0].keypoints_px.astype(np.float32))
     assert tracker._palms.calls == palms + 2  # both of the right hand, which is not there
 
 
@@ -142,7 +145,7 @@ def test_a_hand_that_the_network_is_unsure_of_is_reported_as_tentative_and_follo
     for _ in range(15):
         (_, found), *_ = tracker.step(IMAGE, [(0, person())])
         assert (found.hands[0, :, 2] == -0.3).all()
-        assert np.array_equal(found.hands[0, :, :2], hands[0].keypoints_px)
+        assert np.array_equal(found.hands[0, :, :2], hands[0].keypoints_px.astype(np.float32))
     hands[0] = hand_at((300, 500), presence=0.1)
     (_, found), *_ = tracker.step(IMAGE, [(0, person())])
     assert not found.hands.any()
@@ -209,6 +212,93 @@ def test_without_a_palm_a_hand_has_to_be_more_certain_the_farther_it_is_from_the
 def test_one_hand_is_not_assigned_to_both_sides(follow):
     tracker = follow([hand_at((500, 500), left=0.5)])
     assert list(seen(tracker, person(left_wrist=(495, 500), right_wrist=(540, 500)))) == [True, False]
+
+
+@pytest.mark.parametrize(("certainty", "are_both_seen"), [(0.95, True), (0.8, False)])
+def test_hands_that_touch_are_two_where_the_network_is_sure_of_their_sides(follow, certainty, are_both_seen):
+    """A hand behind the other one, which the network imagines where that one is, has an unsure side."""
+    left, right = hand_at((300, 500), left=certainty), hand_at((300 + 0.25 * LENGTH, 500), left=0.02)
+    tracker = follow([left, right])
+    wrists = person(left_wrist=(300, 500), right_wrist=(300 + 0.5 * LENGTH, 500))
+    for _ in range(3):
+        assert seen(tracker, wrists).all() == are_both_seen
+        assert seen(tracker, wrists).any()
+
+
+def test_a_hand_whose_place_shows_the_other_one_is_looked_for_beside_it(follow):
+    class SeenInPalms(FakeHands):
+        def estimate(self, image, region):
+            if region.side_px == 2 * LENGTH:
+                return super().estimate(image, region)
+            return hand_at((300, 500), left=0.5)  # both followed regions show the left hand
+
+    hands = [hand_at((300, 500)), hand_at((300 + 0.5 * LENGTH, 500), left=0.02)]
+    tracker = follow(hands)
+    wrists = person(right_wrist=(300 + 0.5 * LENGTH, 500))
+    assert seen(tracker, wrists).all()
+    tracker._network = SeenInPalms(hands)
+    (_, found), *_ = tracker.step(IMAGE, [(0, wrists)])
+    np.testing.assert_allclose(found.hands[1, :, :2], hands[1].keypoints_px, rtol=1e-6)
+    assert found.hands[0, 0, 2] > 0
+
+
+def test_a_followed_hand_may_look_like_the_other_one_farther_from_the_wrist(follow):
+    hands = [hand_at((300, 500))]
+    tracker = follow(hands)
+    assert seen(tracker, person())[0]
+    hands[0] = hand_at((300 + 0.4 * LENGTH, 500), left=0.02)
+    assert seen(tracker, person())[0]
+
+
+def numbered_pixels(late=True):
+    """An image in which each pixel says where it is, and whether the frame is a late one."""
+    y, x = np.mgrid[:1000, :1000]
+    return np.stack([x % 256, y % 256, 128 * late + 16 * (x // 256) + y // 256], axis=2).astype(np.uint8)
+
+
+class InFrame(FakeHands):
+    """Knows from the pixels which part of the frame it is given; only late frames show other hands than the first."""
+
+    def estimate(self, image, region):
+        x, y, both = (int(value) for value in image[0, 0])
+        offset = np.array([x + 256 * (both % 128 // 16), y + 256 * (both % 16)])
+        in_sight = FakeHands(self.hands if both >= 128 else self.hands[:1])
+        found = in_sight.estimate(image, replace(region, center_px=tuple(region.center_px + offset)))
+        return replace(found, keypoints_px=found.keypoints_px - offset)
+
+
+def test_a_hand_that_is_found_again_is_followed_back_through_the_frames_in_which_it_was_missed(follow):
+    """For a third of a second, and in the arrays that were given out for these frames."""
+    hands, people, first = [], PeopleBuilder(), None
+    tracker = follow(hands)
+    tracker._network, image = InFrame(hands), numbered_pixels()
+    for k in range(25):
+        if k == 20:
+            hands.append(hand_at((300, 500)))
+        observations = tracker.step(image, [(0, person())], k / 30)
+        if observations[0][1].hands.any() and first is None:
+            first = k
+        people.add(k, k / 30, observations)
+    assert first >= 20
+    (track,) = people.build(1)
+    assert list(np.flatnonzero(track.hands[:, 0, 0, 2] > 0)) == list(range(first - 10, 25))
+    for row in track.hands[first - 10 :, 0]:
+        np.testing.assert_allclose(row[:, :2], hands[0].keypoints_px, atol=1e-3)
+    assert not track.hands[:, 1].any()
+
+
+def test_a_hand_is_not_followed_back_onto_one_that_is_another(follow):
+    """The left hand comes out from behind the right one, at which it would be seen before."""
+    hands = [hand_at((300, 500), left=0.5)]
+    tracker, found = follow(hands), []
+    tracker._network = InFrame(hands)
+    for k in range(4):
+        if k == 3:
+            hands.append(hand_at((300 + 0.4 * LENGTH, 500)))
+        wrists = person(left_wrist=(300 + 0.4 * LENGTH, 500), right_wrist=(300, 500))
+        ((_, o),) = tracker.step(numbered_pixels(late=k == 3), [(0, wrists)], k / 30)
+        found.append(o.hands)
+    assert [list(hand[:, 0, 2] > 0) for hand in found] == [*3 * [[False, True]], [True, True]]
 
 
 def test_hands_are_found_in_most_frames_of_a_gesturing_person(frames):

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One hand of one person in one frame: where it is looked for, and what is found there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...perception.hand_landmarks import HAND_POINTS, HandEstimate, HandNetwork
+from ...perception.hand_region import HAND_LENGTH_M, WRISTS
+from ...perception.observation import Observation
+from ...perception.region import Region
+from .hand_assignment import CERTAIN_PRESENCE, SAME_WRIST, Least, assigned, is_same_hand
+from .hand_color import is_like, palm_color
+
+FAR_MOTION = 0.35  # of the wrist in a frame, in hand lengths, from which the region that does not move is tried as well
+KEPT_REACH = 2.0  # of the part of a frame that is kept around the wrist, in hand lengths
+
+
+class Found(NamedTuple):
+    """An estimate that may be this hand, whether the network is sure of it, and the palm's colour."""
+
+    estimate: HandEstimate
+    is_sure: bool
+    color: NDArray[np.float64] | None
+
+    @property
+    def row(self) -> NDArray[np.float32]:
+        """Pixels, confidence and world landmarks (21, 6), finite; the confidence of a tentative hand is negative."""
+        out = np.empty((HAND_POINTS, 6))
+        out[:, :2], out[:, 3:] = self.estimate.keypoints_px, self.estimate.world_landmarks
+        out[:, 2] = self.estimate.presence if self.is_sure else -self.estimate.presence
+        return np.where(np.isfinite(out), out, 0.0).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Sight:
+    """Where one hand is looked for: ``scale`` in pixels per metre, ``side`` 0 left, 1 right, ``color`` of the palm.
+
+    ``image_rgb`` is the frame, or a part of it with the pixel ``offset_px`` at its top left; ``others`` are the other
+    hands that are known in it.
+    """
+
+    image_rgb: NDArray[np.uint8]
+    person: Observation
+    side: int
+    scale: float
+    color: NDArray[np.float64] | None
+    offset_px: tuple[int, int] = (0, 0)
+    others: Sequence[HandEstimate] = ()
+
+    def estimate(self, network: HandNetwork, region: Region) -> HandEstimate:
+        """Run the network in a region of the frame."""
+        x, y = np.subtract(region.center_px, self.offset_px).tolist()
+        found = network.estimate(self.image_rgb, replace(region, center_px=(x, y)))
+        return replace(found, keypoints_px=found.keypoints_px + self.offset_px, region=region)
+
+    def around_wrist(self) -> Sight:
+        """Return the same with a copy of the part of the frame in which a hand at the body's wrist can be."""
+        reach = KEPT_REACH * self.hand_px
+        height, width = self.image_rgb.shape[:2]
+        (x0, y0), (x1, y1) = np.floor(self.wrist_px - reach), np.ceil(self.wrist_px + reach)
+        x0, x1 = (int(np.clip(x, 0, width)) for x in (x0, x1))
+        y0, y1 = (int(np.clip(y, 0, height)) for y in (y0, y1))
+        return replace(self, image_rgb=self.image_rgb[y0:y1, x0:x1].copy(), offset_px=(x0, y0))
+
+    @property
+    def wrist_px(self) -> NDArray[np.float64]:
+        """The body's wrist (2,)."""
+        wrist: NDArray[np.float64] = self.person.keypoints_px[WRISTS[self.side]]
+        return wrist
+
+    @property
+    def wrist_confidence(self) -> float:
+        """Of the body's wrist."""
+        return float(self.person.keypoints_confidence[WRISTS[self.side]])
+
+    @property
+    def hand_px(self) -> float:
+        """Length of the hand in pixels."""
+        return HAND_LENGTH_M * self.scale
+
+    def judge(
+        self, estimate: HandEstimate, sure: Least, tentative: Least, same_wrist: float = SAME_WRIST
+    ) -> Found | None:
+        """Return an estimate if it may be this hand, see `assigned`; unless it is certain, in the hand's colour."""
+        if any(is_same_hand(estimate, other) for other in self.others):
+            return None
+        color = palm_color(self.image_rgb, estimate.keypoints_px - self.offset_px)
+        if estimate.presence < CERTAIN_PRESENCE and not is_like(color, self.color):
+            return None
+        for is_sure, least in ((True, sure), (False, tentative)):
+            hand = assigned(estimate, self.person, self.scale, self.side, least, same_wrist)
+            if hand is not None:
+                return Found(hand, is_sure, color)
+        return None
+
+
+def followed_regions(estimate: HandEstimate, motion_px: NDArray[np.float64], hand_px: float) -> list[Region]:
+    """Return where a hand that was seen a frame ago may be: moved with the body's wrist, and at its place of then."""
+    region = estimate.next_region
+    if np.linalg.norm(motion_px) < FAR_MOTION * hand_px:
+        return [region]
+    x, y = np.asarray(region.center_px) + motion_px
+    return [replace(region, center_px=(float(x), float(y))), region]
+
+
+def better(a: Found | None, b: Found | None) -> Found | None:
+    """Return the sure one of two findings, or the one with more presence."""
+    both = [found for found in (a, b) if found is not None]
+    return max(both, key=lambda found: (found.is_sure, found.estimate.presence), default=None)
