@@ -9,8 +9,8 @@ next frame is fitted to these places and to the floor (`Support`), from which th
 then bridge what smoothing has left between held feet and their places: they bend, and the rest of the body stays. Where
 a hold begins or ends, what it would change abruptly dies away (`transition`).
 
-A place can be wrong from the beginning, as after a cut of the footage, or where frames are rare and smoothing has not yet
-followed. The fits then stay at that place, too, and bend the body. So a foot that the image shows elsewhere for
+A place can be wrong from the beginning, as after a cut of the footage, or where frames are rare and smoothing has not
+yet followed. The fits then stay at that place, too, and bend the body. So a foot that the image shows elsewhere for
 `REFUTED_S` is let go, and not held for a while.
 
 The places drift towards where the fits have the points, because an error in where a hold began would otherwise tilt the
