@@ -79,8 +79,10 @@ def test_only_every_tenth_take_is_drawn(tmp_path, body):
         take_name=np.array([f"take {k}" for k in range(count)]),
         take_betas=np.zeros((count, body.P)),
         take_fps=np.full(count, 30.0),
+        take_subject=np.array([f"performer {k // 5}" for k in range(count)]),
     )
-    assert [(take.name, len(take.poses)) for take in held_out_takes(path)] == [("take 9", 2), ("take 19", 2)]
+    found = [(take.name, len(take.poses), take.performer) for take in held_out_takes(path)]
+    assert found == [("take 9", 2, "performer 1"), ("take 19", 2, "performer 3")]
 
 
 def test_feet_stand_where_the_sample_says(body):
