@@ -101,7 +101,11 @@ class Sight:
 
 
 def followed_regions(estimate: HandEstimate, motion_px: NDArray[np.float64], hand_px: float) -> list[Region]:
-    """Return where a hand that was seen a frame ago may be: moved with the body's wrist, and at its place of then."""
+    """Return where a hand that was seen a frame ago may be: moved with the body's wrist, and at its place of then.
+
+    :param motion_px: (2,) of the body's wrist.
+    :param hand_px: length of the hand.
+    """
     region = estimate.next_region
     if np.linalg.norm(motion_px) < FAR_MOTION * hand_px:
         return [region]
