@@ -72,8 +72,8 @@ def test_other_threads_run_while_the_kernels_do():
             ticks.append(None)
             time.sleep(0)
 
-    # Of a fit's milliseconds Python sees the first and last few microseconds: many ticks mean that the kernel let go. How
-    # many fits that takes, a busy computer decides, which may not let the thread run.
+    # Of a fit's milliseconds Python sees the first and last few microseconds: many ticks mean that the kernel let go.
+    # How many fits that takes, a busy computer decides, which may not let the thread run.
     counter = threading.Thread(target=count)
     counter.start()
     shared = fits = 0
