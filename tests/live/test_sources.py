@@ -199,6 +199,9 @@ def test_a_transport_stream_in_datagrams_is_read():
     following = []
     with sent_by_udp(encoded(moving(36))) as address:
         for picture in islice(open_source(address).pictures(FakeClock()), 5000):
+            if picture is None:  # damaged, and left out
+                following = []
+                continue
             k, off = which(picture.image_rgb)
             before = following if following and k == (following[-1] + 1) % 36 else []
             following = [*before, k] if off < 10 else []

@@ -42,6 +42,7 @@ class JsonServer:
         self._header, self._people = line(description(body)), people
         self._clients: list[_Client] = []
         self._lock = threading.Lock()
+        self._is_over = False
         try:
             family = socket.AF_INET6 if ":" in address else socket.AF_INET
             self._socket = socket.create_server((address, port), family=family)
@@ -78,6 +79,7 @@ class JsonServer:
             self._socket.shutdown(socket.SHUT_RDWR)
         self._socket.close()
         with self._lock:
+            self._is_over = True
             clients = list(self._clients)
         for client in clients:
             client.finish()
@@ -93,7 +95,7 @@ class JsonServer:
                 return
             with self._lock:
                 self._clients = [client for client in self._clients if not client.is_gone]
-                if len(self._clients) >= MOST_CLIENTS:
+                if self._is_over or len(self._clients) >= MOST_CLIENTS:
                     connection.close()
                     continue
                 self._clients.append(_Client(connection, self._header, _QUEUED_LINES * self._people))

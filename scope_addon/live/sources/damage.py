@@ -34,7 +34,11 @@ class Damage:
         self._numbers = FrameNumbers(extradata) if codec == "h264" else None
         self._hides_them = codec == "hevc"
         self._until_loss = 0  # packets; 0: none is announced
-        self._is_broken = self._has_key = self._has_begun = False
+        self._waiting = 0  # packets of which no picture has come yet
+        self._delay: int | None = (
+            None  # pictures that the decoder keeps, to put them in order; None before the first one
+        )
+        self._is_broken = self._has_key = False
 
     def see(self, packet: av.Packet[Any]) -> None:
         """Note a packet that is going to be decoded."""
@@ -70,8 +74,13 @@ class Damage:
 
     def is_hidden(self, frames: list[av.VideoFrame]) -> bool:
         """Return whether the decoder has left out a damaged picture itself, from what it gives for a packet."""
-        self._has_begun = self._has_begun or bool(frames)
-        return self._hides_them and self._has_begun and not frames
+        self._waiting += 1 - len(frames)
+        if frames and self._delay is None:
+            self._delay = self._waiting
+        if not self._hides_them or self._delay is None or self._waiting <= self._delay:
+            return False
+        self._waiting -= 1  # it never comes
+        return True
 
     def is_in(self, frame: av.VideoFrame) -> bool:
         """Return whether a picture is damaged."""

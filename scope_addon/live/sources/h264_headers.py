@@ -13,8 +13,11 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
+from itertools import islice
 
 _SLICE, _IDR_SLICE, _PARAMETERS = 1, 5, 7  # nal_unit_type
+_BUILT_ON = 0x60  # nal_ref_idc in the first byte, not zero where other pictures build on this one
+_MOST_UNITS = 64  # of a packet that are looked at; one has some parameters and slices
 _HEAD_BYTES = 64  # of a slice, more than what comes before its frame_num
 _RECENT, _MANY = 16, 8  # pictures, and gaps among them from which these are no losses
 _PARAMETER_BYTES = 1024  # of a sequence parameter set, which may have scaling lists
@@ -32,7 +35,7 @@ class FrameNumbers:
         self._length_bytes = 0  # of a NAL unit's length; 0: they begin with a start code instead
         self._bits: int | None = None  # of frame_num; None before they are known
         self._has_planes = self._may_miss = False
-        self._last: int | None = None
+        self._last: int | None = None  # of the last picture on which others build
         self._gaps: deque[bool] = deque(maxlen=_RECENT)  # of the last pictures
         data = extradata or b""
         if data[:1] == b"\x01" and len(data) > 6:
@@ -43,7 +46,7 @@ class FrameNumbers:
 
     def has_gap(self, data: bytes) -> bool:
         """Note a packet, and return whether pictures are missing before that of the packet."""
-        for unit in self._units(data):
+        for unit in islice(self._units(data), _MOST_UNITS):
             kind = unit[0] & 31
             if kind == _PARAMETERS:
                 self._read_parameters(unit)
@@ -53,7 +56,7 @@ class FrameNumbers:
 
     def has_picture(self, data: bytes) -> bool:
         """Return whether a packet contains a picture, or part of one, rather than parameters alone."""
-        return any(unit[0] & 31 in (_SLICE, _IDR_SLICE) for unit in self._units(data))
+        return any(unit[0] & 31 in (_SLICE, _IDR_SLICE) for unit in islice(self._units(data), _MOST_UNITS))
 
     def _is_gap(self, unit: bytes, *, begins: bool) -> bool:
         assert self._bits is not None
@@ -65,12 +68,16 @@ class FrameNumbers:
             number = bits.take(self._bits)
         except IndexError:
             return False
-        last, self._last = self._last, number
+        last, following = self._last, 1 << self._bits
+        is_gap = last is not None and number not in (last, (last + 1) % following)
+        if unit[0] & _BUILT_ON:
+            self._last = number
+        elif is_gap or last is None:
+            self._last = (number - 1) % following
         if begins or last is None or self._may_miss:
             return False
-        self._gaps.append(number not in (last, (last + 1) % (1 << self._bits)))
-        self._may_miss = len(self._gaps) == _RECENT and sum(self._gaps) >= _MANY
-        return self._gaps[-1] and not self._may_miss
+        self._gaps.append(is_gap)
+        return is_gap and not (len(self._gaps) == _RECENT and sum(self._gaps) >= _MANY)
 
     def _units(self, data: bytes) -> Iterator[bytes]:
         """Yield the beginnings of NAL units, up to the first slice at least."""
@@ -83,7 +90,8 @@ class FrameNumbers:
         at = data.find(b"\x00\x00\x01")
         while 0 <= at < len(data) - 3:
             following = data.find(b"\x00\x00\x01", at + 3)
-            yield data[at + 3 : following if following >= 0 else None]
+            if following != at + 3:  # an empty one has no type
+                yield data[at + 3 : following if following >= 0 else None]
             at = following
 
     def _read_parameters(self, unit: bytes) -> None:

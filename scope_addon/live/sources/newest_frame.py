@@ -26,7 +26,7 @@ from ...errors import VideoError
 from ..clock import Clock
 from .pace import Pace
 from .source import Picture, Source
-from .stream import STALLED_S
+from .stream import DAMAGED_S, STALLED_S
 
 _POLLING_INTERVAL_S = 0.2  # in which a waiting main thread reacts to Ctrl-C on every system
 SAME_SHAPE = 0.01  # relative difference of two pictures' width over height
@@ -169,8 +169,8 @@ class NewestFrame:
         if self.now() - self._damage_said_s > DAMAGE_SAID_S:
             self._damage_said_s = self.now()
             self._say(
-                f"data of {self._source.name} was lost or damaged on its way; its pictures are left out until the next"
-                " key frame"
+                f"data of {self._source.name} was lost or damaged on its way; damaged pictures are left out, for at"
+                f" most {DAMAGED_S:g} s each time"
             )
 
     def _say_pause(self, seconds: float) -> None:

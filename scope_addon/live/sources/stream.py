@@ -86,7 +86,8 @@ class StreamSource:
         import av
 
         has_begun, began_s = False, clock.now()
-        seen_s = intact_s = began_s
+        seen_s = began_s
+        damaged_s: float | None = None  # since when pictures have been damaged
         damage = Damage(stream.codec_context.name, stream.codec_context.extradata)
         held: list[av.VideoFrame] = []  # until it is known whether they are damaged
         for packet in container.demux(stream):
@@ -110,11 +111,11 @@ class StreamSource:
                 raise VideoError(f"{self.name} was interrupted (no picture could be decoded for {UNREADABLE_S:g} s)")
             for frame in frames:
                 is_intact = not damage.is_in(frame)
-                intact_s = now_s if is_intact else intact_s
+                damaged_s = None if is_intact else now_s if damaged_s is None else damaged_s
                 if is_intact and damage.is_doubtful:
                     held.append(frame)
                 else:
-                    yield frame if is_intact or now_s - intact_s > DAMAGED_S else None
+                    yield frame if damaged_s is None or now_s - damaged_s > DAMAGED_S else None
 
     def _open(self) -> InputContainer:
         import av

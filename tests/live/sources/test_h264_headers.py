@@ -54,7 +54,7 @@ def test_a_complete_stream_has_no_gaps_and_losses_are_found(way):
     numbers = FrameNumbers(extradata)
     assert not any(numbers.has_gap(packet) for packet in packets)
     assert all(numbers.has_picture(packet) for packet in packets)
-    for lost in (20, 21, 120, 215):
+    for lost in (20, 21, 22, 23, 120, 215):
         numbers = FrameNumbers(extradata)
         left = [(k, numbers.has_gap(packet)) for k, packet in enumerate(packets) if k != lost]
         expected = [lost + 1] if way == "in mp4" or is_built_on(packets[lost]) else []
@@ -68,6 +68,20 @@ def test_numbers_that_always_have_gaps_tell_nothing():
     gaps = [numbers.has_gap(packet) for packet in packets[::2]]
     assert all(gaps[1:16])
     assert not any(gaps[17:])
+
+
+def test_losses_are_found_again_after_many_in_a_row():
+    packets, extradata = packets_of("baseline")
+    numbers = FrameNumbers(extradata)
+    for packet in packets[:40:2]:
+        numbers.has_gap(packet)
+    left = [numbers.has_gap(packet) for k, packet in enumerate(packets[40:]) if k != 100]
+    assert [k for k, is_gap in enumerate(left) if is_gap] == [100]
+
+
+def test_an_empty_unit_is_no_error():
+    assert not FrameNumbers().has_gap(b"\0\0\1\0\0\1")
+    assert not FrameNumbers(b"\0\0\1\0\0\1").has_picture(b"\0\0\1\0\0\1\x09")
 
 
 def test_parameters_alone_are_no_picture():

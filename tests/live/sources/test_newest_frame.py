@@ -127,7 +127,7 @@ def test_damaged_frames_are_counted_and_said_not_again_and_again():
         reader._thread.join(300)
     assert (reader.received, reader.damaged) == (6, 4)
     assert [picture.timestamp_s for picture in taken] == pytest.approx([0.0, 0.1, 0.2, 0.6, 0.7, 0.9])
-    said = [text for text in said if text.startswith("data of fake was lost or damaged on its way; its pictures")]
+    said = [text for text in said if text.startswith("data of fake was lost or damaged on its way; damaged pictures")]
     assert len(said) == 2
 
 
