@@ -60,8 +60,10 @@ class PinnedSource(PinnedWheel):
 
     def command(self, folder: Path) -> list[str]:
         """Return the command that downloads the archive into the folder, in which it is run."""
-        options = ("--no-deps", "--no-binary=:all:", "--no-build-isolation")
-        return [sys.executable, "-m", "pip", "download", "--quiet", *options, "-d", str(folder), self.requirement]
+        wanted = folder / f"{self.file_name}.txt"  # pip compares the checksum before it runs the archive's code
+        wanted.write_text(f"{self.requirement} --hash=sha256:{self.sha256}\n", "utf-8")
+        options = ("--no-deps", "--no-binary=:all:", "--no-build-isolation", "--require-hashes", "-r", str(wanted))
+        return [sys.executable, "-m", "pip", "download", "--quiet", "-d", str(folder), *options]
 
 
 class PinnedDebian(PinnedWheel):

@@ -111,7 +111,7 @@ if __name__ == "__main__":
         of_new = arguments.numbers or list(range(SCENES_OF_NEW_PERFORMERS))
         try:
             render_missing(load_body("scope"), of_new, arguments.threads, NEW_PERFORMERS)
-        except subprocess.CalledProcessError:  # it has said why: no connection to a package index, or no apt-get
+        except subprocess.CalledProcessError:  # it has said why, as where there is no connection or no apt-get
             if arguments.new_performers:
                 raise
             print("the scenes of new performers were left out", file=sys.stderr, flush=True)

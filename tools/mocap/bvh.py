@@ -39,8 +39,10 @@ def joint_positions(text: str, name: str = "motion") -> tuple[dict[str, NDArray[
         joints, words = _hierarchy(head), motion.split()
         count, seconds = int(words[1]), float(words[4])
         values = np.array(words[5:], float).reshape(-1, sum(len(joint.channels) for joint in joints))
-        if len(values) < count:  # some programs write a frame more than they say
+        if not 0 < count <= len(values):  # some programs write a frame more than they say
             raise ValueError(f"{len(values)} of {count} frames")
+        if not 1e-4 <= seconds <= 1.0:
+            raise ValueError(f"frames of {seconds} s")
         return _positions(joints, values[:count]), 1.0 / seconds
     except (ValueError, IndexError, KeyError, ZeroDivisionError) as error:
         raise MotionFileError(f"{name}: malformed .bvh file ({error})") from error

@@ -83,7 +83,7 @@ def climb(values: Points, name: str, performer: str) -> Take:
 
     :raises MotionFileError: when there are other joints.
     """
-    if values.ndim != 3 or values.shape[1] < len(CLIMB_JOINTS):
+    if values.ndim != 3 or values.shape[1] < len(CLIMB_JOINTS) or values.shape[2] != 3:
         raise MotionFileError(f"{name}: joints must be (T, 53, 3), but got {values.shape}")
     at = {joint: values[:, k].astype(float) @ R_Y_UP_Z_UP.T for k, joint in enumerate(CLIMB_JOINTS)}
     joints = {"pelvis": at["Hips"], "chest": at["Spine1"], "neck": at["Neck"], "head_end": at["Head"]}
@@ -120,10 +120,10 @@ def gaits(archive: Path) -> list[Take]:
     takes = []
     with tarfile.open(archive) as files:
         for name, performer in (("parkinson", "patient_a"), ("stroke", "patient_b")):
-            member = next(m for m in files.getnames() if m.endswith(f"/example_{name}.json"))
-            stream = files.extractfile(member)
+            member = next((m for m in files.getmembers() if m.name.endswith(f"/example_{name}.json")), None)
+            stream = files.extractfile(member) if member is not None else None
             if stream is None:
-                raise MotionFileError(f"{archive}: {member} is not a file")
+                raise MotionFileError(f"{archive} has no file example_{name}.json")
             takes.append(gait(json.load(stream), performer))
     return takes
 
@@ -154,8 +154,9 @@ def gait(data: dict[str, object], performer: str) -> Take:
         joints[f"{side}_foot_end"], joints[f"{side}_collar"] = joints[f"{side}_toe"], joints[f"{side}_shoulder"]
         joints[f"{side}_elbow"] = joints[f"{side}_shoulder"] + UPPER_ARM_M * down
         joints[f"{side}_wrist"] = joints[f"{side}_elbow"] + FOREARM_M * down
-    fps = data["fps"]
-    assert isinstance(fps, float | int)
+    fps = data.get("fps")
+    if not isinstance(fps, float | int) or not 1.0 <= fps <= 1e4:
+        raise MotionFileError(f"{performer}: malformed rate ({fps})")
     return take_from_joints(f"{performer}_0", performer, "gaits", float(fps), joints)
 
 
@@ -166,7 +167,10 @@ def debian_texts(package: Path, ends: tuple[str, ...]) -> dict[str, str]:
     """
     data, at = package.read_bytes(), 8
     while at < len(data):  # an ar archive: 60 bytes of header before each member, members at even offsets
-        name, size = data[at : at + 16].decode("ascii", "replace").strip(" /"), int(data[at + 48 : at + 58])
+        name, digits = data[at : at + 16].decode("ascii", "replace").strip(" /"), data[at + 48 : at + 58].strip()
+        if not digits.isdigit():
+            raise MotionFileError(f"{package}: malformed header of {name!r}")
+        size = int(digits)
         if name == "data.tar.xz":
             with tarfile.open(fileobj=io.BytesIO(lzma.decompress(data[at + 60 : at + 60 + size]))) as files:
                 found = {end: _text(files, end) for end in ends}

@@ -61,6 +61,7 @@ def solve(shot: Shot, tracks: Iterable[Track], progress: Progress, heights_m: Se
         people.append(FittedPerson(track, raw, body))
         placed.append(place(shot, track, finished, smoothing=False))
         del raw, finished
+    del known, track, body
     return_freed_memory()
     world = find_world(placed, shot.lines)
     motions: list[Motion] = []

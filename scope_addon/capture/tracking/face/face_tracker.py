@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...perception.execution import Execution
+from ...perception.face.expression_network import ExpressionNetwork
 from ...perception.face.face_landmarks import FaceEstimate, FaceNetwork
 from ...perception.face.face_record import record
 from ...perception.face.face_region import HEAD, region_from_body
 from ...perception.observation import Observation
 from ...perception.region import Region
-from ...perception.sessions import network_path
 from ..frame_clock import PATIENCE_S, is_search_due
 
 PRESENCE_THRESHOLD = 0.5
@@ -42,12 +42,13 @@ class FaceTracker:
     :param threads: of the network.
     :param folder: of the networks; None: the built-in ones.
     :param execution: what the network runs on.
-    :raises SetupError: the network is missing.
+    :raises SetupError: a network is missing.
+    :raises ModelFileError: a network is damaged.
     """
 
     def __init__(self, threads: int, folder: Path | None = None, execution: Execution | None = None) -> None:
         self._network = FaceNetwork(threads, folder, execution)
-        network_path("face_expression")  # `with_expressions` may need it: if it is missing, say so now
+        ExpressionNetwork(folder)  # `with_expressions` may need it: if it is missing or damaged, say so now
         self._faces: dict[int, _Face] = {}
 
     def another(self) -> FaceTracker:

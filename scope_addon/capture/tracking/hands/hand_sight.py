@@ -3,8 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -51,7 +50,7 @@ class Sight:
     scale: float
     color: NDArray[np.float64] | None
     offset_px: tuple[int, int] = (0, 0)
-    others: Sequence[HandEstimate] = ()
+    others: list[HandEstimate] = field(default_factory=list)
 
     def estimate(self, network: HandNetwork, region: Region) -> HandEstimate:
         """Run the network in a region of the frame."""

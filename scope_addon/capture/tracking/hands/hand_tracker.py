@@ -41,6 +41,9 @@ SEARCH_SCALE = 2.3  # side of the square in which a palm is searched, in sides o
 CLOSER_SCALE, SMALLER_SCALE = 1.5, 0.7  # of the square and the region of a second look, likewise
 UNSURE_SCORE = 0.2  # of a palm in a second look
 MOST_PALMS = 2
+MOST_MISSED = (
+    11  # frames that are kept of a hand, a third of a second at 30 frames/s: each is a copy of its surroundings
+)
 SMALLEST_HAND_PX = 12.0
 LARGER_SCALE = 1.3  # of a region by the body in which a hand is looked for that was found later
 _MARGIN = 0.3  # of a region's side, by which its centre may be outside the image
@@ -127,11 +130,12 @@ class HandTracker:
             hand = found[key]
             missed = [m for m in before.get(key, []) if now - m.time_s <= SUPPORT_S + 0.005]
             if hand is not None and hand.is_sure:
-                self._look_back(missed, hand, sight)
+                elsewhere = [m for other, those in (before | self._missed).items() if other != key for m in those]
+                self._look_back(missed, hand, sight, elsewhere)
             elif sight.hand_px >= SMALLEST_HAND_PX:
                 others = [h.estimate for other, h in found.items() if other != key and h is not None]
                 seen = replace(sight.around_wrist(), others=others)
-                self._missed[key] = [*missed, _Missed(now, seen, hand, rows[key[0]][key[1]])]
+                self._missed[key] = [*missed, _Missed(now, seen, hand, rows[key[0]][key[1]])][-MOST_MISSED:]
         return [(n, replace(o, hands=rows[n])) for n, o in observations]
 
     def _beside(self, sight: Sight, others: Sequence[HandEstimate]) -> Found | None:
@@ -139,15 +143,21 @@ class HandTracker:
         predicted = region_from_body(sight.person.keypoints_px, sight.scale, sight.side)
         if sight.hand_px < SMALLEST_HAND_PX or not _is_in_image(predicted, sight.image_rgb):
             return None
-        return self._search(replace(sight, others=others), predicted, look_again=False)
+        return self._search(replace(sight, others=list(others)), predicted, look_again=False)
 
-    def _look_back(self, missed: Sequence[_Missed], hand: Found, sight: Sight) -> None:
-        """Follow a hand that was surely found back through the frames before in which it was not; see `_Missed`."""
+    def _look_back(self, missed: Sequence[_Missed], hand: Found, sight: Sight, elsewhere: Sequence[_Missed]) -> None:
+        """Follow a hand that was surely found back through the frames before in which it was not; see `_Missed`.
+
+        :param elsewhere: frames in which other hands were missed, which are told of this one.
+        """
         for each in reversed(missed):
             found = each.found or self._found_back(each.sight, hand, sight)
             if found is None:
                 return
             each.row[:] = found.row
+            for other in elsewhere:
+                if other.time_s == each.time_s:
+                    other.sight.others.append(found.estimate)
             hand, sight = found, each.sight
 
     def _found_back(self, sight: Sight, later: Found, later_sight: Sight) -> Found | None:
