@@ -77,6 +77,7 @@ def test_a_signal_whose_exception_is_lost_ends_a_live_capture_too(tmp_path, monk
         return step(people, frame)
 
     monkeypatch.setattr(LivePeople, "step", losing)
+    monkeypatch.setattr(signals, "received", [])
     assert main(["live", str(SAMPLE), "--record", str(tmp_path / "take.npz"), "--json"]) == 0
     report = json.loads(capfd.readouterr().out)
     assert (report["stopped"], report["poses"], report["outputs"]) == (True, 1, [str(tmp_path / "take.npz")])

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Frames and clips on several threads: the same results in the same order, and really at the same time."""
 
+import sys
 import threading
 import time
 
@@ -74,13 +75,19 @@ def test_other_threads_run_while_the_kernels_do():
 
     # Of a fit's milliseconds Python sees the first and last few microseconds: many ticks mean that the kernel let go.
     # How many fits that takes, a busy computer decides, which may not let the thread run.
+    # Meanwhile, Python does not switch threads by itself.
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1000.0)
     counter = threading.Thread(target=count)
     counter.start()
     shared = fits = 0
-    while shared < 10 and fits < 20_000:
-        before = len(ticks)
-        solver.fit(m)
-        shared, fits = shared + (len(ticks) - before >= 5), fits + 1
-    done.set()
-    counter.join()
+    try:
+        while shared < 10 and fits < 20_000:
+            before = len(ticks)
+            solver.fit(m)
+            shared, fits = shared + (len(ticks) - before >= 5), fits + 1
+    finally:
+        sys.setswitchinterval(interval)
+        done.set()
+        counter.join()
     assert shared == 10
