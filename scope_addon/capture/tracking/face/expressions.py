@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Expressions and gaze of a face over a clip, from its landmarks: fitted, or a network's where it was seen briefly.
 
-They are found when all frames have been observed: only then it is known whether a face was seen for long enough, and
-the expression network, which few captures need, is not even opened for the others.
+They are found when all frames have been observed: only then is it known whether a face was seen for long enough, and
+the expression network, which few captures need, does not run for the others.
 """
 
 from __future__ import annotations
