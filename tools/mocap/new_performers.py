@@ -20,6 +20,7 @@ import json
 import lzma
 import tarfile
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -88,18 +89,27 @@ def climb(values: Points, name: str, performer: str) -> Take:
     at = {joint: values[:, k].astype(float) @ R_Y_UP_Z_UP.T for k, joint in enumerate(CLIMB_JOINTS)}
     joints = {"pelvis": at["Hips"], "chest": at["Spine1"], "neck": at["Neck"], "head_end": at["Head"]}
     joints["pelvis_up"] = at["Spine"] - 0.5 * (at["LeftUpLeg"] + at["RightUpLeg"])
-    ours = {"collar": "Shoulder", "shoulder": "Arm", "elbow": "ForeArm", "wrist": "Hand"}
-    ours |= {"hip": "UpLeg", "knee": "Leg", "ankle": "Foot", "foot_end": "ToeBase"}
-    joints |= {f"{side}_{joint}": at[f"{side.title()}{theirs}"] for side in SIDES for joint, theirs in ours.items()}
+    limbs = {"collar": "Shoulder", "shoulder": "Arm", "elbow": "ForeArm", "wrist": "Hand"}
+    joints |= on_both_sides(at, limbs | {"hip": "UpLeg", "knee": "Leg", "ankle": "Foot", "foot_end": "ToeBase"})
     return take_from_joints(name, performer, "climbs", CLIMBS_FPS, joints)
+
+
+def on_both_sides(at: Mapping[str, Points], limbs: Mapping[str, str]) -> dict[str, Points]:
+    """Return the joints (T, 3) of both sides by our names.
+
+    :param at: (T, 3) each, by the source's names, which begin with ``Left`` or ``Right``.
+    :param limbs: the source's names without the side, by ours.
+    """
+    return {f"{side}_{ours}": at[f"{side.title()}{theirs}"] for side in SIDES for ours, theirs in limbs.items()}
 
 
 def models(package: Path) -> list[Take]:
     """Read fencer and boxer out of the Debian package."""
     texts = debian_texts(package, ("CSM/ThomasFechten.csm", "BVH/Boxing_Toes.bvh"))
     fencing, boxing = texts.values()
-    joints, head = markers.joint_centres(markers.parse_csm(fencing, "fencing")[0])
-    fencer = take_from_joints("fencer_0", "fencer", "markers", markers.parse_csm(fencing)[1], joints, head)
+    at, fps = markers.parse_csm(fencing, "fencing")
+    joints, head = markers.joint_centres(at)
+    fencer = take_from_joints("fencer_0", "fencer", "markers", fps, joints, head)
     return [fencer, boxer(boxing)]
 
 
@@ -109,9 +119,8 @@ def boxer(text: str) -> Take:
     at = {joint: 0.01 * position for joint, position in found.items()}
     joints = {"pelvis": at["Hips"], "chest": at["Chest"], "neck": at["Neck"], "head_end": at["Head_end"]}
     joints["pelvis_up"] = at["Ab"] - at["Hips"]
-    ours = {"collar": "Shoulder", "shoulder": "Shoulder", "elbow": "Elbow", "wrist": "Wrist"}
-    ours |= {"hip": "Hip", "knee": "Knee", "ankle": "Ankle", "foot_end": "Toes"}
-    joints |= {f"{side}_{joint}": at[f"{side.title()}{theirs}"] for side in SIDES for joint, theirs in ours.items()}
+    limbs = {"collar": "Shoulder", "shoulder": "Shoulder", "elbow": "Elbow", "wrist": "Wrist"}
+    joints |= on_both_sides(at, limbs | {"hip": "Hip", "knee": "Knee", "ankle": "Ankle", "foot_end": "Toes"})
     return take_from_joints("boxer_0", "boxer", "bvh", fps, joints)
 
 

@@ -41,7 +41,7 @@ Frame Time: 0.01
 
 
 def standing(knee_deg: float = 0.0, elbow_deg: float = 0.0, turn_deg: float = 0.0) -> dict[str, np.ndarray]:
-    """Return the joints of somebody who stands facing +z with hanging arms, bends knees and elbows, and turns."""
+    """Return the joints of somebody who faces +z with arms hanging, knees and elbows bent, and the body turned."""
     joints: dict[str, Any] = {
         "pelvis": [0.0, 1.0, 0.0],
         "chest": [0.0, 1.2, 0.0],
@@ -110,8 +110,9 @@ def test_the_body_stands_as_the_joints_do(body):
 
 
 def made_markers() -> dict[str, np.ndarray]:
-    """Return Plug-in Gait markers, millimetres, z up, of somebody who stands facing -y, left to +x, with outstretched
-    arms. In the frame with y up, left is +z, and ahead is -x.
+    """Return Plug-in Gait markers, millimetres, z up, of somebody with outstretched arms.
+
+    The person faces -y, with the left side towards +x. In the frame with y up, left is +z, and ahead is -x.
     """
     at = {"C7": [0, 80, 1430], "T10": [0, 100, 1200], "CLAV": [0, -60, 1420], "STRN": [0, -90, 1250]}
     for s, x in (("L", 1), ("R", -1)):
