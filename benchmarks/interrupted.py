@@ -133,15 +133,16 @@ class Run:
 
 
 def memory_mib(group: int) -> float:
-    """Return the resident memory of all processes of a group, MiB; pages that they share count for each of them."""
-    pages = 0
+    """Return the memory that all processes of a group take, MiB: a page that n of them share counts 1/n for each (PSS)."""
+    kib = 0
     for folder in Path("/proc").glob("[0-9]*"):
         try:
             if os.getpgid(int(folder.name)) == group:
-                pages += int((folder / "statm").read_text("utf-8").split()[1])
+                lines = (folder / "smaps_rollup").read_text("utf-8").splitlines()
+                kib += next((int(line.split()[1]) for line in lines if line.startswith("Pss:")), 0)
         except OSError:  # it has ended
             continue
-    return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
+    return kib / 2**10
 
 
 def _children_s() -> float:
