@@ -39,6 +39,15 @@ def test_actions_of_others_are_pinned_by_hash() -> None:
     assert [action for action in used if not re.fullmatch(r"[\w-]+/[\w-]+@[0-9a-f]{40}", action)] == []
 
 
+def test_no_job_leaves_the_token_in_the_checkout() -> None:
+    """Actions of others, tests and packages run in it, and nothing is pushed."""
+    jobs = package("yaml").safe_load((ROOT / ".github" / "workflows" / "ci.yml").read_text("utf-8"))["jobs"]
+    steps = [step for job in jobs.values() for step in job["steps"]]
+    checkouts = [step["with"] for step in steps if step.get("uses", "").startswith("actions/checkout@")]
+    assert len(checkouts) == len(jobs)
+    assert [settings for settings in checkouts if settings.get("persist-credentials") is not False] == []
+
+
 @pytest.mark.skipif(os.name == "nt", reason="the first bash there may be that of another Linux")
 def test_every_step_is_a_script_that_bash_can_read() -> None:
     """With the values of the matrix filled in."""
