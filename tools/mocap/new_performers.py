@@ -129,11 +129,7 @@ def gaits(archive: Path) -> list[Take]:
     takes = []
     with tarfile.open(archive) as files:
         for name, performer in (("parkinson", "patient_a"), ("stroke", "patient_b")):
-            member = next((m for m in files.getmembers() if m.name.endswith(f"/example_{name}.json")), None)
-            stream = files.extractfile(member) if member is not None else None
-            if stream is None:
-                raise MotionFileError(f"{archive} has no file example_{name}.json")
-            takes.append(gait(json.load(stream), performer))
+            takes.append(gait(json.loads(_content(files, f"/example_{name}.json")), performer))
     return takes
 
 
@@ -182,17 +178,17 @@ def debian_texts(package: Path, ends: tuple[str, ...]) -> dict[str, str]:
         size = int(digits)
         if name == "data.tar.xz":
             with tarfile.open(fileobj=io.BytesIO(lzma.decompress(data[at + 60 : at + 60 + size]))) as files:
-                found = {end: _text(files, end) for end in ends}
-            return found
+                return {end: _content(files, end).decode("latin-1") for end in ends}
         at += 60 + size + size % 2
     raise MotionFileError(f"{package}: has no data.tar.xz")
 
 
-def _text(files: tarfile.TarFile, end: str) -> str:
+def _content(files: tarfile.TarFile, end: str) -> bytes:
+    """Return the first file whose path ends so."""
     for member in files.getmembers():
         stream = files.extractfile(member) if member.name.endswith(end) else None
         if stream is not None:
-            return stream.read().decode("latin-1")
+            return stream.read()
     raise MotionFileError(f"the package has no file …{end}")
 
 

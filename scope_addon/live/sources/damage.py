@@ -35,9 +35,8 @@ class Damage:
         self._hides_them = codec == "hevc"
         self._until_loss = 0  # packets; 0: none is announced
         self._waiting = 0  # packets of which no picture has come yet
-        self._delay: int | None = (
-            None  # pictures that the decoder keeps, to put them in order; None before the first one
-        )
+        # Pictures that the decoder keeps, to put them in order; None before the first one.
+        self._delay: int | None = None
         self._is_broken = self._has_key = False
 
     def see(self, packet: av.Packet[Any]) -> None:

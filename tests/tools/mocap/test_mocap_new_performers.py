@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import io
+import json
 import tarfile
 from pathlib import Path
 from typing import Any
@@ -153,8 +154,8 @@ def test_climbs_with_other_joints_are_refused():
         new_performers.climb(np.zeros((5, 22, 3)), "climber_a_0", "climber_a")
 
 
-@pytest.mark.parametrize("up", [1, 2])
-def test_gaits_stand_upright_whichever_axis_is_up(up):
+def made_gait(up: int) -> dict:
+    """Return a gait's file, of somebody who stands; ``up`` is the axis that is up."""
     joints = standing()
     order = {"hip": "hip", "knee": "knee", "ankle": "ankle", "heel": "ankle", "toe": "foot_end", "shoulder": "shoulder"}
     frames = []
@@ -162,11 +163,31 @@ def test_gaits_stand_upright_whichever_axis_is_up(up):
         place = {f"{s}_{j}": joints[f"{s}_{ours}"][t] * 1000 for s in ("left", "right") for j, ours in order.items()}
         turned = {key: value if up == 1 else value[[2, 0, 1]] for key, value in place.items()}
         frames.append({"landmark_positions": {key: value.tolist() for key, value in turned.items()}})
-    take = new_performers.gait({"angle_frames": frames, "fps": 30.0}, "patient_a")
+    return {"angle_frames": frames, "fps": 30.0}
+
+
+@pytest.mark.parametrize("up", [1, 2])
+def test_gaits_stand_upright_whichever_axis_is_up(up):
+    take = new_performers.gait(made_gait(up), "patient_a")
     assert take.joint("neck")[0, 1] - take.joint("pelvis")[0, 1] == pytest.approx(0.52, abs=0.01)
     assert take.joint("left_hip")[0, 0] > take.joint("right_hip")[0, 0]
     with pytest.raises(MotionFileError, match="malformed"):
         new_performers.gait({"angle_frames": [{"landmark_positions": {}}], "fps": 30.0}, "patient_a")
+
+
+def test_gaits_are_read_out_of_a_source_archive(tmp_path: Path):
+    archive = tmp_path / "made-1.0.tar.gz"
+    with tarfile.open(archive, "w:gz") as files:
+        for name in ("parkinson", "stroke"):
+            content = json.dumps(made_gait(1)).encode()
+            info = tarfile.TarInfo(f"made-1.0/data/example_{name}.json")
+            info.size = len(content)
+            files.addfile(info, io.BytesIO(content))
+    assert [take.subject for take in new_performers.gaits(archive)] == ["patient_a", "patient_b"]
+    with tarfile.open(archive, "w:gz"):
+        pass
+    with pytest.raises(MotionFileError, match="example_parkinson"):
+        new_performers.gaits(archive)
 
 
 def test_files_are_read_out_of_a_debian_package(tmp_path: Path):

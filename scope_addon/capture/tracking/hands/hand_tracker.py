@@ -41,9 +41,8 @@ SEARCH_SCALE = 2.3  # side of the square in which a palm is searched, in sides o
 CLOSER_SCALE, SMALLER_SCALE = 1.5, 0.7  # of the square and the region of a second look, likewise
 UNSURE_SCORE = 0.2  # of a palm in a second look
 MOST_PALMS = 2
-MOST_MISSED = (
-    11  # frames that are kept of a hand, a third of a second at 30 frames/s: each is a copy of its surroundings
-)
+# Frames that are kept of a hand, a third of a second at 30 frames/s: each is a copy of its surroundings.
+MOST_MISSED = 11
 SMALLEST_HAND_PX = 12.0
 LARGER_SCALE = 1.3  # of a region by the body in which a hand is looked for that was found later
 _MARGIN = 0.3  # of a region's side, by which its centre may be outside the image
