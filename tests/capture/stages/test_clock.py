@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Seconds of stages by a clock that the test turns, and times of footage as text."""
+
+from __future__ import annotations
+
+import pytest
+from scope.scope_addon.capture.stages import clock
+from scope.scope_addon.capture.stages.clock import StageClock, at_times
+
+
+def test_stages_add_up_also_when_they_fail(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [100.0]
+    monkeypatch.setattr(clock.time, "perf_counter", lambda: now[0])
+    found = StageClock()
+    for name, seconds in (("decode", 1.0), ("solver", 2.0), ("decode", 0.5)):
+        with found.stage(name):
+            now[0] += seconds
+        now[0] += 40.0  # between them
+    with pytest.raises(ZeroDivisionError), found.stage("solver"):
+        now[0] += 0.5
+        _ = 1 / 0
+    assert found.seconds == {"decode": 1.5, "solver": 2.5}
+    assert found.rates(30) == {"decode": 20.0, "solver": 12.0, "total": 7.5}
+
+
+def test_a_stage_that_took_no_time_has_a_rate() -> None:
+    found = StageClock()
+    found.seconds["decode"] = 0.0
+    assert found.rates(3)["decode"] > 1e6
+
+
+@pytest.mark.parametrize(
+    ("times_s", "text"),
+    [
+        ([2.04], "at 2.0 s"),
+        ([2.0, 4.12], "at 2.0 s and at 4.1 s"),
+        ([1.0, 2.0, 3.0, 4.0], "at 1.0 s, at 2.0 s, at 3.0 s and at 4.0 s"),
+        ([1.0, 2.0, 3.0, 4.0, 5.0, 6.0], "at 1.0 s, at 2.0 s, at 3.0 s, at 4.0 s and 2 more times"),
+    ],
+)
+def test_times_are_listed_up_to_the_fourth(times_s: list[float], text: str) -> None:
+    assert at_times(times_s) == text

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whose hand it is: places, sizes and sides that fit a body, and one hand that was found twice."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.perception.hand_landmarks import HandEstimate
+from scope.scope_addon.capture.perception.hand_region import HAND_LENGTH_M, WRISTS
+from scope.scope_addon.capture.perception.observation import Observation
+from scope.scope_addon.capture.perception.region import Region
+from scope.scope_addon.capture.tracking.hands.hand_assignment import (
+    CERTAIN_PRESENCE,
+    MAX_SIZE,
+    PREDICTED,
+    SECOND,
+    assigned,
+    is_same_hand,
+    without_duplicates,
+)
+
+SCALE = 500.0  # pixels per metre
+LENGTH = HAND_LENGTH_M * SCALE
+WRIST_PX = {0: (300.0, 500.0), 1: (700.0, 500.0)}
+FINGERS = [(x, y) for x in (-0.25, -0.12, 0.0, 0.12, 0.24) for y in (-0.5, -0.65, -0.8, -1.0)]
+SHAPE = np.array([(0.0, 0.0), *FINGERS])  # in hand lengths, fingers up
+
+
+def hand(side: int, *, away: float = 0.0, size: float = 1.0, left: float | None = None, presence: float = 0.9):
+    """Return the hand at a wrist, or some hand lengths beside it, with keypoints that agree with those in space."""
+    at = np.array(WRIST_PX[side]) + [away * LENGTH, 0.0]
+    world = np.pad(SHAPE * HAND_LENGTH_M, ((0, 0), (0, 1)))
+    world[:, 2] = np.linspace(0.0, 0.02, len(world))
+    left = (0.95 if side == 0 else 0.05) if left is None else left
+    return HandEstimate(size * LENGTH * SHAPE + at, world, presence, left, Region((at[0], at[1]), 2 * LENGTH, 0.0))
+
+
+def person(sure: float = 1.0, right_wrist_px: tuple[float, float] = WRIST_PX[1]) -> Observation:
+    points, confidence = np.zeros((33, 2)), np.ones(33)
+    points[WRISTS[0]], points[WRISTS[1]] = WRIST_PX[0], right_wrist_px
+    confidence[WRISTS] = sure
+    return Observation(points, confidence, np.zeros((33, 3)), 1.0, Region((500.0, 500.0), 900.0, 0.0), False)
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_a_hand_at_its_wrist_is_this_one(side: int) -> None:
+    found = hand(side)
+    assert assigned(found, person(), SCALE, side) is found
+    assert assigned(found, person(), SCALE, 1 - side) is None
+
+
+def test_a_hand_beside_the_wrist_is_this_one_only_as_far_as_the_wrist_is_unsure() -> None:
+    for away, is_sure, is_unsure in ((0.6, True, True), (0.9, False, True), (1.4, False, False)):
+        found = hand(0, away=away)
+        assert (assigned(found, person(), SCALE, 0) is not None) == is_sure
+        assert (assigned(found, person(sure=0.3), SCALE, 0) is not None) == is_unsure
+
+
+def test_a_hand_has_a_size_that_fits_the_body() -> None:
+    sizes = {size: assigned(hand(0, size=size), person(), SCALE, 0) is not None for size in (0.2, 0.3, 1.9, 2.1)}
+    assert sizes == {0.2: False, 0.3: True, 1.9: True, 2.1: False}
+    assert MAX_SIZE == 2.0
+    assert assigned(hand(0, size=0.3), person(), SCALE, 0, SECOND) is None  # a second look finds small ones in skin
+
+
+def test_more_presence_is_required_elsewhere_than_at_the_wrist() -> None:
+    for presence, away, is_found in ((0.7, 0.0, True), (0.7, 0.5, False), (0.85, 0.5, True), (0.5, 0.0, False)):
+        found = assigned(hand(0, away=away, presence=presence), person(), SCALE, 0, PREDICTED)
+        assert (found is not None) == is_found
+    assert assigned(hand(0, presence=np.nan), person(), SCALE, 0) is None
+
+
+def test_an_imagined_hand_contradicts_itself() -> None:
+    found = hand(0)
+    odd = replace(found, world_landmarks=found.world_landmarks[::-1] * [1.0, -1.0, 1.0])
+    assert odd.disagreement > 0.3 > found.disagreement
+    assert assigned(odd, person(), SCALE, 0) is None
+    assert assigned(replace(odd, presence=CERTAIN_PRESENCE), person(), SCALE, 0) is not None
+
+
+def test_a_hand_of_the_wrong_side_at_this_wrist_alone_is_mirrored_in_depth() -> None:
+    """A left hand looks like a right one with reversed depth."""
+    found = hand(0, left=0.05)
+    mirrored = assigned(found, person(), SCALE, 0)
+    assert mirrored is not None
+    np.testing.assert_array_equal(mirrored.world_landmarks, found.world_landmarks * [1, 1, -1])
+    np.testing.assert_array_equal(mirrored.keypoints_px, found.keypoints_px)
+    assert mirrored.left == pytest.approx(0.95)
+    assert assigned(hand(0, left=0.05, away=0.4), person(), SCALE, 0) is None
+    assert assigned(hand(0, left=0.05, away=0.4), person(), SCALE, 0, same_wrist=0.5) is not None
+    near = WRIST_PX[0][0] + 0.8 * LENGTH, WRIST_PX[0][1]
+    assert assigned(found, person(right_wrist_px=near), SCALE, 0) is None  # it may be the other hand
+    assert assigned(found, person(sure=0.3), SCALE, 0) is None
+
+
+def test_a_hand_that_was_found_twice_goes_to_the_nearest_wrist() -> None:
+    left, right, again = hand(0), hand(1), hand(1, away=0.1, left=0.5)
+    people = {4: person(), 7: person()}
+    found = without_duplicates({(4, 0): left, (4, 1): again, (7, 1): right, (7, 0): None}, people)
+    assert found == {(4, 0): left, (4, 1): None, (7, 1): right, (7, 0): None}
+
+
+def test_hands_that_touch_are_two_where_the_network_is_sure_of_their_sides() -> None:
+    a = hand(0, left=0.95)
+    for left, away, is_same in ((0.5, 0.2, True), (0.05, 0.2, False), (0.05, 0.1, True), (0.5, 0.5, False)):
+        assert is_same_hand(a, hand(0, left=left, away=away)) == is_same
+    assert not is_same_hand(a, None)

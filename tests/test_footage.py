@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Footage by its names: sequences of pictures, addresses, and names that are no text."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+
+import pytest
+from scope.scope_addon.footage import (
+    is_sequence,
+    is_url,
+    is_utf8,
+    json_text,
+    numbered,
+    numbered_from,
+    pictures_in,
+    sequence_pattern,
+    shown,
+)
+
+
+def made(folder: Path, *names: str) -> Path:
+    for name in names:
+        (folder / name).write_bytes(b"")
+    return folder
+
+
+def names(pictures: list[Path]) -> list[str]:
+    return [picture.name for picture in pictures]
+
+
+def test_pictures_come_in_natural_order_without_anything_else(tmp_path: Path) -> None:
+    made(tmp_path, "f10.png", "f9.png", "f010.PNG", "notes.txt", ".hidden.png", "clip.mp4")
+    (tmp_path / "folder.png").mkdir()
+    found = names(pictures_in(tmp_path))
+    assert found[0] == "f9.png"
+    assert sorted(found[1:]) == ["f010.PNG", "f10.png"]
+
+
+def test_a_sequence_differs_in_the_last_number_only(tmp_path: Path) -> None:
+    assert sequence_pattern(Path("take2_v3_0041.PNG")) == "take2_v3_#.png"
+    assert is_sequence([Path("a1.png"), Path("a2.png")])
+    assert not is_sequence([Path("a1.png")])
+    assert not is_sequence([Path("a1.png"), Path("b2.png")])
+    assert not is_sequence([Path("a1.png"), Path("a2.jpg")])
+
+
+def test_a_picture_is_continued_by_those_with_larger_numbers(tmp_path: Path) -> None:
+    made(tmp_path, "a_8.png", "a_9.png", "a_010.png", "a_11.jpg", "a_12.png.txt", "b_12.png", "a_7.png", "still.png")
+    assert names(numbered_from(tmp_path / "a_8.png")) == ["a_8.png", "a_9.png", "a_010.png"]
+    assert names(numbered(tmp_path, "a_", ".png")) == ["a_7.png", "a_8.png", "a_9.png", "a_010.png"]
+    assert numbered(tmp_path, "a_", ".png.txt") == []  # no picture
+    assert numbered(tmp_path, "a.", ".png") == []  # no pattern
+    assert numbered_from(tmp_path / "still.png") == []
+
+
+def test_addresses_are_told_from_paths() -> None:
+    assert [is_url(text) for text in ("s3://bucket/clips", "https://a/b.mp4", "clips/a.mp4", "C:\\a.mp4", 3, None)] == [
+        True, True, False, False, False, False
+    ]  # fmt: skip
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="file names are Unicode on this system")
+def test_names_that_are_no_text_can_be_shown() -> None:
+    odd = os.fsdecode(b"caf\xe9.mp4")
+    assert (is_utf8(odd), is_utf8("café.mp4")) == (False, True)
+    assert shown(odd) == "caf\N{REPLACEMENT CHARACTER}.mp4"
+    assert shown(Path("café.mp4")) == "café.mp4"
+    text = json_text({odd: [odd, "é", 1.5, None]})
+    assert text.isascii()
+    assert json.loads(text) == {shown(odd): [shown(odd), "é", 1.5, None]}
