@@ -9,7 +9,8 @@ import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -128,6 +129,28 @@ def networks() -> Path:
     if absent:
         missing(f"{NETWORKS_FOLDER} lacks {', '.join(absent)}; python -m scope.tools.convert_networks builds them")
     return NETWORKS_FOLDER
+
+
+@pytest.fixture(scope="session", autouse=True)
+def sessions_are_opened_once() -> Iterator[None]:
+    """Keep the sessions on Scope's own networks: they have no state, and a capture opens four.
+
+    They have one thread each: more would wait for each other while other tests need the cores.
+    """
+    if os.environ.get("NOKEEP"):
+        yield
+        return
+    from scope.scope_addon.capture.perception import sessions
+
+    open_on = sessions._open_on
+    keep = cache(open_on)
+
+    def opened(name: str, path: Path, threads: int) -> object:
+        return keep(name, path, 1) if path.parent == sessions.NETWORKS_FOLDER else open_on(name, path, threads)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sessions, "_open_on", opened)
+        yield
 
 
 @pytest.fixture(scope="session")

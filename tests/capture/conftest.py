@@ -4,33 +4,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from functools import cache
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception import sessions
-from scope.scope_addon.capture.perception.sessions import NETWORKS_FOLDER
 
 Frames = Callable[..., Iterator[np.ndarray]]
-
-
-@pytest.fixture(scope="session", autouse=True)
-def sessions_are_opened_once() -> Iterator[None]:
-    """Keep the sessions on Scope's own networks: they have no state, and a capture opens four.
-
-    They have one thread each: more would wait for each other while other tests need the cores.
-    """
-    open_on = sessions._open_on
-    keep = cache(open_on)
-
-    def opened(name: str, path: Path, threads: int) -> object:
-        return keep(name, path, 1) if path.parent == NETWORKS_FOLDER else open_on(name, path, threads)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sessions, "_open_on", opened)
-        yield
 
 
 @pytest.fixture(scope="session")
