@@ -6,7 +6,9 @@ from __future__ import annotations
 import os
 import signal
 import threading
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -53,6 +55,13 @@ print(json.dumps({"frames": 3 * count, "outputs": outputs, "warnings": []}))
 """
 
 
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[Any]:
+    """Start two workers, which live as long as the tests that kill none of them."""
+    with started(n_workers=2, processes=True) as cluster:
+        yield cluster
+
+
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     clips = tmp_path / "clips"
@@ -85,22 +94,21 @@ def test_the_last_part_of_a_clip_is_followed_by_its_capture(tmp_path: Path) -> N
     assert divisions.close(last) == (0, {})
 
 
-def test_a_long_clip_is_captured_in_windows_and_counted_once(folder: Path) -> None:
+def test_a_long_clip_is_captured_in_windows_and_counted_once(cluster: Any, folder: Path) -> None:
     (folder / "a.mp4").write_text("7")
     (folder / "b.mp4").write_text("1")
-    with started(n_workers=2, processes=True) as cluster:
-        status, report = run(cluster, folder, program=CLIP)
-        assert status == 0
-        assert result(folder, "a") == "0 1 2 3 4 5 6 "
-        assert result(folder, "b") == "whole"
-        assert files(folder) == ["a.glb", "a.npz", "b.glb", "b.npz", "scope-batch.json"]  # and no window
-        long, short = report["files"]
-        assert (long["windows"], "windows" in short) == (7, False)
-        rows = report["workers"]
-        assert sum(row["windows"] for row in rows) == 7
-        assert sum(row["frames"] for row in rows) == report["throughput"]["frames"] == 24
-        assert sum(row["clips"] for row in rows) == 2
-        status, report = run(cluster, folder, program=CLIP)
+    status, report = run(cluster, folder, program=CLIP)
+    assert status == 0
+    assert result(folder, "a") == "0 1 2 3 4 5 6 "
+    assert result(folder, "b") == "whole"
+    assert files(folder) == ["a.glb", "a.npz", "b.glb", "b.npz", "scope-batch.json"]  # and no window
+    long, short = report["files"]
+    assert (long["windows"], "windows" in short) == (7, False)
+    rows = report["workers"]
+    assert sum(row["windows"] for row in rows) == 7
+    assert sum(row["frames"] for row in rows) == report["throughput"]["frames"] == 24
+    assert sum(row["clips"] for row in rows) == 2
+    status, report = run(cluster, folder, program=CLIP)
     assert report["counts"]["skipped"] == 2
 
 
@@ -129,26 +137,24 @@ def test_the_windows_of_a_killed_worker_are_observed_by_another(folder: Path) ->
     assert any("a.mp4 (windows" in event["event"] for event in report["log"])
 
 
-def test_a_part_that_fails_is_left_to_the_capture_of_the_clip(folder: Path) -> None:
+def test_a_part_that_fails_is_left_to_the_capture_of_the_clip(cluster: Any, folder: Path) -> None:
     clip = folder / "a.mp4"
     clip.write_text("4")
     clip.with_suffix(".fails").write_text("1")
-    with started(n_workers=2, processes=True) as cluster:
-        status, report = run(cluster, folder, program=CLIP)
+    status, report = run(cluster, folder, program=CLIP)
     assert status == 0
     assert result(folder, "a") == "0 2 3 "  # which then observes the missing window itself
     assert sum(row["frames"] for row in report["workers"]) == 12
 
 
-def test_real_windows_of_two_workers_give_the_result_in_one_piece(folder: Path, networks: Path) -> None:
+def test_real_windows_of_two_workers_give_the_result_in_one_piece(cluster: Any, folder: Path, networks: Path) -> None:
     (folder / "clip.mp4").write_bytes(SAMPLE.read_bytes())
     options = ["--quality", "fast", "--end", "1.6", "--window-seconds", "0.5", "--formats", "npz"]
     whole = folder.parent / "whole.npz"
     capture = ["capture", str(SAMPLE), "-o", str(whole), *options[:-2], "--threads", "1"]
     assert main(capture) == 0
-    with started(n_workers=2, processes=True) as cluster:
-        argv = ["batch", str(folder), "--out", str(folder.parent / "out"), *options]
-        assert main([*argv, "--scheduler", cluster.scheduler_address], program=PROGRAM) == 0
+    argv = ["batch", str(folder), "--out", str(folder.parent / "out"), *options]
+    assert main([*argv, "--scheduler", cluster.scheduler_address], program=PROGRAM) == 0
     with np.load(whole) as one, np.load(folder.parent / "out" / "clip.npz") as other:
         assert set(one.files) == set(other.files)
         different = [name for name in one.files if not np.array_equal(one[name], other[name])]
