@@ -309,7 +309,7 @@ def test_real_worker_on_a_picture(footage):
     assert np.allclose(got.trans, expected.trans, atol=1e-4)
 
 
-def test_real_worker_uses_a_calibration_and_no_internet_connection(footage, tmp_path):
+def test_real_worker_uses_a_calibration_and_no_internet_connection(fake_worker, footage, tmp_path):
     import cv2
 
     height, width = cv2.imread(str(footage)).shape[:2]
@@ -327,28 +327,20 @@ def test_real_worker_uses_a_calibration_and_no_internet_connection(footage, tmp_
         "sys.argv = sys.argv[1:]\n"
         "runpy.run_path(sys.argv[0], run_name='__main__')\n"
     )
-    found = []
-    for k1 in (dist[0], -0.1):  # a changed file needs another capture
-        lens.write_text(json.dumps({"intrinsics": K, "dist": [k1, *dist[1:]]}))
-        run_to_end(CaptureJob(scene, python=[sys.executable, str(guard)]))
-        assert scene.scope.result.people == 1
-        found.append(stored_motion(next(o for o in captures()[-1].objects if "scope_source" in o)))
-    assert np.allclose(found[0].intrinsics, K)
-    assert np.allclose(found[0].dist, dist)
-    assert found[1].dist[0] == -0.1
+    lens.write_text(json.dumps({"intrinsics": K, "dist": dist}))
+    run_to_end(CaptureJob(scene, python=[sys.executable, str(guard)]))
+    assert scene.scope.result.people == 1
+    found = stored_motion(next(o for o in captures()[-1].objects if "scope_source" in o))
+    assert np.allclose(found.intrinsics, K)
+    assert np.allclose(found.dist, dist)
     assert scene.scope.result.pixel_aspect[:] == pytest.approx((720 / 700, 1.0))
     camera = next(o for o in captures()[0].objects if o.type == "CAMERA")
     assert camera.data.background_images[0].clip_user.use_render_undistorted
-
-
-def test_real_worker_reports_that_no_person_was_found(tmp_path):
-    import cv2
-
-    cv2.imwrite(str(tmp_path / "wall.png"), np.full((240, 320, 3), 128, np.uint8))
-    scene = bpy.context.scene
-    scene.scope.footage, scene.scope.quality = str(tmp_path / "wall.png"), "FAST"
-    with pytest.raises(RuntimeError, match="No person was found in wall.png"):
-        bpy.ops.scope.capture()
+    fake_worker("send('error', message='asked again')")
+    run_to_end(CaptureJob(scene))
+    lens.write_text(json.dumps({"intrinsics": K, "dist": [-0.1, *dist[1:]]}))
+    with pytest.raises(WorkerFailedError, match="asked again"):
+        run_to_end(CaptureJob(scene))
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="file names are Unicode on this system")
