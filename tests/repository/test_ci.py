@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -26,6 +27,34 @@ def test_every_script_of_the_local_run_is_in_the_hosted_one() -> None:
     local = scripts((ROOT / ".ci" / "run").read_text("utf-8"))
     assert {"./scripts/check", "./scripts/test", "./scripts/gate", "./scripts/fuzz"} <= local
     assert local - PREPARES == scripts((ROOT / ".github" / "workflows" / "ci.yml").read_text("utf-8"))
+
+
+def run_locally(folder: Path, failing: str) -> subprocess.CompletedProcess[str]:
+    """Run `.ci/run` where every script only says its name and arguments, and one of them fails."""
+    for name in scripts((ROOT / ".ci" / "run").read_text("utf-8")):
+        (folder / "scripts").mkdir(exist_ok=True)
+        script = folder / name
+        status = 3 if script.name == failing else 0
+        script.write_text(f'#!/bin/sh\necho "$0 $*," && exit {status}\n')
+        script.chmod(0o755)
+    (folder / ".ci").mkdir()
+    shutil.copy2(ROOT / ".ci" / "run", folder / ".ci" / "run")
+    return subprocess.run([folder / ".ci" / "run"], capture_output=True, text=True, check=False, timeout=60)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the first bash there may be that of another Linux")
+@pytest.mark.parametrize("failing", ["debian", "build", "fuzz", "blender"])
+def test_a_failure_fails_the_local_run_and_is_shown_also_in_the_background(tmp_path: Path, failing: str) -> None:
+    done = run_locally(tmp_path, failing)
+    assert done.returncode == 3
+    assert f"./scripts/{failing} " in done.stdout
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the first bash there may be that of another Linux")
+def test_the_local_run_builds_every_zip_before_the_extension_is_tested(tmp_path: Path) -> None:
+    done = run_locally(tmp_path, "")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.endswith("./scripts/build ,\n./scripts/blender ,\n")  # no platform: all of them
 
 
 def test_all_that_is_run_exists() -> None:
