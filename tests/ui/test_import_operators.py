@@ -30,6 +30,9 @@ def test_a_motion_of_another_tool_is_built_and_listed(amass):
     assert (result.collection.name, result.people, result.frames) == ("walk_poses", 1, len(MOTION))
     assert "Scope's own body" in result.warnings[0].text
     assert "keeps its 24 frames/s, the motion has 120" in result.warnings[1].text
+    button = bpy.ops.scope.match_frame_rate.get_rna_type().name
+    assert button in result.warnings[1].text
+    assert "footage" not in result.warnings[1].text.lower()  # there is none
     armature = captured_armature(bpy.context)
     assert scene.render.fps == 24
     assert armature.animation_data.action.frame_range[1] == pytest.approx(1 + 24 * (len(MOTION) - 1) / 120, abs=0.01)

@@ -183,8 +183,8 @@ def rate_warnings(motion: Motion, options: BuildOptions, result: BuildResult, wh
     if options.frame_rate != "keep" or len(motion) < 2 or abs(rate - result.frame_rate) <= 0.01:
         return []
     return [
-        f"{RATE_WARNING} {result.frame_rate:.5g} frames/s, the {what} has {rate:.5g}: keys lie between frames; Set "
-        "Frame Rate from Footage changes the scene's rate and moves them"
+        f"{RATE_WARNING} {result.frame_rate:.5g} frames/s, the {what} has {rate:.5g}: keys lie between frames; Match "
+        "Frame Rate changes the scene's rate and moves them"
     ]
 
 

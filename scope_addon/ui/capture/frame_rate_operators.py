@@ -37,17 +37,17 @@ def keyed_for(scene: bpy.types.Scene) -> float:
 
 
 class SCOPE_OT_match_frame_rate(ReportingOperator):
-    """Set the scene to the footage's frame rate. Captures keep their speed, other animation keeps its frames"""
+    """Set the scene to the motion's frame rate. Captures keep their speed, other animation keeps its frames"""
 
     bl_idname = "scope.match_frame_rate"
-    bl_label = "Set Frame Rate from Footage"
+    bl_label = "Match Frame Rate"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Require a capture with a frame rate, and that everything to move is stored in this file."""
         scene = context.scene
         if scene.scope.result.footage_rate <= 0:
-            cls.poll_message_set(tip_("The scene contains no captured video"))
+            cls.poll_message_set(tip_("The scene contains no captured video or imported motion"))
             return False
         linked = next((block for block in [scene, *captured_people(context)] if _library(block)), None)
         library = _library(linked) if linked is not None else None
