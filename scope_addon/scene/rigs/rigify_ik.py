@@ -9,6 +9,7 @@ rolled to put both bones of the limb into the hinge's plane. The pole target lie
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import bpy
@@ -49,7 +50,7 @@ def ik_keys(rig: bpy.types.Object, keys: list[BoneKeys]) -> list[BoneKeys]:
     for limb in limbs:
         for name in limb.at_rest:
             rig.pose.bones[name].matrix_basis = Matrix()
-    for t in range(count):
+    for t in _shown_at_the_mouse(count):
         for key in keys:
             rig.pose.bones[key.bone].matrix_basis = key.basis(t)
         bpy.context.view_layer.update()
@@ -63,6 +64,18 @@ def ik_keys(rig: bpy.types.Object, keys: list[BoneKeys]) -> list[BoneKeys]:
     found = [_keys_of(bone, matrices) for bone, matrices in bases.items()]
     still = [bone for limb in limbs for bone in limb.at_rest]
     return found + [_keys_of(bone, [Matrix()] * count) for bone in still]
+
+
+def _shown_at_the_mouse(count: int) -> Iterator[int]:
+    """Yield the frames, and show them at the mouse: Blender evaluates the whole rig twice for each, seconds in all."""
+    manager = bpy.context.window_manager
+    manager.progress_begin(0, count)
+    try:
+        for t in range(count):
+            manager.progress_update(t)
+            yield t
+    finally:
+        manager.progress_end()
 
 
 def _limbs(rig: bpy.types.Object) -> list[_Limb]:
