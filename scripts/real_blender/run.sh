@@ -35,7 +35,7 @@ on_screen() { # a command, with a separate virtual screen
     return $status
 }
 
-in_window() { # a script of this folder in a Blender
+in_window() { # a script below this folder in a Blender
     local script=$1
     shift
     on_screen blender --python-exit-code 1 --python "parts/$script" -- "$@"
@@ -47,16 +47,17 @@ case $1 in
         blender --background --command extension install-file --repo user_default --enable scope.zip >"$log" 2>&1 ||
             { cat "$log" >&2; exit 1; }
         ;;
-    panel) in_window panel.py "/scope/$2" /scope/out ;;
-    undo | trouble | stored | pins | live | details | reload) in_window "$1.py" /scope/clips/walk.mp4 /scope/out ;;
-    startup) on_screen python3 parts/startup.py 15 ;;
-    walk) on_screen python3 parts/walk.py "$3" ;;
+    panel) in_window window/panel.py "/scope/$2" /scope/out ;;
+    undo | trouble | stored | pins | details | reload) in_window "window/$1.py" /scope/clips/walk.mp4 /scope/out ;;
+    live) in_window live/live.py /scope/clips/walk.mp4 /scope/out ;;
+    startup) on_screen python3 parts/window/startup.py 15 ;;
+    walk) on_screen python3 parts/walk/walk.py "$3" ;;
     first) # on a computer without the cache of earlier captures
         status=0
-        blender --background --python-exit-code 1 --python parts/first_capture.py >"$log" 2>&1 || status=$?
+        blender --background --python-exit-code 1 --python parts/without_window/first_capture.py >"$log" 2>&1 || status=$?
         [ $status = 0 ] || tail -n 40 "$log" >&2
         exit $status
         ;;
-    headless) python3 parts/headless.py 2>&1 | tee "$log" >&2 ;;
+    headless) python3 parts/without_window/headless.py 2>&1 | tee "$log" >&2 ;;
     *) echo "run.sh: no part '$1'; there are panel, headless, undo, trouble, stored, pins, details, live, first, startup, reload and walk" >&2; exit 2 ;;
 esac

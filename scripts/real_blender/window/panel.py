@@ -18,8 +18,8 @@ import bpy
 import numpy as np
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 
-sys.path.insert(0, str(Path(__file__).parent))
-from session import FOOTAGE, OUT, addon, inventory, invoke, key, picture, press, run, show_tab, until, viewport
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from shared.session import FOOTAGE, OUT, addon, inventory, invoke, key, picture, press, run, show_tab, until, viewport
 
 # Where the panel's buttons are on a screen of 1600 x 1000, in pixels from its top left.
 FAST_BUTTON, CAPTURE_BUTTON = (1086, 151), (1174, 183)

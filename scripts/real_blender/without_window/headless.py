@@ -137,7 +137,8 @@ def folder() -> None:
 
 def languages() -> None:
     """Show texts of the interface in each of its languages."""
-    subprocess.run(["blender", "--background", "--python-exit-code", "1", "--python", "parts/languages.py"], check=True)
+    script = "parts/without_window/languages.py"
+    subprocess.run(["blender", "--background", "--python-exit-code", "1", "--python", script], check=True)
 
 
 if __name__ == "__main__":

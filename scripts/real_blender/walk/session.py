@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The random walk inside Blender: one step per timer, so that the window is redrawn and other timers run in between.
 
-Usage: ``blender --python walk_session.py -- VIDEO FOLDER SEED STEPS``; ``walk.py`` starts it. A traceback that is
+Usage: ``blender --python session.py -- VIDEO FOLDER SEED STEPS``; ``walk.py`` starts it. A traceback that is
 printed or raised between two steps is a failure of the step before. An operator that reports an error is none, unless
 it has changed the file. PyPI's bpy, which has no window and cannot undo, takes the same steps:
-``python walk_session.py -- VIDEO FOLDER SEED STEPS``.
+``python session.py -- VIDEO FOLDER SEED STEPS``.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from pathlib import Path
 
 import bpy
 
-sys.path.insert(0, str(Path(__file__).parent))
-import walk_steps
-from file_state import State, differences, identities, state
-from session import ARGUMENTS, OUT, show_tab
-from walk_file_steps import Step
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from shared.file_state import State, differences, identities, state
+from shared.session import ARGUMENTS, OUT, show_tab
+from walk import steps as walk_steps
+from walk.file_steps import Step
 
 SEED, COUNT = int(ARGUMENTS[2]), int(ARGUMENTS[3])
 PAUSE_S = 0.02

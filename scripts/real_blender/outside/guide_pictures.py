@@ -17,7 +17,7 @@ PICTURES = {
 }
 _SCALE = 0.6  # of wide pictures
 _MOST_BYTES = 60_000
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 made = []
 for name, (screenshot, (left, top, right, bottom)) in PICTURES.items():

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import bpy
 from bpy_extras.view3d_utils import location_3d_to_region_2d
-from session import addon, invoke, use, viewport
-from walk_file_steps import FileSteps, Step
+from shared.session import addon, invoke, use, viewport
+from walk.file_steps import FileSteps, Step
 
 TOOLS = ("pin_limb", "upright_line")
 # Cancelled or not, these change what is not undone: the view, the frame.

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import bpy
 
-sys.path.insert(0, str(Path(__file__).parent))
-from session import FOOTAGE, OUT, addon, captured, inventory, invoke, run, show_tab, until, use, viewport
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from shared.session import FOOTAGE, OUT, addon, captured, inventory, invoke, run, show_tab, until, use, viewport
 
 SAVED = OUT / "reload.blend"
 report: dict[str, int] = {"files_opened": 0}

@@ -17,8 +17,8 @@ from pathlib import Path
 
 import bpy
 
-sys.path.insert(0, str(Path(__file__).parent))
-from session import FOOTAGE, OUT, addon, captured, inventory, invoke, picture, run, show_tab, until, use, workers
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from shared.session import FOOTAGE, OUT, addon, captured, inventory, invoke, picture, run, show_tab, until, use, workers
 
 SMALL = Path("/scope/small")  # a separate disk
 report: dict[str, str] = {}
@@ -141,7 +141,7 @@ def fill(leave: int = 0) -> None:
 def closed(how: str) -> Iterator[float]:
     """Close another Blender, or let it crash, while it captures."""
     shutil.rmtree(cache().root / "captures", ignore_errors=True)
-    script = str(Path(__file__).with_name("closed.py"))
+    script = str(Path(__file__).resolve().parents[1] / "shared" / "closed.py")
     other = subprocess.Popen(["blender", "--python", script, "--", FOOTAGE, str(OUT), how])
     yield from until(lambda: other.poll() is not None, 300, "the other Blender to end")
     assert (OUT / f"closed_{how}").read_text("utf-8") == "capturing", "the other Blender did not capture"

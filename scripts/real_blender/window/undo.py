@@ -16,9 +16,9 @@ from pathlib import Path
 import bpy
 from mathutils import Vector
 
-sys.path.insert(0, str(Path(__file__).parent))
-from file_state import State, identities, same, state
-from session import FOOTAGE, OUT, addon, captured, invoke, picture, run, show_tab, until, use, viewport
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from shared.file_state import State, identities, same, state
+from shared.session import FOOTAGE, OUT, addon, captured, invoke, picture, run, show_tab, until, use, viewport
 
 # Bones of the face by which a rig like MPFB's is known, and the tip of each, from the head's bone; metres.
 FACE = {

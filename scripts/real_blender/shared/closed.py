@@ -15,8 +15,8 @@ from pathlib import Path
 
 import bpy
 
-sys.path.insert(0, str(Path(__file__).parent))
-from session import ARGUMENTS, FOOTAGE, OUT, addon, invoke, run, until, use
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from shared.session import ARGUMENTS, FOOTAGE, OUT, addon, invoke, run, until, use
 
 
 def footage() -> Iterator[float]:

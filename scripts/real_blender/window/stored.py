@@ -15,8 +15,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parent))
-from session import OUT, invoke, picture, run, show_tab, use
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from shared.session import OUT, invoke, picture, run, show_tab, use
 
 SAVED, WALK, JUMP = OUT / "stored.blend", OUT / "walk.npz", OUT / "jump_poses.npz"
 report: dict[str, list[str]] = {"worked": []}

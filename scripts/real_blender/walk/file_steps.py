@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
-from session import invoke, use
+from shared.session import invoke, use
 
 _BLOCKS = ("objects", "meshes", "armatures", "actions", "cameras", "collections", "scenes")
 _DATA = (*_BLOCKS, "materials", "images", "texts")

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from live_session import captures, connection_closed, moving, plays, report, start, state
-from session import OUT, addon, captured, invoke, picture, until, use
+from live.session import captures, connection_closed, moving, plays, report, start, state
+from shared.session import OUT, addon, captured, invoke, picture, until, use
 
 SAVED, TAKE = OUT / "live.blend", OUT / "live_take.blend"
 RECORDED_S = 5.0

@@ -16,8 +16,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parent))
-from session import FOOTAGE, OUT, captured, invoke, key, picture, press, run, show_tab, until, use, viewport
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from shared.session import FOOTAGE, OUT, captured, invoke, key, picture, press, run, show_tab, until, use, viewport
 
 # On a screen of 1600 x 1000, of which a laptop of 1366 x 768 shows the first 768 pixels, with two captures in the list.
 FBX_BUTTON, RAW_BUTTON, FOLD = (1090, 453), (1085, 622), 768

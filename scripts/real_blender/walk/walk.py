@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run a random walk over the extension's operators in a Blender with a window, and judge how it ended.
 
-Usage, in the Debian with its own Python, in /scope: ``walk.py SEED [STEPS]``. ``walk_session.py`` takes the steps. It
+Usage, in the Debian with its own Python, in /scope: ``walk.py SEED [STEPS]``. ``session.py`` takes the steps. It
 logs each one before it is taken, so that a crash or a hang names its step; the same seed takes the same steps.
 """
 
@@ -27,7 +27,7 @@ def main(seed: int, steps: int) -> int:
     FOLDER.mkdir(parents=True)
     log, printed = FOLDER / "steps.log", FOLDER / "printed.log"
     print(f"walk: seed {seed}, {steps} steps", flush=True)
-    script = str(Path(__file__).with_name("walk_session.py"))
+    script = str(Path(__file__).with_name("session.py"))
     command = ["blender", "--enable-event-simulate", "--window-geometry", "0", "0", *_WINDOW]
     command += ["--python-exit-code", "1", "--python", script, "--"]
     command += ["/scope/clips/walk.mp4", str(FOLDER), str(seed), str(steps)]

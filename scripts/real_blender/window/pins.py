@@ -19,8 +19,22 @@ import bpy
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Vector
 
-sys.path.insert(0, str(Path(__file__).parent))
-from session import FOOTAGE, OUT, captured, click, invoke, key, picture, press, run, show_tab, until, use, viewport
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from shared.session import (
+    FOOTAGE,
+    OUT,
+    captured,
+    click,
+    invoke,
+    key,
+    picture,
+    press,
+    run,
+    show_tab,
+    until,
+    use,
+    viewport,
+)
 
 # On a screen of 1600 x 1000, in the comparison of the only capture.
 DOCUMENTATION, RAW, NORMAL, STRONG = (1222, 97), (1086, 529), (1165, 529), (1244, 529)

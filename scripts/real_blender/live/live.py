@@ -18,8 +18,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parent))
-from live_session import (
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from live.session import (
     ADDRESS,
     GONE_S,
     begin,
@@ -32,8 +32,8 @@ from live_session import (
     start,
     state,
 )
-from live_takes import SAVED, captured_again, kept_take, recorded
-from session import FOOTAGE, OUT, inventory, invoke, key, picture, run, show_tab, until, use, viewport, workers
+from live.takes import SAVED, captured_again, kept_take, recorded
+from shared.session import FOOTAGE, OUT, inventory, invoke, key, picture, run, show_tab, until, use, viewport, workers
 
 OVER_PANEL = (1174, 300)
 MEASURED_S = 2.0
@@ -159,7 +159,7 @@ def cancelled(before: dict) -> Iterator[float]:
 
 def closed(how: str) -> Iterator[float]:
     """Close another Blender, or let it crash, while live: the camera is left at once, and no worker runs."""
-    script = str(Path(__file__).with_name("closed.py"))
+    script = str(Path(__file__).resolve().parents[1] / "shared" / "closed.py")
     other = subprocess.Popen(["blender", "--python", script, "--", FOOTAGE, str(OUT), how, ADDRESS])
     yield from until(lambda: other.poll() is not None, 400, "the other Blender to end")
     ended = time.monotonic()

@@ -10,7 +10,7 @@ from collections.abc import Generator, Iterator
 from pathlib import Path
 
 import bpy
-from session import OUT, addon, until, use
+from shared.session import OUT, addon, until, use
 
 ADDRESS, PORT = "http://127.0.0.1:8099/video", "8099"
 CLIENTS = OUT / "live_clients.txt"
