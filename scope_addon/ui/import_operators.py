@@ -114,7 +114,7 @@ def _build(scene: bpy.types.Scene, path: Path, imported: Imported, options: Buil
     """Build one motion and store it and its result with the scene."""
     from ..scene.build import build_scene
     from ..scene.packed_motion import pack_motion
-    from .capture.capture_job import rate_warnings
+    from .capture.frame_rate_operators import rate_warnings
     from .capture.result import show_result
 
     motion, footage = imported.motion, None
@@ -125,7 +125,8 @@ def _build(scene: bpy.types.Scene, path: Path, imported: Imported, options: Buil
     options = replace(options, name=path.stem, with_camera=options.with_camera and seen)
     result = build_scene([motion], imported.body, footage, options)
     pack_motion(result.people[0].armature, motion.to_bytes())
-    warnings = [*imported.notes, *rate_warnings(motion, options, result, "motion"), *result.warnings]
+    rate = float(motion.mocap_framerate) if options.frame_rate == "keep" and len(motion) > 1 else 0.0
+    warnings = [*imported.notes, *rate_warnings(result.frame_rate, rate, "motion"), *result.warnings]
     report = {"warnings": warnings}
     show_result(result.collection.scope_result, str(footage or ""), report, result)
     scene.scope.capture = result.collection

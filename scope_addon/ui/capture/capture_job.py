@@ -32,7 +32,7 @@ from ...scene.packed_motion import pack_motion
 from ..declared_properties import option_values
 from ..preferences import cache, preferences
 from . import preview_picture
-from .frame_rate_operators import RATE_WARNING
+from .frame_rate_operators import rate_warnings
 from .result import show_result
 
 _ENDING_S = 5.0  # after which a worker that has sent its result is killed
@@ -167,25 +167,12 @@ def build_capture(
     with window_shows(scene):
         result = build_scene(motions, load_body(body), footage if shows_footage else None, options)
     store_motions(result, [content for _, content in contents], body)
-    warnings += rate_warnings(motions[0], options, result)
+    if options.frame_rate == "keep" and len(motions[0]) > 1:
+        warnings += rate_warnings(result.frame_rate, float(motions[0].mocap_framerate))
     report = dict(report, warnings=[shown(warning) for warning in warnings + result.warnings])
     show_result(result.collection.scope_result, footage, report, result)
     scene.scope.capture = result.collection
     return result
-
-
-def rate_warnings(motion: Motion, options: BuildOptions, result: BuildResult, what: str = "footage") -> list[str]:
-    """Return the warning that a motion's keys lie between the frames of a scene that keeps its frame rate, if so.
-
-    :param what: has the other rate.
-    """
-    rate = float(motion.mocap_framerate)
-    if options.frame_rate != "keep" or len(motion) < 2 or abs(rate - result.frame_rate) <= 0.01:
-        return []
-    return [
-        f"{RATE_WARNING} {result.frame_rate:.5g} frames/s, the {what} has {rate:.5g}: keys lie between frames; Match "
-        "Frame Rate changes the scene's rate and moves them"
-    ]
 
 
 def capture_request(scene: bpy.types.Scene) -> JobRequest:

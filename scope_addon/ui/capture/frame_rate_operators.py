@@ -15,8 +15,26 @@ if TYPE_CHECKING:
     from ...motion import Motion
 
 _SAME = 0.01  # frames per second
+_WHOLE = 1e-3  # how far the keys' distance may be from whole frames
 RATE_WARNING = "the scene keeps its"  # how the warnings begin that another frame rate settles
 DRIFT_WARNING = "the background image drifts"
+
+
+def rate_warnings(scene_rate: float, rate: float, what: str = "footage") -> list[str]:
+    """Return the warning that a scene keeps another frame rate than a motion has, and where its keys lie, if so.
+
+    :param scene_rate: frames per second of the scene.
+    :param rate: frames per second of the motion; 0 for a still image.
+    :param what: has the other rate.
+    """
+    if rate <= 0 or abs(rate - scene_rate) <= _SAME:
+        return []
+    apart = scene_rate / rate
+    lie = f"are {round(apart)} frames apart" if abs(apart - round(apart)) < _WHOLE else "lie between frames"
+    return [
+        f"{RATE_WARNING} {scene_rate:.5g} frames/s, the {what} has {rate:.5g}: keys {lie}; Match Frame Rate changes "
+        "the scene's rate and moves them"
+    ]
 
 
 def differs(scene: bpy.types.Scene) -> bool:
@@ -85,7 +103,7 @@ class SCOPE_OT_match_frame_rate(ReportingOperator):
                 rate=rate,
                 factor=rate / former,
             )
-        return rpt_("The scene has {rate:.5g} frames/s, as the footage", rate=rate)
+        return rpt_("The scene has {rate:.5g} frames/s, as the motion", rate=rate)
 
 
 def _library(block: bpy.types.ID) -> bpy.types.Library | None:
@@ -117,15 +135,18 @@ def _update_results(
     from ...scene.match_rate import retimed_spans
 
     for collection in scene.collection.children_recursive:
-        shown = collection.scope_result.warnings
-        person = next((p for p in keyed if p.name in collection.all_objects), None)
+        result, person = collection.scope_result, next((p for p in keyed if p.name in collection.all_objects), None)
         if person is None:
             continue
+        shown = result.warnings
         for index in reversed(range(len(shown))):
             if shown[index].text.startswith((sentence(RATE_WARNING), sentence(DRIFT_WARNING))):
                 shown.remove(index)
             elif shown[index].spans:
                 shown[index].spans = retimed_spans(shown[index].spans, person, rate, keyed[person])
+        if not person.get("scope_resampled"):  # which has keys on every frame
+            for text in rate_warnings(rate, result.footage_rate, "footage" if result.footage else "motion"):
+                shown.add().text = sentence(text)
     for text in dict.fromkeys(warnings):
         scene.scope.result.warnings.add().text = sentence(text)
 

@@ -421,7 +421,7 @@ TEXTS = STAGES | {
     "The scene contains no capture yet": "Die Szene enthält noch keine Erfassung",
     "The scene contains no captured video or imported motion": "Die Szene enthält kein erfasstes Video und keine importierte Bewegung",
     "The scene has no camera of a capture: capture with the option Camera with Footage": "Die Szene hat keine Kamera einer Erfassung: mit der Option Kamera mit Filmmaterial erfassen",
-    "The scene has {rate:.5g} frames/s, as the footage": "Die Szene hat {rate:.5g} Bilder/s wie das Filmmaterial",
+    "The scene has {rate:.5g} frames/s, as the motion": "Die Szene hat {rate:.5g} Bilder/s wie die Bewegung",
     "The scene has {rate:.5g} frames/s; animation that was not captured plays {factor:.3g} times as fast": "Die Szene hat {rate:.5g} Bilder/s; nicht erfasste Animationen laufen {factor:.3g}-mal so schnell",
     "The scene has {scene:.5g} frames/s and the footage {footage:.5g}: the strip will not stay synchronized with the motion": "Die Szene hat {scene:.5g} Bilder/s und das Filmmaterial {footage:.5g}: der Streifen bleibt nicht synchron zur Bewegung",
     "The scene's frame rate was changed from {was:.5g} to {now:.5g}, which changed the motion's speed; importing an FBX file does that": "Die Bildrate der Szene wurde von {was:.5g} auf {now:.5g} geändert, was das Tempo der Bewegung verändert hat; der Import einer FBX-Datei bewirkt das",

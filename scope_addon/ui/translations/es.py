@@ -421,7 +421,7 @@ TEXTS = STAGES | {
     "The scene contains no capture yet": "La escena aún no contiene ninguna captura",
     "The scene contains no captured video or imported motion": "La escena no contiene ningún video capturado ni movimiento importado",
     "The scene has no camera of a capture: capture with the option Camera with Footage": "La escena no tiene cámara de una captura: capture con la opción Cámara con filmación",
-    "The scene has {rate:.5g} frames/s, as the footage": "La escena tiene {rate:.5g} fotogramas/s, como la filmación",
+    "The scene has {rate:.5g} frames/s, as the motion": "La escena tiene {rate:.5g} fotogramas/s, como el movimiento",
     "The scene has {rate:.5g} frames/s; animation that was not captured plays {factor:.3g} times as fast": "La escena tiene {rate:.5g} fotogramas/s; la animación no capturada va {factor:.3g} veces más rápido",
     "The scene has {scene:.5g} frames/s and the footage {footage:.5g}: the strip will not stay synchronized with the motion": "La escena tiene {scene:.5g} fotogramas/s y la filmación {footage:.5g}: el clip no seguirá sincronizado con el movimiento",
     "The scene's frame rate was changed from {was:.5g} to {now:.5g}, which changed the motion's speed; importing an FBX file does that": "La velocidad de fotogramas de la escena cambió de {was:.5g} a {now:.5g}, lo que cambió el ritmo del movimiento; importar un archivo FBX tiene ese efecto",

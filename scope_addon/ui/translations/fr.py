@@ -421,7 +421,7 @@ TEXTS = STAGES | {
     "The scene contains no capture yet": "La scène ne contient pas encore de capture",
     "The scene contains no captured video or imported motion": "La scène ne contient aucune vidéo capturée ni mouvement importé",
     "The scene has no camera of a capture: capture with the option Camera with Footage": "La scène n’a aucune caméra de capture : capturez avec l’option Caméra avec métrage",
-    "The scene has {rate:.5g} frames/s, as the footage": "La scène a {rate:.5g} images/s, comme le métrage",
+    "The scene has {rate:.5g} frames/s, as the motion": "La scène a {rate:.5g} images/s, comme le mouvement",
     "The scene has {rate:.5g} frames/s; animation that was not captured plays {factor:.3g} times as fast": "La scène a {rate:.5g} images/s ; les animations non capturées vont {factor:.3g} fois plus vite",
     "The scene has {scene:.5g} frames/s and the footage {footage:.5g}: the strip will not stay synchronized with the motion": "La scène a {scene:.5g} images/s et le métrage {footage:.5g} : la bande ne restera pas synchronisée avec le mouvement",
     "The scene's frame rate was changed from {was:.5g} to {now:.5g}, which changed the motion's speed; importing an FBX file does that": "La fréquence d’images de la scène est passée de {was:.5g} à {now:.5g}, ce qui a changé la vitesse du mouvement ; l’import d’un fichier FBX a cet effet",

@@ -421,7 +421,7 @@ TEXTS = STAGES | {
     "The scene contains no capture yet": "シーンにはまだキャプチャがありません",
     "The scene contains no captured video or imported motion": "シーンにはキャプチャした動画もインポートしたモーションもありません",
     "The scene has no camera of a capture: capture with the option Camera with Footage": "シーンにキャプチャのカメラがありません。「フッテージ付きカメラ」を有効にしてキャプチャしてください",
-    "The scene has {rate:.5g} frames/s, as the footage": "シーンはフッテージと同じ {rate:.5g} フレーム/秒です",
+    "The scene has {rate:.5g} frames/s, as the motion": "シーンはモーションと同じ {rate:.5g} フレーム/秒です",
     "The scene has {rate:.5g} frames/s; animation that was not captured plays {factor:.3g} times as fast": "シーンは {rate:.5g} フレーム/秒です。キャプチャ以外のアニメーションは {factor:.3g} 倍の速さで再生されます",
     "The scene has {scene:.5g} frames/s and the footage {footage:.5g}: the strip will not stay synchronized with the motion": "シーンは {scene:.5g} フレーム/秒、フッテージは {footage:.5g} です。ストリップはモーションと同期しません",
     "The scene's frame rate was changed from {was:.5g} to {now:.5g}, which changed the motion's speed; importing an FBX file does that": "シーンのフレームレートが {was:.5g} から {now:.5g} に変わり、モーションの速さが変わりました。FBX ファイルのインポートで起こります",

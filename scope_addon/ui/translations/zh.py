@@ -421,7 +421,7 @@ TEXTS = STAGES | {
     "The scene contains no capture yet": "场景中尚无捕捉",
     "The scene contains no captured video or imported motion": "场景中没有已捕捉的视频或导入的动作",
     "The scene has no camera of a capture: capture with the option Camera with Footage": "场景中没有捕捉的摄像机：请启用“带素材的摄像机”选项进行捕捉",
-    "The scene has {rate:.5g} frames/s, as the footage": "场景为 {rate:.5g} 帧/秒，与素材相同",
+    "The scene has {rate:.5g} frames/s, as the motion": "场景为 {rate:.5g} 帧/秒，与动作相同",
     "The scene has {rate:.5g} frames/s; animation that was not captured plays {factor:.3g} times as fast": "场景为 {rate:.5g} 帧/秒；非捕捉的动画以 {factor:.3g} 倍速播放",
     "The scene has {scene:.5g} frames/s and the footage {footage:.5g}: the strip will not stay synchronized with the motion": "场景为 {scene:.5g} 帧/秒，素材为 {footage:.5g}：片段将无法与动作保持同步",
     "The scene's frame rate was changed from {was:.5g} to {now:.5g}, which changed the motion's speed; importing an FBX file does that": "场景帧率已从 {was:.5g} 变为 {now:.5g}，动作速度也随之改变；导入 FBX 文件会导致这种情况",

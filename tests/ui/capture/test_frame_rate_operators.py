@@ -180,6 +180,24 @@ def test_two_captures_keep_their_starts_and_speeds(scene):
     assert (scene.frame_start, scene.frame_end) == (11, 161)
 
 
+def texts(collection):
+    return [warning.text for warning in collection.scope_result.warnings]
+
+
+def test_a_capture_of_another_rate_keeps_its_warning_with_the_new_rate(scene):
+    built(mocap_framerate=np.array(5.0), timestamps=np.arange(61) / 5.0)
+    other = scene.scope.capture
+    built()
+    bpy.ops.scope.match_frame_rate()
+    assert texts(scene.scope.capture) == []
+    (text,) = texts(other)
+    assert "keeps its 30 frames/s" in text
+    assert "has 5: keys are 6 frames apart" in text
+    scene.scope.capture = other
+    bpy.ops.scope.match_frame_rate()
+    assert texts(other) == []
+
+
 def test_a_rate_that_was_changed_by_hand_is_taken_into_account(scene):
     person = built()
     before = at_times(person, NAMES)
