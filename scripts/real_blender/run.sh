@@ -51,7 +51,7 @@ case $1 in
     undo | trouble | stored | pins | details | reload) in_window "window/$1.py" /scope/clips/walk.mp4 /scope/out ;;
     live) in_window live/live.py /scope/clips/walk.mp4 /scope/out ;;
     startup) on_screen python3 parts/window/startup.py 15 ;;
-    walk) on_screen python3 parts/walk/walk.py "$3" ;;
+    walk) on_screen python3 parts/walk/start.py "$3" ;;
     first) # on a computer without the cache of earlier captures
         status=0
         blender --background --python-exit-code 1 --python parts/without_window/first_capture.py >"$log" 2>&1 || status=$?

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The random walk inside Blender: one step per timer, so that the window is redrawn and other timers run in between.
 
-Usage: ``blender --python session.py -- VIDEO FOLDER SEED STEPS``; ``walk.py`` starts it. A traceback that is
+Usage: ``blender --python session.py -- VIDEO FOLDER SEED STEPS``; ``start.py`` starts it. A traceback that is
 printed or raised between two steps is a failure of the step before. An operator that reports an error is none, unless
 it has changed the file. PyPI's bpy, which has no window and cannot undo, takes the same steps:
 ``python session.py -- VIDEO FOLDER SEED STEPS``.

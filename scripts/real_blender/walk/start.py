@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run a random walk over the extension's operators in a Blender with a window, and judge how it ended.
 
-Usage, in the Debian with its own Python, in /scope: ``walk.py SEED [STEPS]``. ``session.py`` takes the steps. It
+Usage, in the Debian with its own Python, in /scope: ``start.py SEED [STEPS]``. ``session.py`` takes the steps. It
 logs each one before it is taken, so that a crash or a hang names its step; the same seed takes the same steps.
 """
 
