@@ -20,6 +20,7 @@ from ..world.camera_path import CameraPath
 from ..world.camera_travel import camera_travel
 from ..world.clip.clip_fit import fit_clip
 from ..world.placement import PlacedTrack, place_track
+from ..world.raw_motion import RawMotion
 from ..world.shot import FittedPerson, Shot
 from ..world.stance import stance_on_floor
 from ..world.world_frame import SharedWorld, find_world
@@ -58,9 +59,10 @@ def solve(shot: Shot, tracks: Iterable[Track], progress: Progress, heights_m: Se
     people, placed = [], []
     for k, (track, body) in enumerate(known):
         raw, finished = refine(shot, prepared.pop(0), fits.pop(0), progress_of_person(progress, k, count))
-        people.append(FittedPerson(track, raw, body))
+        people.append(FittedPerson(track, RawMotion.of(track, raw, shot.path), body))
+        del raw
         placed.append(place(shot, track, finished, smoothing=False))
-        del raw, finished
+        del finished
     del known, track, body
     return_freed_memory()
     world = find_world(placed, shot.lines)

@@ -18,7 +18,7 @@ from ..tracking.face.expression_motion import expression_motion
 from ..tracking.face.expressions import with_expressions
 from ..tracking.track import Track
 from .camera_path import CameraPath
-from .placement import PlacedTrack, raw_motion
+from .placement import PlacedTrack
 from .shot import FittedPerson, Shot
 
 MIN_CONFIDENCE = 0.5  # of keypoints that count in the reprojection error
@@ -45,17 +45,22 @@ def assemble_motion(
     R_world_camera, t_world_camera = T_world_camera[:3, :3], T_world_camera[:3, 3]
 
     def to_world(
-        rotation: NDArray[np.floating[Any]], position: NDArray[np.floating[Any]]
+        rotation: NDArray[np.floating[Any]], position: NDArray[np.floating[Any]], vectors: NDArray[np.floating[Any]]
     ) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
-        poses = rotations.log(rotation)
-        poses[:, 0] = rotations.log(R_world_camera @ rotation[:, 0])
+        root = rotations.log(R_world_camera @ rotation)
+        poses = np.concatenate([root[:, None], vectors], axis=1)
         trans = position @ R_world_camera.T + t_world_camera - J0
         return poses.reshape(len(poses), -1).astype(np.float32), trans
 
-    poses_raw, trans_raw = by_blocks(to_world, *raw_motion(track, person.fit, path))
-    poses, trans = by_blocks(to_world, placed.rotations, placed.root)
+    raw = person.raw
+    poses_raw, trans_raw = by_blocks(to_world, raw.R_first_root, raw.t_first_root, raw.joints)
+    poses, trans = by_blocks(
+        lambda rotation, position: to_world(rotation[:, 0], position, rotations.log(rotation[:, 1:])),
+        placed.rotations,
+        placed.root,
+    )
     joints = placed.place(placed.rotations, placed.root)[0]
-    sigma = person.fit.joint_sigma_m
+    sigma = raw.joint_sigma_m
     return Motion(
         poses=poses,
         trans=trans,
@@ -73,7 +78,7 @@ def assemble_motion(
         keypoints2d_names=np.array(KEYPOINT_NAMES if track.hands is None else KEYPOINT_NAMES + HAND_KEYPOINT_NAMES),
         intrinsics=shot.camera.intrinsics,
         dist=shot.camera.dist,
-        joint_confidence=person.fit.joint_confidence,
+        joint_confidence=raw.joint_confidence,
         world_from_camera=path.world_from_frames(T_world_camera),
         foot_contact=contact[:, : len(SOLES)],
         residual_px=reprojection_error(shot, person, placed),
@@ -81,7 +86,7 @@ def assemble_motion(
         source=shot.source,
         joint_sigma_m=None if sigma is None else np.sqrt((sigma[..., 0] ** 2 + 2.0 * sigma[..., 1] ** 2) / 3.0),
         joint_sigma_depth_m=None if sigma is None else sigma[..., 0],
-        height_sigma_m=person.fit.height_sigma_m,
+        height_sigma_m=raw.height_sigma_m,
         face=_face(track, placed.times, shot.smoothing),
     )
 

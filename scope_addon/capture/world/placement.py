@@ -91,7 +91,7 @@ def place_track(
     """
     path = path or CameraPath.static(len(track))
     times, valid, betas = track.times, fitted.valid, fitted.betas
-    rotations, root = raw_motion(track, fitted, path)
+    rotations, root = without_gaps(track, fitted, path)
     if smoothing:
         rotations = smooth_rotations(rotations, times)
         root = path.center + smooth_root(root - path.center, times)
@@ -106,7 +106,7 @@ def place_track(
     )
 
 
-def raw_motion(
+def without_gaps(
     track: Track, fitted: FittedTrack, path: CameraPath
 ) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
     """Return rotations (T, K+1, 3, 3) and pelvis (T, 3) as fitted, without gaps, in the first frame's camera axes."""

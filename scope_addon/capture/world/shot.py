@@ -10,9 +10,9 @@ from ....solver.body import Body
 from ..camera.intrinsics import Camera
 from ..camera.line_segments import Lines
 from ..fitting.ablation import NO_ABLATION, Ablation
-from ..fitting.frame_sequence import FittedTrack
 from ..tracking.track import Track
 from .camera_path import CameraPath
+from .raw_motion import RawMotion
 
 
 @dataclass(frozen=True)
@@ -37,8 +37,8 @@ class Shot:
 
 @dataclass(frozen=True)
 class FittedPerson:
-    """One person's track and the body fitted to it in each frame's camera."""
+    """One person's track and the body fitted to each of its frames."""
 
     track: Track
-    fit: FittedTrack
+    raw: RawMotion
     body: Body  # with its keypoints where the network places them, for the reprojection error

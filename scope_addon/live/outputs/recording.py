@@ -24,6 +24,7 @@ from ...capture.tracking.track import Track
 from ...capture.world.assemble import assemble_motion
 from ...capture.world.camera_path import CameraPath
 from ...capture.world.placement import place_track
+from ...capture.world.raw_motion import RawMotion
 from ...capture.world.shot import FittedPerson, Shot
 from ...errors import NoPersonError
 from ...motion import Motion
@@ -111,7 +112,7 @@ class Recording:
         contact = np.zeros((T, len(poses[0].contact)))
         contact[rows] = _stacked(poses, "contact")
         shot = Shot(self._body, camera, path, Lines.none(), self._source.fps, self._size, self._source.name)
-        return assemble_motion(shot, FittedPerson(track, raw, self._body), placed, contact, T_world_frame[0])
+        return assemble_motion(shot, FittedPerson(track, RawMotion.of(track, raw, path), self._body), placed, contact, T_world_frame[0])
 
     def _track(self, poses: list[LivePose], rows: NDArray[np.intp], T: int) -> Track:
         first, times = poses[0].index, np.array([pose.timestamp_s for pose in poses])

@@ -37,7 +37,8 @@ _Progress = Callable[[str, int, int], None]
 def fit_clip(prepared: PreparedTrack, start: FittedTrack, path: CameraPath, progress: _Progress) -> FittedTrack:
     """Fit all frames of a track together, between longer gaps.
 
-    :param start: the states to start from, and the shape, in each frame's camera.
+    :param start: the states to start from, and the shape, in each frame's camera. Of a static camera, its rotations are
+        overwritten: a copy of those of an hour takes 93 MB.
     :param progress: called with the stage's name, the frames done and the total; it may raise to cancel.
     :return: the states in each frame's camera; those of invalid frames are as given.
     """
@@ -54,7 +55,7 @@ class _Clip:
     def __init__(self, prepared: PreparedTrack, start: FittedTrack, path: CameraPath, progress: _Progress) -> None:
         self._prepared, self._path, self._progress = prepared, path, progress
         self._start, first = start, path.to_first(start)
-        self._rotations, self._root = first.rotations.copy(), first.t_camera_root.copy()
+        self._rotations, self._root = first.rotations, first.t_camera_root.copy()
         self._done = np.zeros(len(start.valid), bool)
         self._sigma = np.full((*first.rotations.shape[:2], 2), np.nan, np.float32)
 
