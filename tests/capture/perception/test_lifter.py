@@ -205,11 +205,21 @@ def rigid(a, b):
     return R, b.mean(axis=0) - R @ a.mean(axis=0)
 
 
-def test_four_cameras_together_are_within_30_mm_of_the_truth(estimates):
+def head_as_three_keypoints(confidence):
+    """The errors of the eleven keypoints of a head are alike, so that they weigh as much as three others."""
+    head = [any(part in name for part in ("nose", "eye", "ear", "mouth")) for name in KEYPOINT_NAMES]
+    return np.where(head, 0.25, 1.0) * confidence
+
+
+@pytest.mark.parametrize(
+    ("cameras", "limit_mm"), [((1, 2, 3, 4), 30.0), ((1, 2, 3), 34.0), ((1, 2, 4), 34.0), ((1, 3, 4), 34.0)]
+)
+def test_several_cameras_together_are_near_the_truth(estimates, cameras, limit_mm):
     """One frame in 20 of each camera, 2D keypoints alone, through `fit_motion`.
 
     The rig's calibration: intrinsics and distortion as published; a camera's place is where the true joints are the
-    same in its axes as in the first one's, to rounding. Measured: 28.1 mm; captures of one camera have 57 to 74.
+    same in its axes as in the first one's, to rounding. Measured: 28.4 mm, 29.8 in all frames of the captures, and
+    32.5, 27.7 and 29.2 with three cameras; captures of one camera have 57 to 74.
     """
     plain = load_body("scope")
     body, names = with_keypoint_offsets(plain), plain.joint_names
@@ -218,8 +228,8 @@ def test_four_cameras_together_are_within_30_mm_of_the_truth(estimates):
     true = {(camera, frame): joints for camera, frame, _, _, joints in estimates}
     common = sorted(frame for camera, frame in true if camera == 1 and all((c, frame) in true for c in (2, 3, 4)))
     views = {frame: [] for frame in common}
-    for _, frame, seen, truth, joints in estimates:
-        if frame not in common:
+    for camera, frame, seen, truth, joints in estimates:
+        if frame not in common or camera not in cameras:
             continue
         K, first = truth["intrinsics"], true[1, frame]
         both = [n for n in joints if np.isfinite(joints[n] + first[n]).all()]
@@ -227,7 +237,7 @@ def test_four_cameras_together_are_within_30_mm_of_the_truth(estimates):
         R, t = rigid(a, b)
         assert np.abs(a @ R.T + t - b).max() < 1e-9
         pixels = cv2.undistortPoints(seen.keypoints_px[:, None].astype(float), K, truth["dist"], P=K)[:, 0]
-        keypoints = Keypoints2D(index, pixels, seen.keypoints_confidence)
+        keypoints = Keypoints2D(index, pixels, head_as_three_keypoints(seen.keypoints_confidence))
         views[frame].append(View(Measurements(K, keypoints2d=keypoints), R, t))
     options = Options(robust_keypoints2d=0.01, stages=[Stage(Weights())])
     found = fit_motion(body, [views[frame] for frame in common], np.array(common) / 60.0, options=options)
@@ -235,9 +245,9 @@ def test_four_cameras_together_are_within_30_mm_of_the_truth(estimates):
     ours = found.t_world_part[:, [names.index(part) for part in parts]]
     exact = np.array([[true[1, frame][part] for part in parts] for frame in common])
     ours, exact = (joints - joints[:, -2:].mean(axis=1, keepdims=True) for joints in (ours, exact))
-    error = np.nanmean(np.linalg.norm(ours - exact, axis=-1))
+    error = 1e3 * np.nanmean(np.linalg.norm(ours - exact, axis=-1))
     assert len(common) >= 4
-    assert error < 0.03
+    assert error < limit_mm
 
 
 def test_disagreement_widens_the_deviation_along_its_own_axis(people):
