@@ -112,7 +112,8 @@ class Recording:
         contact = np.zeros((T, len(poses[0].contact)))
         contact[rows] = _stacked(poses, "contact")
         shot = Shot(self._body, camera, path, Lines.none(), self._source.fps, self._size, self._source.name)
-        return assemble_motion(shot, FittedPerson(track, RawMotion.of(track, raw, path), self._body), placed, contact, T_world_frame[0])
+        person = FittedPerson(track, RawMotion.of(track, raw, path), self._body)
+        return assemble_motion(shot, person, placed, contact, T_world_frame[0])
 
     def _track(self, poses: list[LivePose], rows: NDArray[np.intp], T: int) -> Track:
         first, times = poses[0].index, np.array([pose.timestamp_s for pose in poses])
