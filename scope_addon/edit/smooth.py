@@ -1,26 +1,34 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Changing the amount of smoothing, always from the raw motion, so that repeated changes do not accumulate."""
+"""Changing the amount of smoothing, always from the captured motions, so that repeated changes do not accumulate."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ..errors import UsageError
-from ..kinematics.smoothing import ROTATION_CUTOFF_HZ, smooth_root, smooth_rotations
+from ..kinematics.frame_blocks import by_blocks
+from ..kinematics.leg_reach import move_feet
+from ..kinematics.smoothing import ROTATION_CUTOFF_HZ, gaussian_smooth, smooth_root, smooth_rotations
 from ..motion import Motion
 from .clip import Clip, clip_from_motion, interpolate_rotations
 from .pins.corrected_motion import before_smoothing, corrected
 
+_REACH_S = 0.3  # of the filter beyond the finished motion, times its strength: four deviations of the slower one
+
 
 def smoothed(body: Body, motion: Motion, strength: float) -> Clip:
-    """Smooth the raw motion without phase shift, and correct it where the user did.
+    """Smooth a motion without phase shift, and correct it where the user did.
 
     Strength 0 is the raw motion, of which every frame is fitted alone, 1 the finished one, of all frames together, and
-    3 very smooth. Anything else is the raw motion through a filter whose cut-off frequency is 4.5 Hz / strength. What
-    the finished motion has besides, above all feet that stay in place, is its difference from the filtered one at
-    strength 1; it is added to the result, and fades out below strength 1. The distance from the camera,
-    which a single camera measures inaccurately, is smoothed more than the position in the image.
+    3 very smooth. Below 1, the raw motion goes through a filter whose cut-off frequency is 4.5 Hz / strength, and a
+    share of what the finished motion has besides is added. Beyond 1, the finished motion goes through a filter, of 4.5
+    Hz / √(strength² − 1), so that it would be one of 4.5 Hz / strength after one of 4.5 Hz; feet that rest stay where
+    the finished motion has them. The distance from the camera, which a single camera measures inaccurately, is smoothed
+    more than the position in the image.
 
     :raises UsageError: when the strength is negative or not a number.
     """
@@ -33,25 +41,66 @@ def smoothed(body: Body, motion: Motion, strength: float) -> Clip:
     if strength == 1:
         return finished
     if not motion.corrections:
-        return _smoothed(motion, raw, finished, strength)
+        return _smoothed(motion, body, raw, finished, strength)
     captured = before_smoothing(motion, body)
     clips = clip_from_motion(body, captured, raw=True), clip_from_motion(body, captured, raw=False)
-    return corrected(_smoothed(captured, *clips, strength), motion, body)
+    return corrected(_smoothed(captured, body, *clips, strength), motion, body)
 
 
-def _smoothed(motion: Motion, raw: Clip, finished: Clip, strength: float) -> Clip:
+def _smoothed(motion: Motion, body: Body, raw: Clip, finished: Clip, strength: float) -> Clip:
     """Smooth a motion without corrections; see `smoothed`."""
-    plain, wanted = _plain(raw, motion, 1.0), _plain(raw, motion, strength)
-    share = min(strength, 1.0)
+    if strength > 1.0:
+        center = motion.world_from_camera[:, :3, 3]
+        calm = _calmed(Clip(finished.times, finished.rotations, finished.root - center), strength)
+        return _with_resting_feet(replace(calm, root=calm.root + center), finished, motion, body)
+    plain, wanted = _filtered(raw, motion, 1.0), _filtered(raw, motion, strength)
     correction = np.swapaxes(plain.rotations, -1, -2) @ finished.rotations
-    if share < 1.0:
-        none = np.broadcast_to(np.eye(3), correction.shape)
-        correction = interpolate_rotations(none, correction, np.full(correction.shape[:2], share))
-    return Clip(raw.times, wanted.rotations @ correction, wanted.root + share * (finished.root - plain.root))
+    none = np.broadcast_to(np.eye(3), correction.shape)
+    correction = interpolate_rotations(none, correction, np.full(correction.shape[:2], strength))
+    return Clip(raw.times, wanted.rotations @ correction, wanted.root + strength * (finished.root - plain.root))
 
 
-def _plain(raw: Clip, motion: Motion, strength: float) -> Clip:
+def _filtered(clip: Clip, motion: Motion, strength: float) -> Clip:
     """Smooth without corrections; the position is taken relative to the camera, which may rotate but not travel."""
-    rotations = smooth_rotations(raw.rotations, raw.times, ROTATION_CUTOFF_HZ / strength)
+    rotations = smooth_rotations(clip.rotations, clip.times, ROTATION_CUTOFF_HZ / strength)
     center = motion.world_from_camera[:, :3, 3]
-    return Clip(raw.times, rotations, center + smooth_root(raw.root - center, raw.times, strength))
+    return Clip(clip.times, rotations, center + smooth_root(clip.root - center, clip.times, strength))
+
+
+def _calmed(clip: Clip, strength: float) -> Clip:
+    """Return a clip whose root is relative to the camera through a filter that keeps its first and its last frame.
+
+    The filter would move both ends of a path inwards, a walker by 12 cm, so the clip goes on at each of them as its
+    reflection in that frame's pose.
+    """
+    beyond = float(np.sqrt(strength * strength - 1.0))
+    times, R, T = clip.times, clip.rotations, len(clip)
+    first, last = (int(np.sum(abs(times - end) <= _REACH_S * beyond)) - 1 for end in times[[0, -1]])
+    before, after = slice(first, 0, -1), np.arange(T - 2, T - 2 - last, -1)
+    times = np.concatenate([2 * times[0] - times[before], times, 2 * times[-1] - times[after]])
+    root = np.concatenate([2 * clip.root[0] - clip.root[before], clip.root, 2 * clip.root[-1] - clip.root[after]])
+    R = np.concatenate([
+        R[0] @ np.swapaxes(R[before], -1, -2) @ R[0], R, R[-1] @ np.swapaxes(R[after], -1, -2) @ R[-1]
+    ])  # fmt: skip
+    smooth_rotations(R, times, ROTATION_CUTOFF_HZ / beyond, out=R)
+    inner = slice(first, first + T)
+    return Clip(clip.times, R[inner], smooth_root(root, times, beyond)[inner])
+
+
+def _with_resting_feet(calm: Clip, finished: Clip, motion: Motion, body: Body) -> Clip:
+    """Bend the legs so that the ankles of feet that rest are where the finished motion has them."""
+    ankles = [body.joint_names.index(f"{side}_ankle") for side in ("left", "right")]
+    pelvis_at_rest = body.rest_joints(motion.betas)[0]
+    rests = motion.foot_contact.reshape(len(finished), 2, 2).max(axis=2).astype(float)
+    share = gaussian_smooth(rests, finished.times, ROTATION_CUTOFF_HZ)
+
+    def bend(
+        R: NDArray[np.float64], root: NDArray[np.float64], R_held: NDArray[np.float64],
+        root_held: NDArray[np.float64], share: NDArray[np.float64],
+    ) -> tuple[NDArray[np.float64]]:  # fmt: skip
+        poses = body.forward_kinematics(R, root - pelvis_at_rest, motion.betas)
+        held = body.forward_kinematics(R_held, root_held - pelvis_at_rest, motion.betas)[1]
+        return (move_feet(body, R, poses, share[..., None] * (held - poses[1])[:, ankles]),)
+
+    rotations = by_blocks(bend, calm.rotations, calm.root, finished.rotations, finished.root, share)[0]
+    return Clip(calm.times, rotations, calm.root)
