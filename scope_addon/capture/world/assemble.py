@@ -19,6 +19,7 @@ from ..tracking.face.expressions import with_expressions
 from ..tracking.track import Track
 from .camera_path import CameraPath
 from .placement import PlacedTrack
+from .raw_motion import rotation_vectors_of_joints
 from .shot import FittedPerson, Shot
 
 MIN_CONFIDENCE = 0.5  # of keypoints that count in the reprojection error
@@ -42,22 +43,10 @@ def assemble_motion(
     :param T_world_camera: (4, 4) the first frame's camera to the world that all people share.
     """
     track, betas, path, J0 = person.track, placed.betas, shot.path, shot.body.rest_joints(placed.betas)[0]
-    R_world_camera, t_world_camera = T_world_camera[:3, :3], T_world_camera[:3, 3]
-
-    def to_world(
-        rotation: NDArray[np.floating[Any]], position: NDArray[np.floating[Any]], vectors: NDArray[np.floating[Any]]
-    ) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
-        root = rotations.log(R_world_camera @ rotation)
-        poses = np.concatenate([root[:, None], vectors], axis=1)
-        trans = position @ R_world_camera.T + t_world_camera - J0
-        return poses.reshape(len(poses), -1).astype(np.float32), trans
-
     raw = person.raw
-    poses_raw, trans_raw = by_blocks(to_world, raw.R_first_root, raw.t_first_root, raw.joints)
-    poses, trans = by_blocks(
-        lambda rotation, position: to_world(rotation[:, 0], position, rotations.log(rotation[:, 1:])),
-        placed.rotations,
-        placed.root,
+    poses_raw, trans_raw = _to_world(T_world_camera, J0, raw.R_first_root, raw.t_first_root, raw.joints)
+    poses, trans = _to_world(
+        T_world_camera, J0, placed.rotations[:, 0], placed.root, rotation_vectors_of_joints(placed.rotations)
     )
     joints = placed.place(placed.rotations, placed.root)[0]
     sigma = raw.joint_sigma_m
@@ -89,6 +78,25 @@ def assemble_motion(
         height_sigma_m=raw.height_sigma_m,
         face=_face(track, placed.times, shot.smoothing),
     )
+
+
+def _to_world(
+    T_world_camera: NDArray[np.float64],
+    J0: NDArray[np.float64],
+    R_root: NDArray[np.floating[Any]],
+    t_root: NDArray[np.floating[Any]],
+    joints: NDArray[np.float32],
+) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+    """Return poses (T, 3 (K+1)) and trans (T, 3) of a root and the rotation vectors (T, K, 3) of its joints."""
+    R_world_camera, t_world_camera = T_world_camera[:3, :3], T_world_camera[:3, 3]
+
+    def to_world(R: NDArray[Any], t: NDArray[Any], joints: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+        root = rotations.log(R_world_camera @ R).astype(np.float32)
+        poses = np.concatenate([root[:, None], joints], axis=1)
+        return poses.reshape(len(poses), -1), t @ R_world_camera.T + t_world_camera - J0
+
+    poses, trans = by_blocks(to_world, R_root, t_root, joints)
+    return poses, trans
 
 
 def _face(track: Track, times: NDArray[np.float64], smoothing: bool) -> dict[str, NDArray[Any]]:

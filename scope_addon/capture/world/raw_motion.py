@@ -36,8 +36,13 @@ class RawMotion:
     def of(cls, track: Track, fitted: FittedTrack, path: CameraPath) -> RawMotion:
         """Return the motion of a fit in each frame's camera."""
         matrices, t_first_root = without_gaps(track, fitted, path)
-        (joints,) = by_blocks(lambda some: (rotations.log(some[:, 1:]).astype(np.float32),), matrices)
         return cls(
-            matrices[:, 0].copy(), t_first_root, joints, fitted.joint_confidence, fitted.joint_sigma_m,
-            fitted.height_sigma_m,
+            matrices[:, 0].copy(), t_first_root, rotation_vectors_of_joints(matrices), fitted.joint_confidence,
+            fitted.joint_sigma_m, fitted.height_sigma_m,
         )  # fmt: skip
+
+
+def rotation_vectors_of_joints(matrices: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
+    """Return (T, K, 3) for rotations (T, K+1, 3, 3) without the root's, in single precision as in the motion file."""
+    (vectors,) = by_blocks(lambda some: (rotations.log(some[:, 1:]).astype(np.float32),), matrices)
+    return vectors
