@@ -12,50 +12,18 @@ from numpy.typing import NDArray
 from scope.scope_addon.capture.camera.intrinsics import Camera
 from scope.scope_addon.capture.fitting.outline.rim import OutlineMeasurer
 from scope.scope_addon.capture.perception.observation import PersonMask
-from scope.scope_addon.capture.perception.region import Region
 from scope.solver import Body, ClipFit, Options, PosePriors, Priors, Stage, State, Weights, fit_clip
 from scope.solver.measurements import Measurements
-from scope.solver.rotations import exp
 
-SIZE = (640, 480)
-K = np.array([[700.0, 0, 320], [0, 700, 240], [0, 0, 1]])
-REGION = Region((320.0, 240.0), 480.0, 0.0)
-FINER = 8  # OpenCV fills every pixel that a triangle touches, so masks are drawn finer
+from .silhouettes import REGION, SIZE, K, mask_of, posed, standing, surface_error
+
 CLOTHES_PX = 12  # of the mask: 17 cm at this distance
 WEIGHTS = Weights(keypoints2d=0.0, joint_prior=0.0, joint_limits=0.0, shape=1.0, tables={"outline": 3e5})
 
 
 @pytest.fixture(scope="module")
 def states(body: Body) -> list[State]:
-    """A person standing with arms out to the sides and legs apart, at six headings."""
-    found = []
-    for heading in np.linspace(0, np.pi, 6, endpoint=False):
-        rotations = np.tile(np.eye(3), (body.K + 1, 1, 1))
-        for side, sign in (("left", 1.0), ("right", -1.0)):
-            rotations[body.joint_names.index(f"{side}_shoulder")] = exp(np.array([0, 0, -0.7 * sign]))
-            rotations[body.joint_names.index(f"{side}_hip")] = exp(np.array([0, 0, 0.15 * sign]))
-        R_root = np.diag([1.0, -1.0, -1.0]) @ exp(np.array([0, heading, 0]))
-        found.append(State(R_root, np.array([0.0, 0.0, 3.6]), rotations[1:], np.zeros(body.P)))
-    return found
-
-
-def posed(body: Body, state: State, betas: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Part poses with the pelvis at the state's position, whatever the shape."""
-    rotations = np.concatenate([state.R_camera_root[None], state.Omega])
-    return body.forward_kinematics(rotations, state.t_camera_root - body.rest_joints(betas)[0], betas)
-
-
-def mask_of(body: Body, state: State, betas: NDArray[np.float64]) -> NDArray[np.float32]:
-    """The true silhouette in the region, by filled triangles of OpenCV's projection, with soft edges."""
-    skin = body.skin(*posed(body, state, betas), betas)
-    pixels = cv2.projectPoints(skin, np.zeros(3), np.zeros(3), K, np.zeros(5))[0][:, 0].astype(float)
-    at = (REGION.crop_from_image(pixels) * 256 * FINER - 0.5) * 16
-    image = np.zeros((256 * FINER, 256 * FINER), np.uint8)
-    for triangle in np.rint(at).astype(np.int32)[body.triangles()]:
-        cv2.fillConvexPoly(image, np.ascontiguousarray(triangle), (255,), cv2.LINE_8, 4)
-    small = cv2.resize(image, (256, 256), interpolation=cv2.INTER_AREA)
-    soft: NDArray[np.float32] = cv2.GaussianBlur(small, (0, 0), 1.0).astype(np.float32) / np.float32(255)
-    return soft
+    return standing(body)
 
 
 def fitted(body: Body, states: list[State], masks: list[NDArray[np.float32]], rounds: int = 3) -> ClipFit:
@@ -78,12 +46,6 @@ def fitted(body: Body, states: list[State], masks: list[NDArray[np.float32]], ro
         now = [fit.state for fit in found.frames]
         found = fit_clip(outline.body, rows, init=now, priors=Priors(), options=options)
     return found
-
-
-def surface_error(body: Body, a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    """Root mean square distance of the two shapes' vertices, pelvis on pelvis, metres."""
-    apart = (body.rest_vertices(a) - body.rest_joints(a)[0]) - (body.rest_vertices(b) - body.rest_joints(b)[0])
-    return float(np.sqrt((apart**2).sum(axis=1).mean()))
 
 
 @pytest.mark.parametrize("seed", [0, 1])
