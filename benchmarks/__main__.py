@@ -21,6 +21,7 @@ from .solver import clip_comparison, clip_steps, peers, plots, startup, steps  #
 OUT = frames.CACHE
 ELSEWHERE = {  # imported where they are wanted: some need packages that others do not
     "perception": (".perception.perception", "perception"),
+    "ablation": (".ablation", "ablation"),
     "choices": (".perception.choices", "choices"),
     "renders": (".perception.renders", "renders"),
     "scenes": (".scenes.accuracy", "scenes"),

@@ -46,6 +46,7 @@ class Outcome:
 
 LONG = (  # what takes hours together, and is left out of a quick run
     Command("Accuracy and speed of captures", "bench", ("perception",)),
+    Command("What each part of the pipeline brings", "bench", ("ablation",)),
     Command("Rendered clips with exact truth", "bench", ("renders",)),
     Command("Rendered scenes of many people", "bench", ("scenes",)),
     Command("An optimizer in the manner of SMPLify", "bench", ("smplify",)),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Errors of captured bodies against ground truth of the four pose2sim cameras, and the ablation."""
+"""Errors of captured bodies against ground truth of the four pose2sim cameras."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from ...scope_addon.capture.fitting.ablation import Ablation
 from ...scope_addon.capture.options import CaptureOptions
 from ...scope_addon.capture.pipeline import capture
 from ...scope_addon.motion import Motion
@@ -30,23 +29,6 @@ SHOWN = {  # key of the evaluation: heading, target
     "foot_slide_cm": ("foot slide cm", 1.5),
     "flipped": ("flipped share", 0.01),
     "coverage": ("coverage", 1.0),
-}
-ABLATION: dict[str, dict[str, Any]] = {
-    "all parts": {},
-    "without the lifting network": {"ablation": Ablation(lifter=False)},
-    "lifting network without world landmarks": {"ablation": Ablation(world_landmarks=False)},
-    "without keypoint offsets": {"ablation": Ablation(keypoint_offsets=False)},
-    "without 3D keypoints": {"ablation": Ablation(keypoints3d=False)},
-    "without the orientation field": {"ablation": Ablation(orientation_field=False)},
-    "without the joint prior": {"ablation": Ablation(joint_prior=False)},
-    "without the outline": {"ablation": Ablation(outline=False)},
-    "without left-right repair": {"ablation": Ablation(left_right=False)},
-    "without keypoint-jump repair": {"ablation": Ablation(keypoint_jumps=False)},
-    "without the stance": {"ablation": Ablation(stance=False)},
-    "without balance in it": {"ablation": Ablation(balance=False)},
-    "without the floor in it": {"ablation": Ablation(floor=False)},
-    "without contact": {"ablation": Ablation(contact=False)},
-    "without smoothing": {"smoothing": False},
 }
 FLIPS = ("lr_swap", "mirror", "mirror_swap")
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`./scripts/bench perception`: accuracy against ground truth, ablation, frames per second."""
+"""`./scripts/bench perception`: accuracy against ground truth, frames per second."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ...scope_addon.capture.options import CaptureOptions
 from ...solver import Body, load_body
 from ..frames import DATA
 from ..report import table
-from .accuracy import ABLATION, CAMERAS, SHOWN, calibration, evaluate_all
+from .accuracy import CAMERAS, SHOWN, calibration, evaluate_all
 from .throughput import decoding, end_to_end, looped, side_by_side, warm_up
 
 LONG_CLIP, TWO_PEOPLE = "clips/run_moving_camera.mp4", "clips/two_people_portrait.mp4"
@@ -31,7 +31,6 @@ def perception(quick: bool) -> dict[str, Any]:
     if not quick:
         presets = {q: evaluate_all(body, _always(CaptureOptions(quality=q))) for q in PRESETS}
         figures["presets"] = {q: _show(q, found) for q, found in presets.items()}
-        figures["ablation"] = _ablation(body)
     return figures
 
 
@@ -77,18 +76,6 @@ def _accuracy(body: Body) -> dict[str, Any]:
         rows += [[f"{camera}, {name} intrinsics", *_row(found[camera])] for camera in (*CAMERAS, "mean")]
     print(table(head, rows), end="\n\n", flush=True)
     return {"clips": estimated, "clips_given_intrinsics": given}
-
-
-def _ablation(body: Body) -> dict[str, Any]:
-    found, rows, by_camera = {}, [], []
-    for name, options in ABLATION.items():
-        each = evaluate_all(body, _always(CaptureOptions(**options)))
-        found[name] = each["mean"]
-        rows.append([name, *_row(each["mean"])])
-        by_camera.append([name, *(f"{f['mpjpe_root']:.1f} / {f['pa_mpjpe']:.1f}" for f in (each[c] for c in CAMERAS))])
-    print(table(("mean of four cameras", *(heading for heading, _ in SHOWN.values())), rows), end="\n\n", flush=True)
-    print(table(("MPJPE-root / PA-MPJPE mm", *CAMERAS), by_camera), end="\n\n", flush=True)
-    return found
 
 
 def _always(options: CaptureOptions) -> Callable[[str], CaptureOptions]:

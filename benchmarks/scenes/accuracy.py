@@ -124,8 +124,13 @@ def evaluate_scene(
         motions = capture(video, body, CaptureOptions(quality=quality, people=count, heights_m=heights)).motions
     except NoPersonError:
         motions = []
+    return score_people(body, motions, video.stem, truth)
+
+
+def score_people(body: Body, motions: list[Motion], clip: str, truth: Truth) -> list[Result]:
+    """Return the errors of each true person of a clip."""
     matched = match_people(body, motions, truth)
-    return [_result(body, video.stem, matched.get(k), truth, k) for k in range(count)]
+    return [_result(body, clip, matched.get(k), truth, k) for k in range(len(truth["limbs"]))]
 
 
 def _heights(truth: Truth) -> tuple[float, ...]:

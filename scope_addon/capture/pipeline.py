@@ -58,14 +58,14 @@ def capture(
     return_freed_memory()  # of the networks
     with clock.stage("solver"):
         repaired = (repair(tracks.pop(0), footage.camera, options.ablation) for _ in range(len(tracks)))
-        solved = solve(_shot(video, body, options, footage), repaired, progress, options.heights_m)
+        solved = solve(shot_of(video, body, options, footage), repaired, progress, options.heights_m)
         motions = [replace(motion, timestamps=footage.timestamps) for motion in solved.motions]
     rates = clock.rates(len(footage.timestamps))
     return Capture(motions, make_report(video, body, options, footage, solved, rates))
 
 
-def _shot(video: Video, body: Body, options: CaptureOptions, footage: Footage) -> Shot:
-    """Assemble what is known of the footage; the camera's path so far contains only its rotation."""
+def shot_of(video: Video, body: Body, options: CaptureOptions, footage: Footage) -> Shot:
+    """Assemble what is known of observed footage; the camera's path so far contains only its rotation."""
     frames, motion = len(footage.timestamps), footage.camera_motion
     path = CameraPath.static(frames) if motion.is_static else CameraPath.rotating(motion.R_first_camera)
     return Shot(

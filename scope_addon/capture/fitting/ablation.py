@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from ....solver import Weights
 from ...errors import UsageError
+from .stature import FIXED
 
 
 @dataclass(frozen=True)
@@ -22,13 +23,16 @@ class Ablation:
     keypoints3d: bool = True
     orientation_field: bool = True
     joint_prior: bool = True
+    shape: bool = True  # False: everybody has the mean shape
     outline: bool = True  # in the shape: the body's silhouette against person masks
+    stature: bool = True  # False: proportions move an unknown stature as far as they do in the population
     left_right: bool = True  # repair of left-right swaps and limb swaps
     keypoint_jumps: bool = True  # repair of keypoint jumps
     stance: bool = True  # distance and lean that follow from floor, feet and balance
     balance: bool = True  # in the stance: the zero moment point lies between the contact points
     floor: bool = True  # in the stance: feet in contact lie on the floor
     contact: bool = True  # feet in contact stay in place, and none goes below the floor
+    limb_search: bool = True  # limbs are tried on both sides of the image plane
 
     def __post_init__(self) -> None:
         """Require a source of depth."""
@@ -43,6 +47,7 @@ class Ablation:
             orientation_field=weights.orientation_field * self.orientation_field,
             joint_prior=weights.joint_prior * self.joint_prior,
             floor=weights.floor * self.floor,
+            shape=weights.shape if self.shape else FIXED,
         )
 
 

@@ -21,7 +21,7 @@ from .ablation import NO_ABLATION, Ablation
 from .frame_measurements import DEPTH_SIGMA_M, EARS, Measurer
 from .hand_measurements import HandMeasurer, with_finger_limits
 from .keypoint_offsets import with_keypoint_offsets
-from .stature import with_stature, with_unknown_stature
+from .stature import with_population, with_stature, with_unknown_stature
 from .weights import WEIGHTS, joint_weights
 
 SHAPE_CERTAINTY = 1e6  # information (1/σ² per coefficient) that fixes the shape once it is known
@@ -135,7 +135,10 @@ def prepare_track(
     if height_m is not None and height_m < CHILD_BELOW_M:  # the lifting network knows adults alone
         lifted = lifted.scaled(height_m / body.stature())
     priors = replace(default_priors(body), joint_weights=joint_weights(body))
-    priors = with_unknown_stature(priors, body) if height_m is None else with_stature(priors, body, height_m)
+    if height_m is not None:
+        priors = with_stature(priors, body, height_m)
+    else:
+        priors = (with_unknown_stature if ablation.stature else with_population)(priors, body)
     prepared = PreparedTrack(body, track, measurer, pixels, lifted, priors, ablation.weights(WEIGHTS), camera=camera)
     if track.face is not None:
         across, ears = across_head(track.face, camera), lifted.points[:, EARS[1]] - lifted.points[:, EARS[0]]

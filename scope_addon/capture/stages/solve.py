@@ -136,7 +136,7 @@ def refine(
     """Return the raw motion, of which every frame is fitted alone, and the finished one, of all frames together."""
     if shot.is_still:
         return start, start
-    finished = fit_clip(prepared, start, shot.path, progress) if shot.smoothing else start
+    finished = fit_clip(prepared, start, shot.path, progress, shot.ablation) if shot.smoothing else start
     del start
     return_freed_memory()
     raw = to_single_precision(fit_each_frame(prepared, finished, progress))

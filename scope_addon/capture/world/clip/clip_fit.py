@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from .....solver import MotionFit, State
 from .....solver.rotations import exp, log
+from ...fitting.ablation import NO_ABLATION, Ablation
 from ...fitting.frame_sequence import LONGEST_COAST_S, FittedTrack
 from ...fitting.prepared_track import PreparedTrack
 from ...fitting.weights import motion_priors
@@ -34,7 +35,13 @@ LONGEST_STEP = 2.5  # between two frames that are fitted together, in units of t
 _Progress = Callable[[str, int, int], None]
 
 
-def fit_clip(prepared: PreparedTrack, start: FittedTrack, path: CameraPath, progress: _Progress) -> FittedTrack:
+def fit_clip(
+    prepared: PreparedTrack,
+    start: FittedTrack,
+    path: CameraPath,
+    progress: _Progress,
+    ablation: Ablation = NO_ABLATION,
+) -> FittedTrack:
     """Fit all frames of a track together, between longer gaps.
 
     :param start: the states to start from, and the shape, in each frame's camera. Of a static camera, its rotations are
@@ -42,7 +49,7 @@ def fit_clip(prepared: PreparedTrack, start: FittedTrack, path: CameraPath, prog
     :param progress: called with the stage's name, the frames done and the total; it may raise to cancel.
     :return: the states in each frame's camera; those of invalid frames are as given.
     """
-    clip = _Clip(prepared, start, path, progress)
+    clip = _Clip(prepared, start, path, progress, ablation.limb_search)
     for run in runs(start.valid, prepared.track.times):
         for window in windows(len(run), _frames_of(prepared, WINDOW_UNKNOWNS), _frames_of(prepared, OVERLAP)):
             clip.fit(run[window])
@@ -52,8 +59,10 @@ def fit_clip(prepared: PreparedTrack, start: FittedTrack, path: CameraPath, prog
 class _Clip:
     """A track on its way to its motion, in the first frame's axes."""
 
-    def __init__(self, prepared: PreparedTrack, start: FittedTrack, path: CameraPath, progress: _Progress) -> None:
-        self._prepared, self._path, self._progress = prepared, path, progress
+    def __init__(
+        self, prepared: PreparedTrack, start: FittedTrack, path: CameraPath, progress: _Progress, limb_search: bool
+    ) -> None:
+        self._prepared, self._path, self._progress, self._limb_search = prepared, path, progress, limb_search
         self._start, first = start, path.to_first(start)
         self._rotations, self._root = first.rotations, first.t_camera_root.copy()
         self._done = np.zeros(len(start.valid), bool)
@@ -66,7 +75,7 @@ class _Clip:
         quadratic, robust = motion_priors(body, times)
         window = ClipWindow.of(self._prepared, self._path, frames, self._start.betas)
         found = window.fit(every, [self._state(k) for k in frames], quadratic)
-        better = search_limbs(body, window, found, quadratic)
+        better = search_limbs(body, window, found, quadratic) if self._limb_search else None
         if better is not None:
             found = window.fit(every, better, quadratic)
         self._keep(frames, window.with_resting_places(found).fit(every, found.states, robust, covariance=True))

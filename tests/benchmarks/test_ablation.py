@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The table of the ablation: means over people, medians of IoU, and a dash where nothing was measured."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scope.benchmarks import ablation
+from scope.benchmarks.perception.accuracy import CAMERAS, SHOWN
+from scope.scope_addon.capture.overlay.overlay_video import camera_vertices
+from scope.scope_addon.capture.perception.observation import PersonMask
+from scope.scope_addon.capture.perception.region import Region
+from scope.solver import Body
+
+from ..made_motion import made_motion
+
+
+def test_a_table_has_means_of_people_and_medians_of_iou(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(ablation, "RENDERS", tmp_path)
+    (tmp_path / "walks.mp4").touch()
+    camera = dict.fromkeys(SHOWN, 1.0) | {"jitter_rel": 7.0, "foot_slide_cm": 0.25}
+    clips = {
+        name: {"row": [camera | {"mpjpe_root": 60.0 + k, "pa_mpjpe": 40.0, "iou": 0.8 + 0.01 * k}]}
+        for k, name in enumerate(CAMERAS)
+    }
+    clips |= {"walks": {"row": [camera | {"mpjpe_root": 80.0, "pa_mpjpe": 50.0, "iou": 0.5}]}}
+    clips |= {
+        "development_00": {"row": [{"mpjpe_root": 90.0, "pa_mpjpe": 30.0}]},
+        "development_03": {"row": [{"mpjpe_root": 100.0, "pa_mpjpe": 40.0}, {"mpjpe_root": 110.0, "pa_mpjpe": 50.0}]},
+        "development_06": {"row": []},
+        "jumps": {"row": [{"iou": 0.7}]},
+        "nobody": {"row": []},
+    }
+    shown = ablation.ablation_table(clips, {"row": {}}).splitlines()
+    assert "1 renders" in shown[0]
+    cells = [cell.strip() for cell in shown[-1].strip("|").split("|")]
+    expected = ["row", "61.5 / 40.0", "7", "0.25", "80.0 / 50.0", "100.0 / 40.0", "0.815", "0.700"]
+    assert cells == expected
+
+
+def test_what_was_not_measured_is_a_dash() -> None:
+    shown = ablation.ablation_table({"jumps": {"row": []}}, {"row": {}}).splitlines()[-1]
+    assert [cell.strip() for cell in shown.strip("|").split("|")] == ["row", *"–––––––"]
+
+
+def test_iou_is_of_the_frames_that_have_masks(body: Body) -> None:
+    """A mask of the body itself has 1, of its left half about a half, and one of an unseen frame does not count."""
+    turned = np.tile(np.array([[0.0, 0.0, np.pi]] + [[0.0] * 3] * body.K), (3, 1, 1))
+    seen, camera = np.array([True, True, False]), np.tile(np.eye(4), (3, 1, 1))
+    trans = np.tile([0.0, 0.0, 3.0], (3, 1))
+    motion = made_motion(body, turned, trans, valid=seen, world_from_camera=camera)
+    region, size = Region((320.0, 240.0), 480.0, 0.0), (640, 480)
+    whole = ablation.silhouette(body, camera_vertices(motion, body, 0), motion.intrinsics, None, size, region) == 2
+    assert whole.sum() > 1000
+    half = whole & (np.arange(256) < np.median(np.nonzero(whole)[1]))
+    wrong = np.ones((256, 256))
+    masks = [PersonMask(region, picture.astype(float), size) for picture in (whole, whole, wrong)]
+    assert ablation.mask_iou(body, motion, tuple(enumerate(masks)), size) == 1.0
+    masks[1] = PersonMask(region, half.astype(float), size)
+    assert 0.7 < ablation.mask_iou(body, motion, tuple(enumerate(masks)), size) < 0.8
+    assert np.isnan(ablation.mask_iou(body, motion, (), size))
