@@ -41,6 +41,7 @@ from .perception.render_shots import RENDERS
 from .report import table
 from .scenes.accuracy import score_people
 from .scenes.scene import DEVELOPMENT, FOLDER
+from .scenes.statistics import mean_over_people
 
 ALL_PARTS = "all parts"
 ROWS: dict[str, dict[str, Any]] = {
@@ -171,11 +172,13 @@ def ablation_table(
                 f"{cameras['foot_slide_cm']:.2f}" if cameras else "–",
                 _pair(_mean(clips, row, renders)),
                 _pair(_mean(clips, row, scenes)),
+                _more(clips, row, scenes),
                 *(_median_iou(clips, row, some) for some in (CAMERAS, others)),
             ]
         )
-    head = ("MPJPE-root / PA-MPJPE mm", "Pose2Sim", "jitter m/s³", "foot slide cm", f"{len(renders)} renders")
-    return table((*head, f"{len(scenes)} scenes", "IoU, Pose2Sim", f"IoU, {len(others)} clips"), lines)
+    counts = f"{len(renders)} renders", f"{len(scenes)} scenes", "more than with all parts, mm"
+    head = ("MPJPE-root / PA-MPJPE mm", "Pose2Sim", "jitter m/s³", "foot slide cm", *counts)
+    return table((*head, "IoU, Pose2Sim", f"IoU, {len(others)} clips"), lines)
 
 
 def _clips() -> Iterator[tuple[Path, Path | None]]:
@@ -200,6 +203,20 @@ def _mean(clips: Mapping[str, Any], row: str, names: Any) -> dict[str, float]:
 def _median_iou(clips: Mapping[str, Any], row: str, names: Any) -> str:
     known = [each["iou"] for name in names if name in clips for each in clips[name][row] if "iou" in each]
     return f"{np.nanmedian(known):.3f}" if known else "–"
+
+
+def _more(clips: Mapping[str, Any], row: str, names: Sequence[str]) -> str:
+    """Return by how much MPJPE-root is larger than with all parts, with a 95 % interval by bootstrap over people."""
+    pairs = [
+        (whole["mpjpe_root"], without["mpjpe_root"])
+        for name in names
+        for whole, without in zip(clips[name].get(ALL_PARTS, []), clips[name][row], strict=False)
+        if len(clips[name][ALL_PARTS]) == len(clips[name][row])
+    ]
+    if row == ALL_PARTS or not pairs:
+        return ""
+    more = mean_over_people([without - whole for whole, without in pairs])
+    return f"{more.mean:+.1f} ({more.low:.1f} to {more.high:.1f})"
 
 
 def _pair(figures: Mapping[str, float]) -> str:

@@ -36,13 +36,26 @@ def test_a_table_has_means_of_people_and_medians_of_iou(monkeypatch: pytest.Monk
     shown = ablation.ablation_table(clips, {"row": {}}).splitlines()
     assert "1 renders" in shown[0]
     cells = [cell.strip() for cell in shown[-1].strip("|").split("|")]
-    expected = ["row", "61.5 / 40.0", "7", "0.25", "80.0 / 50.0", "100.0 / 40.0", "0.815", "0.700"]
+    expected = ["row", "61.5 / 40.0", "7", "0.25", "80.0 / 50.0", "100.0 / 40.0", "", "0.815", "0.700"]
     assert cells == expected
 
 
 def test_what_was_not_measured_is_a_dash() -> None:
     shown = ablation.ablation_table({"jumps": {"row": []}}, {"row": {}}).splitlines()[-1]
-    assert [cell.strip() for cell in shown.strip("|").split("|")] == ["row", *"–––––––"]
+    assert [cell.strip() for cell in shown.strip("|").split("|")] == ["row", *"–––––", "", "–", "–"]
+
+
+def test_people_are_compared_with_themselves() -> None:
+    """3 and 5 mm more; who is not found with both does not count."""
+    people = [{"mpjpe_root": 100.0, "pa_mpjpe": 40.0}, {"mpjpe_root": 200.0, "pa_mpjpe": 40.0}]
+    worse = [people[0] | {"mpjpe_root": 103.0}, people[1] | {"mpjpe_root": 205.0}]
+    clips = {
+        "development_00": {ablation.ALL_PARTS: people, "row": worse},
+        "development_03": {ablation.ALL_PARTS: people, "row": worse[:1]},
+    }
+    shown = ablation.ablation_table(clips, {ablation.ALL_PARTS: {}, "row": {}}).splitlines()
+    assert "+4.0 (3.0 to 5.0)" in shown[-1]
+    assert "(" not in shown[-2]
 
 
 def test_iou_is_of_the_frames_that_have_masks(body: Body) -> None:
