@@ -39,13 +39,15 @@ def add_live(parser: argparse.ArgumentParser) -> None:
 
 
 def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
-    """Run ``scope live`` until the source ends or Ctrl-C; return the report.
+    """Run ``scope live`` until the source ends or Ctrl-C, or ask a camera for its formats; return the report.
 
     :raises ScopeError: an argument is invalid, the source cannot be read, or an output failed.
     """
     check_live()
     values = option_values(args, Place.LIVE)
     check_installed(CAPTURE if values["vmc"] is None else (*CAPTURE, "pythonosc"))
+    if values["list_formats"]:
+        return _list_formats(args.source, quiet=args.json)
     check_memory_limit(with_scene=False)
     options = _checked(values)
     check_outputs(_paths(values), Path(args.source), overlay=values["keep_footage"])
@@ -76,6 +78,19 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
     if not args.json:
         say(_summary(report))
     return report
+
+
+def _list_formats(source: str, *, quiet: bool) -> dict[str, Any]:
+    """Ask a camera for its formats.
+
+    :raises ScopeError: it is no camera, or does not answer.
+    """
+    from ..job.live.formats import ask_for_formats
+
+    camera = ask_for_formats(source)
+    if not quiet:
+        say(camera.label if camera.formats else f"{camera.label}: it tells no formats")
+    return {"camera": camera.number, "name": camera.name, "formats": list(camera.formats)}
 
 
 def _each(functions: Sequence[Callable[..., None]]) -> Callable[..., None]:

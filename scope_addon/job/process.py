@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import SetupError
+from .live.formats_request import FormatsRequest
 from .live.request import LiveRequest
 from .messages import CAPTURE_FIELDS, LONGEST_LINE, WARM_UP_FIELDS, Fields, WorkerFailedError, parse_message
 from .request import WARM_UP, JobRequest
@@ -31,7 +32,7 @@ class WorkerProcess:
 
     def __init__(
         self,
-        request: JobRequest | LiveRequest | None,
+        request: JobRequest | LiveRequest | FormatsRequest | None,
         job_folder: Path,
         kernels: Path | None,
         python: Sequence[str] = (sys.executable,),
@@ -39,7 +40,7 @@ class WorkerProcess:
     ) -> None:
         """Start the worker.
 
-        :param request: the capture; None to compile what captures need.
+        :param request: the capture, or the question to a camera; None to compile what captures need.
         :param job_folder: folder for the worker's files.
         :param kernels: folder for the code that numba compiles; if None, next to the sources.
         :param python: interpreter and its arguments; inside Blender ``[sys.executable, *bpy.app.python_args]``.

@@ -16,6 +16,7 @@ from ...solver.errors import ScopeError
 from ..errors import exit_status, lacks_memory, system_error_message
 from ..footage import json_text
 from .live.commands import Commands
+from .live.formats_request import FormatsRequest
 from .live.request import LiveRequest
 from .parent import when_parent_ends
 from .request import WARM_UP, JobRequest
@@ -50,12 +51,13 @@ class Reporter:
         self.send("progress", stage=stage, done=done, total=total)
 
 
-def run(
-    request: JobRequest | LiveRequest | None, job_folder: Path, reporter: Reporter, commands: Commands | None = None
-) -> int:
+Request = JobRequest | LiveRequest | FormatsRequest | None
+
+
+def run(request: Request, job_folder: Path, reporter: Reporter, commands: Commands | None = None) -> int:
     """Do what is requested and return the exit status. Every failure is reported as an ``error`` message.
 
-    :param request: the capture; None to compile what captures need.
+    :param request: the capture, or the question to a camera; None to compile what captures need.
     :param commands: of the parent, to a live capture.
     """
     try:
@@ -68,6 +70,11 @@ def run(
             from .live.capture import capture_live
 
             capture_live(request, job_folder, reporter.send, commands or Commands())
+        elif isinstance(request, FormatsRequest):
+            from .live.cameras import camera_with_formats
+
+            camera = camera_with_formats(request.source)
+            reporter.send("result", name=camera.name, formats=camera.formats)
         else:
             _capture(request, job_folder, reporter)
         return 0
@@ -138,13 +145,15 @@ def main(job_folder: Path) -> NoReturn:
     _exit(status)
 
 
-def _parsed(line: str) -> JobRequest | LiveRequest | None:
+def _parsed(line: str) -> Request:
     """Return the request in a line; None to compile what captures need.
 
     :raises UsageError: it is none.
     """
     if line.strip() == WARM_UP:
         return None
+    if FormatsRequest.is_in(line):
+        return FormatsRequest.from_json(line)
     return LiveRequest.from_json(line) if LiveRequest.is_in(line) else JobRequest.from_json(line)
 
 

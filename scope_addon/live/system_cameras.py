@@ -2,7 +2,11 @@
 """Cameras of Windows and macOS, listed and opened by FFmpeg, so that a camera's number is its place in the list.
 
 OpenCV opens cameras by numbers of its own there, whose order no list tells. Not tried with cameras of these systems:
-FFmpeg's documentation of dshow and avfoundation is what this follows.
+documentation and source text of FFmpeg's dshow and avfoundation are what this follows.
+
+A camera's modes come from FFmpeg's log, which is switched on meanwhile: in a process of its own, never in Blender's.
+dshow loads the camera's driver for it, and runs nothing. avfoundation opens the device, for which macOS asks the user,
+refuses the size that it is asked for, and closes the device before any picture is taken.
 """
 
 from __future__ import annotations
@@ -15,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import VideoError
+from .camera_modes import Mode, nearest_mode, parse_modes
 from .clock import Clock
 
 if TYPE_CHECKING:
@@ -24,6 +29,8 @@ if TYPE_CHECKING:
 FORMATS = {"win32": "dshow", "darwin": "avfoundation"}  # of FFmpeg, by `sys.platform`
 # What a camera is asked for beside the size: some refuse a rate that they do not have, and others want one to be given.
 _WISHES: tuple[dict[str, str], ...] = ({"framerate": "30"}, {})
+# What makes each of them log a camera's modes, and refuse to open it. No camera has so small a picture.
+_LISTING = {"dshow": {"list_options": "true"}, "avfoundation": {"video_size": "1x1"}}
 _WAITING_S, _GONE_S = 0.002, 5.0  # for the next picture, and without one, after which a camera counts as gone
 
 
@@ -40,25 +47,25 @@ def open_camera(number: int, size: tuple[int, int], platform: str) -> InputConta
     """
     import av
 
-    devices = _devices(platform)
-    if number >= len(devices):
-        names = ", ".join(f"{k}: {_name(device)}" for k, device in enumerate(devices))
-        raise VideoError(
-            f"camera {number} does not exist; "
-            + (f"choose one of {names}" if devices else "connect a camera, or choose a stream or a file")
-        )
-    device, problem = devices[number], ""
-    file = f"video={device.name}" if FORMATS[platform] == "dshow" else device.name
-    for wanted in ({"video_size": f"{size[0]}x{size[1]}"}, {}):
-        for wish in _WISHES:
-            try:
-                return av.open(file, format=FORMATS[platform], options=wanted | wish, mode="r")
-            except (av.error.FFmpegError, OSError, ValueError) as error:
-                problem = str(getattr(error, "strerror", None) or error).lower()
+    device, problem = _device(number, platform), ""
+    for wanted in _wanted(device, size, platform):
+        try:
+            return av.open(_file(device, platform), format=FORMATS[platform], options=wanted, mode="r")
+        except (av.error.FFmpegError, OSError, ValueError) as error:
+            problem = str(getattr(error, "strerror", None) or error).lower()
     raise VideoError(
         f"camera {number} ({_name(device)}) cannot be opened ({problem}); check that it is plugged"
         " in, that no other program uses it, and that this one may use cameras"
     )
+
+
+def camera_with_modes(number: int, platform: str) -> tuple[str, list[Mode]]:
+    """Return the name and the modes of a camera of the list; no modes if FFmpeg does not tell them.
+
+    :raises VideoError: it does not exist.
+    """
+    device = _device(number, platform)
+    return _name(device), _modes(device, platform)
 
 
 def pictures(container: InputContainer, clock: Clock) -> Iterator[NDArray[np.uint8]]:
@@ -77,6 +84,50 @@ def pictures(container: InputContainer, clock: Clock) -> Iterator[NDArray[np.uin
                 clock.sleep(_WAITING_S)
             except av.error.FFmpegError:
                 is_open = False
+
+
+def _wanted(device: DeviceInfo, size: tuple[int, int], platform: str) -> Iterator[dict[str, str]]:
+    """Yield what a camera is asked for, from the best on: the size, then what is nearest to it, then anything."""
+    for wish in _WISHES:
+        yield {"video_size": f"{size[0]}x{size[1]}"} | wish
+    if (mode := nearest_mode(_modes(device, platform), size)) is not None:
+        width, height = mode.nearest_size(size)
+        yield {"video_size": f"{width}x{height}", "framerate": f"{mode.fps:.6f}"}
+    yield from _WISHES
+
+
+def _modes(device: DeviceInfo, platform: str) -> list[Mode]:
+    import av
+
+    kind, level, skips = FORMATS[platform], av.logging.get_level(), av.logging.get_skip_repeated()
+    av.logging.set_level(av.logging.INFO)
+    av.logging.set_skip_repeated(False)  # the note of a repetition has no end of line, and spoils the next one
+    try:
+        with av.logging.Capture() as log, suppress(av.error.FFmpegError, OSError, ValueError):
+            av.open(_file(device, platform), format=kind, options=_LISTING[kind], mode="r").close()
+    finally:
+        av.logging.set_level(level)
+        av.logging.set_skip_repeated(skips)
+    return parse_modes("".join(message for _, _, message in log), kind)  # dshow logs a line in pieces
+
+
+def _file(device: DeviceInfo, platform: str) -> str:
+    return f"video={device.name}" if FORMATS[platform] == "dshow" else device.name
+
+
+def _device(number: int, platform: str) -> DeviceInfo:
+    """Return a camera of the list.
+
+    :raises VideoError: it does not exist.
+    """
+    devices = _devices(platform)
+    if number < len(devices):
+        return devices[number]
+    names = ", ".join(f"{k}: {_name(device)}" for k, device in enumerate(devices))
+    raise VideoError(
+        f"camera {number} does not exist; "
+        + (f"choose one of {names}" if devices else "connect a camera, or choose a stream or a file")
+    )
 
 
 def _name(device: DeviceInfo) -> str:

@@ -33,6 +33,13 @@ LIVE_OPTIONS = (
         blender=Property("people", "People"),
     ),
     Option(
+        "list_formats",
+        bool,
+        False,
+        Place.LIVE,
+        "tell the camera's name and formats, and capture nothing; on macOS, the camera is opened for that",
+    ),
+    Option(
         "record",
         Path,
         None,

@@ -16,6 +16,8 @@ from scope.scope_addon import installed
 from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.cli import SAMPLE, main
 from scope.scope_addon.command_line import signals
+from scope.scope_addon.job.live import formats
+from scope.scope_addon.job.live.cameras import Camera
 from scope.scope_addon.live.outputs.vmc import BONES
 from scope.scope_addon.live.people import LivePeople
 from scope.scope_addon.live.smoothing import DELAY_S
@@ -39,6 +41,7 @@ from ..live.outputs.test_vmc import parsed
         (["x.mp4", "--height", "170,180"], 2, "2 heights are given, but --people is 1"),
         (["x.mp4", "--json-port", "70000"], 2, "--json-port must be from 0 to 65535, not 70000"),
         (["x.mp4", "--reconnect", "-1"], 2, "--reconnect must be from 0 to 3600 s, not -1"),
+        (["x.mp4", "--list-formats"], 2, "x.mp4 is no camera; give its number, 0 for the first"),
         (["x.mp4", "--focal-mm", "26", "--fov", "60"], 2, "--focal-mm and --fov contradict each other"),
     ],
 )
@@ -49,6 +52,16 @@ def test_what_is_wrong_is_said_in_one_sentence(arguments, status, sentence, caps
     assert sentence in error
     assert error.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_formats_of_a_camera_are_told_without_opening_it_as_a_source(capfd, monkeypatch):
+    told = Camera(2, "USB Camera", ("mjpeg 1280×720",))
+    monkeypatch.setattr(formats, "ask_for_formats", lambda source: {"2": told}[source])
+    assert main(["live", "2", "--list-formats"]) == 0
+    assert capfd.readouterr().err == "scope: 2: USB Camera (mjpeg 1280×720)\n"
+    assert main(["live", "2", "--list-formats", "--json"]) == 0
+    report = json.loads(capfd.readouterr().out)
+    assert (report["camera"], report["name"], report["formats"]) == (2, "USB Camera", ["mjpeg 1280×720"])
 
 
 def test_a_port_in_use_is_said(capsys):

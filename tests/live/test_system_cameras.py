@@ -10,7 +10,7 @@ import av
 import numpy as np
 import pytest
 from scope.scope_addon.errors import VideoError
-from scope.scope_addon.job.live.cameras import camera_source, list_cameras
+from scope.scope_addon.job.live.cameras import camera_source, camera_with_formats, list_cameras
 from scope.scope_addon.live import system_cameras
 from scope.scope_addon.live.clock import Clock
 from scope.scope_addon.live.sources import open_source
@@ -113,3 +113,56 @@ def test_where_nothing_is_listed_opencv_opens_the_number(platform, monkeypatch):
     monkeypatch.setattr(av, "enumerate_input_devices", lambda _: [])
     with pytest.raises(VideoError, match="camera 7 cannot be opened; check that it is plugged in"):
         next(iter(open_source("7").pictures(Clock())))
+
+
+# What FFmpeg says of a camera, in the pieces in which dshow.c and avfoundation.m hand it to the log.
+LOGS = {
+    "win32": [
+        "DirectShow video device options (from video devices)\n", ' Pin "Capture" (alternative pin name "0")\n',
+        "  pixel_format=yuyv422", "  min s=640x480 fps=5 max s=640x480 fps=30", " (tv, bt470bg/bt709/unknown",
+        ", topleft", ")", "\n", "  vcodec=mjpeg", "  min s=960x540 fps=5 max s=960x540 fps=15", "\n",
+        "  vcodec=mjpeg", "  min s=960x540 fps=5 max s=960x540 fps=15", "\n",
+    ],
+    "darwin": [
+        "Selected video size (1x1) is not supported by the device.\n", "Supported modes:\n",
+        *["  640x480@[15.000000 30.000000]fps\n"] * 3, "  960x540@[15.000000 15.000015]fps\n",
+    ],
+}  # fmt: skip
+LEVELS = {"win32": av.logging.INFO, "darwin": av.logging.ERROR}
+ASKED = {"win32": {"list_options": "true"}, "darwin": {"video_size": "1x1"}}
+SHOWN = {"win32": ("yuyv422 640×480", "mjpeg 960×540"), "darwin": ("960×540", "640×480")}
+
+
+@pytest.fixture
+def telling(system, monkeypatch):
+    """The same system, whose cameras have none of the sizes that they are asked for, and say which they have."""
+    rate = "15.000000" if system.name == "win32" else "15.000015"
+
+    def open_device(file, *, format, options, mode):
+        system.asked.append((format, file, options))
+        if options == ASKED[system.name]:
+            for piece in LOGS[system.name]:
+                av.logging.log(LEVELS[system.name], format, piece)
+        if options != {"video_size": "960x540", "framerate": rate}:
+            raise av.error.ExitError(5, "Immediate exit requested")
+        return nullcontext(SimpleNamespace(decode=lambda video: iter([])))
+
+    monkeypatch.setattr(av, "open", open_device)
+    return system
+
+
+def test_a_camera_tells_its_formats_through_ffmpegs_log(telling):
+    camera = camera_with_formats("1")
+    assert (camera.number, camera.name, camera.formats) == (1, "USB[2J Camera", SHOWN[telling.name])
+    assert telling.asked == [(*OPENED[telling.name], ASKED[telling.name])]
+    assert av.logging.get_level() is None  # as before
+    assert av.logging.get_skip_repeated()
+    with pytest.raises(VideoError, match="camera 7 does not exist; choose one of 0: "):
+        camera_with_formats("7")
+
+
+def test_a_camera_without_720p_is_opened_in_the_mode_nearest_to_it(telling):
+    assert list(system_cameras.pictures(system_cameras.open_camera(1, (1280, 720), telling.name), Clock())) == []
+    sizes = [options.get("video_size") for _, _, options in telling.asked]
+    assert sizes[:2] == ["1280x720"] * 2
+    assert sizes[-1] == "960x540"

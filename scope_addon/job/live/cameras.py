@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The cameras of this computer with their names, and on Linux their sizes.
+"""The cameras of this computer with their names and formats.
 
 On Linux from sysfs and Video4Linux, elsewhere as FFmpeg lists them, by DirectShow or AVFoundation, where a camera's
-number is its place in this list. Reading them does not switch a camera on.
+number is its place in this list. Reading them does not switch a camera on. Elsewhere than on Linux, the list has no
+formats: for these, FFmpeg has to open a camera, which is done for one camera, in a process of its own (`formats`).
 """
 
 from __future__ import annotations
@@ -17,7 +18,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ...live.system_cameras import camera_names
+from ...errors import VideoError
+from ...live.camera_modes import described
+from ...live.system_cameras import camera_names, camera_with_modes
 
 NAMES, DEVICES = Path("/sys/class/video4linux"), Path("/dev")
 LONGEST_NAME = 60  # characters
@@ -64,6 +67,22 @@ def list_cameras(names: Path = NAMES, devices: Path = DEVICES, ioctl: Ioctl | No
         found = (_camera(n, names / entry / "name", devices / entry, ioctl) for n, entry in entries)
         return [camera for camera in found if camera is not None]
     return []
+
+
+def camera_with_formats(source: str) -> Camera:
+    """Return a camera with its formats, for which it is opened on Windows and macOS: not in Blender's process.
+
+    :param source: as `camera_source` gives it.
+    :raises VideoError: it does not exist.
+    """
+    number = int(source.removeprefix("/dev/video"))
+    if sys.platform.startswith("linux"):
+        for camera in list_cameras():
+            if camera.number == number:
+                return camera
+        raise VideoError(f"camera {number} does not exist; connect a camera, or choose a stream or a file")
+    name, modes = camera_with_modes(number, sys.platform)
+    return Camera(number, _shown(name), tuple(_shown(text) for text in described(modes)[:_MOST_FORMATS]))
 
 
 def camera_source(text: str) -> str | None:

@@ -12,13 +12,15 @@ from ..reporting import sentence, tip_
 from ..view.sidebar import redraw_sidebars
 from ..view.view_operators import frame_selected, hide_startup_cube
 from ..view.viewports import viewports
-from . import stream_logins
+from . import camera_formats, stream_logins
 from .live_state import state, stop_job
 
 
 def end_live() -> None:
     """End a running live capture: the extension is being disabled, or a test begins."""
     stop_job()
+    camera_formats.end()
+    state.cameras.clear()
     state.message = ""
     stream_logins.forget()
 
@@ -58,6 +60,7 @@ class SCOPE_OT_live(JobOperator):
             return self.fail(f"a part of Scope cannot be loaded ({error}); reinstall the extension")
         from ....solver.errors import ScopeError
 
+        camera_formats.end()  # the camera is needed
         warm_up.stop()  # its processor time is the capture's; what it has compiled is kept
         try:
             state.job = LiveJob(context.scene)

@@ -7,6 +7,7 @@ import bpy
 
 from ..capture.capture_panel import Tab, draw_text
 from ..reporting import iface_
+from . import camera_formats
 from .live_state import state
 
 
@@ -25,7 +26,10 @@ class SCOPE_PT_live(Tab, bpy.types.Panel):
         column.enabled = job is None
         column.row(align=True).prop(settings, "source", expand=True)
         if settings.source == "CAMERA":
-            column.prop(settings, "camera", icon="CAMERA_DATA")
+            row = column.row(align=True)
+            row.prop(settings, "camera", icon="CAMERA_DATA")
+            row.operator("scope.camera_formats", text="", icon="FILE_REFRESH")
+            camera_formats.draw(context, column)
         elif settings.source == "STREAM":
             column.prop(settings, "stream", text="", icon="URL")
         else:

@@ -18,10 +18,12 @@ def _forget_message(_settings: bpy.types.PropertyGroup, _context: bpy.types.Cont
 
 
 def _cameras(_settings: bpy.types.PropertyGroup, _context: bpy.types.Context, typed: str) -> list[str]:
-    """Return the cameras whose number or name contains what was typed."""
+    """Return the cameras whose number or name contains what was typed, with formats where these are known."""
     from ...job.live.cameras import list_cameras
 
-    return [camera.label for camera in list_cameras() if typed.lower() in camera.label.lower()]
+    told = {(camera.number, camera.name): camera for camera in state.cameras.values()}
+    labels = [told.get((c.number, c.name), c).label for c in list_cameras()]
+    return [label for label in labels if typed.lower() in label.lower()]
 
 
 def _keep_login(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:

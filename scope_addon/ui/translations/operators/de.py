@@ -6,6 +6,7 @@ OPERATORS = {
     "Add Pin": "Pin hinzufügen",
     "Back to the Scene": "Zurück zur Szene",
     "Bake to Frame Rate": "Auf Bildrate backen",
+    "Camera Formats": "Kameraformate",
     "Cancel": "Abbrechen",
     "Cancel Capture": "Erfassung abbrechen",
     "Cancel Live Capture": "Live-Erfassung abbrechen",

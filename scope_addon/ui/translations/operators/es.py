@@ -6,6 +6,7 @@ OPERATORS = {
     "Add Pin": "Agregar anclaje",
     "Back to the Scene": "Volver a la escena",
     "Bake to Frame Rate": "Capturar a velocidad fija",
+    "Camera Formats": "Formatos de la cámara",
     "Cancel": "Cancelar",
     "Cancel Capture": "Cancelar captura",
     "Cancel Live Capture": "Cancelar la captura en vivo",

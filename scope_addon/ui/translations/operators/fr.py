@@ -6,6 +6,7 @@ OPERATORS = {
     "Add Pin": "Ajouter une épingle",
     "Back to the Scene": "Retour à la scène",
     "Bake to Frame Rate": "Précalculer à une fréquence",
+    "Camera Formats": "Formats de la caméra",
     "Cancel": "Annuler",
     "Cancel Capture": "Annuler la capture",
     "Cancel Live Capture": "Annuler la capture en direct",

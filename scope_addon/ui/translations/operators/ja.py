@@ -6,6 +6,7 @@ OPERATORS = {
     "Add Pin": "ピンを追加",
     "Back to the Scene": "シーンに戻る",
     "Bake to Frame Rate": "フレームレートにベイク",
+    "Camera Formats": "カメラの形式",
     "Cancel": "キャンセル",
     "Cancel Capture": "キャプチャをキャンセル",
     "Cancel Live Capture": "ライブキャプチャをキャンセル",

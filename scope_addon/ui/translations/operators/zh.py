@@ -6,6 +6,7 @@ OPERATORS = {
     "Add Pin": "添加图钉",
     "Back to the Scene": "返回场景",
     "Bake to Frame Rate": "烘焙到帧率",
+    "Camera Formats": "相机格式",
     "Cancel": "取消",
     "Cancel Capture": "取消捕捉",
     "Cancel Live Capture": "取消实时捕捉",

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The button that asks a camera for its formats, with processes that answer as a script says."""
+
+import textwrap
+from types import SimpleNamespace
+
+import bpy
+import pytest
+from scope.scope_addon.job.live import cameras, formats
+from scope.scope_addon.job.live.cameras import Camera
+from scope.scope_addon.ui.live import camera_formats, live_properties
+from scope.scope_addon.ui.live.live_operators import end_live
+from scope.scope_addon.ui.live.live_state import state
+
+from ...job.processes import runs, wait_for
+
+ANSWER = {"event": "result", "name": "USB Camera", "formats": ["mjpeg 1280×720"]}
+
+
+@pytest.fixture
+def answering(tmp_path, monkeypatch):
+    """Let cameras answer by a script."""
+
+    def answer(code):
+        script = tmp_path / "fake.py"
+        script.write_text("import json, sys, time\nasked = json.loads(sys.stdin.readline())\n" + textwrap.dedent(code))
+        real = formats.FormatsProcess
+        monkeypatch.setattr(formats, "FormatsProcess", lambda *arguments: real(*arguments, script))
+
+    yield answer
+    end_live()
+
+
+def ask(camera="1: USB Camera"):
+    bpy.context.scene.scope_live.camera = camera
+    bpy.ops.scope.camera_formats()
+    process = state.asking
+    assert not bpy.ops.scope.camera_formats.poll()  # one after another
+    wait_for(lambda: camera_formats.step() is None)
+    assert not runs(process.pid)
+    assert not process.job_folder.exists()
+
+
+def drawn():
+    """Return the texts that the panel shows of the chosen camera."""
+    texts = []
+    column = SimpleNamespace(label=lambda text, icon: texts.append(text))
+    context = SimpleNamespace(preferences=bpy.context.preferences, region=None, scene=bpy.context.scene)
+    camera_formats.draw(context, SimpleNamespace(column=lambda align: column))
+    return " ".join(texts)
+
+
+def test_the_answer_is_shown_and_completes_the_list(answering, monkeypatch):
+    answering(f"assert asked == {{'formats_of': '1'}}; print(json.dumps({ANSWER!r}))")
+    listed = [Camera(0, "Front"), Camera(1, "USB Camera")]
+    monkeypatch.setattr(cameras, "list_cameras", lambda: listed)
+    assert live_properties._cameras(None, None, "usb") == ["1: USB Camera"]
+    ask()
+    assert live_properties._cameras(None, None, "usb") == ["1: USB Camera (mjpeg 1280×720)"]
+    assert drawn() == "1: USB Camera (mjpeg 1280×720)"
+    bpy.context.scene.scope_live.camera = "0"
+    assert drawn() == ""
+    listed[1] = Camera(1, "Other Camera")  # plugged in instead
+    assert live_properties._cameras(None, None, "1") == ["1: Other Camera"]
+
+
+def test_a_camera_without_an_answer_is_said(answering):
+    answering(f"print(json.dumps({ {'event': 'error', 'message': 'camera 1 does not exist'}!r}))")
+    ask()
+    assert state.message == "Camera 1 does not exist"
+    assert drawn() == ""
+
+
+def test_a_camera_that_tells_none_is_said(answering):
+    answering(f"print(json.dumps({ANSWER | {'formats': []}!r}))")
+    ask()
+    assert drawn() == "1: USB Camera It tells no formats"
+
+
+def test_what_is_no_camera_is_not_asked(answering):
+    bpy.context.scene.scope_live.camera = "front"
+    with pytest.raises(RuntimeError, match="'front' is no camera; enter its number"):
+        bpy.ops.scope.camera_formats()
+    assert state.asking is None
+
+
+def test_disabling_the_extension_ends_the_question(answering):
+    answering("time.sleep(600)")
+    bpy.context.scene.scope_live.camera = "1"
+    bpy.ops.scope.camera_formats()
+    process = state.asking
+    assert drawn() == "Asking the camera"
+    end_live()
+    assert not runs(process.pid)
+    assert camera_formats.step() is None
