@@ -7,9 +7,9 @@ landmarks in a region are those of the visible person nearest to its centre, who
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
@@ -34,7 +34,8 @@ _BODY = np.array([_joint(name) for name in KEYPOINT_NAMES])
 class Person:
     """``center_px(t)`` of the hips, None outside the image; ``size_px``, pixels per metre; ``hidden`` frames.
 
-    In the frames ``swapped`` the small network confuses left and right, in the frames ``lost`` it sees nobody.
+    In the frames ``swapped`` the small network confuses left and right, in the frames ``lost`` it sees nobody, and in
+    the frames ``turned`` it sees the person turned about the vertical axis by as many degrees.
     """
 
     center_px: Callable[[int], tuple[float, float] | None]
@@ -43,6 +44,7 @@ class Person:
     hidden: range = range(0)
     swapped: Collection[int] = ()
     lost: Collection[int] = ()
+    turned: Mapping[int, float] = field(default_factory=dict)
 
     def place(self, t: int) -> np.ndarray | None:
         center = self.center_px(t)
@@ -121,6 +123,10 @@ class FakeLandmarks:
         body = person.body(t)
         if t in person.swapped and not self.is_reliable:
             body = body[MIRROR_PARTNER]
+        if t in person.turned and not self.is_reliable:
+            angle = np.radians(person.turned[t])
+            c, s = np.cos(angle), np.sin(angle)
+            body = body @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
         there = Region((float(place[0]), float(place[1])), 2.5 * person.size_px, 0.0)
         return PoseEstimate(
             keypoints_px=place + body[:, :2] * person.size_px,

@@ -110,10 +110,13 @@ def apply_labels(world_landmarks: NDArray[np.floating[Any]], labels: NDArray[np.
     return out
 
 
-def looks_swapped(before: PoseEstimate, after: PoseEstimate) -> bool:
-    """Return whether the bodies of two successive frames are closer with left and right swapped in one of them."""
+def looks_swapped(before: PoseEstimate, after: PoseEstimate, times: float = 1.0) -> bool:
+    """Return whether the bodies of two successive frames are closer with left and right swapped in one of them.
+
+    :param times: with more than 1, whether they are so many times as far apart as with sides swapped, at most.
+    """
     a, b = _centred_body(before), _centred_body(after)
-    return bool(_limb_distance(a[MIRROR_PARTNER], b) < _limb_distance(a, b))
+    return bool(_limb_distance(a[MIRROR_PARTNER], b) < times * _limb_distance(a, b))
 
 
 def _centred_body(estimate: PoseEstimate) -> NDArray[np.floating[Any]]:

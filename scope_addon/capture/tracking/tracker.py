@@ -46,6 +46,7 @@ MOST_PEOPLE = 12
 REFERENCE_S = 30 * FRAME_S  # between two calls of the reference network
 REFERENCE_SWAPPED_S = 8 * FRAME_S  # the same where left and right seem to be swapped
 FALLBACK_S = 15 * FRAME_S  # for which the largest network replaces a smaller one that lost the person, or swapped sides
+HALF_SWAPPED = 2.0  # how far bodies are from each other, over how far with sides swapped, where a network confuses them
 APPEARANCE_S = 4 * FRAME_S  # between two samples of the appearance
 _MIN_REDETECTION_AGE = 6  # frames for which somebody was tracked
 _SAME_TARGET, _LOST_TARGET, _REPLACED_TARGET = 0.12, 0.5, 0.35  # distances of regions in sides, see `Region.resembles`
@@ -204,7 +205,11 @@ class PeopleTracker:
         swapped = estimate is not None and looks_swapped(target.estimate, estimate)
         if self._networks.fallback is None:
             return estimate, swapped
-        if estimate is None or swapped or target.becomes_occluded(estimate):
+        if (
+            estimate is None
+            or looks_swapped(target.estimate, estimate, HALF_SWAPPED)
+            or target.becomes_occluded(estimate)
+        ):
             target.fallback_s = self._clock.time_s
         if self._clock.has_passed(FALLBACK_S, self._clock.time_s - target.fallback_s):
             return estimate, swapped

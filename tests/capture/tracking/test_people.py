@@ -327,6 +327,12 @@ def test_the_fallback_network_prevents_left_right_swaps(follow: Callable[..., li
     assert (track.keypoints_px[:, 11, 0] > track.keypoints_px[:, 12, 0]).all()
 
 
+def test_the_fallback_network_prevents_swaps_that_come_by_and_by(follow: Callable[..., list[Track]]) -> None:
+    turned = {40: 60.0, 41: 120.0} | dict.fromkeys(range(42, 70), 180.0)
+    (track,) = follow([Person(lambda t: (300 + t, 200), BLUE, turned=turned)], 120)
+    assert (track.keypoints_px[:, 11, 0] > track.keypoints_px[:, 12, 0]).all()
+
+
 def test_the_fallback_network_keeps_a_person_whom_the_smaller_one_loses(follow: Callable[..., list[Track]]) -> None:
     (track,) = follow([Person(lambda t: (300 + t, 200), BLUE, lost=range(40, 80))], 120)
     assert track.seen.all()
