@@ -32,7 +32,7 @@ from live.session import (
     start,
     state,
 )
-from live.takes import SAVED, captured_again, kept_take, recorded
+from live.takes import SAVED, captured_again, kept_take, played, recorded
 from shared.session import FOOTAGE, OUT, inventory, invoke, key, picture, run, show_tab, until, use, viewport, workers
 
 OVER_PANEL = (1174, 300)
@@ -94,6 +94,13 @@ def prepared() -> Iterator[float]:
     yield 1.0
     show_tab()
     settings = bpy.context.scene.scope_live
+    settings.camera = "99"
+    use(bpy.ops.scope.camera_formats)  # in a process of its own, as it would ask a camera that exists
+    yield from until(lambda: state().asking is None, 60, "an answer about a camera")
+    report["camera_formats"] = state().message
+    assert "Camera 99 does not exist" in state().message, state().message
+    yield 0.5
+    picture("19_live_formats")
     settings.source, settings.stream = "STREAM", ADDRESS.replace("//", "//me:secret@")
     assert settings.stream == ADDRESS, settings.stream
     bpy.context.preferences.system.use_online_access = False
@@ -243,6 +250,7 @@ def steps() -> Iterator[float]:
     yield from recorded()
     yield from kept_take()
     yield from captured_again()
+    yield from played()
     yield from stopped()
     for how in ("quit", "crash"):
         yield from closed(how)
