@@ -50,6 +50,20 @@ def region_from_body(keypoints_px: NDArray[np.float64]) -> Region:
     return Region((float(center[0]), float(center[1])), side, math.atan2(float(up[0]), -float(up[1])))
 
 
+def facing(world_landmarks: NDArray[np.float64]) -> float:
+    """Return the cosine of the angle between where the body's head looks and the direction to the camera.
+
+    It looks along (left ear − right ear) × (eyes − mouth): -1 is the back of a head, 1 a face from the front.
+
+    :param world_landmarks: (33, 3) of the body, metres, camera axes; all 0 where depth is unknown, for which this is 1.
+    """
+    across = world_landmarks[_EARS[0]] - world_landmarks[_EARS[1]]
+    up = world_landmarks[_EYES].mean(axis=0) - world_landmarks[_MOUTH].mean(axis=0)
+    ahead = np.cross(across, up)
+    length = float(np.linalg.norm(ahead))
+    return -float(ahead[2]) / length if length > 0 else 1.0
+
+
 def region_from_landmarks(landmarks_px: NDArray[np.float64]) -> Region:
     """Calculate the region for the next frame from this one's landmarks (478, 2): their box along the line of the eyes.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from ...perception.execution import Execution
 from ...perception.face.expression_network import ExpressionNetwork
 from ...perception.face.face_landmarks import FaceEstimate, FaceNetwork
 from ...perception.face.face_record import record
-from ...perception.face.face_region import HEAD, region_from_body
+from ...perception.face.face_region import HEAD, facing, region_from_body
 from ...perception.observation import Observation
 from ...perception.region import Region
 from ..frame_clock import PATIENCE_S, is_search_due
@@ -24,6 +25,10 @@ PRESENCE_THRESHOLD = 0.5
 MAX_DISTANCE = 0.35  # between the face and where the body's head predicts it, in sides of the predicted region
 MIN_SIZE, MAX_SIZE = 0.5, 1.6  # side of the face's region over that of the predicted one
 SMALLEST_REGION_PX = 24.0
+# Least cosine of the angle to the camera, by the body, of a head on which a lost face is looked for. Of heads that look
+# farther away, the network imagines the half that nobody sees, or a face at the back.
+LEAST_FACING = 0.1
+FIRST_PRESENCE = 0.001  # in the region by the body, below which it is not looked for by the landmarks there
 
 
 @dataclass
@@ -47,8 +52,11 @@ class FaceTracker:
     """
 
     def __init__(self, threads: int, folder: Path | None = None, execution: Execution | None = None) -> None:
-        self._network = FaceNetwork(threads, folder, execution)
-        ExpressionNetwork(folder)  # `with_expressions` may need it: if it is missing or damaged, say so now
+        with ThreadPoolExecutor(1) as pool:
+            # `with_expressions` may need it: if it is missing or damaged, say so now. Opening takes a core 20 ms.
+            opened = pool.submit(ExpressionNetwork, folder)
+            self._network = FaceNetwork(threads, folder, execution)
+            opened.result()
         self._faces: dict[int, _Face] = {}
 
     def another(self) -> FaceTracker:
@@ -101,9 +109,11 @@ class FaceTracker:
                 return estimate
         elif not is_search_due(time_s, face.seen_s, face.searched_s):
             return None
+        if facing(person.world_landmarks) < LEAST_FACING:
+            return None
         face.searched_s = time_s
         first = self._network.estimate(image_rgb, predicted)
-        if not np.isfinite(first.landmarks).all():
+        if first.presence < FIRST_PRESENCE or not np.isfinite(first.landmarks).all():
             return None
         second = self._network.estimate(image_rgb, first.next_region)
         return second if belongs(second, predicted) else None

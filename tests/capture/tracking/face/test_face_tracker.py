@@ -25,8 +25,8 @@ SHAPE[[33, 263]] = [[-0.3, 0, 0], [0.3, 0, 0]]
 SHAPE[[10, 152]] = [[0, -0.5, 0], [0, 0.5, 0]]
 
 
-def person(x: float, y: float, scale: float = 500.0) -> Observation:
-    """A frontal head with its eyes around (x, y)."""
+def person(x: float, y: float, scale: float = 500.0, yaw: float | None = None) -> Observation:
+    """A head with its eyes around (x, y), frontal in the image; its depth says that it is turned by ``yaw`` degrees."""
     points = np.zeros((33, 2))
     places = {
         "left_eye": (0.03, 0),
@@ -37,22 +37,27 @@ def person(x: float, y: float, scale: float = 500.0) -> Observation:
     for name, offset in places.items():
         points[KEYPOINT_NAMES.index(name)] = offset
     points[[0, 7, 8]] = (0, 0.03), (0.07, 0.01), (-0.07, 0.01)
+    world = np.zeros((33, 3))
+    if yaw is not None:
+        c, s = np.cos(np.radians(yaw)), np.sin(np.radians(yaw))
+        world[:, :2] = points
+        world = world @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]).T
     points = scale * points + [x, y]
-    return Observation(points, np.ones(33), np.zeros((33, 3)), 1.0, Region((x, y), 400.0, 0.0), False)
+    return Observation(points, np.ones(33), world, 1.0, Region((x, y), 400.0, 0.0), False)
 
 
 class FakeNetwork:
     """Sees the faces (x, y, size) whose middle is inside the inner half of a region."""
 
     def __init__(self, *_):
-        self.faces, self.calls = [], 0
+        self.faces, self.calls, self.presence = [], 0, 0.01
 
     def estimate(self, _image, region):
         self.calls += 1
         for x, y, size in self.faces:
             if np.abs(np.subtract((x, y), region.center_px)).max() < region.side_px / 4:
                 return FaceEstimate(size * SHAPE + [x, y, 0], 0.99, region)
-        return FaceEstimate(region.side_px * SHAPE + [*region.center_px, 0], 0.01, region)
+        return FaceEstimate(region.side_px * SHAPE + [*region.center_px, 0], self.presence, region)
 
 
 @pytest.fixture
@@ -96,6 +101,28 @@ def test_a_lost_face_is_looked_for_less_often(tracker):
     for k in range(60):
         face_of(tracker, {1: person(300, 200)}, k / 30)
     assert 30 < tracker._network.calls < 60  # two runs each: ten eager frames, then every fourth
+
+
+def test_where_surely_no_face_is_the_landmarks_say_nothing_of_another_place(tracker):
+    tracker._network.presence = 1e-4
+    face_of(tracker, {1: person(300, 200)})
+    assert tracker._network.calls == 1
+
+
+@pytest.mark.parametrize(("yaw", "is_looked_for"), [(None, True), (0, True), (75, True), (-90, False), (180, False)])
+def test_a_face_is_looked_for_on_heads_that_the_body_does_not_see_from_the_side_or_the_back(
+    tracker, yaw, is_looked_for
+):
+    tracker._network.faces = [(*middle(300, 200), 92.0)]
+    seen = face_of(tracker, {1: person(300, 200, yaw=yaw)})[1][0][0] > 0
+    assert seen == is_looked_for
+    assert (tracker._network.calls > 0) == is_looked_for
+
+
+def test_a_face_that_turns_away_is_followed(tracker):
+    tracker._network.faces = [(*middle(300, 200), 92.0)]
+    face_of(tracker, {1: person(300, 200, yaw=0)})
+    assert face_of(tracker, {1: person(300, 200, yaw=95)}, 1 / 30)[1][0][0] > 0
 
 
 def test_a_head_too_small_is_not_looked_at(tracker):
