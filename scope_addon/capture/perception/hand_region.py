@@ -19,7 +19,7 @@ HAND_LENGTH_M = 0.18  # wrist to the tip of the middle finger
 _ARM = np.array(
     [[KEYPOINT_NAMES.index(f"{side}_{name}") for name in ("elbow", "wrist", "index", "pinky")] for side in SIDES]
 )
-WRISTS = _ARM[:, 1]
+ELBOWS, WRISTS = _ARM[:, 0], _ARM[:, 1]
 _STATURE = [[KEYPOINT_NAMES.index(f"{side}_{name}") for name in ("shoulder", "hip", "knee", "ankle")] for side in SIDES]
 _STATURE_M = 1.35  # shoulder to ankle along the bones
 _MIDDLE = 0.45  # distance from the wrist to the hand's centre, in hand lengths

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...perception.hand_landmarks import HandEstimate
-from ...perception.hand_region import HAND_LENGTH_M, WRISTS
+from ...perception.hand_region import ELBOWS, HAND_LENGTH_M, WRISTS
 from ...perception.observation import Observation
 
 WRIST_DISTANCE = 0.7  # largest distance between the hand's wrist and the body's, in hand lengths
@@ -27,6 +27,9 @@ CERTAIN_PRESENCE = 0.95  # from which a hand is none that the network imagines
 MIN_SIDE_PROBABILITY = 0.15  # of the right side
 SAME_WRIST, OTHER_WRIST = 0.3, 1.0  # distances of the body's two wrists from a hand of the wrong side, in hand lengths
 FOLLOWED_WRIST = 0.5  # the first of them for a hand that was this one in the frame before or after
+# Where forearms cross, the body's wrists are exchanged or both at one hand. A hand of a sure side then goes by its own.
+CROSSING = 2.0  # distance of the body's two wrists up to which this may be so, in hand lengths
+FOREARM = 2.0  # most of a hand's wrist from its elbow there, likewise
 
 Key = tuple[int, int]  # tracklet number, and 0 for the left hand or 1 for the right one
 
@@ -62,7 +65,8 @@ def assigned(
 
     A hand that the network takes for one of the other side is somebody else's or the person's other one, unless its
     wrist is this one and the other is far away: seen edge-on, left and right hands look alike. In an orthographic
-    projection, a left hand looks like a right one with reversed depth, which is then returned.
+    projection, a left hand looks like a right one with reversed depth, which is then returned. Where the body's wrists
+    are near each other, they may be exchanged: a hand of which the network is certain, side included, may be at either.
 
     :param scale: pixels per metre at the person's distance.
     :param side: 0 left, 1 right.
@@ -71,6 +75,9 @@ def assigned(
     sure = person.keypoints_confidence[WRISTS[side]] >= SURE_WRIST
     length = HAND_LENGTH_M * scale
     distance, other = _wrist_distances(estimate, person, scale)[[side, 1 - side]]
+    crossing = _may_cross(person, scale)
+    if crossing and side_of(estimate) == side and _is_in_reach(estimate, person, scale, side):
+        distance = min(distance, other)
     if (
         not estimate.presence >= (least.near if distance <= SAME_WRIST else least.elsewhere)
         or distance > (WRIST_DISTANCE if sure else UNSURE_WRIST_DISTANCE)
@@ -81,10 +88,29 @@ def assigned(
     probability = estimate.left if side == 0 else 1.0 - estimate.left
     if probability >= MIN_SIDE_PROBABILITY:
         return estimate
-    if not sure or distance > same_wrist or other < OTHER_WRIST:
+    if not sure or distance > same_wrist or other < OTHER_WRIST or (crossing and side_of(estimate) == 1 - side):
         return None
     mirrored = estimate.world_landmarks * np.array([1.0, 1.0, -1.0])
     return replace(estimate, world_landmarks=mirrored, left=1.0 - estimate.left)
+
+
+def side_of(estimate: HandEstimate) -> int | None:
+    """Return 0 for what surely is a left hand, 1 for a right one, None if the network is not sure."""
+    if estimate.presence < CERTAIN_PRESENCE or 1.0 - SURE_SIDE < estimate.left < SURE_SIDE:
+        return None
+    return 0 if estimate.left >= SURE_SIDE else 1
+
+
+def _may_cross(person: Observation, scale: float) -> bool:
+    """Return whether the body's wrists are so near each other that they may be exchanged."""
+    apart = float(np.linalg.norm(np.subtract(*person.keypoints_px[WRISTS])))
+    return apart <= CROSSING * HAND_LENGTH_M * scale
+
+
+def _is_in_reach(estimate: HandEstimate, person: Observation, scale: float, side: int) -> bool:
+    """Return whether a forearm can reach from the body's elbow to a hand."""
+    reach = float(np.linalg.norm(estimate.keypoints_px[0] - person.keypoints_px[ELBOWS[side]]))
+    return reach <= FOREARM * HAND_LENGTH_M * scale
 
 
 def _wrist_distances(estimate: HandEstimate, person: Observation, scale: float) -> NDArray[np.float64]:
@@ -96,16 +122,18 @@ def _wrist_distances(estimate: HandEstimate, person: Observation, scale: float) 
 def without_duplicates(
     found: Mapping[Key, HandEstimate | None], people: Mapping[int, Observation]
 ) -> dict[Key, HandEstimate | None]:
-    """Assign a hand that was found more than once to the nearest wrist; None for the others."""
+    """Assign a hand that was found more than once to the nearest wrist, of its side if that is sure; else None."""
 
-    def distance(key: Key) -> float:
+    def rank(key: Key) -> tuple[bool, float]:
         number, side = key
         estimate = found[key]
+        if estimate is None:
+            return True, np.inf
         wrist = people[number].keypoints_px[WRISTS[side]]
-        return np.inf if estimate is None else float(np.linalg.norm(estimate.keypoints_px[0] - wrist))
+        return side_of(estimate) != side, float(np.linalg.norm(estimate.keypoints_px[0] - wrist))
 
     unique = dict(found)
-    keys = sorted(found, key=distance)
+    keys = sorted(found, key=rank)
     for k, key in enumerate(keys):
         estimate = unique[key]
         if estimate is not None and any(is_same_hand(estimate, unique[other]) for other in keys[:k]):

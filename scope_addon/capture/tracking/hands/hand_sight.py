@@ -13,7 +13,7 @@ from ...perception.hand_landmarks import HAND_POINTS, HandEstimate, HandNetwork
 from ...perception.hand_region import HAND_LENGTH_M, WRISTS
 from ...perception.observation import Observation
 from ...perception.region import Region
-from .hand_assignment import CERTAIN_PRESENCE, SAME_WRIST, Least, assigned, is_same_hand
+from .hand_assignment import CERTAIN_PRESENCE, SAME_WRIST, Least, assigned, is_same_hand, side_of
 from .hand_color import is_like, palm_color
 
 FAR_MOTION = 0.35  # of the wrist in a frame, in hand lengths, from which the region that does not move is tried as well
@@ -41,7 +41,7 @@ class Sight:
     """Where one hand is looked for: ``scale`` in pixels per metre, ``side`` 0 left, 1 right, ``color`` of the palm.
 
     ``image_rgb`` is the frame, or a part of it with the pixel ``offset_px`` at its top left; ``others`` are the other
-    hands that are known in it.
+    hands that are known in it; ``opposite`` collects those that were seen and surely are of the other side.
     """
 
     image_rgb: NDArray[np.uint8]
@@ -51,6 +51,7 @@ class Sight:
     color: NDArray[np.float64] | None
     offset_px: tuple[int, int] = (0, 0)
     others: list[HandEstimate] = field(default_factory=list)
+    opposite: list[HandEstimate] = field(default_factory=list)
 
     def estimate(self, network: HandNetwork, region: Region) -> HandEstimate:
         """Run the network in a region of the frame."""
@@ -96,6 +97,8 @@ class Sight:
             hand = assigned(estimate, self.person, self.scale, self.side, least, same_wrist)
             if hand is not None:
                 return Found(hand, is_sure, color)
+        if side_of(estimate) == 1 - self.side:
+            self.opposite.append(estimate)
         return None
 
 

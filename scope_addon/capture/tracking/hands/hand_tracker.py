@@ -113,6 +113,9 @@ class HandTracker:
             for key, sight in sights.items()
         }
         found = {key: self._find(sight, self._hands[key]) for key, sight in sights.items()}
+        for (number, side), sight in sights.items():
+            if found[number, side] is None:
+                found[number, side] = _of_other_side(sight, sights[number, 1 - side].opposite)
         kept = without_duplicates({key: hand and hand.estimate for key, hand in found.items()}, people)
         for key, sight in sights.items():
             if found[key] is not None and kept[key] is None:
@@ -133,7 +136,7 @@ class HandTracker:
                 self._look_back(missed, hand, sight, elsewhere)
             elif sight.hand_px >= SMALLEST_HAND_PX:
                 others = [h.estimate for other, h in found.items() if other != key and h is not None]
-                seen = replace(sight.around_wrist(), others=others)
+                seen = replace(sight.around_wrist(), others=others, opposite=[])
                 self._missed[key] = [*missed, _Missed(now, seen, hand, rows[key[0]][key[1]])][-MOST_MISSED:]
         return [(n, replace(o, hands=rows[n])) for n, o in observations]
 
@@ -247,6 +250,14 @@ class HandTracker:
                 if found is not None and found.is_sure:
                     return found
         return found
+
+
+def _of_other_side(sight: Sight, seen: Sequence[HandEstimate]) -> Found | None:
+    """Return this hand where it was seen while the other one was looked for: the body's wrists may be exchanged."""
+    found = None
+    for estimate in seen:
+        found = better(found, sight.judge(estimate, DETECTED, TENTATIVE))
+    return found
 
 
 def _as_array(hands: Sequence[Found | None]) -> NDArray[np.float32]:

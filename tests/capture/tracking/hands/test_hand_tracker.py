@@ -17,6 +17,7 @@ from scope.scope_addon.capture.perception.palm_detector import Palm
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.capture.tracking.hands import hand_tracker
+from scope.scope_addon.capture.tracking.hands.hand_assignment import without_duplicates
 from scope.scope_addon.capture.tracking.hands.hand_tracker import HandTracker
 from scope.scope_addon.capture.tracking.people import PeopleBuilder
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker
@@ -192,6 +193,39 @@ def test_a_hand_far_from_the_bodys_wrist_is_dropped(follow):
 )
 def test_a_hand_of_the_other_side_is_rejected(follow, hand, other):
     assert not seen(follow([hand_at(hand, left=0.02)]), person(right_wrist=other))[0]
+
+
+@pytest.mark.parametrize(("left", "are_sides_sure"), [(0.97, True), (0.7, False)])
+def test_hands_of_sure_sides_are_not_exchanged_where_the_bodys_wrists_are(follow, left, are_sides_sure):
+    """Forearms cross: the body's elbows are right, but each of its wrists is at the other hand."""
+    at_right, at_left = (500, 500), (500 + 1.2 * LENGTH, 500)
+    tracker = follow([hand_at(at_left, left=left), hand_at(at_right, left=1 - left)])
+    crossed = person(left_wrist=at_right, right_wrist=at_left)
+    for _ in range(3):
+        (_, found), *_ = tracker.step(IMAGE, [(0, crossed)])
+        assert (found.hands[:, 0, 2] > 0).all()
+        np.testing.assert_allclose(found.hands[0, 0, :2], at_left if are_sides_sure else at_right)
+        np.testing.assert_allclose(found.hands[1, 0, :2], at_right if are_sides_sure else at_left)
+
+
+def test_a_hand_beyond_the_forearms_reach_is_not_that_arms(follow):
+    """The left elbow is three hands away: the left hand there is somebody else's."""
+    here, there = (500, 500), (500 + 1.8 * LENGTH, 500)
+    tracker = follow([hand_at(there, left=0.97)])
+    person_ = person(left_wrist=here, right_wrist=there)
+    elbow = KEYPOINT_NAMES.index("left_elbow")
+    person_.keypoints_px[elbow] = (500 - 1.3 * LENGTH, 500)
+    assert not seen(tracker, person_).any()
+
+
+def test_a_hand_found_twice_goes_to_its_sure_side(follow):
+    """What the other side's wrist is nearer to has the pixels of this hand and an unsure side."""
+    right, blurred = hand_at((500, 500), left=0.03), hand_at((500 - 0.2 * LENGTH, 500), left=0.6)
+    wrists = person(left_wrist=(500 - 0.2 * LENGTH, 500), right_wrist=(500 + 0.4 * LENGTH, 500))
+    found = {(0, 0): blurred, (0, 1): right}
+    kept = without_duplicates(found, {0: wrists})
+    assert kept[0, 1] is right
+    assert kept[0, 0] is None
 
 
 def test_a_hand_that_only_looks_like_the_other_one_is_mirrored_in_depth(follow):
