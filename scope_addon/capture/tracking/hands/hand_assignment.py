@@ -16,6 +16,9 @@ from ...perception.observation import Observation
 
 WRIST_DISTANCE = 0.7  # largest distance between the hand's wrist and the body's, in hand lengths
 UNSURE_WRIST_DISTANCE = 1.2  # where the body's wrist is uncertain
+# The same of a hand of a sure side, with this presence, within the forearm's reach, that was this one a frame ago: it
+# has not left its place because the body's wrist is elsewhere.
+FOLLOWED_DISTANCE, FOLLOWED_PRESENCE = 2.0, 0.8
 SURE_WRIST = 0.5
 MAX_SIZE = 2.0  # of the hand, in the hand lengths of the body
 SAME_HAND = 0.35  # mean distance of the keypoints, in sizes of the hand, below which two hands are one
@@ -75,17 +78,20 @@ def assigned(
     sure = person.keypoints_confidence[WRISTS[side]] >= SURE_WRIST
     length = HAND_LENGTH_M * scale
     distance, other = _wrist_distances(estimate, person, scale)[[side, 1 - side]]
-    crossing = _may_cross(person, scale)
-    if crossing and side_of(estimate) == side and _is_in_reach(estimate, person, scale, side):
-        distance = min(distance, other)
+    probability = estimate.left if side == 0 else 1.0 - estimate.left
+    crossing, most = _may_cross(person, scale), WRIST_DISTANCE if sure else UNSURE_WRIST_DISTANCE
+    if probability >= SURE_SIDE and _is_in_reach(estimate, person, scale, side):
+        if crossing and side_of(estimate) == side:
+            distance = min(distance, other)
+        if same_wrist >= FOLLOWED_WRIST and estimate.presence >= FOLLOWED_PRESENCE:
+            most = FOLLOWED_DISTANCE
     if (
         not estimate.presence >= (least.near if distance <= SAME_WRIST else least.elsewhere)
-        or distance > (WRIST_DISTANCE if sure else UNSURE_WRIST_DISTANCE)
+        or distance > most
         or not least.size * length <= estimate.size_px <= MAX_SIZE * length
         or (estimate.presence < CERTAIN_PRESENCE and estimate.disagreement > DISAGREEMENT_THRESHOLD)
     ):
         return None
-    probability = estimate.left if side == 0 else 1.0 - estimate.left
     if probability >= MIN_SIDE_PROBABILITY:
         return estimate
     if not sure or distance > same_wrist or other < OTHER_WRIST or (crossing and side_of(estimate) == 1 - side):

@@ -284,6 +284,15 @@ def test_a_followed_hand_may_look_like_the_other_one_farther_from_the_wrist(foll
     assert seen(tracker, person())[0]
 
 
+@pytest.mark.parametrize(("left", "is_followed"), [(0.97, True), (0.7, False)])
+def test_a_certain_hand_stays_where_the_bodys_wrist_leaves_it_for_the_elbow(follow, left, is_followed):
+    tracker = follow([hand_at((300, 500), left=left)])
+    assert seen(tracker, person())[0]
+    bent = person()
+    bent.keypoints_px[KEYPOINT_NAMES.index("left_wrist")] += (0, 1.2 * LENGTH)
+    assert seen(tracker, bent)[0] == is_followed
+
+
 def numbered_pixels(late=True):
     """An image in which each pixel says where it is, and whether the frame is a late one."""
     y, x = np.mgrid[:1000, :1000]
