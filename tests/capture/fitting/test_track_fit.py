@@ -67,7 +67,6 @@ def _stance(fit: FittedTrack, contact: float = 0.0, floor_m: float = 0.0) -> Sta
 def _refit(prepared, first, stance) -> FittedTrack:
     """All frames together, with the stance as a measurement, and then each alone."""
     measured, start = track_fit.ground(prepared, first, stance)
-    start = replace(start, rotations=start.rotations.copy())  # which are overwritten
     finished = fit_clip(measured, start, CameraPath.static(FRAMES), lambda *_: None)
     return track_fit.fit_each_frame(measured, finished, lambda *_: None)
 

@@ -44,8 +44,7 @@ def fit_clip(
 ) -> FittedTrack:
     """Fit all frames of a track together, between longer gaps.
 
-    :param start: the states to start from, and the shape, in each frame's camera. Of a static camera, its rotations are
-        overwritten: a copy of those of an hour takes 93 MB.
+    :param start: the states to start from, and the shape, in each frame's camera.
     :param progress: called with the stage's name, the frames done and the total; it may raise to cancel.
     :return: the states in each frame's camera; those of invalid frames are as given.
     """
@@ -64,7 +63,7 @@ class _Clip:
     ) -> None:
         self._prepared, self._path, self._progress, self._limb_search = prepared, path, progress, limb_search
         self._start, first = start, path.to_first(start)
-        self._rotations, self._root = first.rotations, first.t_camera_root.copy()
+        self._rotations, self._root = first.rotations.copy(), first.t_camera_root.copy()
         self._done = np.zeros(len(start.valid), bool)
         self._sigma = np.full((*first.rotations.shape[:2], 2), np.nan, np.float32)
 

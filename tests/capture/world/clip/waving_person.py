@@ -66,8 +66,6 @@ def prepare(track: Track, lifted_m: np.ndarray | None = None, sigma_m: np.ndarra
 
 
 def fit(prepared: PreparedTrack, start: FittedTrack, path: CameraPath | None = None) -> FittedTrack:
-    """All frames together, from a copy of the states, which the fit would overwrite."""
-    start = replace(start, rotations=start.rotations.copy())
     return fit_clip(prepared, start, path or CameraPath.static(len(start.valid)), lambda *_: None)
 
 
