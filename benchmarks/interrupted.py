@@ -133,7 +133,7 @@ class Run:
 
 
 def memory_mib(group: int) -> float:
-    """Return the memory that all processes of a group take, MiB: a page that n of them share counts 1/n for each (PSS)."""
+    """Return the memory that all processes of a group take, MiB: a page that n of them share counts 1/n for each."""
     kib = 0
     for folder in Path("/proc").glob("[0-9]*"):
         try:
