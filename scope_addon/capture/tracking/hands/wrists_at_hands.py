@@ -17,7 +17,7 @@ from ..track import Track
 
 SURE = 0.8  # confidence of a hand from which it counts
 # Distances of its wrist from the body's, in hand lengths, up to which the body's is right, and from which it is wrong.
-AGREED, CONTRADICTED = 0.45, 0.6
+AGREED, CONTRADICTED = 0.5, 0.8
 # Keypoints of the body, and those of a hand at the same places.
 _BODY = np.array([[KEYPOINT_NAMES.index(f"{s}_{n}") for n in ("wrist", "pinky", "index", "thumb")] for s in SIDES])
 _HAND = np.array([0, 17, 5, 2])
