@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..scope_addon.capture.fitting.ablation import NO_ABLATION, Ablation
 from ..scope_addon.capture.media.video import open_video
@@ -66,6 +67,7 @@ ROWS: dict[str, dict[str, Any]] = {
 }
 QUICK_ROWS = 3
 ERRORS = ("mpjpe_root", "pa_mpjpe")
+People = Sequence[Mapping[str, float] | None]  # the figures of a clip's people; None of who was not found
 
 
 @dataclass(frozen=True)
@@ -74,13 +76,15 @@ class Observed:
 
     shot: Shot
     tracks: tuple[Track, ...]
+    timestamps: NDArray[np.float64]  # (T,) seconds
 
     def solve(self, ablation: Ablation = NO_ABLATION, smoothing: bool = True) -> list[Motion]:
         """Solve the clip without some parts; most prominent person first."""
         shot = replace(self.shot, ablation=ablation, smoothing=smoothing and self.shot.smoothing)
         given = (track if ablation.outline else replace(track, masks=()) for track in self.tracks)
         repaired = (repair(track, shot.camera, ablation) for track in given)
-        return solve(shot, repaired, lambda *_: None).motions
+        motions = solve(shot, repaired, lambda *_: None).motions
+        return [replace(motion, timestamps=self.timestamps) for motion in motions]
 
 
 def observe_clip(path: Path, body: Body, people: int | str = CaptureOptions().people) -> Observed | None:
@@ -91,7 +95,7 @@ def observe_clip(path: Path, body: Body, people: int | str = CaptureOptions().pe
             footage, tracks = observe(video, body, options, StageClock(), Listeners(lambda *_: None, lambda *_: None))
         except NoPersonError:
             return None
-        return Observed(shot_of(video, body, options, footage), tuple(tracks))
+        return Observed(shot_of(video, body, options, footage), tuple(tracks), footage.timestamps)
 
 
 def mask_iou(body: Body, motion: Motion, masks: Sequence[tuple[int, PersonMask]], size: tuple[int, int]) -> float:
@@ -114,7 +118,7 @@ def ablation(quick: bool) -> dict[str, Any]:
         print(f"{DATA} does not exist: nothing was measured; put the clips there", file=sys.stderr)
         return {}
     body, rows = load_body("scope"), dict(list(ROWS.items())[: QUICK_ROWS if quick else None])
-    clips: dict[str, dict[str, list[dict[str, float]]]] = {}
+    clips: dict[str, dict[str, People]] = {}
     for path, truth in _clips():
         print(f"observing {path.stem}", file=sys.stderr, flush=True)
         clips[path.stem] = measure_clip(body, path, truth, rows)
@@ -124,8 +128,8 @@ def ablation(quick: bool) -> dict[str, Any]:
 
 def measure_clip(
     body: Body, path: Path, truth: Path | None, rows: Mapping[str, Mapping[str, Any]]
-) -> dict[str, list[dict[str, float]]]:
-    """Return the figures of every person of a clip for every row; none for people who were not found.
+) -> dict[str, People]:
+    """Return the figures of every person of a clip for every row; None for people who were not found.
 
     :param truth: of a camera or a render, or of a scene; None: IoU alone.
     """
@@ -136,25 +140,25 @@ def measure_clip(
             arrays = {key: data[key] for key in data.files}
         people = len(arrays["limbs"])
     observed = observe_clip(path, body, people)
-    found: dict[str, list[dict[str, float]]] = {}
+    found: dict[str, People] = {}
     for name, options in rows.items():
         motions = observed.solve(**options) if observed is not None else []
         if scene:
             results = score_people(body, motions, path.stem, arrays)
-            figures = [{key: float(np.nanmean(getattr(r, key))) for key in ERRORS} for r in results if r.flips]
+            found[name] = [
+                {key: float(np.nanmean(getattr(r, key))) for key in ERRORS} if r.flips else None for r in results
+            ]
         elif observed is None:
-            figures = []
+            found[name] = [None]
         else:
-            figures = [{"iou": mask_iou(body, motions[0], observed.tracks[0].masks, observed.shot.image_size)}]
+            figures = {"iou": mask_iou(body, motions[0], observed.tracks[0].masks, observed.shot.image_size)}
             if truth is not None:
-                figures[0] |= {key: float(evaluate_motion(motions[0], truth)[key]) for key in SHOWN}
-        found[name] = figures
+                figures |= {key: float(evaluate_motion(motions[0], truth)[key]) for key in SHOWN}
+            found[name] = [figures]
     return found
 
 
-def ablation_table(
-    clips: Mapping[str, Mapping[str, list[dict[str, float]]]], rows: Mapping[str, Mapping[str, Any]]
-) -> str:
+def ablation_table(clips: Mapping[str, Mapping[str, People]], rows: Mapping[str, Mapping[str, Any]]) -> str:
     """Return the means of Pose2Sim's cameras, renders and scenes, and the median IoU, as a Markdown table."""
     renders, scenes = (
         [name for name in clips if chosen(name)]
@@ -177,7 +181,7 @@ def ablation_table(
             ]
         )
     counts = f"{len(renders)} renders", f"{len(scenes)} scenes", "more than with all parts, mm"
-    head = ("MPJPE-root / PA-MPJPE mm", "Pose2Sim", "jitter m/s³", "foot slide cm", *counts)
+    head = ("MPJPE-root / PA-MPJPE mm", "Pose2Sim", "jitter m/s³", "foot sliding cm", *counts)
     return table((*head, "IoU, Pose2Sim", f"IoU, {len(others)} clips"), lines)
 
 
@@ -196,12 +200,12 @@ def _of_scene(name: str) -> bool:
 
 
 def _mean(clips: Mapping[str, Any], row: str, names: Any) -> dict[str, float]:
-    people = [figures for name in names if name in clips for figures in clips[name][row]]
+    people = [figures for name in names if name in clips for figures in clips[name][row] if figures is not None]
     return {key: float(np.mean([each[key] for each in people])) for key in (people[0] if people else ())}
 
 
 def _median_iou(clips: Mapping[str, Any], row: str, names: Any) -> str:
-    known = [each["iou"] for name in names if name in clips for each in clips[name][row] if "iou" in each]
+    known = [each["iou"] for name in names if name in clips for each in clips[name][row] if each and "iou" in each]
     return f"{np.nanmedian(known):.3f}" if known else "–"
 
 
@@ -210,8 +214,9 @@ def _more(clips: Mapping[str, Any], row: str, names: Sequence[str]) -> str:
     pairs = [
         (whole["mpjpe_root"], without["mpjpe_root"])
         for name in names
-        for whole, without in zip(clips[name].get(ALL_PARTS, []), clips[name][row], strict=False)
-        if len(clips[name][ALL_PARTS]) == len(clips[name][row])
+        if ALL_PARTS in clips[name]
+        for whole, without in zip(clips[name][ALL_PARTS], clips[name][row], strict=True)
+        if whole is not None and without is not None
     ]
     if row == ALL_PARTS or not pairs:
         return ""

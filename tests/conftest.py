@@ -137,9 +137,6 @@ def sessions_are_opened_once() -> Iterator[None]:
 
     They have one thread each: more would wait for each other while other tests need the cores.
     """
-    if os.environ.get("NOKEEP"):
-        yield
-        return
     from scope.scope_addon.capture.perception import sessions
 
     open_on = sessions._open_on

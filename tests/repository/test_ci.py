@@ -29,12 +29,12 @@ def test_every_script_of_the_local_run_is_in_the_hosted_one() -> None:
     assert local - PREPARES == scripts((ROOT / ".github" / "workflows" / "ci.yml").read_text("utf-8"))
 
 
-def run_locally(folder: Path, failing: str) -> subprocess.CompletedProcess[str]:
-    """Run `.ci/run` where every script only says its name and arguments, and one of them fails."""
+def run_locally(folder: Path, *failing: str) -> subprocess.CompletedProcess[str]:
+    """Run `.ci/run` where every script only says its name and arguments, and some of them fail."""
     for name in scripts((ROOT / ".ci" / "run").read_text("utf-8")):
         (folder / "scripts").mkdir(exist_ok=True)
         script = folder / name
-        status = 3 if script.name == failing else 0
+        status = 3 if script.name in failing else 0
         script.write_text(f'#!/bin/sh\necho "$0 $*," && exit {status}\n')
         script.chmod(0o755)
     (folder / ".ci").mkdir()
@@ -51,8 +51,16 @@ def test_a_failure_fails_the_local_run_and_is_shown_also_in_the_background(tmp_p
 
 
 @pytest.mark.skipif(os.name == "nt", reason="the first bash there may be that of another Linux")
+def test_a_failure_in_the_background_is_shown_beside_another(tmp_path: Path) -> None:
+    done = run_locally(tmp_path, "build", "browser")
+    assert done.returncode == 3
+    assert "./scripts/browser " in done.stdout
+    assert "./scripts/build " in done.stdout
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the first bash there may be that of another Linux")
 def test_the_local_run_builds_every_zip_before_the_extension_is_tested(tmp_path: Path) -> None:
-    done = run_locally(tmp_path, "")
+    done = run_locally(tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stdout.endswith("./scripts/build ,\n./scripts/blender ,\n")  # no platform: all of them
 

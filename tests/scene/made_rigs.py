@@ -91,11 +91,14 @@ def _appended(path, frames):
     """Do what `captured` does, with a capture that was kept."""
     with bpy.data.libraries.load(path) as (there, here):
         here.collections = there.collections
+    for library in bpy.data.libraries[:]:
+        bpy.data.libraries.remove(library)  # the appended blocks remember it; a built file has none
     scene, (collection,) = bpy.context.scene, here.collections
     scene.collection.children.link(collection)
     scene.frame_start, scene.frame_end = frames[:2]
     scene.frame_set(frames[2])
     armature = next(each for each in collection.objects if each.type == "ARMATURE")
+    armature.animation_data.action.use_fake_user = True  # as built; appending clears it
     armature.select_set(True)
     bpy.context.view_layer.objects.active = armature
     return armature
