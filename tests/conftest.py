@@ -162,7 +162,7 @@ def body() -> Body:
 def pytest_unconfigure(config: pytest.Config) -> None:
     """Leave without Blender's exit handlers, which can wait forever for a thread of their own (see ``cli.run``)."""
     resources = Path(os.environ.get("BLENDER_USER_RESOURCES", ""))
-    if resources.name.startswith(BLENDER_FOLDER):
+    if resources.name.startswith(BLENDER_FOLDER) and "PYTEST_XDIST_WORKER" not in os.environ:  # others may still use it
         shutil.rmtree(resources, ignore_errors=True)
     if "bpy" in sys.modules:
         sys.stdout.flush()

@@ -71,20 +71,29 @@ def _calmed(clip: Clip, strength: float) -> Clip:
     """Return a clip whose root is relative to the camera through a filter that keeps its first and its last frame.
 
     The filter would move both ends of a path inwards, a walker by 12 cm, so the clip goes on at each of them as its
-    reflection in that frame's pose.
+    reflection in that frame's pose, direction, and logarithm of the distance.
     """
     beyond = float(np.sqrt(strength * strength - 1.0))
     times, R, T = clip.times, clip.rotations, len(clip)
     first, last = (int(np.sum(abs(times - end) <= _REACH_S * beyond)) - 1 for end in times[[0, -1]])
     before, after = slice(first, 0, -1), np.arange(T - 2, T - 2 - last, -1)
     times = np.concatenate([2 * times[0] - times[before], times, 2 * times[-1] - times[after]])
-    root = np.concatenate([2 * clip.root[0] - clip.root[before], clip.root, 2 * clip.root[-1] - clip.root[after]])
+    root = np.concatenate([
+        _reflected(clip.root[before], clip.root[0]), clip.root, _reflected(clip.root[after], clip.root[-1])
+    ])  # fmt: skip
     R = np.concatenate([
         R[0] @ np.swapaxes(R[before], -1, -2) @ R[0], R, R[-1] @ np.swapaxes(R[after], -1, -2) @ R[-1]
     ])  # fmt: skip
     smooth_rotations(R, times, ROTATION_CUTOFF_HZ / beyond, out=R)
     inner = slice(first, first + T)
     return Clip(clip.times, R[inner], smooth_root(root, times, beyond)[inner])
+
+
+def _reflected(root: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return positions (n, 3) with directions turned by 180° about that of ``end``, and distances d as end² / d."""
+    squared = np.maximum(np.sum(root * root, axis=1, keepdims=True), 1e-12)
+    reflected: NDArray[np.float64] = (2 * (root @ end)[:, None] * end - float(end @ end) * root) / squared
+    return reflected
 
 
 def _with_resting_feet(calm: Clip, finished: Clip, motion: Motion, body: Body) -> Clip:

@@ -98,9 +98,9 @@ def parse_message(line: bytes, fields: Fields = CAPTURE_FIELDS) -> dict[str, Any
 
 def _one_line(text: object) -> str:
     said = " ".join(text.split()) if isinstance(text, str) else ""
-    return said[:_LONGEST_TEXT] or "the capture failed"
+    return said[:_LONGEST_TEXT] or "the worker process failed"
 
 
 def unreadable(what: str) -> WorkerFailedError:
     """Return the error for a message that cannot be used."""
-    return WorkerFailedError(f"the capture process sent a message that cannot be used ({what}); capture again")
+    return WorkerFailedError(f"the worker process sent a message that cannot be used ({what}); try again")

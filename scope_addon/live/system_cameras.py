@@ -93,6 +93,7 @@ def _wanted(device: DeviceInfo, size: tuple[int, int], platform: str) -> Iterato
     if (mode := nearest_mode(_modes(device, platform), size)) is not None:
         width, height = mode.nearest_size(size)
         yield {"video_size": f"{width}x{height}", "framerate": f"{mode.fps:.6f}"}
+        yield {"video_size": f"{width}x{height}"}  # of drivers that report infinite rates, FFmpeg accepts none
     yield from _WISHES
 
 

@@ -68,7 +68,7 @@ def test_what_is_no_message_is_ignored(text):
 )
 def test_what_cannot_be_used_is_an_error(message, changes):
     with pytest.raises(
-        WorkerFailedError, match=rf"{message['event']} without a valid {next(iter(changes))}\); capture"
+        WorkerFailedError, match=rf"{message['event']} without a valid {next(iter(changes))}\); try again"
     ):
         parse_message(line(message, **changes))
 

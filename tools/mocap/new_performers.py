@@ -189,7 +189,7 @@ def _content(files: tarfile.TarFile, end: str) -> bytes:
         stream = files.extractfile(member) if member.name.endswith(end) else None
         if stream is not None:
             return stream.read()
-    raise MotionFileError(f"{files.name or 'the package'} has no file …{end}")
+    raise MotionFileError(f"the archive has no file …{end}")
 
 
 def main() -> None:

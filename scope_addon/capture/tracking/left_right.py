@@ -113,7 +113,7 @@ def apply_labels(world_landmarks: NDArray[np.floating[Any]], labels: NDArray[np.
 def looks_swapped(before: PoseEstimate, after: PoseEstimate, times: float = 1.0) -> bool:
     """Return whether the bodies of two successive frames are closer with left and right swapped in one of them.
 
-    :param times: with more than 1, whether they are so many times as far apart as with sides swapped, at most.
+    :param times: than which multiple of their distance as they are; with 2, bodies that are turned half round as well.
     """
     a, b = _centred_body(before), _centred_body(after)
     return bool(_limb_distance(a[MIRROR_PARTNER], b) < times * _limb_distance(a, b))

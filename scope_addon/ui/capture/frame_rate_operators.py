@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ...motion import Motion
 
 _SAME = 0.01  # frames per second
-_WHOLE = 1e-3  # how far the keys' distance may be from whole frames
+_WHOLE = 1e-5  # how far the keys' distance may be from whole frames, of which thousands add up
 RATE_WARNING = "the scene keeps its"  # how the warnings begin that another frame rate settles
 DRIFT_WARNING = "the background image drifts"
 
@@ -27,10 +27,11 @@ def rate_warnings(scene_rate: float, rate: float, what: str = "footage") -> list
     :param rate: frames per second of the motion; 0 for a still image.
     :param what: has the other rate.
     """
-    if rate <= 0 or abs(rate - scene_rate) <= _SAME:
+    if not rate > 0 or abs(rate - scene_rate) <= _SAME:
         return []
     apart = scene_rate / rate
-    lie = f"are {round(apart)} frames apart" if abs(apart - round(apart)) < _WHOLE else "lie between frames"
+    is_whole = apart > 1.5 and abs(apart - round(apart)) < _WHOLE
+    lie = f"are {round(apart)} frames apart" if is_whole else "lie between frames"
     return [
         f"{RATE_WARNING} {scene_rate:.5g} frames/s, the {what} has {rate:.5g}: keys {lie}; Match Frame Rate changes "
         "the scene's rate and moves them"

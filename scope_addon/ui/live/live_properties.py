@@ -21,7 +21,7 @@ def _cameras(_settings: bpy.types.PropertyGroup, _context: bpy.types.Context, ty
     """Return the cameras whose number or name contains what was typed, with formats where these are known."""
     from ...job.live.cameras import list_cameras
 
-    told = {(camera.number, camera.name): camera for camera in state.cameras.values()}
+    told = {(camera.number, camera.name): camera for camera in state.cameras.values() if camera.formats}
     labels = [told.get((c.number, c.name), c).label for c in list_cameras()]
     return [label for label in labels if typed.lower() in label.lower()]
 

@@ -18,6 +18,12 @@ from ..processes import runs, wait_for
 ANSWER = {"event": "result", "name": "USB Camera", "formats": ["mjpeg 1280×720"]}
 
 
+@pytest.fixture(autouse=True)
+def nobody_is_given_up(monkeypatch):
+    """On a computer that has other work, a process may take minutes to start."""
+    monkeypatch.setattr(formats, "ANSWER_S", 900.0)
+
+
 @pytest.fixture
 def asking(tmp_path):
     """Start a process that does as a script says, which knows the request as ``asked``."""

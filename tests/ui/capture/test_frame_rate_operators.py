@@ -9,7 +9,7 @@ from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.character.correction_list import listed_corrections
 from scope.scope_addon.scene.packed_motion import pack_motion
-from scope.scope_addon.ui.capture.frame_rate_operators import keyed_for
+from scope.scope_addon.ui.capture.frame_rate_operators import keyed_for, rate_warnings
 from scope.scope_addon.ui.capture.result import show_result
 
 from ...edit.walking import BODY, NAMES, motion_of, walk
@@ -211,3 +211,17 @@ def test_a_picture_has_no_frame_rate(scene, standing):
     show_result(result.collection.scope_result, "", {}, result)
     with pytest.raises(RuntimeError, match="no captured video"):
         bpy.ops.scope.match_frame_rate()
+
+
+@pytest.mark.parametrize(
+    ("scene_rate", "rate", "said"),
+    [(30, 5, "are 6 frames apart"), (30, 29.98, "lie between"), (60, 29.99, "lie between"), (24, 1000, "lie between")],
+)
+def test_keys_are_whole_frames_apart_only_if_they_stay_so(scene_rate, rate, said):
+    (text,) = rate_warnings(scene_rate, rate)
+    assert f"keys {said}" in text
+
+
+def test_a_rate_that_is_none_has_no_warning():
+    assert rate_warnings(30.0, float("nan")) == []
+    assert rate_warnings(30.0, 0.0) == []

@@ -17,6 +17,12 @@ from ...job.processes import runs, wait_for
 ANSWER = {"event": "result", "name": "USB Camera", "formats": ["mjpeg 1280×720"]}
 
 
+@pytest.fixture(autouse=True)
+def nobody_is_given_up(monkeypatch):
+    """On a computer that has other work, a process may take minutes to start."""
+    monkeypatch.setattr(formats, "ANSWER_S", 900.0)
+
+
 @pytest.fixture
 def answering(tmp_path, monkeypatch):
     """Let cameras answer by a script."""

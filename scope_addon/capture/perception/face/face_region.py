@@ -55,6 +55,8 @@ def facing(world_landmarks: NDArray[np.float64]) -> float:
 
     It looks along (left ear − right ear) × (eyes − mouth): -1 is the back of a head, 1 a face from the front.
 
+    Where the body's network exchanges left and right, a face from the front counts as the back of a head.
+
     :param world_landmarks: (33, 3) of the body, metres, camera axes; all 0 where depth is unknown, for which this is 1.
     """
     across = world_landmarks[_EARS[0]] - world_landmarks[_EARS[1]]

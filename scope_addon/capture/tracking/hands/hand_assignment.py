@@ -102,9 +102,11 @@ def assigned(
 
 def side_of(estimate: HandEstimate) -> int | None:
     """Return 0 for what surely is a left hand, 1 for a right one, None if the network is not sure."""
-    if estimate.presence < CERTAIN_PRESENCE or 1.0 - SURE_SIDE < estimate.left < SURE_SIDE:
+    if not estimate.presence >= CERTAIN_PRESENCE:
         return None
-    return 0 if estimate.left >= SURE_SIDE else 1
+    if estimate.left >= SURE_SIDE:
+        return 0
+    return 1 if estimate.left <= 1.0 - SURE_SIDE else None
 
 
 def _may_cross(person: Observation, scale: float) -> bool:

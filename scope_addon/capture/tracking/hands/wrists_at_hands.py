@@ -32,7 +32,7 @@ def wrists_at_hands(track: Track) -> Track:
     for side, points in enumerate(_BODY):
         hands = track.hands[:, side][:, _HAND]
         off = np.linalg.norm(hands[:, 0, :2] - px[:, points[0]], axis=-1) / np.maximum(HAND_LENGTH_M * scale, 1e-6)
-        rows = np.flatnonzero(track.seen & (hands[:, 0, 2] >= SURE) & (off > AGREED))
+        rows = np.flatnonzero(track.seen & (hands[:, 0, 2] >= SURE) & (off > AGREED) & (scale > 0))
         share = np.clip((off[rows] - AGREED) / (CONTRADICTED - AGREED), 0.0, 1.0)[:, None, None]
         at = np.ix_(rows, points)
         moved = share * (hands[rows, :, :2] - px[at])
