@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import VideoError
-from ...live.camera_modes import described
-from ...live.system_cameras import camera_names, camera_with_modes
+from ...live.sources.camera_modes import described
+from ...live.sources.system_cameras import camera_names, camera_with_modes
 
 NAMES, DEVICES = Path("/sys/class/video4linux"), Path("/dev")
 LONGEST_NAME = 60  # characters

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import VideoError
-from .. import system_cameras
 from ..clock import Clock
+from . import system_cameras
 from .source import DEFAULT_FPS, Picture
 
 CAMERA_SIZE = (1280, 720)

@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import VideoError
+from ...errors import VideoError
+from ..clock import Clock
 from .camera_modes import Mode, nearest_mode, parse_modes
-from .clock import Clock
 
 if TYPE_CHECKING:
     from av.container import InputContainer

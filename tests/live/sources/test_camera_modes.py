@@ -4,7 +4,14 @@
 from __future__ import annotations
 
 import pytest
-from scope.scope_addon.live.camera_modes import LONGEST_LOG, MOST_MODES, Mode, described, nearest_mode, parse_modes
+from scope.scope_addon.live.sources.camera_modes import (
+    LONGEST_LOG,
+    MOST_MODES,
+    Mode,
+    described,
+    nearest_mode,
+    parse_modes,
+)
 
 HD = (1280, 720)
 
