@@ -82,7 +82,8 @@ def ask_for_formats(text: str) -> Camera:
     """
     source = camera_source(text)
     if source is None:
-        raise UsageError("the source is no camera; give its number, 0 for the first")  # it may contain a password
+        said = "a stream" if "://" in text else text  # whose address may contain a password
+        raise UsageError(f"{said} is no camera; give its number, 0 for the first")
     with tempfile.TemporaryDirectory(prefix="scope-formats-", ignore_cleanup_errors=True) as folder:
         process = FormatsProcess(source, Path(folder), [sys.executable])
         try:
