@@ -32,7 +32,7 @@ from live.session import (
     start,
     state,
 )
-from live.takes import SAVED, captured_again, kept_take, recorded
+from live.takes import SAVED, captured_again, kept_take, played, recorded
 from shared.session import FOOTAGE, OUT, inventory, invoke, key, picture, run, show_tab, until, use, viewport, workers
 
 OVER_PANEL = (1174, 300)
@@ -250,6 +250,7 @@ def steps() -> Iterator[float]:
     yield from recorded()
     yield from kept_take()
     yield from captured_again()
+    yield from played()
     yield from stopped()
     for how in ("quit", "crash"):
         yield from closed(how)

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from live.session import captures, connection_closed, moving, plays, report, start, state
-from shared.session import OUT, addon, captured, invoke, picture, until, use
+from live.session import ADDRESS, begin, captures, connection_closed, moving, plays, report, start, state
+from shared.session import FOOTAGE, OUT, addon, captured, invoke, picture, until, use
 
 SAVED, TAKE = OUT / "live.blend", OUT / "live_take.blend"
 RECORDED_S = 5.0
@@ -121,6 +121,32 @@ def captured_again() -> Iterator[float]:
     frames = 0.5 * bpy.context.scene.render.fps
     assert again[0] - frames < live[0] < live[1] < again[1] + frames, report["again"]
     settings.keep_footage = False
+
+
+def played() -> Iterator[float]:
+    """Record a video that is played in real time and ends by itself, with its own times; undo that."""
+    settings, count = bpy.context.scene.scope_live, len(captures())
+    settings.source, settings.file = "FILE", FOOTAGE
+    begin()
+    job = state().job
+    yield from until(lambda: job.has_body or state().job is None, 300, "the first pose")
+    # On a busy machine, the video may have ended before the button can be pressed: then the last pose stays.
+    if state().job is not None and not job.finishing:
+        use(bpy.ops.scope.record_live)
+    yield from until(lambda: state().job is None, 120, "the end of the video")
+    yield 0.5
+    report["played"] = {"recorded": job.recording, "poses": job.poses}
+    assert len(captures()) == count + job.recording, state().message
+    if job.recording:
+        first, last = frames_of(bpy.context.scene.scope.result.collection)
+        fps = bpy.context.scene.render.fps
+        assert first < last, (first, last)
+        report["played"]["seconds"] = (last - first) / fps
+    invoke(bpy.ops.ed.undo)
+    yield 0.5
+    assert len(captures()) == count, "one undo does not remove the recording of a video"
+    settings = bpy.context.scene.scope_live
+    settings.source, settings.stream = "STREAM", ADDRESS
 
 
 def frames_of(collection: bpy.types.Collection) -> tuple[float, float]:
