@@ -9,7 +9,7 @@ import os
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, Self
 
 from ..errors import SetupError, UsageError
 from ..options import Place, options_at
@@ -18,8 +18,33 @@ WARM_UP = json.dumps({"warm_up": True})  # the request to compile what a capture
 _SAMPLE_BYTES = 1 << 20  # hashed at the beginning and end of the footage; reading gigabytes would block the window
 
 
-class JobRequest:
+class LineRequest:
+    """What a worker is asked for: one line of JSON, whose keys are the arguments of the constructor."""
+
+    called: ClassVar[str]  # in messages
+    first_key: ClassVar[str]  # which begins it, and no other kind of request
+
+    @classmethod
+    def is_in(cls, text: str) -> bool:
+        """Return whether a text is such a request, rather than another one."""
+        return text.startswith(f'{{"{cls.first_key}": ')
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """Parse a request.
+
+        :raises UsageError: the text is not a request.
+        """
+        try:
+            return cls(**json.loads(text))
+        except (ValueError, TypeError, RecursionError) as error:
+            raise UsageError(f"this is not {cls.called}: {error}") from error
+
+
+class JobRequest(LineRequest):
     """One capture: the footage, and a value for each option of `Place.WORKER`."""
+
+    called, first_key = "a capture request", "footage"
 
     def __init__(self, footage: str, **values: Any) -> None:
         """Check the values, and fill in the defaults of the others.
@@ -38,17 +63,6 @@ class JobRequest:
     def to_json(self) -> str:
         """Return the request as one line of JSON."""
         return json.dumps({"footage": self.footage, **self.values})
-
-    @classmethod
-    def from_json(cls, text: str) -> JobRequest:
-        """Parse a request.
-
-        :raises UsageError: the text is not a request.
-        """
-        try:
-            return cls(**json.loads(text))
-        except (ValueError, TypeError, RecursionError) as error:
-            raise UsageError(f"this is not a capture request: {error}") from error
 
     def key(self, code_version: str) -> str:
         """Return the hexadecimal key of the result: equal only for the same footage, options and program.

@@ -75,7 +75,7 @@ def camera_with_formats(source: str) -> Camera:
     :param source: as `camera_source` gives it.
     :raises VideoError: it does not exist.
     """
-    number = int(source.removeprefix("/dev/video"))
+    number = camera_number(source)
     if sys.platform.startswith("linux"):
         for camera in list_cameras():
             if camera.number == number:
@@ -89,6 +89,11 @@ def camera_source(text: str) -> str | None:
     """Return the number or device that a text begins with, which may be a label; None if it is no camera."""
     match = re.match(r"(\d{1,3}|/dev/video\d{1,3})\s*(?::.*)?$", text.strip(), re.S | re.ASCII)
     return match[1] if match else None
+
+
+def camera_number(source: str) -> int:
+    """Return the number of what `camera_source` gives."""
+    return int(source.removeprefix("/dev/video"))
 
 
 def _camera(number: int, name: Path, device: Path, ioctl: Ioctl) -> Camera | None:

@@ -15,7 +15,7 @@ from pathlib import Path
 from ...errors import UsageError
 from ..messages import WARM_UP_FIELDS, Fields, WorkerFailedError
 from ..process import START_SCRIPT, WorkerProcess
-from .cameras import LONGEST_NAME, Camera, camera_source
+from .cameras import LONGEST_NAME, Camera, camera_number, camera_source
 from .formats_request import FormatsRequest
 
 ANSWER_S = 20.0  # for an answer, and for the user's to the system's question
@@ -57,8 +57,7 @@ class FormatsProcess(WorkerProcess):
         """
         for message in self.poll():
             if message["event"] == "result":
-                number = int(self.source.removeprefix("/dev/video"))
-                return Camera(number, message["name"], tuple(message["formats"]))
+                return Camera(camera_number(self.source), message["name"], tuple(message["formats"]))
         if time.monotonic() - self._began_s > ANSWER_S:
             raise WorkerFailedError(
                 f"camera {self.source} has not told its formats within {ANSWER_S:.0f} s; if the system asks whether it"

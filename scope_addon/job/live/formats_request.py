@@ -7,12 +7,13 @@ import json
 import re
 
 from ...errors import UsageError
+from ..request import LineRequest
 
-_KEY = '{"formats_of": '
 
-
-class FormatsRequest:
+class FormatsRequest(LineRequest):
     """A camera, by number or device."""
+
+    called, first_key = "the request for a camera's formats", "formats_of"
 
     def __init__(self, formats_of: str) -> None:
         """Check it.
@@ -26,19 +27,3 @@ class FormatsRequest:
     def to_json(self) -> str:
         """Return the request as one line of JSON."""
         return json.dumps({"formats_of": self.source})
-
-    @staticmethod
-    def is_in(text: str) -> bool:
-        """Return whether a text is such a request, rather than another one."""
-        return text.startswith(_KEY)
-
-    @classmethod
-    def from_json(cls, text: str) -> FormatsRequest:
-        """Parse a request.
-
-        :raises UsageError: the text is not a request.
-        """
-        try:
-            return cls(**json.loads(text))
-        except (ValueError, TypeError, RecursionError) as error:
-            raise UsageError(f"this is not the request for a camera's formats: {error}") from error

@@ -8,13 +8,13 @@ from typing import Any
 
 from ...errors import UsageError
 from ...options import Place
-from ..request import checked_values
-
-_KEY = '{"live": '  # begins the request, unlike that of a capture of footage
+from ..request import LineRequest, checked_values
 
 
-class LiveRequest:
+class LiveRequest(LineRequest):
     """A source, whether it may be a stream, and a value for each option of `Place.LIVE_WORKER`."""
+
+    called, first_key = "the request of a live capture", "live"
 
     def __init__(self, live: str, *, online: bool = False, **values: Any) -> None:
         """Check the values, and fill in the defaults of the others.
@@ -32,19 +32,3 @@ class LiveRequest:
         """Return the request as one line of JSON."""
         values = {name: str(v) if hasattr(v, "__fspath__") else v for name, v in self.values.items()}
         return json.dumps({"live": self.source, "online": self.online, **values})
-
-    @staticmethod
-    def is_in(text: str) -> bool:
-        """Return whether a text is such a request, rather than another one."""
-        return text.startswith(_KEY)
-
-    @classmethod
-    def from_json(cls, text: str) -> LiveRequest:
-        """Parse a request.
-
-        :raises UsageError: the text is not a request.
-        """
-        try:
-            return cls(**json.loads(text))
-        except (ValueError, TypeError, RecursionError) as error:
-            raise UsageError(f"this is not the request of a live capture: {error}") from error

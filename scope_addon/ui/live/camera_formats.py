@@ -89,10 +89,10 @@ def draw(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
     if state.asking is not None:
         draw_text(context, layout, iface_("Asking the camera"))
     elif state.cameras:
-        from ...job.live.cameras import camera_source
+        from ...job.live.cameras import camera_number, camera_source
 
-        source = camera_source(context.scene.scope_live.camera) or ""
-        camera = state.cameras.get(int(source.removeprefix("/dev/video") or -1))
+        source = camera_source(context.scene.scope_live.camera)
+        camera = state.cameras.get(camera_number(source)) if source is not None else None
         if camera is not None:
             draw_text(context, layout, camera.label, "INFO")
             if not camera.formats:
