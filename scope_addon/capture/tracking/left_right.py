@@ -110,13 +110,20 @@ def apply_labels(world_landmarks: NDArray[np.floating[Any]], labels: NDArray[np.
     return out
 
 
-def looks_swapped(before: PoseEstimate, after: PoseEstimate, times: float = 1.0) -> bool:
-    """Return whether the bodies of two successive frames are closer with left and right swapped in one of them.
+def looks_swapped(before: PoseEstimate, after: PoseEstimate) -> bool:
+    """Return whether the bodies of two successive frames are closer with left and right swapped in one of them."""
+    return swap_ratio(before, after) < 1.0
 
-    :param times: than which multiple of their distance as they are; with 2, bodies that are turned half round as well.
+
+def swap_ratio(before: PoseEstimate, after: PoseEstimate) -> float:
+    """Return the distance of the bodies of two successive frames with left and right swapped in one, over that without.
+
+    It is below 1 where they look swapped, about 1 where a body is turned by a right angle, and infinite where both are
+    the same.
     """
     a, b = _centred_body(before), _centred_body(after)
-    return bool(_limb_distance(a[MIRROR_PARTNER], b) < times * _limb_distance(a, b))
+    plain = float(_limb_distance(a, b))
+    return float(_limb_distance(a[MIRROR_PARTNER], b)) / plain if plain else float("inf")
 
 
 def _centred_body(estimate: PoseEstimate) -> NDArray[np.floating[Any]]:

@@ -30,7 +30,7 @@ from .landmarks.plausibility import PRESENCE_THRESHOLD, is_in_image, is_plausibl
 from .landmarks.redetection import redetect_rotated
 from .landmarks.reference_estimator import ReferenceEstimator
 from .landmarks.tracking_networks import open_networks
-from .left_right import looks_swapped
+from .left_right import looks_swapped, swap_ratio
 from .search_schedule import EAGER_S, SearchSchedule
 from .tracked_target import TrackedTarget
 
@@ -46,7 +46,7 @@ MOST_PEOPLE = 12
 REFERENCE_S = 30 * FRAME_S  # between two calls of the reference network
 REFERENCE_SWAPPED_S = 8 * FRAME_S  # the same where left and right seem to be swapped
 FALLBACK_S = 15 * FRAME_S  # for which the largest network replaces a smaller one that lost the person, or swapped sides
-HALF_SWAPPED = 2.0  # distance of bodies with sides swapped over that without, below which a network may confuse them
+HALF_SWAPPED = 2.0  # `swap_ratio` below which a network may be about to confuse the sides
 APPEARANCE_S = 4 * FRAME_S  # between two samples of the appearance
 _MIN_REDETECTION_AGE = 6  # frames for which somebody was tracked
 _SAME_TARGET, _LOST_TARGET, _REPLACED_TARGET = 0.12, 0.5, 0.35  # distances of regions in sides, see `Region.resembles`
@@ -202,14 +202,11 @@ class PeopleTracker:
 
         :return: the estimate, and whether left and right are swapped in it.
         """
-        swapped = estimate is not None and looks_swapped(target.estimate, estimate)
+        ratio = np.inf if estimate is None else swap_ratio(target.estimate, estimate)
+        swapped = ratio < 1.0
         if self._networks.fallback is None:
             return estimate, swapped
-        if (
-            estimate is None
-            or looks_swapped(target.estimate, estimate, HALF_SWAPPED)
-            or target.becomes_occluded(estimate)
-        ):
+        if estimate is None or ratio < HALF_SWAPPED or target.becomes_occluded(estimate):
             target.fallback_s = self._clock.time_s
         if self._clock.has_passed(FALLBACK_S, self._clock.time_s - target.fallback_s):
             return estimate, swapped
