@@ -155,7 +155,7 @@ def test_climbs_with_other_joints_are_refused():
 
 
 def made_gait(up: int) -> dict:
-    """Return a gait's file, of somebody who stands; ``up`` is the axis that is up."""
+    """Return the file of a gait, here of a person standing still, with ``up`` as its vertical axis."""
     joints = standing()
     order = {"hip": "hip", "knee": "knee", "ankle": "ankle", "heel": "ankle", "toe": "foot_end", "shoulder": "shoulder"}
     frames = []
