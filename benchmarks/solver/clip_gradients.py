@@ -3,7 +3,7 @@
 
 Each frame's matrix is applied through the tree, never formed, and its recursion, with the temporal terms' diagonal
 added, is the preconditioner. The shape is fixed and no point stands still, which favours this method: beta would add
-columns to every operation, and contacts couple whole chains of joints. See NOTEBOOK.md for the comparison.
+columns to every operation, and contacts couple whole chains of joints. See ../notebook/solver.md for the comparison.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ SHORTEST_M, TALLEST_M = 0.5, 2.6  # statures outside are input errors
 MAX_DEVIATIONS = 4.5  # standard deviations of the population up to which the shapes of a body are realistic
 SHORTEST_CHILD_M = 0.8  # one year of age; below, growth extrapolated from that of six-year-olds makes legs too long
 STIFFNESS = 4.0  # κ of ``with_unknown_stature``
-UNKNOWN_M = 0.1  # s of `stature_sigma`, about the deviation of adults (benchmarks/NOTEBOOK.md)
+UNKNOWN_M = 0.1  # s of `stature_sigma`, about the deviation of adults (benchmarks/notebook/shape.md)
 FIXED = 1e6  # information of a coefficient that does not vary
 _ROUNDS = 3
 

@@ -7,7 +7,7 @@ little from person to person and from joint to joint, and grows less with the fr
 covariance:
     sigma = c s (rate / 60 Hz)^0.3,   s of the covariance,   c = 15.5 along the line of sight and 11.5 across it
 Fitted to the twelve limb joints of real clips and renders with ground truth
-(benchmarks/NOTEBOOK.md, "A clip as one problem").
+(benchmarks/notebook/clip.md).
 """
 
 from __future__ import annotations
