@@ -57,6 +57,7 @@ ROWS: dict[str, dict[str, Any]] = {
     "without the orientation field": {"ablation": Ablation(orientation_field=False)},
     "without the joint prior": {"ablation": Ablation(joint_prior=False)},
     "without the search for mirrored limbs": {"ablation": Ablation(limb_search=False)},
+    "without the body's own surface": {"ablation": Ablation(body_surface=False)},
     "without left-right repair": {"ablation": Ablation(left_right=False)},
     "without keypoint-jump repair": {"ablation": Ablation(keypoint_jumps=False)},
     "without the stance": {"ablation": Ablation(stance=False)},

@@ -6,7 +6,6 @@ A confidence multiplies the squared residual; zero, or a value that is not finit
 measurement out.
 """
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -122,12 +121,13 @@ class Floor:
 
     indices (n,), normal (3,), a unit vector pointing up, offset in metres, contact (n,): the probability of touching
     the floor, 0 where a point is free to be above; below (n,): the weight of a point that is below, one for all if
-    None, 0 where a point is free to be there, as on a stair.
+    None, 0 where a point is free to be there, as on a stair. With normal (n, 3) and offset (n,), each point has a
+    plane of its own, such as the tangent plane of a surface that it may not enter.
     """
 
     indices: ArrayLike
     normal: ArrayLike
-    offset: float
+    offset: ArrayLike
     contact: ArrayLike
     below: ArrayLike | None = None
 
@@ -283,18 +283,22 @@ def _foot_contact_rows(m: FootContacts, points: int) -> tuple[Array, Array]:
 
 def _floor_rows(m: Floor, points: int) -> tuple[Array, Array]:
     indices = as_indices(m.indices, points, "Indices of the floor's points")
-    normal = as_array(m.normal, (3,), "Normal of the floor")
+    planes = (len(indices),) if np.ndim(m.normal) > 1 else ()
+    normal = as_array(m.normal, (*planes, 3), "Normal of the floor")
     contact = as_array(m.contact, (len(indices),), "Contact with the floor")
     below = np.ones(len(indices)) if m.below is None else m.below
     below = as_array(below, (len(indices),), "Weights below the floor")
     check_not_negative(below, "Weights below the floor")
     check_not_negative(contact, "Contact with the floor")
-    offset = as_number(m.offset, "Offset of the floor")
-    length = math.hypot(*normal)
-    if not (math.isfinite(offset) and abs(length - 1.0) < 1e-6):
+    name = "Offset of the floor"
+    offset = as_array(m.offset, planes, name) if planes else np.asarray(as_number(m.offset, name))
+    lengths = np.linalg.norm(normal, axis=-1)
+    wrong = ~(np.isfinite(offset) & (np.abs(lengths - 1.0) < 1e-6))
+    if wrong.any():
+        first = np.flatnonzero(wrong)[0]
         raise InvalidValueError(
-            f"The floor needs a finite offset and a normal of length 1, but got offset {offset} and a normal of "
-            f"length {length:.6g}; divide both by that length."
+            f"The floor needs a finite offset and a normal of length 1, but got offset {offset.flat[first]} and a "
+            f"normal of length {lengths.flat[first]:.6g}; divide both by that length."
         )
     return _usable_rows(floor.pack(indices, normal, offset, below, contact))
 

@@ -15,17 +15,20 @@ from numpy.typing import NDArray
 BLOCK_FRAMES = 4096
 
 
-def by_blocks(compute: Callable[..., tuple[NDArray[Any], ...]], *arrays: NDArray[Any]) -> tuple[NDArray[Any], ...]:
+def by_blocks(
+    compute: Callable[..., tuple[NDArray[Any], ...]], *arrays: NDArray[Any], frames: int | None = None
+) -> tuple[NDArray[Any], ...]:
     """Evaluate ``compute(*arrays)`` one block of frames at a time, for functions that treat frames independently.
 
     :param compute: maps arrays (t, ...) to a tuple of arrays (t, ...), for any number t of frames.
     :param arrays: (T, ...) each.
+    :param frames: of a block; by default `BLOCK_FRAMES`.
     :return: arrays (T, ...).
     """
-    T = len(arrays[0])
+    T, frames = len(arrays[0]), frames or BLOCK_FRAMES
     out: list[NDArray[Any]] = []
-    for start in range(0, max(T, 1), BLOCK_FRAMES):
-        block = slice(start, start + BLOCK_FRAMES)
+    for start in range(0, max(T, 1), frames):
+        block = slice(start, start + frames)
         results = compute(*(array[block] for array in arrays))
         if not out:
             out = [np.empty((T, *result.shape[1:]), result.dtype) for result in results]

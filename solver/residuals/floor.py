@@ -42,11 +42,12 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
     return cost
 
 
-def pack(points: Array, normal: Array, offset: float, w_below: Array, w_above: Array) -> tuple[Array, Array]:
+def pack(points: Array, normal: Array, offset: Array, w_below: Array, w_above: Array) -> tuple[Array, Array]:
     """Return the tables of `accumulate`: int64 (n, 1) and float64 (n, 6).
 
     :param points: (n,) which points, as in the measurements.
-    :param normal, offset: of the plane normal^T p = offset in camera axes; (3,), a unit vector pointing up, and metres.
+    :param normal, offset: of the plane normal^T p = offset in camera axes; (3,), a unit vector pointing up, and ()
+        metres; or (n, 3) and (n,), of each point's own plane.
     :param w_below: (n,) weights of points that are below the plane. :param w_above: (n,) of those above.
     """
     n = len(points)

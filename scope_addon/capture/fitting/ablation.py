@@ -31,6 +31,7 @@ class Ablation:
     stance: bool = True  # distance and lean that follow from floor, feet and balance
     balance: bool = True  # in the stance: the zero moment point lies between the contact points
     floor: bool = True  # in the stance: feet in contact lie on the floor
+    body_surface: bool = True  # forearms and hands stay outside trunk, legs and head
     contact: bool = True  # feet in contact stay in place, and none goes below the floor
     limb_search: bool = True  # limbs are tried on both sides of the image plane
 

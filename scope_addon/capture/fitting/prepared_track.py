@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ....solver import Body, Floor, Measurements, Priors, Weights, default_priors
 from ....solver.loaders.body_file import CHILD_BELOW_M
+from ...kinematics.body_surface import with_arm_points
 from ...kinematics.contact_points import CONTACT_POINTS, with_contact_points
 from ..camera.intrinsics import Camera
 from ..perception.lifter import Lifted, default_lifter
@@ -106,12 +107,12 @@ class PreparedTrack:
         return replace(self, lifted=replace(self.lifted, points=rotated))
 
     def with_stance(self, stance: Stance, betas: NDArray[np.floating[Any]]) -> PreparedTrack:
-        """Add the pelvis and the floor, and to the body the contact points of this shape.
+        """Add the pelvis and the floor, and to the body points on the arms and the contact points of this shape.
 
         :param stance: in each frame's camera.
         :param betas: (P,) shape coefficients.
         """
-        body, K = with_contact_points(self.body, betas), self.measurer.intrinsics
+        body, K = with_contact_points(with_arm_points(self.body), betas), self.measurer.intrinsics
         hands = None if self.hand_measurer is None else HandMeasurer(body, K)
         return replace(self, body=body, measurer=Measurer(body, K), hand_measurer=hands, stance=stance)
 

@@ -101,6 +101,23 @@ def test_points_may_be_left_free_below_the_floor():
     assert low[0] < low[1] - 1e-3 < low[2] - 2e-3
 
 
+def test_each_point_may_have_a_plane_of_its_own():
+    """One plane for all points is the same as a copy for each; a point below its own plane alone is raised."""
+    state = standing()
+    p = points(state)
+    height = (p[FEET] @ UP).min() + 0.05
+    one = fit(BODY, seen(state, floor=Floor(FEET, UP, height, np.zeros(4))), init=state)
+    copies = Floor(FEET, np.tile(UP, (4, 1)), np.full(4, height), np.zeros(4))
+    np.testing.assert_array_equal(fit(BODY, seen(state, floor=copies), init=state).t_camera_part, one.t_camera_part)
+    sideways = np.array([1.0, 0.0, 0.0])
+    normals, offsets = np.array([sideways, -sideways]), np.array([1.0, -1.0]) * (p[FEET[:2], 0] + [0.05, 0.05])
+    found = points(fit(BODY, seen(state, floor=Floor(FEET[:2], normals, offsets, np.zeros(2))), init=state).state)
+    plain = points(fit(BODY, seen(state), init=state).state)
+    moved = (found - plain)[FEET[:2], 0]
+    assert moved[0] > 0.02
+    assert abs(moved[1]) < 0.5 * moved[0]
+
+
 @pytest.mark.parametrize("size", [-1.5, 1.5])
 def test_the_floor_tells_the_depth_that_a_picture_does_not(size):
     """With 2D alone, distance and size are one; a floor of known height below somebody small or tall decides."""
@@ -150,6 +167,9 @@ def test_a_point_that_is_not_finite_is_left_out_and_no_probability_is_no_contact
         ({"floor": Floor(FEET, UP, 0.0, np.zeros(3))}, r"\(4,\)"),
         ({"floor": Floor(FEET, UP, 0.0, np.zeros(4), below=np.zeros(5))}, r"\(4,\), but got shape \(5,\)"),
         ({"floor": Floor([10000], UP, 0.0, [0.0])}, "10000"),
+        ({"floor": Floor(FEET, np.tile(UP, (3, 1)), np.zeros(4), np.zeros(4))}, r"Normal .* \(4, 3\)"),
+        ({"floor": Floor(FEET, np.tile(UP, (4, 1)), 0.0, np.zeros(4))}, r"Offset .* \(4,\)"),
+        ({"floor": Floor(FEET, np.outer([1, 1, 3, 1], UP), np.zeros(4), np.zeros(4))}, "length 3"),
         ({"foot_contacts": FootContacts(FEET, np.zeros((3, 3)), np.ones(4))}, r"\(4, 3\)"),
     ],
 )

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from .....solver import MotionFit, State
 from .....solver.rotations import exp, log
+from ....kinematics.body_surface import BodySurface
 from ...fitting.ablation import NO_ABLATION, Ablation
 from ...fitting.frame_sequence import LONGEST_COAST_S, FittedTrack
 from ...fitting.prepared_track import PreparedTrack
@@ -48,7 +49,7 @@ def fit_clip(
     :param progress: called with the stage's name, the frames done and the total; it may raise to cancel.
     :return: the states in each frame's camera; those of invalid frames are as given.
     """
-    clip = _Clip(prepared, start, path, progress, ablation.limb_search)
+    clip = _Clip(prepared, start, path, progress, ablation)
     for run in runs(start.valid, prepared.track.times):
         for window in windows(len(run), _frames_of(prepared, WINDOW_UNKNOWNS), _frames_of(prepared, OVERLAP)):
             clip.fit(run[window])
@@ -59,11 +60,12 @@ class _Clip:
     """A track on its way to its motion, in the first frame's axes."""
 
     def __init__(
-        self, prepared: PreparedTrack, start: FittedTrack, path: CameraPath, progress: _Progress, limb_search: bool
+        self, prepared: PreparedTrack, start: FittedTrack, path: CameraPath, progress: _Progress, ablation: Ablation
     ) -> None:
-        self._prepared, self._path, self._progress, self._limb_search = prepared, path, progress, limb_search
+        self._prepared, self._path, self._progress, self._limb_search = prepared, path, progress, ablation.limb_search
         self._start, first = start, path.to_first(start)
         self._rotations, self._root = first.rotations.copy(), first.t_camera_root.copy()
+        self._surface = BodySurface(prepared.body, np.asarray(start.betas, float)) if ablation.body_surface else None
         self._done = np.zeros(len(start.valid), bool)
         self._sigma = np.full((*first.rotations.shape[:2], 2), np.nan, np.float32)
 
@@ -77,7 +79,14 @@ class _Clip:
         better = search_limbs(body, window, found, quadratic) if self._limb_search else None
         if better is not None:
             found = window.fit(every, better, quadratic)
-        self._keep(frames, window.with_resting_places(found).fit(every, found.states, robust, covariance=True))
+        resting = window.with_resting_places(found)
+        if self._surface is None:
+            return self._keep(frames, resting.fit(every, found.states, robust, covariance=True))
+        outside, entered = resting.with_body_surface(found, self._surface)
+        if entered:  # what comes out of one part may enter the next
+            found = outside.fit(every, found.states, robust)
+            outside, _ = resting.with_body_surface(found, self._surface)
+        self._keep(frames, outside.fit(every, found.states, robust, covariance=True))
 
     def fitted(self) -> FittedTrack:
         """Return the states in each frame's camera."""

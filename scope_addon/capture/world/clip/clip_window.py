@@ -27,10 +27,12 @@ from .....solver import (
     make_tree,
 )
 from .....solver.compiled.tree import Tree, with_fixed_shape
+from ....kinematics.body_surface import BodySurface
 from ....kinematics.contact_points import contact_point_positions
 from ...fitting.prepared_track import PreparedTrack
 from ...fitting.weights import ROBUST, clip_stages
 from ..camera_path import CameraPath
+from .body_planes import ENTERS_M, with_planes
 from .resting_places import resting_places
 
 
@@ -113,6 +115,20 @@ class ClipWindow:
             for each, place_cam, p in zip(self.measured, places_cam, resting, strict=True)
         ]
         return replace(self, measured=measured)
+
+    def with_body_surface(self, found: MotionFit, surface: BodySurface) -> tuple[ClipWindow, bool]:
+        """Add to the measurements the body's own surface in a motion, which forearms and hands may not enter.
+
+        :return: and whether they enter it by more than `ENTERS_M` there.
+        """
+        path, planes = self.path, surface.planes(found.R_world_part, found.t_world_part)
+        offset = planes.offset - np.einsum("tci,ti->tc", planes.normal, path.center[self.frames])
+        normal_cam = planes.normal @ path.R_first_camera[self.frames]
+        measured = [
+            replace(each, floor=with_planes(each.floor, surface.indices[near], normal[near], d[near]))
+            for each, near, normal, d in zip(self.measured, planes.near, normal_cam, offset, strict=True)
+        ]
+        return replace(self, measured=measured), bool((planes.height[planes.near] < -ENTERS_M).any())
 
     @cached_property
     def _tree(self) -> Tree:

@@ -7,15 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scope.scope_addon.capture.fitting.ablation import Ablation
 from scope.scope_addon.capture.fitting.prepared_track import Stance
 from scope.scope_addon.capture.fitting.weights import motion_priors
-from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.world.camera_path import CameraPath
 from scope.scope_addon.capture.world.clip import clip_fit
 from scope.scope_addon.capture.world.placement import place_track
+from scope.scope_addon.kinematics.body_surface import BodySurface, with_arm_points
 from scope.solver.rotations import exp
 
-from .waving_person import BODY, FPS, FRAMES, HIPS, JOINTS, LEG, fit, joints, person, prepare
+from .waving_person import ARM, BODY, FPS, FRAMES, HIPS, JOINTS, LEG, fit, joints, keypoints, person, prepare
 
 
 @pytest.mark.parametrize("flipped", [1, 4, 8])
@@ -55,9 +56,8 @@ def test_noise_of_single_frames_is_averaged_and_a_motion_keeps_its_amplitude():
 
 def test_a_limb_that_nothing_shows_has_larger_deviations_than_its_twin():
     track, true = person()
-    arm = [KEYPOINT_NAMES.index(f"left_{name}") for name in ("elbow", "wrist", "pinky", "index", "thumb")]
     sigma = np.full((FRAMES, JOINTS), 0.1)
-    track.confidence[12:, arm], sigma[12:, arm] = 0.0, 10.0
+    track.confidence[12:, ARM], sigma[12:, ARM] = 0.0, 10.0
     found = fit(prepare(track, sigma_m=sigma), true).joint_sigma_m
     left, right = (found[:, BODY.joint_names.index(f"{side}_wrist")] for side in ("left", "right"))
     assert (left[18:] > 2.0 * right[18:]).all()
@@ -203,3 +203,26 @@ def test_the_states_to_start_from_stay_as_they_are():
     clip_fit.fit_clip(prepare(track), true, CameraPath.static(FRAMES), lambda *_: None)
     np.testing.assert_array_equal(true.rotations, before[0])
     np.testing.assert_array_equal(true.t_camera_root, before[1])
+
+
+@pytest.mark.parametrize("left_out", [False, True])
+def test_a_hand_that_is_lifted_into_the_trunk_lies_on_it(left_out):
+    """The image does not show the left arm, and the lifting network has it hanging through the hips."""
+    track, true = person()
+    shoulder = BODY.joint_names.index("left_shoulder")
+    start = replace(true, rotations=true.rotations.copy())
+    start.rotations[:, shoulder] = exp(np.array([0.0, 0.0, -1.8]))
+    track.confidence[:, ARM] = 0.0
+    points = keypoints(start.rotations, start.t_camera_root)
+    inside = points - points[:, HIPS].mean(axis=1, keepdims=True)
+    up, nothing = np.tile([0.0, -1.0, 0.0], (FRAMES, 1)), np.zeros((FRAMES, 6))
+    stance = Stance(true.t_camera_root, np.tile(np.eye(3), (FRAMES, 1, 1)), up, np.full(FRAMES, -5.0), nothing, nothing)
+    prepared = prepare(track, inside).with_stance(stance, true.betas)
+    found = fit(prepared, start, ablation=Ablation(body_surface=not left_out))
+    surface = BodySurface(with_arm_points(BODY), np.zeros(BODY.P))
+    R, t = BODY.forward_kinematics(found.rotations, found.t_camera_root - BODY.rest_joints()[0], np.zeros(BODY.P))
+    lowest = surface.planes(R, t).height.min(axis=1)
+    if left_out:
+        assert lowest.max() < -0.03
+    else:
+        assert lowest.min() > -0.015

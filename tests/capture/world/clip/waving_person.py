@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
+from scope.scope_addon.capture.fitting.ablation import NO_ABLATION, Ablation
 from scope.scope_addon.capture.fitting.frame_sequence import FittedTrack
 from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
 from scope.scope_addon.capture.fitting.prepared_track import PreparedTrack, prepare_track
@@ -22,6 +23,7 @@ FPS, FRAMES = 30.0, 24
 BODY, CAMERA = load_body("scope"), choose_camera(1080, 1920)
 JOINTS = len(KEYPOINT_NAMES)
 HIPS = [KEYPOINT_NAMES.index(f"{side}_hip") for side in ("left", "right")]
+ARM = [KEYPOINT_NAMES.index(f"left_{name}") for name in ("elbow", "wrist", "pinky", "index", "thumb")]
 LEG = [KEYPOINT_NAMES.index(f"right_{name}") for name in ("knee", "ankle", "heel", "foot_index")]
 
 
@@ -39,9 +41,7 @@ def person(frames: int = FRAMES, path: CameraPath | None = None) -> tuple[Track,
     wave = 0.5 * np.sin(2 * np.pi * times)
     rotations[:, BODY.joint_names.index("left_shoulder")] = exp(wave[:, None] * [0.0, 0.0, 1.0])
     root = np.tile([0.0, 0.0, 4.0], (frames, 1))
-    R, t = BODY.forward_kinematics(rotations, root - BODY.rest_joints()[0], np.zeros(BODY.P))
-    at = BODY.keypoint_set("blazepose")
-    points = with_keypoint_offsets(BODY).keypoints(R, t, np.zeros(BODY.P), [at[name] for name in KEYPOINT_NAMES])
+    points = keypoints(rotations, root)
     if path is not None:
         points = path.points_to_frames(points)
     pixels = points[..., :2] / points[..., 2:] * CAMERA.intrinsics[0, 0] + CAMERA.intrinsics[:2, 2]
@@ -58,6 +58,13 @@ def person(frames: int = FRAMES, path: CameraPath | None = None) -> tuple[Track,
     return track, FittedTrack(rotations, root, np.zeros(BODY.P), np.ones(frames, bool), seen, 1.0)
 
 
+def keypoints(rotations: np.ndarray, root: np.ndarray) -> np.ndarray:
+    """The network's keypoints (T, J, 3) of states, in their axes."""
+    R, t = BODY.forward_kinematics(rotations, root - BODY.rest_joints()[0], np.zeros(BODY.P))
+    at = BODY.keypoint_set("blazepose")
+    return with_keypoint_offsets(BODY).keypoints(R, t, np.zeros(BODY.P), [at[name] for name in KEYPOINT_NAMES])
+
+
 def prepare(track: Track, lifted_m: np.ndarray | None = None, sigma_m: np.ndarray | float = 0.1) -> PreparedTrack:
     """The track with lifted points and their deviation; by default those of the track, which are exact."""
     sigma = np.broadcast_to(sigma_m, (len(track), JOINTS)).copy()
@@ -65,8 +72,10 @@ def prepare(track: Track, lifted_m: np.ndarray | None = None, sigma_m: np.ndarra
     return replace(prepare_track(BODY, track, CAMERA), lifted=Lifted(points, sigma, sigma))
 
 
-def fit(prepared: PreparedTrack, start: FittedTrack, path: CameraPath | None = None) -> FittedTrack:
-    return fit_clip(prepared, start, path or CameraPath.static(len(start.valid)), lambda *_: None)
+def fit(
+    prepared: PreparedTrack, start: FittedTrack, path: CameraPath | None = None, ablation: Ablation = NO_ABLATION
+) -> FittedTrack:
+    return fit_clip(prepared, start, path or CameraPath.static(len(start.valid)), lambda *_: None, ablation)
 
 
 def joints(fitted: FittedTrack) -> np.ndarray:

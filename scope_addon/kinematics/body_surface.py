@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The surface of trunk, legs and head, and the points of the arms that may not enter it.
+
+Depth is what one camera measures worst, so a hand that lies on a thigh or hangs beside the hips easily ends up some
+centimetres inside of them. That two parts do not overlap depends on the poses of both, which does not have the form
+r(T_i, Omega_i, beta) of section 3 of the paper. In a motion that is nearly right, though, the surface is where it will
+be: the tangent plane n^T p = d next to a point p of an arm is constant, and p stays above it as above a floor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...solver.body import Body
+from .contact_points import PALMS
+from .frame_blocks import by_blocks
+
+SPACING_M = 0.05  # between the sampled vertices
+REACH_M = 0.15  # from a vertex on, up to which its tangent plane stands for the surface
+AHEAD_M = 0.05  # height from which on no plane is needed: so far, a point does not move in one more fit
+_FRAMES = 256  # whose distances are computed at once: some 20 MB
+_TRUNK = ("pelvis", "spine1", "spine2", "spine3", "neck", "head")
+_LEGS = ("hip", "knee", "ankle")
+_ON_ARMS = ("elbow", "wrist", "index", "pinky", "thumb_tip", "middle_finger_tip")
+
+
+def with_arm_points(body: Body) -> Body:
+    """Add four keypoints to a body: on each forearm, at a third and two thirds of the way from elbow to wrist."""
+    parts, template, shapedirs = [], [], []
+    for side in ("left", "right"):
+        elbow, wrist = (body.joint_names.index(f"{side}_{joint}") for joint in ("elbow", "wrist"))
+        for share in (1 / 3, 2 / 3):
+            parts.append(elbow)
+            template.append((1 - share) * body.J_template[elbow] + share * body.J_template[wrist])
+            shapedirs.append((1 - share) * body.J_shapedirs[elbow] + share * body.J_shapedirs[wrist])
+    return replace(
+        body,
+        keypoint_names=(*body.keypoint_names, *_FOREARMS),
+        keypoint_part=np.concatenate([body.keypoint_part, np.array(parts, np.int32)]),
+        keypoint_template=np.concatenate([body.keypoint_template, template]),
+        keypoint_shapedirs=np.concatenate([body.keypoint_shapedirs, shapedirs]),
+    )
+
+
+_FOREARMS = tuple(f"forearm/{side}_{which}" for side in ("left", "right") for which in ("upper", "lower"))
+
+
+@dataclass(frozen=True)
+class TangentPlanes:
+    """For each of C points of the arms in T frames: the plane normal^T p = offset that it stays above."""
+
+    normal: NDArray[np.float64]  # (T, C, 3) unit, outwards
+    offset: NDArray[np.float64]  # (T, C) metres, with the room that the arm needs around the point
+    height: NDArray[np.float64]  # (T, C) of the point above the plane, metres; negative inside the body
+    near: NDArray[np.bool_]  # (T, C) the surface is so near that the plane matters
+
+
+class BodySurface:
+    """Vertices of trunk, legs and head, spread evenly, and the keypoints on the arms, for one shape of a body."""
+
+    def __init__(self, body: Body, betas: NDArray[np.floating[Any]]) -> None:
+        """Choose the vertices, and measure the room that the arm needs around each keypoint.
+
+        :param body: whose keypoints on the arms are used, those of `with_arm_points` and the palms if it has them.
+        :param betas: (P,) shape coefficients.
+        """
+        v, J = body.rest_vertices(betas), body.rest_joints(betas)
+        strongest = body.skin_joints[np.arange(len(v)), body.skin_weights.argmax(1)]
+        own = [k for k, name in enumerate(body.joint_names) if name in _TRUNK or name.endswith(_LEGS)]
+        rows = np.flatnonzero(np.isin(strongest, own))
+        rows = rows[_one_per_cell(v[rows])]
+        self._count, self._skin = len(rows), list(_skin(body, rows, v[rows], J, _vertex_normals(body, v)[rows]))
+        self._body, self.indices = body, _points_on_arms(body)
+        self._room = self._distance_to_skin(betas, v[np.isin(strongest, _arm_parts(body))])
+
+    def planes(self, R: NDArray[np.floating[Any]], t: NDArray[np.floating[Any]]) -> TangentPlanes:
+        """Return the tangent planes next to the points `indices` of a posed body.
+
+        :param R, t: (T, K+1, 3, 3) and (T, K+1, 3) part poses in any frame; the result is in that frame.
+        """
+        return TangentPlanes(*by_blocks(self._planes, R, t, frames=_FRAMES))
+
+    def _planes(self, R: NDArray[np.floating[Any]], t: NDArray[np.floating[Any]]) -> tuple[NDArray[Any], ...]:
+        v, normals = self._posed(R, t)
+        points = self._body.keypoints(R, t)[:, self.indices]
+        squared = (points**2).sum(-1)[..., None] + (v**2).sum(-1)[:, None] - 2.0 * points @ np.swapaxes(v, 1, 2)
+        nearest = squared.argmin(-1)
+        frame = np.arange(len(R))[:, None]
+        normal = normals[frame, nearest]
+        offset = (normal * v[frame, nearest]).sum(-1) + self._room
+        height = (normal * points).sum(-1) - offset
+        return normal, offset, height, (squared.min(-1) < REACH_M**2) & (height < AHEAD_M)
+
+    def _posed(
+        self, R: NDArray[np.floating[Any]], t: NDArray[np.floating[Any]]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the vertices (T, V, 3) by linear blend skinning, and their unit normals (T, V, 3)."""
+        v, normals = np.zeros((2, len(R), self._count, 3))
+        for joint, rows, weights, local, normal in self._skin:
+            R_transposed = np.swapaxes(R[:, joint], 1, 2)
+            v[:, rows] += local @ R_transposed + weights * t[:, joint, None]
+            normals[:, rows] += normal @ R_transposed
+        return v, normals / np.linalg.norm(normals, axis=-1, keepdims=True)
+
+    def _distance_to_skin(
+        self, betas: NDArray[np.floating[Any]], skin: NDArray[np.floating[Any]]
+    ) -> NDArray[np.float64]:
+        """Return the (C,) distances from the points to the arms' nearest vertex (n, 3) in the rest pose."""
+        points = (self._body.keypoint_template + self._body.keypoint_shapedirs @ betas)[self.indices]
+        distance: NDArray[np.float64] = np.linalg.norm(points[:, None] - skin, axis=-1).min(axis=1)
+        return distance
+
+
+def _skin(
+    body: Body,
+    rows: NDArray[np.intp],
+    v: NDArray[np.floating[Any]],
+    J: NDArray[np.floating[Any]],
+    normals: NDArray[np.floating[Any]],
+) -> Iterator[tuple[int, NDArray[np.intp], NDArray[np.floating[Any]], NDArray[np.float64], NDArray[np.float64]]]:
+    """Yield for each joint the chosen vertices that it moves, and their weights (n, 1), places and normals (n, 3).
+
+    Places are from the joint, and both are times the weight.
+    """
+    for joint in range(len(body.joint_names)):
+        moved, column = np.nonzero((body.skin_joints[rows] == joint) & (body.skin_weights[rows] > 0.0))
+        if len(moved):
+            weights = body.skin_weights[rows][moved, column][:, None]
+            yield joint, moved, weights, weights * (v[moved] - J[joint]), weights * normals[moved]
+
+
+def _points_on_arms(body: Body) -> NDArray[np.intp]:
+    """Return the keypoints (C,) on forearms and hands that stay outside: one for each name, of whichever set."""
+    chosen: dict[str, int] = {}
+    for k, keypoint in enumerate(body.keypoint_names):
+        side, _, name = keypoint.rpartition("/")[2].partition("_")
+        if name in _ON_ARMS or keypoint in _FOREARMS or keypoint in PALMS:
+            chosen.setdefault(keypoint if name not in _ON_ARMS else f"{side}_{name}", k)
+    return np.array(list(chosen.values()), np.intp)
+
+
+def _arm_parts(body: Body) -> list[int]:
+    """Return the forearms and all parts below them."""
+    arms: list[int] = []
+    for part, parent in enumerate(body.parents):
+        if body.joint_names[part].endswith("_elbow") or parent in arms:
+            arms.append(part)
+    return arms
+
+
+def _vertex_normals(body: Body, v: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+    triangles, normals = body.triangles(), np.zeros(v.shape)
+    a, b, c = (v[triangles[:, corner]] for corner in range(3))
+    for corner in range(3):
+        np.add.at(normals, triangles[:, corner], np.cross(b - a, c - a))
+    length: NDArray[np.float64] = np.linalg.norm(normals, axis=1, keepdims=True)
+    unit: NDArray[np.float64] = normals / np.maximum(length, np.finfo(float).tiny)
+    return unit
+
+
+def _one_per_cell(points: NDArray[np.floating[Any]]) -> NDArray[np.intp]:
+    """Return the rows of points (n, 3), one in each cell of a grid."""
+    _, first = np.unique(np.floor(points / SPACING_M).astype(int), axis=0, return_index=True)
+    return np.sort(first)

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Arms near trunk and thighs, against full skinning and the distance to all of its triangles."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scope.scope_addon.kinematics.body_surface import AHEAD_M, BodySurface, with_arm_points
+from scope.scope_addon.kinematics.contact_points import with_contact_points
+from scope.solver import load_body
+from scope.solver.rotations import exp
+
+BODY = load_body("scope")
+BETAS = np.linspace(-1.0, 1.0, BODY.P)
+PLANES_M = 0.01  # error of the tangent planes of vertices 5 cm apart
+
+
+def posed(**joints: list[float]) -> tuple[np.ndarray, np.ndarray]:
+    """The part poses (1, K+1, 3, 3) and (1, K+1, 3) of a body with some joints turned."""
+    omega = np.tile(np.eye(3), (BODY.K + 1, 1, 1))
+    for name, vector in joints.items():
+        omega[BODY.joint_names.index(name)] = exp(np.array(vector))
+    R, t = BODY.forward_kinematics(omega, np.zeros(3), BETAS)
+    return R[None], t[None]
+
+
+POSES = {
+    "arms out": posed(),
+    "arms through the hips": posed(left_shoulder=[0, 0, -1.65], right_shoulder=[0, 0, 1.65]),
+    "arms beside the hips": posed(left_shoulder=[0, 0, -1.4], right_shoulder=[0, 0, 1.4]),
+    "a forearm through the belly": posed(left_shoulder=[0, 0, -1.45], left_elbow=[0, 0, -1.2]),
+    "seated, a hand in the thigh": posed(
+        left_hip=[-1.5, 0, 0], right_hip=[-1.5, 0, 0], left_shoulder=[0, 0, -1.7], left_elbow=[0, -0.7, 0]
+    ),
+}
+
+
+def surface() -> BodySurface:
+    return BodySurface(with_contact_points(with_arm_points(BODY), BETAS), BETAS)
+
+
+def distances_outside(points: np.ndarray, R: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Signed distances (C,) from trunk, legs and head: by samples of all their triangles, inside by the winding number.
+
+    The arms' own triangles are left out, and so are the holes that they leave: the shoulders are far from all points.
+    """
+    v, triangles = BODY.skin(R[0], t[0], BETAS), BODY.triangles()
+    part = BODY.skin_joints[np.arange(len(v)), BODY.skin_weights.argmax(1)]
+    arms = [k for k, name in enumerate(BODY.joint_names) if name.endswith(("shoulder", "elbow", "wrist", "hand"))]
+    corners = v[triangles[~np.isin(part[triangles], arms).any(axis=1)]]
+    a, b, c = (corners[None, :, k] - points[:, None] for k in range(3))
+    lengths = [np.linalg.norm(each, axis=-1) for each in (a, b, c)]
+    volume = np.einsum("pti,pti->pt", a, np.cross(b, c))
+    angle = 2 * np.arctan2(
+        volume,
+        np.prod(lengths, axis=0) + (a * b).sum(-1) * lengths[2] + (b * c).sum(-1) * lengths[0]
+        + (c * a).sum(-1) * lengths[1],
+    )  # fmt: skip
+    inside = np.abs(angle.sum(axis=1)) > 2 * np.pi
+    nearest = np.linalg.norm((a + b + c) / 3.0, axis=-1).min(axis=1)
+    for each in lengths:
+        nearest = np.minimum(nearest, each.min(axis=1))
+    return np.where(inside, -nearest, nearest)
+
+
+@pytest.mark.parametrize("pose", POSES)
+def test_heights_are_the_distances_from_the_skin_less_the_room_that_the_arm_needs(pose: str) -> None:
+    (R, t), own = POSES[pose], surface()
+    body = with_contact_points(with_arm_points(BODY), BETAS)
+    planes = own.planes(R, t)
+    points = body.keypoints(R, t)[0, own.indices]
+    true = distances_outside(points, R, t)
+    at_rest = (body.keypoint_template + body.keypoint_shapedirs @ BETAS)[own.indices]
+    rest = np.linalg.norm(at_rest[:, None] - BODY.rest_vertices(BETAS), axis=-1).min(axis=1)
+    near = planes.near[0]
+    np.testing.assert_allclose((planes.height[0] + rest)[near], true[near], atol=PLANES_M)
+    assert (true - rest)[~near].min(initial=1.0) > AHEAD_M - PLANES_M
+
+
+def test_arms_enter_the_body_in_some_poses_and_in_others_not() -> None:
+    lowest = {pose: surface().planes(*POSES[pose]) for pose in POSES}
+    assert not lowest["arms out"].near.any()
+    assert lowest["arms beside the hips"].near.any()
+    assert lowest["arms beside the hips"].height.min() > 0.03
+    for pose in ("arms through the hips", "a forearm through the belly", "seated, a hand in the thigh"):
+        assert lowest[pose].height[lowest[pose].near].min() < -0.03, pose
+
+
+def test_planes_move_with_the_body() -> None:
+    R, t = POSES["seated, a hand in the thigh"]
+    turn, shift = exp(np.array([0.3, -1.2, 0.5])), np.array([0.4, -2.0, 5.0])
+    here, there = surface().planes(R, t), surface().planes(turn @ R, t @ turn.T + shift)
+    np.testing.assert_allclose(there.height, here.height, atol=1e-6)
+    np.testing.assert_allclose(there.normal, here.normal @ turn.T, atol=1e-6)
+    np.testing.assert_array_equal(there.near, here.near)
+
+
+def test_each_place_on_the_arms_counts_once_and_forearms_have_points() -> None:
+    body = with_contact_points(with_arm_points(BODY), BETAS)
+    own = surface()
+    names = [body.keypoint_names[k] for k in own.indices]
+    assert {"forearm/left_upper", "forearm/right_lower", "palm/left", "palm/right"} <= set(names)
+    places = body.keypoint_template[own.indices]
+    apart = np.linalg.norm(places[:, None] - places, axis=-1)[np.triu_indices(len(names), 1)]
+    assert apart.min() > 0.005
