@@ -89,7 +89,7 @@ def _list_formats(source: str, *, quiet: bool) -> dict[str, Any]:
 
     camera = ask_for_formats(source)
     if not quiet:
-        say(camera.label if camera.formats else f"{camera.label}: it tells no formats")
+        say(camera.label if camera.formats else f"{camera.label}: it reports no formats")
     return {"camera": camera.number, "name": camera.name, "formats": list(camera.formats)}
 
 

@@ -147,5 +147,5 @@ def device_problem(path: Path, ioctl: Callable[[int, int, bytearray], Any] | Non
         os.close(node)
     of_all, of_this = struct.unpack(_CAPABILITY, answer)[4:6]
     if not (of_this if of_all & _OF_THIS_NODE else of_all) & _CAPTURE:
-        return "gives no pictures, as the second device of many cameras; choose another one"
+        return "delivers no images, like the second device of many cameras; choose another one"
     return ""

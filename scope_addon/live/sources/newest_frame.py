@@ -133,7 +133,7 @@ class NewestFrame:
             problem = str(error)
         if self._source.ends or self._reconnect_s <= 0:
             if not self.received:
-                raise VideoError(f"{self._source.name} gave no frames; check that it shows a picture")
+                raise VideoError(f"{self._source.name} delivered no frames; check that it shows an image")
             return True
         if problem != self._said:  # once, not at every attempt
             self._said = problem
@@ -169,7 +169,7 @@ class NewestFrame:
         if self.now() - self._damage_said_s > DAMAGE_SAID_S:
             self._damage_said_s = self.now()
             self._say(
-                f"data of {self._source.name} was lost or damaged on its way; damaged pictures are left out, for at"
+                f"data of {self._source.name} was lost or damaged in transmission; damaged images are left out, for at"
                 f" most {DAMAGED_S:g} s each time"
             )
 
@@ -188,7 +188,7 @@ class NewestFrame:
             self._changed_s, self._is_frozen = picture.arrived_s, False
         elif picture.arrived_s - self._changed_s > STALLED_S and not self._is_frozen and not self._source.ends:
             self._is_frozen = True
-            self._say(f"{self._source.name} has shown the same picture for {STALLED_S:g} s; check whether it is frozen")
+            self._say(f"{self._source.name} has shown the same image for {STALLED_S:g} s; check whether it is frozen")
 
     def _in_first_size(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Return a picture in the size of the first one, unless its shape is another one."""

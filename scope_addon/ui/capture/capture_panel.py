@@ -56,7 +56,7 @@ class SCOPE_PT_capture(Tab, bpy.types.Panel):
         if not settings.footage:
             row = column.row()
             row.scale_y = 1.6
-            row.operator("scope.choose_footage", text="Choose Video or Picture", icon="FILE_MOVIE")
+            row.operator("scope.choose_footage", text="Choose Video or Image", icon="FILE_MOVIE")
             column.operator("scope.use_sample", icon="PLAY")
             column.operator("scope.import_motion", icon="IMPORT")
             return
