@@ -87,7 +87,7 @@ class NewestFrame:
         :raises VideoError: the source cannot be read.
         """
         with self._changed:
-            self._pace.spend(self.now() - self._taken_s)
+            self._pace.add_duration(self.now() - self._taken_s)
             while self._newest is None and not self._is_over:
                 if self._clock.stopped.is_set():  # the source may be stalled, and its thread with it
                     return None
@@ -150,7 +150,7 @@ class NewestFrame:
         index = self._first_index + picture.index
         time_s = max(picture.timestamp_s - self._began_s, self._last_s + 1e-3 if self.received else 0.0)
         if self.received and not is_first:
-            self._say_pause(picture.arrived_s - self._arrived_s)
+            self._report_pause(picture.arrived_s - self._arrived_s)
         self._arrived_s = picture.arrived_s
         self._watch(picture)
         picture = replace(picture, index=index, timestamp_s=time_s, image_rgb=self._in_first_size(picture.image_rgb))
@@ -173,7 +173,7 @@ class NewestFrame:
                 f" most {DAMAGED_S:g} s each time"
             )
 
-    def _say_pause(self, seconds: float) -> None:
+    def _report_pause(self, seconds: float) -> None:
         """Say that nothing came for a while, if the source itself has not noticed: maybe the computer slept."""
         if seconds > STALLED_S:
             self._changed_s += seconds

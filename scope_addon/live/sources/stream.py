@@ -95,7 +95,7 @@ class StreamSource:
             has_begun = has_begun or packet.is_keyframe or now_s - began_s > KEY_FRAME_S  # streams may have none
             frames: list[av.VideoFrame] = []
             if has_begun:
-                damage.see(packet)
+                damage.observe(packet)
                 yield from [None if damage.is_broken else frame for frame in held]
                 held = []
                 try:
