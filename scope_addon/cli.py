@@ -35,7 +35,7 @@ from .command_line.outputs import (
     write_outputs,
 )
 from .command_line.signals import interrupted, stopped_by_signals
-from .command_line.terminal import ProgressBar, open_standard_streams, say, stdout_for_report
+from .command_line.terminal import ProgressBar, open_standard_streams, print_message, stdout_for_report
 from .command_line.windows import (
     WINDOW_SECONDS,
     add_window_arguments,
@@ -249,7 +249,7 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
                 written.append(args.report)
     report = dict(result.report, outputs=[str(p) for p in written])
     for warning in report["warnings"]:
-        say(f"warning: {warning}")
+        print_message(f"warning: {warning}")
     if not args.json:
         print(summary(report), file=sys.stderr)
     return report
@@ -290,13 +290,13 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
         progress = stack.enter_context(ProgressBar(sys.stderr, show=sys.stderr.isatty() and not args.quiet))
         stack.enter_context(interrupted("finished clips are kept; run the same command again to continue"))
         report = batch.run(
-            args.jobs, recursive=args.recursive, again=args.again, progress=progress, say=say, runner=runner
+            args.jobs, recursive=args.recursive, again=args.again, progress=progress, say=print_message, runner=runner
         )
     if not args.json:
         for line in worker_table(report):
-            say(line)
+            print_message(line)
         counts = ", ".join(f"{count} {status.replace('_', ' ')}" for status, count in report["counts"].items() if count)
-        say(f"{counts or 'nothing to capture'}; report in {args.out}/{batch.report_file.name}")
+        print_message(f"{counts or 'nothing to capture'}; report in {args.out}/{batch.report_file.name}")
     return report
 
 

@@ -54,7 +54,7 @@ def is_url(text: object) -> bool:
     return isinstance(text, str) and "://" in text
 
 
-def shown(path: str | Path) -> str:
+def display_text(path: str | Path) -> str:
     """Return a path as text for people and other programs: bytes that are not UTF-8 become U+FFFD.
 
     Old discs and archives hold such names, and Python keeps the bytes as lone surrogates. Text with them can name a
@@ -64,10 +64,10 @@ def shown(path: str | Path) -> str:
 
 
 def json_text(value: object, indent: int | None = None) -> str:
-    """Return JSON in ASCII, in which file names are as `shown`."""
+    """Return JSON in ASCII, in which file names are as in `display_text`."""
     import json  # here, because Blender loads this module when it starts
 
-    return json.dumps(json.loads(shown(json.dumps(value, ensure_ascii=False))), indent=indent)
+    return json.dumps(json.loads(display_text(json.dumps(value, ensure_ascii=False))), indent=indent)
 
 
 def is_utf8(path: str | Path) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scope.scope_addon import cli
 from scope.scope_addon.cli import SAMPLE, main
-from scope.scope_addon.footage import shown
+from scope.scope_addon.footage import display_text
 from scope.scope_addon.motion import Motion
 
 BRIEF = ["--quality", "fast", "--end", "0.1", "--threads", "1"]  # several would wait for each other in busy loops
@@ -218,9 +218,9 @@ def test_a_picture_gives_a_motion_of_one_frame_and_only_json_on_stdout(tmp_path)
     assert report["frames"] == 1
     assert report["people"] == 1
     assert set(report["outputs"]) == {
-        shown(p) for p in [*outputs, tmp_path / f"{name}.o.png", tmp_path / f"{name}.html"]
+        display_text(p) for p in [*outputs, tmp_path / f"{name}.o.png", tmp_path / f"{name}.html"]
     }
-    assert f"<h1>{shown(f'{name}.png')}</h1>" in (tmp_path / f"{name}.html").read_text("utf-8")
+    assert f"<h1>{display_text(f'{name}.png')}</h1>" in (tmp_path / f"{name}.html").read_text("utf-8")
     assert {"fps", "reprojection_px", "warnings"} <= set(report)
     motion = Motion.load(outputs[0])
     assert len(motion) == 1

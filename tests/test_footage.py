@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from scope.scope_addon.footage import (
+    display_text,
     is_sequence,
     is_url,
     is_utf8,
@@ -18,7 +19,6 @@ from scope.scope_addon.footage import (
     numbered_from,
     pictures_in,
     sequence_pattern,
-    shown,
 )
 
 
@@ -67,8 +67,8 @@ def test_addresses_are_told_from_paths() -> None:
 def test_names_that_are_no_text_can_be_shown() -> None:
     odd = os.fsdecode(b"caf\xe9.mp4")
     assert (is_utf8(odd), is_utf8("café.mp4")) == (False, True)
-    assert shown(odd) == "caf\N{REPLACEMENT CHARACTER}.mp4"
-    assert shown(Path("café.mp4")) == "café.mp4"
+    assert display_text(odd) == "caf\N{REPLACEMENT CHARACTER}.mp4"
+    assert display_text(Path("café.mp4")) == "café.mp4"
     text = json_text({odd: [odd, "é", 1.5, None]})
     assert text.isascii()
-    assert json.loads(text) == {shown(odd): [shown(odd), "é", 1.5, None]}
+    assert json.loads(text) == {display_text(odd): [display_text(odd), "é", 1.5, None]}

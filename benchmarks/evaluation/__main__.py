@@ -14,7 +14,7 @@ from typing import Any
 from ...scope_addon.atomic_write import atomic_path, reason
 from ...scope_addon.command_line.arguments import path_argument
 from ...scope_addon.errors import OutputError, UsageError, exit_status
-from ...scope_addon.footage import shown
+from ...scope_addon.footage import display_text
 from ...scope_addon.job.request import code_version
 from ...scope_addon.options.capture import QUALITIES
 from ...solver.body import Body
@@ -38,7 +38,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         return _run(args)
     except ScopeError as error:
-        print(f"scope: {shown(str(error))}", file=sys.stderr)
+        print(f"scope: {display_text(str(error))}", file=sys.stderr)
         return exit_status(error)
     except KeyboardInterrupt:
         print("scope: interrupted; run the same command again to go on", file=sys.stderr)
@@ -78,7 +78,7 @@ def _run(args: argparse.Namespace) -> int:
     for name in figures:
         print("\n".join(_lines(name, PROTOCOLS[name], figures[name], _joints_of(body, models), settings)), end="\n\n")
     for problem in problems:
-        print(f"scope: {shown(problem)}", file=sys.stderr)
+        print(f"scope: {display_text(problem)}", file=sys.stderr)
     if args.json:
         _write(args.json, {"options": vars(settings), "protocols": figures, "problems": problems})
     return 1 if any(each.frames == 0 for each in scores.values()) or problems else 0
@@ -160,7 +160,7 @@ def _say_of(place: str, text: str) -> None:
 
 
 def _say(text: str) -> None:
-    print(f"scope: {shown(text)}", file=sys.stderr, flush=True)
+    print(f"scope: {display_text(text)}", file=sys.stderr, flush=True)
 
 
 if __name__ == "__main__":

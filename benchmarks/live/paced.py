@@ -152,7 +152,7 @@ def simulated(
             if newest is not None and frame.timestamp_s > machine.now_s:
                 pace.take(newest.timestamp_s)
                 recording.send(people.step(newest)[0], 0.0)
-                pace.spend(machine.spend())
+                pace.add_duration(machine.spend())
                 statistics.add(newest.timestamp_s, machine.now_s)
                 newest = None
             received += 1

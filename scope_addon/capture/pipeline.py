@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ...solver.body import Body
-from ..footage import shown
+from ..footage import display_text
 from ..motion import Motion
 from .media.video import Video, open_video
 from .options import CaptureOptions, check_options
@@ -75,7 +75,7 @@ def shot_of(video: Video, body: Body, options: CaptureOptions, footage: Footage)
         footage.lines,
         video.fps,
         (video.width, video.height),
-        shown(Path(video.path).name),
+        display_text(Path(video.path).name),
         options.smoothing and frames > 1,
         options.ablation,
     )

@@ -89,7 +89,7 @@ class DaskRunner:
         while self._waiting or any(attempt.task for attempt in self._attempts.values()):
             found: dict[str, Entry] = {}
             if time.monotonic() - self._looked > _POLLING_INTERVAL_S:
-                found = self._look_at_workers(wanted)
+                found = self._check_workers(wanted)
             while self._waiting and self._client.status == "running" and (record := self._workers.free(self._jobs)):
                 self._start(self._waiting.popleft(), record.address)
             yield found | self._next_outcome()
@@ -134,7 +134,7 @@ class DaskRunner:
             "basis": task.basis,
         }
 
-    def _look_at_workers(self, wanted: dict[str, Any]) -> dict[str, Entry]:
+    def _check_workers(self, wanted: dict[str, Any]) -> dict[str, Entry]:
         """Check workers that have joined, and give up the attempts of those that have left.
 
         :return: clips that are given up.

@@ -15,7 +15,7 @@ from ..errors import UsageError
 from ..footage import is_url
 from ..installed import check_cluster
 from .arguments import path_argument
-from .terminal import say
+from .terminal import print_message
 
 if TYPE_CHECKING:
     from ..cluster.runner import DaskRunner
@@ -33,7 +33,7 @@ def dask_runner(args: argparse.Namespace, program: Sequence[str] | None) -> Dask
 
     # As given, not resolved: a link may lead elsewhere on other machines.
     folder, out = (path if is_url(path) else os.path.abspath(path) for path in (args.folder, args.out))
-    return DaskRunner(connect(args.scheduler), folder, out, args.jobs, program, say)
+    return DaskRunner(connect(args.scheduler), folder, out, args.jobs, program, print_message)
 
 
 def folder_argument(text: str) -> Path | str:

@@ -14,7 +14,7 @@ from ..options import Place, options_at
 from ..scene.export.output_paths import SUFFIXES
 from .arguments import add_options, option_values, path_argument
 from .outputs import check_blender, check_outputs, checked_rig, distinct_paths, write_outputs
-from .terminal import say
+from .terminal import print_message
 
 
 def add_import(parser: argparse.ArgumentParser) -> None:
@@ -58,7 +58,7 @@ def run_import(args: argparse.Namespace) -> dict[str, Any]:
     rig = checked_rig(args, outputs, imported.motion.joint_count > len(SKELETONS[24].joint_names))
     written = write_outputs(outputs, [imported.motion], imported.body, args.motion, args, rig)
     for note in imported.notes:
-        say(f"warning: {note}")
+        print_message(f"warning: {note}")
     frames, rate = len(imported.motion), imported.motion.mocap_framerate
     if not args.json and not args.quiet:
         print(f"{counted(frames, 'frame')} at {rate:g} frames/s; wrote {', '.join(map(str, written))}", file=sys.stderr)

@@ -19,7 +19,7 @@ from ..scene.export.output_paths import person_paths
 from .arguments import add_options, option_values
 from .memory_limit import check_memory_limit
 from .outputs import MOTION_SUFFIXES, check_outputs
-from .terminal import ProgressLine, say
+from .terminal import ProgressLine, print_message
 
 if TYPE_CHECKING:
     from ...solver.body import Body
@@ -68,15 +68,15 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
         with_camera = [output for output in (recording, page) if output]
         begin = _each([output.begin for output in with_camera])
         receive = _each([each for each in (footage and footage.add, page and page.receive) if each])
-        listeners = Listeners(say, lambda state: line(str(state)), begin, receive)
+        listeners = Listeners(print_message, lambda state: line(str(state)), begin, receive)
         report = run_live(source, body, options, [*outputs, *with_camera], listeners)
         saved = [footage.save()] if footage else []
         if footage and footage.missing:
-            say(f"{footage.missing} in {values['keep_footage']}, since the computer was too busy")
+            print_message(f"{footage.missing} in {values['keep_footage']}, since the computer was too busy")
     saved = [*(recording.save() if recording else []), *saved]
     report["outputs"] = [str(path) for path in saved if path]
     if not args.json:
-        say(_summary(report))
+        print_message(_summary(report))
     return report
 
 
@@ -89,7 +89,7 @@ def _list_formats(source: str, *, quiet: bool) -> dict[str, Any]:
 
     camera = ask_for_formats(source)
     if not quiet:
-        say(camera.label if camera.formats else f"{camera.label}: it tells no formats")
+        print_message(camera.label if camera.formats else f"{camera.label}: it reports no formats")
     return {"camera": camera.number, "name": camera.name, "formats": list(camera.formats)}
 
 
@@ -145,7 +145,7 @@ def _outputs(values: Mapping[str, Any], body: Body, stack: ExitStack) -> list[Ou
         from ..live.outputs.json_lines import JsonServer
 
         server = stack.enter_context(JsonServer(body, values["listen"], values["json_port"], values["live_people"]))
-        say(f"lines of JSON on {values['listen']} port {server.port}")
+        print_message(f"lines of JSON on {values['listen']} port {server.port}")
         outputs.append(server)
     if values["vmc"] is not None:
         from ..live.outputs.vmc import VmcSender, parse_address
@@ -164,7 +164,7 @@ def _preview(body: Body, stack: ExitStack) -> PreviewPage:
     from ..live.outputs.preview_page import PreviewPage
 
     page = stack.enter_context(PreviewPage(body))
-    say(f"preview: open {page.address} in a browser")
+    print_message(f"preview: open {page.address} in a browser")
     return page
 
 

@@ -13,13 +13,13 @@ from ...solver.body import Body
 from ...solver.loaders.body_file import ASSETS
 from ..counts import counted
 from ..errors import UsageError
-from ..footage import shown
+from ..footage import display_text
 from ..installed import check_installed
 from ..motion import Motion
 from ..options import option
 from ..scene.export.output_paths import check_output, person_paths
 from .blender_folder import load_blender
-from .terminal import say
+from .terminal import print_message
 
 if TYPE_CHECKING:
     from ..retarget.rig_source import RigSource
@@ -140,7 +140,7 @@ def write_outputs(
         from ..scene.export.export import ExportOptions, export_motions
 
         footage = _footage(video, args)
-        options = replace(NEW_SCENE, name=shown(video.stem), shape=args.shape_keys)
+        options = replace(NEW_SCENE, name=display_text(video.stem), shape=args.shape_keys)
         if not motions[0].image_size.any():  # imported, and never seen by a camera
             options = replace(options, resolution="keep", active_camera=False, with_camera=False)
         separate = ExportOptions(separate=args.file_per_person, bvh_unit=args.bvh_unit)
@@ -153,7 +153,7 @@ def write_outputs(
             files, warnings = export_motions(motions, body, scene_files, footage, options, separate)
         written += files
         for warning in warnings:
-            say(f"warning: {warning}")
+            print_message(f"warning: {warning}")
     return written
 
 

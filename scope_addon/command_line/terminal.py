@@ -15,7 +15,7 @@ from . import signals
 _CLEAR_LINE = "\r\x1b[K"
 
 
-def say(text: str) -> None:
+def print_message(text: str) -> None:
     """Print a message on a separate line, even if a progress bar is shown."""
     clear = _CLEAR_LINE if sys.stderr.isatty() else ""
     print(f"{clear}scope: {text}", file=sys.stderr, flush=True)

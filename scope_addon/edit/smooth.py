@@ -51,7 +51,7 @@ def _smoothed(motion: Motion, body: Body, raw: Clip, finished: Clip, strength: f
     """Smooth a motion without corrections; see `smoothed`."""
     if strength > 1.0:
         center = motion.world_from_camera[:, :3, 3]
-        calm = _calmed(Clip(finished.times, finished.rotations, finished.root - center), strength)
+        calm = _smoothed_further(Clip(finished.times, finished.rotations, finished.root - center), strength)
         return _with_resting_feet(replace(calm, root=calm.root + center), finished, motion, body)
     plain, wanted = _filtered(raw, motion, 1.0), _filtered(raw, motion, strength)
     correction = np.swapaxes(plain.rotations, -1, -2) @ finished.rotations
@@ -67,7 +67,7 @@ def _filtered(clip: Clip, motion: Motion, strength: float) -> Clip:
     return Clip(clip.times, rotations, center + smooth_root(clip.root - center, clip.times, strength))
 
 
-def _calmed(clip: Clip, strength: float) -> Clip:
+def _smoothed_further(clip: Clip, strength: float) -> Clip:
     """Return a clip whose root is relative to the camera through a filter that keeps its first and its last frame.
 
     The filter would move both ends of a path inwards, a walker by 12 cm, so the clip goes on at each of them as its

@@ -105,7 +105,7 @@ class Batch:
             for finished in runner.outcomes(self._tasks(clips, previous)):
                 for name, entry in finished.items():
                     entries[name] = entry
-                    _say_outcome(entry, f"{len(entries)}/{len(clips)}", say)
+                    _print_outcome(entry, f"{len(entries)}/{len(clips)}", say)
                 if finished:
                     self._write_report(_in_order(entries, clips), previous, runner, last=False)
                 progress("clips", len(entries), len(clips))
@@ -177,7 +177,7 @@ def _in_order(entries: dict[str, Entry], clips: dict[str, Path]) -> dict[str, En
     return {name: entries[name] for name in clips if name in entries}
 
 
-def _say_outcome(entry: Entry, number: str, say: Callable[[str], None]) -> None:
+def _print_outcome(entry: Entry, number: str, say: Callable[[str], None]) -> None:
     """Tell the user how a clip ended, and its warnings."""
     message = f": {entry['message']}" if entry.get("message") else ""
     say(f"{number} {entry['file']} {entry['status'].replace('_', ' ')}{message}")

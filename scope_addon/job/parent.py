@@ -20,15 +20,15 @@ GRACE_S = 5.0  # time for the main thread to clean up, after which the process e
 _POLLING_INTERVAL_S = 0.2  # of the pipe, on Windows
 
 
-def when_parent_ends(end: Callable[[], object], hear: Callable[[bytes], object] = lambda _: None) -> None:
+def when_parent_ends(end: Callable[[], object], receive: Callable[[bytes], object] = lambda _: None) -> None:
     """Call ``end`` in a new thread when standard input, a pipe, is closed; immediately if it is closed already.
 
-    :param hear: gets what the parent writes before, in any pieces.
+    :param receive: gets what the parent writes before, in any pieces.
     """
 
     def wait() -> None:
         try:
-            _wait_for_end_of_stdin(hear)
+            _wait_for_end_of_stdin(receive)
         except BrokenPipeError:  # Windows reports the end of the pipe this way
             pass
         except OSError:
@@ -52,7 +52,7 @@ def stop_with_parent() -> None:
     when_parent_ends(stop)
 
 
-def _wait_for_end_of_stdin(hear: Callable[[bytes], object]) -> None:
+def _wait_for_end_of_stdin(receive: Callable[[bytes], object]) -> None:
     if sys.platform == "win32":
         # A blocking read would lock the pipe, and numpy's libraries, which query its state while they are loaded, would
         # wait for the read to end: https://github.com/numpy/numpy/issues/24290
@@ -63,9 +63,9 @@ def _wait_for_end_of_stdin(hear: Callable[[bytes], object]) -> None:
         while True:
             available, _ = _winapi.PeekNamedPipe(handle, 0)
             if available:
-                hear(os.read(0, available))
+                receive(os.read(0, available))
             else:
                 time.sleep(_POLLING_INTERVAL_S)
     # Not sys.stdin, whose lock would block the exit of the interpreter.
     while piece := os.read(0, 4096):
-        hear(piece)
+        receive(piece)

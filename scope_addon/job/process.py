@@ -66,7 +66,7 @@ class WorkerProcess:
             raise SetupError(f"cannot start {python[0]}: {error.strerror}; reinstall Blender") from error
         self._lines: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         threading.Thread(target=self._read, name="scope-worker-lines", daemon=True).start()
-        self._tell((request.to_json() if request else WARM_UP).encode() + b"\n")
+        self._send_line((request.to_json() if request else WARM_UP).encode() + b"\n")
 
     @property
     def pid(self) -> int:
@@ -113,7 +113,7 @@ class WorkerProcess:
         self._end()
         shutil.rmtree(self.job_folder, ignore_errors=True)
 
-    def _tell(self, line: bytes) -> None:
+    def _send_line(self, line: bytes) -> None:
         with contextlib.suppress(OSError):  # the worker has ended already; poll() reports that
             assert self._process.stdin is not None
             self._process.stdin.write(line)

@@ -171,7 +171,7 @@ def _exit_with_parent(job_folder: Path, commands: Commands | None = None) -> Non
         _remove(job_folder)
         os._exit(1)
 
-    when_parent_ends(end, (commands or Commands()).hear)
+    when_parent_ends(end, (commands or Commands()).receive)
 
 
 def _remove(job_folder: Path) -> None:

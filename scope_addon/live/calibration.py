@@ -52,7 +52,7 @@ class Calibration:
         T[:3, 3] = self.camera_position
         return T
 
-    def towards(self, target: Calibration, share: float, share_of_world: float) -> Calibration:
+    def interpolated(self, target: Calibration, share: float, share_of_world: float) -> Calibration:
         """Return the calibration that lies between this one and another.
 
         :param share: of the way to the other one, 0..1, for focal length (its logarithm) and shape.
@@ -76,7 +76,7 @@ def _between(camera: Camera, target: Camera, share: float) -> Camera:
     return replace(target, intrinsics=intrinsics)
 
 
-class Approach:
+class GradualCalibration:
     """A calibration that approaches estimates; its velocity and acceleration continue where a new estimate comes.
 
     Calibrations x_k follow each other, x_k' = (x_{k-1} - x_k) / s, with the estimate before the first of them.
@@ -96,7 +96,7 @@ class Approach:
         """
         share, share_of_world = (float(1 - np.exp(-step_s / s)) for s in (self._settling_s, world_s))
         for k, stage in enumerate(self._stages):
-            self._stages[k] = target = stage.towards(target, share, share_of_world if k == 0 else share)
+            self._stages[k] = target = stage.interpolated(target, share, share_of_world if k == 0 else share)
         return target
 
 
@@ -117,7 +117,7 @@ class Calibrator:
         self._up_of_lines: NDArray[np.float64] | None = None
         self._focal_of_lines = 1e-9  # for which that was estimated
 
-    def look_at(self, image_rgb: NDArray[np.uint8], observation: Observation) -> None:
+    def observe(self, image_rgb: NDArray[np.uint8], observation: Observation) -> None:
         """Find the edges of the background in a frame (H, W, 3) in which somebody is seen."""
         people, bars = [observation.keypoints_px], find_bars(image_rgb)
         self._segments = find_segments(image_rgb, people, bars=bars)

@@ -34,7 +34,7 @@ _NEW_SHARE = 0.3  # of the newest frame in the velocity of somebody who is seen
 
 
 @dataclass(eq=False)
-class _Place:
+class _FollowedPerson:
     """A session, and who is followed by it: their tracklet, where they were seen last, and the sum of appearances."""
 
     session: LiveSession
@@ -47,7 +47,7 @@ class _Place:
         """When the person was seen last; -inf before there was one."""
         return -np.inf if self.end is None else self.end.time
 
-    def see(self, tracklet: int, observation: Observation, time_s: float) -> None:
+    def update(self, tracklet: int, observation: Observation, time_s: float) -> None:
         """Note that the person was seen."""
         before = self.end if self.tracklet == tracklet else None
         self.tracklet, self.end = tracklet, _end(observation, time_s, before)
@@ -87,7 +87,7 @@ class LivePeople:
         heights = [*heights_m, *[None] * count][:count]
         first = LiveSession(body, camera, size, heights[0], executor)
         others = [LiveSession(body, camera, size, height, executor, first) for height in heights[1:]]
-        self._places = [_Place(session) for session in (first, *others)]
+        self._places = [_FollowedPerson(session) for session in (first, *others)]
 
     @property
     def sessions(self) -> list[LiveSession]:
@@ -101,21 +101,21 @@ class LivePeople:
         if len(self._places) == 1:
             self._follow_largest(self._places[0], observations)
         else:
-            self._take_places(observations, frame.timestamp_s)
+            self._assign_people(observations, frame.timestamp_s)
         poses = []
         for number, place in enumerate(self._places):
             observation = None if place.tracklet is None else observations.get(place.tracklet)
             poses.append(replace(place.session.step(frame, observation), person=number))
         return poses
 
-    def _follow_largest(self, place: _Place, observations: Mapping[int, Observation]) -> None:
+    def _follow_largest(self, place: _FollowedPerson, observations: Mapping[int, Observation]) -> None:
         """Keep the person while they are seen, and then take the largest one."""
         if place.tracklet not in observations:
             place.tracklet = max(observations, key=lambda k: observations[k].region.side_px, default=None)
 
-    def _take_places(self, observations: Mapping[int, Observation], time_s: float) -> None:
+    def _assign_people(self, observations: Mapping[int, Observation], time_s: float) -> None:
         """Give places to those who have none, as far as there are free ones, and note who was seen."""
-        followed: dict[int | None, _Place] = {place.tracklet: place for place in self._places}
+        followed: dict[int | None, _FollowedPerson] = {place.tracklet: place for place in self._places}
         new = [tracklet for tracklet in observations if tracklet not in followed]
         new.sort(key=lambda tracklet: -observations[tracklet].region.side_px)
         left = [place for place in self._places if place.tracklet not in observations]
@@ -132,7 +132,7 @@ class LivePeople:
                 places[tracklet].appearance = np.zeros(SIZE)
         for tracklet, observation in observations.items():
             if tracklet in places:
-                places[tracklet].see(tracklet, observation, time_s)
+                places[tracklet].update(tracklet, observation, time_s)
 
 
 def _end(observation: Observation, time_s: float, before: End | None = None) -> End:

@@ -166,8 +166,8 @@ class _Poses:
         if self._people is None or self._size != (width, height):
             if self._people is not None:
                 self._listeners.say(
-                    f"{self._source.name} now gives pictures of another shape ({width} × {height}): body, lens and"
-                    " floor are estimated again, and a recording ends with the picture before"
+                    f"{self._source.name} now delivers images of another shape ({width} × {height}): body, lens and"
+                    " floor are estimated again, and a recording ends with the image before"
                 )
             options = self._options
             camera = choose_camera(

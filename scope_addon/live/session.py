@@ -17,7 +17,7 @@ from ..capture.camera.intrinsics import Camera
 from ..capture.fitting.frame_sequence import FittedTrack
 from ..capture.media.frame import Frame
 from ..capture.perception.observation import Observation
-from .calibration import Approach, Calibration, Calibrator, track_of
+from .calibration import Calibration, Calibrator, GradualCalibration, track_of
 from .causal_fit import CausalFit, FittedFrame
 from .feet.hold import FootHold
 from .feet.support import Support
@@ -28,11 +28,14 @@ from .smoothing import PoseFilter
 CALIBRATED_S = 2.0  # after the person was first seen
 CALIBRATE_AT_S = (0.0, 0.3, 0.7, 1.2, CALIBRATED_S)
 FOLLOW_S, FOLLOWED_S = 1.0, 4.0  # between two estimates of the world afterwards, and how much each of them sees
-SETTLING_S, FOLLOWING_S = 0.1, 10.0  # time constants towards the estimates, see `Approach`; the second at least
+SETTLING_S, FOLLOWING_S = (
+    0.1,
+    10.0,
+)  # time constants towards the estimates, see `GradualCalibration`; the second at least
 SETTLED_S = 1.5  # after the last of the first estimates, when these have long been reached
 CERTAIN_S = 60.0  # for which the world has been known when it has moved almost for the last time
 HOLD_S = 0.5  # for which the pose of a person who is not seen is held, rather than lost
-STANDS_S = 2.0  # for which somebody who stood on the floor and is not seen is still not below it
+FLOOR_MEMORY_S = 2.0  # for which somebody who stood on the floor and is not seen is still not below it
 
 Start = Callable[..., "Future[Calibration]"]
 
@@ -92,7 +95,7 @@ class LiveSession:
         self._fit: CausalFit | None = None
         self._current: Calibration | None = None
         self._target: Calibration | None = None
-        self._approach: Approach | None = None
+        self._approach: GradualCalibration | None = None
         self._pending: Future[Calibration] | None = None
         self._seen: deque[_Seen] = deque()
         self._first_s = self._last_seen_s = self._last_s = -np.inf
@@ -103,7 +106,7 @@ class LiveSession:
     def step(self, frame: Frame, observation: Observation | None) -> LivePose:
         """Return the pose in the next frame, in which the person was observed, or not."""
         observation = None if observation is None else self._left_right(observation)
-        if frame.timestamp_s - self._last_s > STANDS_S:  # the computer slept, or the source was interrupted
+        if frame.timestamp_s - self._last_s > FLOOR_MEMORY_S:  # the computer slept, or the source was interrupted
             self._first_s += frame.timestamp_s - self._last_s
         fitted = self._fit_person(frame, observation) if observation is not None else None
         self._settle(frame.timestamp_s)
@@ -125,9 +128,12 @@ class LiveSession:
                     return None
                 known = replace(self._leader.camera, focal_deviation=0.0)
                 self._calibrator = Calibrator(self._body, known, self._size, self._height_m)
-            self._calibrator.look_at(frame.image_rgb, observation)
+            self._calibrator.observe(frame.image_rgb, observation)
             self._target = self._calibrator.estimate([time_s], [observation])
-            self._current, self._approach = self._in_leaders_world(self._target), Approach(self._target, SETTLING_S)
+            self._current, self._approach = (
+                self._in_first_persons_world(self._target),
+                GradualCalibration(self._target, SETTLING_S),
+            )
             self._fit = CausalFit(self._body, observation, self._current.camera, self._height_m)
             self._fit.set_shape(self._current.betas)
             self._first_s, self._calibrations = time_s, 1
@@ -149,7 +155,7 @@ class LiveSession:
     def _support(self, time_s: float, observation: Observation) -> Support | None:
         """Return what the body stands on, if it was seen a moment ago."""
         pause_s = time_s - self._last_seen_s
-        if self._current is None or self._fit is None or pause_s >= STANDS_S:
+        if self._current is None or self._fit is None or pause_s >= FLOOR_MEMORY_S:
             return None
         support = self._feet.support(self._current.T_world_camera, self._fit.soles(observation))
         return support if support is None or pause_s < HOLD_S else support.after_a_pause()
@@ -165,13 +171,13 @@ class LiveSession:
         step_s = float(np.clip(time_s - self._last_s, 0.0, HOLD_S)) if np.isfinite(self._last_s) else 0.0
         world_s = following_s(time_s - self._first_s) if self.is_settled(time_s) else SETTLING_S
         before = self._current
-        self._current = self._in_leaders_world(self._approach.step(self._target, step_s, world_s))
+        self._current = self._in_first_persons_world(self._approach.step(self._target, step_s, world_s))
         if self._current.camera is not before.camera:
             self._fit.set_camera(self._current.camera)
         if not np.array_equal(self._current.betas, before.betas):
             self._fit.set_shape(self._current.betas)
 
-    def _in_leaders_world(self, calibration: Calibration) -> Calibration:
+    def _in_first_persons_world(self, calibration: Calibration) -> Calibration:
         """Return the calibration with camera and world of the person from whom they are taken, if there is one."""
         world = self._leader._current if self._leader is not None else None
         if world is None:

@@ -26,7 +26,7 @@ LIVE_OPTIONS = (
         int,
         1,
         Place.LIVE | Place.LIVE_WORKER | Place.LIVE_PANEL,
-        "the people to follow, at most; each takes time",
+        "maximum number of people to follow; each one takes time",
         minimum=1,
         maximum=MOST_PEOPLE,
         argument=Argument("--people", "N"),
@@ -37,7 +37,7 @@ LIVE_OPTIONS = (
         bool,
         False,
         Place.LIVE,
-        "tell the camera's name and formats, and capture nothing; on macOS, the camera is opened for that",
+        "print the camera's name and formats, and capture nothing; on macOS, the camera is opened for that",
     ),
     Option(
         "record",
@@ -52,7 +52,7 @@ LIVE_OPTIONS = (
         Path,
         None,
         Place.LIVE | Place.LIVE_WORKER,
-        "video (.mp4) of the recorded pictures to write",
+        "video (.mp4) to which the recorded images are written",
         argument=Argument(metavar="VIDEO"),
     ),
     Option(

@@ -19,7 +19,7 @@ from ..atomic_write import atomic_path, reason
 from ..capture.media.video_range import FootageRange
 from ..counts import counted
 from ..errors import OutputError
-from ..footage import shown
+from ..footage import display_text
 from ..kinematics.foot_skin import under_floor
 from ..motion import Motion
 from ..review_spans import FAR_SHARE, REASONS, Span, body_confidence, find_review_spans
@@ -67,7 +67,7 @@ def write_capture_page(path: Path, clip: CapturedClip, progress: Progress | None
     """
     rows = shown_rows(clip.motions)
     pictures = overlay_pictures(clip.video, clip.motions, clip.body, rows, clip.wanted, progress)
-    content = shown(capture_page(clip, rows, pictures)).encode()
+    content = display_text(capture_page(clip, rows, pictures)).encode()
     try:
         with atomic_path(path) as temporary:
             temporary.write_bytes(content)

@@ -84,7 +84,7 @@ def small_picture(row: int, image: NDArray[np.uint8], longest_side: int = LONGES
     small = cv2.resize(image, size, interpolation=cv2.INTER_AREA) if scale < 1 else image
     ok, data = cv2.imencode(".webp", cv2.cvtColor(small, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_WEBP_QUALITY, _QUALITY])
     if not ok:
-        raise OutputError("cannot make the report's pictures: this OpenCV cannot write WebP; install another")
+        raise OutputError("cannot make the report's images: this OpenCV cannot write WebP; install another")
     return Picture(row, data.tobytes(), *size)
 
 

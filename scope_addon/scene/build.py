@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ..errors import MotionFileError, UsageError
-from ..footage import shown
+from ..footage import display_text
 from ..kinematics.expressions import expressions_of
 from ..kinematics.foot_skin import under_floor
 from ..motion import Motion
@@ -123,7 +123,7 @@ def _build(
     options: BuildOptions,
     report: Progress,
 ) -> BuildResult:
-    name = options.name or shown(Path(str(footage or motions[0].source or "capture")).stem)
+    name = options.name or display_text(Path(str(footage or motions[0].source or "capture")).stem)
     warnings = _face_warnings(motions, body)
     if options.frame_rate == "set":
         timing.set_scene_rate(scene, motions[0].mocap_framerate)

@@ -38,7 +38,8 @@ class SCOPE_AP_preferences(bpy.types.AddonPreferences):
     cache_folder: StringProperty(
         name="Cache Folder",
         subtype="DIR_PATH",
-        description="Folder for captured motion, so that nothing is captured twice; if empty, Blender's user folder",
+        description="Folder for captured motion, so the same footage is not captured twice; if empty, Blender's user "
+        "folder",
     )
     cache_limit_gb: IntProperty(
         name="Cache Size",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.app.translations import pgettext_iface, pgettext_rpt, pgettext_tip
 
-from ..footage import shown
+from ..footage import display_text
 from .translations import CONTEXT
 
 
@@ -35,9 +35,9 @@ def sentence(error: Exception | str, name: str = "") -> str:
 
     :param name: of a file with which the message may begin; without it, a first word such as ``walk.mp4`` is one.
     """
-    text = shown(str(error).strip()) or type(error).__name__
+    text = display_text(str(error).strip()) or type(error).__name__
     first = text.split()[0].rstrip(":,")
-    if (name and text.startswith(shown(name))) or "." in first.rstrip("."):
+    if (name and text.startswith(display_text(name))) or "." in first.rstrip("."):
         return text
     return text[:1].upper() + text[1:]
 

@@ -10,7 +10,7 @@ import sys
 
 import pytest
 from scope.scope_addon.command_line import signals
-from scope.scope_addon.command_line.terminal import ProgressBar, ProgressLine, say
+from scope.scope_addon.command_line.terminal import ProgressBar, ProgressLine, print_message
 
 
 class Terminal(io.StringIO):
@@ -53,7 +53,7 @@ def test_work_that_has_lost_its_interrupt_stops_at_the_next_progress() -> None:
 def test_a_message_has_a_line_of_its_own_below_a_bar(monkeypatch) -> None:
     for stream, clear in ((Terminal(), "\r\x1b[K"), (io.StringIO(), "")):
         monkeypatch.setattr(sys, "stderr", stream)
-        say("done")
+        print_message("done")
         assert stream.getvalue() == f"{clear}scope: done\n"
 
 

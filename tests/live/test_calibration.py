@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.intrinsics import Camera
-from scope.scope_addon.live.calibration import Approach, Calibration
+from scope.scope_addon.live.calibration import Calibration, GradualCalibration
 from scope.scope_addon.live.session import CALIBRATED_S, SETTLED_S, SETTLING_S, following_s
 
 
@@ -21,7 +21,7 @@ BEFORE, AFTER = calibration(1.0), calibration(1.1)
 
 def course(step_s, seconds, world_s=SETTLING_S, before=BEFORE, after=AFTER):
     """The calibrations of an approach that has long been at one estimate, from when another one comes."""
-    approach = Approach(before, SETTLING_S)
+    approach = GradualCalibration(before, SETTLING_S)
     return [approach.step(after, step_s, world_s) for _ in range(round(seconds / step_s))]
 
 

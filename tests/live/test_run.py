@@ -29,7 +29,7 @@ def test_pictures_of_another_shape_are_said_and_begin_new_estimates(body):
     assert len(poses) == 3
     assert sizes == [(160, 96), (96, 160)]
     assert len(said) == 1
-    assert said[0].startswith("fake now gives pictures of another shape (96 × 160): body, lens and floor are estimated")
+    assert said[0].startswith("fake now delivers images of another shape (96 × 160): body, lens and floor are")
 
 
 def test_a_recording_ends_where_pictures_of_another_shape_begin(body, tmp_path):

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ...errors import VideoError
-from ...footage import is_utf8, shown
+from ...footage import display_text, is_utf8
 
 
 @contextmanager
@@ -28,5 +28,7 @@ def utf8_name(path: Path) -> Iterator[str]:
         try:
             link.symlink_to(absolute)
         except OSError as error:
-            raise VideoError(f"the name of {shown(path)} is not UTF-8, so it cannot be opened; rename it") from error
+            raise VideoError(
+                f"the name of {display_text(path)} is not UTF-8, so it cannot be opened; rename it"
+            ) from error
         yield str(link)

@@ -26,7 +26,7 @@ class Trackers(NamedTuple):
     faces: FaceTracker | None
 
 
-class LitFrame(NamedTuple):
+class BrightenedFrame(NamedTuple):
     """A frame, and its image in the brightness that the networks are given."""
 
     frame: Frame
@@ -41,7 +41,7 @@ class FrameObserver:
         self.cuts = SceneCuts()
 
     def step(
-        self, now: LitFrame, upcoming: LitFrame | None, with_masks: bool = True
+        self, now: BrightenedFrame, upcoming: BrightenedFrame | None, with_masks: bool = True
     ) -> tuple[list[tuple[int, Observation]], bool]:
         """Observe one frame.
 

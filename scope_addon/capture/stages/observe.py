@@ -25,7 +25,7 @@ from ..tracking.people import PeopleBuilder
 from ..tracking.track import Track
 from .clock import COMPILING, StageClock
 from .footage import Footage, Listeners, given_camera, no_frames_error
-from .frame_observer import FrameObserver, LitFrame, largest_of
+from .frame_observer import BrightenedFrame, FrameObserver, largest_of
 from .networks import network_threads, open_trackers
 from .windows.long_clip import LongClip
 from .windows.plan import plan_windows
@@ -109,7 +109,7 @@ class _Frames:
     def run(self, video: Video, live: LiveBody, listeners: Listeners) -> None:
         """Process all frames; each is decoded while the networks run on the previous one."""
         expected, exposure = video.expected_frames, AutoExposure()
-        frames = (LitFrame(frame, exposure.brighten(frame.image_rgb)) for frame in video)
+        frames = (BrightenedFrame(frame, exposure.brighten(frame.image_rgb)) for frame in video)
         for now, upcoming in frame_pairs(frames, self._clock):
             largest = self._process(now, upcoming)
             listeners.watch(now.frame, largest, live)
@@ -117,7 +117,7 @@ class _Frames:
         self._background.wait()
         self._background.wait_for_solver(lambda done: listeners.progress(COMPILING, min(done, KERNELS), KERNELS))
 
-    def _process(self, now: LitFrame, upcoming: LitFrame | None) -> Observation | None:
+    def _process(self, now: BrightenedFrame, upcoming: BrightenedFrame | None) -> Observation | None:
         """Add one frame and return its largest person."""
         observations, is_cut = self.observer.step(now, upcoming)
         if is_cut:

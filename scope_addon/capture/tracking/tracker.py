@@ -87,7 +87,7 @@ class PeopleTracker:
         self._max_live = 2 if people is None else min(people + 1, MOST_PEOPLE)
         self.reset()
 
-    def another(self, regions: Sequence[Region] = ()) -> PeopleTracker:
+    def restarted(self, regions: Sequence[Region] = ()) -> PeopleTracker:
         """Return a tracker with the same networks that has seen nothing.
 
         :param regions: in which people are known to be in its first frame; they are followed before it searches.

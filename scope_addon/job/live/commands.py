@@ -10,13 +10,13 @@ _LONGEST = 4096  # bytes without an end of line, which is no command
 
 
 class Commands:
-    """The commands so far. ``hear`` may be called from another thread."""
+    """The commands so far. ``receive`` may be called from another thread."""
 
     def __init__(self) -> None:
         self.recording, self.stopped = threading.Event(), threading.Event()
         self._unfinished = b""
 
-    def hear(self, piece: bytes) -> None:
+    def receive(self, piece: bytes) -> None:
         """Take what was written, in any pieces; lines that are no command are ignored."""
         *lines, self._unfinished = (self._unfinished + piece).split(b"\n")
         self._unfinished = self._unfinished[-_LONGEST:]

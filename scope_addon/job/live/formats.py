@@ -60,8 +60,8 @@ class FormatsProcess(WorkerProcess):
                 return Camera(camera_number(self.source), message["name"], tuple(message["formats"]))
         if time.monotonic() - self._began_s > ANSWER_S:
             raise WorkerFailedError(
-                f"camera {self.source} has not told its formats within {ANSWER_S:.0f} s; if the system asks whether it"
-                " may be used, answer, and ask again"
+                f"camera {self.source} has not reported its formats within {ANSWER_S:.0f} s; if the system asks "
+                "for permission to use it, answer, and try again"
             )
         return None
 

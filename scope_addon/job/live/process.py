@@ -78,11 +78,11 @@ class LiveProcess(WorkerProcess):
 
     def record(self) -> None:
         """Have the poses kept from now on."""
-        self._tell(RECORD)
+        self._send_line(RECORD)
 
     def stop(self) -> None:
         """Have the source closed, and the recording sent as a result."""
-        self._tell(STOP)
+        self._send_line(STOP)
 
     def newest_poses(self, joints: int, coefficients: int) -> list[ShownPose]:
         """Return the newest pose of each person since the last call; older ones are never seen.

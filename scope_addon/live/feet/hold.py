@@ -11,7 +11,7 @@ a hold begins or ends, what it would change abruptly dies away (`transition`).
 
 A place can be wrong from the beginning, as after a cut of the footage, or where frames are rare and smoothing has not
 yet followed. The fits then stay at that place, too, and bend the body. So a foot that the image shows elsewhere for
-`REFUTED_S` is let go, and not held for a while.
+`DISPLACED_S` is let go, and not held for a while.
 
 The places drift towards where the fits have the points, because an error in where a hold began would otherwise tilt the
 body for as long as it lasts: fast while size and floor are being estimated, slowly afterwards.
@@ -51,8 +51,8 @@ TRANSITION_HZ = 6.0
 MOVED_M = 0.06  # in the image since the frame before: more than noise of a foot at rest
 SWING_M_S = 0.7  # in the image, of a foot that swings past the other one
 PASSED_S, RISE_M = 0.15, 0.03  # for which, and up to which height, the other one is not let go
-REFUTED_M, REFUTED_S = 0.12, 0.3  # of a place from where the image shows the foot, and for how long
-BARRED_S = 0.5  # after that, in which smoothing has come to where the foot really is
+DISPLACED_M, DISPLACED_S = 0.12, 0.3  # of a place from where the image shows the foot, and for how long
+REHOLD_DELAY_S = 0.5  # after that, in which smoothing has come to where the foot really is
 SOFT_M = 0.005  # the floor raises soles from about this height on
 
 
@@ -84,7 +84,7 @@ class FootHold:
         self._is_held = np.zeros(n, bool)
         self._moving_s = np.zeros(n)  # since the contact of each point ended
         self._elsewhere_s = np.zeros(n)  # for which the image has shown each point elsewhere
-        self._barred_s = np.zeros(n)  # for which each point is not held yet
+        self._rehold_delay_s = np.zeros(n)  # for which each point is not held yet
         self._speed: NDArray[np.floating[Any]] = np.zeros(len(SOLES))  # of the soles in the image, m/s
         self._points_world: NDArray[np.floating[Any]] | None = None
         self._shift: NDArray[np.float64] = np.zeros((2, 3))  # of each foot in the last frame, world
@@ -148,7 +148,7 @@ class FootHold:
         before = self._points_world if self._points_world is not None else points_world
         old = self._away(before), self._away(points_world)
         was_held = self._is_held
-        self._refute(T_world_camera, step_s)
+        self._release_displaced(T_world_camera, step_s)
         self._update(points_world, step_s, DRIFT_S if is_settled else EARLY_DRIFT_S)
         new = self._away(before), self._away(points_world)
         changed = (self._is_held != was_held)[: len(SOLES)].reshape(2, 2).any(axis=1)
@@ -182,25 +182,27 @@ class FootHold:
         contact[: len(SOLES)] *= logistic(4 * (1 - self._speed / CONTACT_SPEED_M_S))
         return contact
 
-    def _refute(self, T_world_camera: NDArray[np.float64], step_s: float) -> None:
+    def _release_displaced(self, T_world_camera: NDArray[np.float64], step_s: float) -> None:
         """Let go of the feet that the image has shown elsewhere for long."""
         newest, n = self._window[-1], len(SOLES)
         places = (self._anchors[:n] - T_world_camera[:3, 3]) @ T_world_camera[:3, :3]
         depth = np.maximum(places[:, 2:], 1e-6)
         away_m = np.linalg.norm(places[:, :2] - newest.rays * depth, axis=1)
         # Keypoints of heels and toes are not exactly where a foot touches the floor: both must be away.
-        is_elsewhere = (self._is_held[:n] & (newest.visible[:n] > 0.5) & (away_m > REFUTED_M)).reshape(2, 2).all(axis=1)
+        is_elsewhere = (
+            (self._is_held[:n] & (newest.visible[:n] > 0.5) & (away_m > DISPLACED_M)).reshape(2, 2).all(axis=1)
+        )
         self._elsewhere_s[:n] = np.where(np.repeat(is_elsewhere, 2), self._elsewhere_s[:n] + step_s, 0.0)
-        is_refuted = self._elsewhere_s > REFUTED_S
-        self._barred_s = np.where(is_refuted, BARRED_S, self._barred_s - step_s)
-        self._is_held = self._is_held & ~is_refuted
+        is_displaced = self._elsewhere_s > DISPLACED_S
+        self._rehold_delay_s = np.where(is_displaced, REHOLD_DELAY_S, self._rehold_delay_s - step_s)
+        self._is_held = self._is_held & ~is_displaced
 
     def _update(self, points_world: NDArray[np.floating[Any]], step_s: float, drift_s: float) -> None:
         """Move the places of holds, and begin and end these."""
         contact = self._probability
         share = (1 - np.exp(-step_s / drift_s)) * (contact > END)
         self._anchors[:, :2] += share[:, None] * (points_world - self._anchors)[:, :2]
-        begins = ~self._is_held & (contact > BEGIN) & (self._barred_s <= 0)
+        begins = ~self._is_held & (contact > BEGIN) & (self._rehold_delay_s <= 0)
         shown = points_world.copy()
         shown[: len(SOLES)] += np.repeat(self._shift, 2, axis=0)
         self._anchors[begins] = shown[begins]

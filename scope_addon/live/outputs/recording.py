@@ -67,8 +67,8 @@ class Recording:
         """
         if not self._poses or self._session is None or self._session.camera is None:
             raise NoPersonError(
-                f"nobody was seen in {self._source.name}, so nothing was recorded; at least one person must be mostly"
-                " in the picture"
+                f"nobody was seen in {self._source.name}, so nothing was recorded; at least one person must be mostly "
+                "in the image"
             )
         motion = self.motion(self._session.camera)
         if self._from_zero:

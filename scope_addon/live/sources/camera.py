@@ -65,7 +65,7 @@ class CameraSource:
                 ok, bgr = capture.read()
                 now_s = clock.now()
                 if not ok or bgr is None:
-                    raise VideoError(f"{self.name} {self._why_nothing_comes(has_begun=index > 0)}")
+                    raise VideoError(f"{self.name} {self._reason_without_images(has_begun=index > 0)}")
                 yield Picture(index, now_s, now_s, cast(NDArray[np.uint8], cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)))
                 index += 1
         finally:
@@ -82,7 +82,7 @@ class CameraSource:
         for index, image_rgb in enumerate(system_cameras.pictures(container, clock)):
             now_s = clock.now()
             yield Picture(index, now_s, now_s, image_rgb)
-        raise VideoError(f"{self.name} {self._why_nothing_comes(has_begun=index >= 0)}")
+        raise VideoError(f"{self.name} {self._reason_without_images(has_begun=index >= 0)}")
 
     def _require_device(self) -> None:
         if sys.platform.startswith("linux") and not self._path.exists():
@@ -110,7 +110,7 @@ class CameraSource:
     def _problem(self) -> str:
         return device_problem(self._path) if self._path.exists() else _OPEN_ERRORS[errno.ENODEV]
 
-    def _why_nothing_comes(self, *, has_begun: bool) -> str:
+    def _reason_without_images(self, *, has_begun: bool) -> str:
         """Return the end of a sentence on a camera that gives no picture.
 
         :param has_begun: whether it gave some before.
@@ -147,5 +147,5 @@ def device_problem(path: Path, ioctl: Callable[[int, int, bytearray], Any] | Non
         os.close(node)
     of_all, of_this = struct.unpack(_CAPABILITY, answer)[4:6]
     if not (of_this if of_all & _OF_THIS_NODE else of_all) & _CAPTURE:
-        return "gives no pictures, as the second device of many cameras; choose another one"
+        return "delivers no images, like the second device of many cameras; choose another one"
     return ""

@@ -39,7 +39,7 @@ class Damage:
         self._delay: int | None = None
         self._is_broken = self._has_key = False
 
-    def see(self, packet: av.Packet[Any]) -> None:
+    def observe(self, packet: av.Packet[Any]) -> None:
         """Note a packet that is going to be decoded."""
         if self._numbers is not None:
             if self._numbers.has_gap(bytes(packet)):

@@ -87,7 +87,7 @@ class NewestFrame:
         :raises VideoError: the source cannot be read.
         """
         with self._changed:
-            self._pace.spend(self.now() - self._taken_s)
+            self._pace.add_duration(self.now() - self._taken_s)
             while self._newest is None and not self._is_over:
                 if self._clock.stopped.is_set():  # the source may be stalled, and its thread with it
                     return None
@@ -133,7 +133,7 @@ class NewestFrame:
             problem = str(error)
         if self._source.ends or self._reconnect_s <= 0:
             if not self.received:
-                raise VideoError(f"{self._source.name} gave no frames; check that it shows a picture")
+                raise VideoError(f"{self._source.name} delivered no frames; check that it shows an image")
             return True
         if problem != self._said:  # once, not at every attempt
             self._said = problem
@@ -150,7 +150,7 @@ class NewestFrame:
         index = self._first_index + picture.index
         time_s = max(picture.timestamp_s - self._began_s, self._last_s + 1e-3 if self.received else 0.0)
         if self.received and not is_first:
-            self._say_pause(picture.arrived_s - self._arrived_s)
+            self._report_pause(picture.arrived_s - self._arrived_s)
         self._arrived_s = picture.arrived_s
         self._watch(picture)
         picture = replace(picture, index=index, timestamp_s=time_s, image_rgb=self._in_first_size(picture.image_rgb))
@@ -169,11 +169,11 @@ class NewestFrame:
         if self.now() - self._damage_said_s > DAMAGE_SAID_S:
             self._damage_said_s = self.now()
             self._say(
-                f"data of {self._source.name} was lost or damaged on its way; damaged pictures are left out, for at"
+                f"data of {self._source.name} was lost or damaged in transmission; damaged images are left out, for at"
                 f" most {DAMAGED_S:g} s each time"
             )
 
-    def _say_pause(self, seconds: float) -> None:
+    def _report_pause(self, seconds: float) -> None:
         """Say that nothing came for a while, if the source itself has not noticed: maybe the computer slept."""
         if seconds > STALLED_S:
             self._changed_s += seconds
@@ -188,7 +188,7 @@ class NewestFrame:
             self._changed_s, self._is_frozen = picture.arrived_s, False
         elif picture.arrived_s - self._changed_s > STALLED_S and not self._is_frozen and not self._source.ends:
             self._is_frozen = True
-            self._say(f"{self._source.name} has shown the same picture for {STALLED_S:g} s; check whether it is frozen")
+            self._say(f"{self._source.name} has shown the same image for {STALLED_S:g} s; check whether it is frozen")
 
     def _in_first_size(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Return a picture in the size of the first one, unless its shape is another one."""

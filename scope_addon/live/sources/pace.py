@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 SLOWEST_S = 1 / 28  # between frames: n is not raised beyond it without need, so that no slow source becomes slower
 MORE_TIME, MOST_TIME = 1.25, 1.35  # between even frames beyond that, over uneven ones: to begin with n, and to keep it
 RECENT_S, FEWEST = 1.0, 8  # over which it is seen that frames take too long, and the least number of them
-CALM_S = 4.0  # the same, that they would be processed in time with a lower n
+IN_TIME_S = 4.0  # the same, that they would be processed in time with a lower n
 LATE_SHARE, RARE_SHARE = 0.15, 0.08  # of the frames in these times, that take too long
 SLOWER = 1.5  # distance of the source's frames, over that for which n was chosen, from which n is chosen anew
-SPARE = 0.8  # of the time between two frames, which all but a few have to leave some of for n to be lowered
+MAX_BUSY_SHARE = 0.8  # of the time between two frames, which all but a few have to leave some of for n to be lowered
 _INTERVALS = 31  # of the source, whose median counts
 
 
@@ -55,20 +55,20 @@ class Pace:
         """Note that the frame of this time is processed now."""
         self._taken_s = time_s
 
-    def spend(self, seconds: float) -> None:
+    def add_duration(self, seconds: float) -> None:
         """Note how long the frame took that was taken last, and choose n."""
         if self._taken_s is None or self.every is None:
             return
         self._took.append((self._taken_s, seconds))
-        while self._took[0][0] < self._taken_s - CALM_S:
+        while self._took[0][0] < self._taken_s - IN_TIME_S:
             self._took.popleft()
         if self.every > self._most and not self._is_worth_it():
             self._change(self._most)
         elif self._share_above(self.every * self._interval_s, RECENT_S) > LATE_SHARE:
             self._raise()
-        elif self._took[-1][0] - self._took[0][0] > CALM_S - 2 * SLOWEST_S:
+        elif self._took[-1][0] - self._took[0][0] > IN_TIME_S - 2 * SLOWEST_S:
             for every in range(1, self.every):
-                if self._share_above(SPARE * every * self._interval_s, CALM_S) < RARE_SHARE:
+                if self._share_above(MAX_BUSY_SHARE * every * self._interval_s, IN_TIME_S) < RARE_SHARE:
                     self._change(every)
                     return
 
@@ -90,7 +90,7 @@ class Pace:
         assert self.every is not None
         if self._interval_s > SLOWER * self._chosen_for_s:
             return False
-        return len(self._recent(CALM_S)) < FEWEST or self._costs_little(self.every, MOST_TIME, CALM_S)
+        return len(self._recent(IN_TIME_S)) < FEWEST or self._costs_little(self.every, MOST_TIME, IN_TIME_S)
 
     def _costs_little(self, every: int, more_time: float, recent_s: float) -> bool:
         """Return whether every n-th frame takes hardly more time than whichever frames could be processed."""

@@ -95,7 +95,7 @@ class StreamSource:
             has_begun = has_begun or packet.is_keyframe or now_s - began_s > KEY_FRAME_S  # streams may have none
             frames: list[av.VideoFrame] = []
             if has_begun:
-                damage.see(packet)
+                damage.observe(packet)
                 yield from [None if damage.is_broken else frame for frame in held]
                 held = []
                 try:
@@ -108,7 +108,7 @@ class StreamSource:
             if frames:
                 seen_s = now_s
             elif now_s - seen_s > UNREADABLE_S:
-                raise VideoError(f"{self.name} was interrupted (no picture could be decoded for {UNREADABLE_S:g} s)")
+                raise VideoError(f"{self.name} was interrupted (no image could be decoded for {UNREADABLE_S:g} s)")
             for frame in frames:
                 is_intact = not damage.is_in(frame)
                 damaged_s = None if is_intact else now_s if damaged_s is None else damaged_s

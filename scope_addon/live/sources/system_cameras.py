@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 FORMATS = {"win32": "dshow", "darwin": "avfoundation"}  # of FFmpeg, by `sys.platform`
 # What a camera is asked for beside the size: some refuse a rate that they do not have, and others want one to be given.
-_WISHES: tuple[dict[str, str], ...] = ({"framerate": "30"}, {})
+_REQUESTED_MODES: tuple[dict[str, str], ...] = ({"framerate": "30"}, {})
 # What makes each of them log a camera's modes, and refuse to open it. No camera has so small a picture.
 _LISTING = {"dshow": {"list_options": "true"}, "avfoundation": {"video_size": "1x1"}}
 _WAITING_S, _GONE_S = 0.002, 5.0  # for the next picture, and without one, after which a camera counts as gone
@@ -88,13 +88,13 @@ def pictures(container: InputContainer, clock: Clock) -> Iterator[NDArray[np.uin
 
 def _wanted(device: DeviceInfo, size: tuple[int, int], platform: str) -> Iterator[dict[str, str]]:
     """Yield what a camera is asked for, from the best on: the size, then what is nearest to it, then anything."""
-    for wish in _WISHES:
+    for wish in _REQUESTED_MODES:
         yield {"video_size": f"{size[0]}x{size[1]}"} | wish
     if (mode := nearest_mode(_modes(device, platform), size)) is not None:
         width, height = mode.nearest_size(size)
         yield {"video_size": f"{width}x{height}", "framerate": f"{mode.fps:.6f}"}
         yield {"video_size": f"{width}x{height}"}  # of drivers that report infinite rates, FFmpeg accepts none
-    yield from _WISHES
+    yield from _REQUESTED_MODES
 
 
 def _modes(device: DeviceInfo, platform: str) -> list[Mode]:

@@ -17,7 +17,7 @@ import bpy
 
 from ....solver.loaders.body_file import load_body
 from ...errors import UsageError, VideoError
-from ...footage import shown
+from ...footage import display_text
 from ...job.cache import Cache, CachedCapture
 from ...job.process import ROOT, START_SCRIPT, WorkerProcess
 from ...job.progress.job_progress import BUILDING, JobProgress
@@ -169,7 +169,7 @@ def build_capture(
     store_motions(result, [content for _, content in contents], body)
     if options.frame_rate == "keep" and len(motions[0]) > 1:
         warnings += rate_warnings(result.frame_rate, float(motions[0].mocap_framerate))
-    report = dict(report, warnings=[shown(warning) for warning in warnings + result.warnings])
+    report = dict(report, warnings=[display_text(warning) for warning in warnings + result.warnings])
     show_result(result.collection.scope_result, footage, report, result)
     scene.scope.capture = result.collection
     return result

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import bpy
 
-from ...footage import shown
+from ...footage import display_text
 from .. import warm_up
 from ..export_operators import FORMATS, is_available
 from ..presets import SCOPE_PT_capture_presets
@@ -56,7 +56,7 @@ class SCOPE_PT_capture(Tab, bpy.types.Panel):
         if not settings.footage:
             row = column.row()
             row.scale_y = 1.6
-            row.operator("scope.choose_footage", text="Choose Video or Picture", icon="FILE_MOVIE")
+            row.operator("scope.choose_footage", text="Choose Video or Image", icon="FILE_MOVIE")
             column.operator("scope.use_sample", icon="PLAY")
             column.operator("scope.import_motion", icon="IMPORT")
             return
@@ -235,7 +235,7 @@ class SCOPE_PT_figures(Tab, bpy.types.Panel):
 def _draw_figures(context: bpy.types.Context, layout: bpy.types.UILayout, result: bpy.types.PropertyGroup) -> None:
     """Draw footage, people, frames and error. A .blend file written by the command line has no figures."""
     column = layout.column(align=True)
-    column.label(text=shown(Path(result.footage).name) or result.collection.name, icon="FILE_MOVIE")
+    column.label(text=display_text(Path(result.footage).name) or result.collection.name, icon="FILE_MOVIE")
     people = people_of(result.collection)
     column.label(
         text=people_text(len(people)) if people else "The captured person was deleted",

@@ -104,7 +104,7 @@ class SCOPE_OT_match_frame_rate(ReportingOperator):
                 rate=rate,
                 factor=rate / former,
             )
-        return rpt_("The scene has {rate:.5g} frames/s, as the motion", rate=rate)
+        return rpt_("The scene has {rate:.5g} frames/s, like the motion", rate=rate)
 
 
 def _library(block: bpy.types.ID) -> bpy.types.Library | None:

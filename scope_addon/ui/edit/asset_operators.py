@@ -19,7 +19,7 @@ def _offered_catalogs(_operator: bpy.types.Operator, _context: bpy.types.Context
 
 
 class SCOPE_OT_mark_asset(ActionOperator):
-    """Mark the captured motion as an asset with a picture of its pose, to use it in other files by the Asset Browser"""
+    """Mark the captured motion as an asset with a preview image of its pose, for use in other files"""
 
     bl_idname = "scope.mark_asset"
     bl_label = "Mark as Asset"
@@ -34,9 +34,10 @@ class SCOPE_OT_mark_asset(ActionOperator):
         description="Catalog of the Asset Browser, such as Motions/Walks; unassigned if left empty",
     )
     current_pose: BoolProperty(
-        name="Picture of Current Frame",
+        name="Preview of Current Frame",
         default=False,
-        description="Show the pose of the current frame in the picture, instead of the first one that needs no review",
+        description="Show the pose of the current frame in the preview image, instead of the first one that needs no "
+        "review",
         options={"SKIP_SAVE"},
     )
 

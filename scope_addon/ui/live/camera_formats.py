@@ -20,7 +20,7 @@ _INTERVAL_S = 0.1
 
 
 class SCOPE_OT_camera_formats(bpy.types.Operator):
-    """Ask the camera for its formats, without taking a picture. macOS may ask whether it may be used"""
+    """Query the camera's formats, without taking an image. macOS may ask for permission"""
 
     bl_idname = "scope.camera_formats"
     bl_label = "Camera Formats"
@@ -87,7 +87,7 @@ def end() -> None:
 def draw(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
     """Show what the chosen camera has answered."""
     if state.asking is not None:
-        draw_text(context, layout, iface_("Asking the camera"))
+        draw_text(context, layout, iface_("Querying the camera"))
     elif state.cameras:
         from ...job.live.cameras import camera_number, camera_source
 
@@ -96,7 +96,7 @@ def draw(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
         if camera is not None:
             draw_text(context, layout, camera.label, "INFO")
             if not camera.formats:
-                draw_text(context, layout, iface_("It tells no formats"))
+                draw_text(context, layout, iface_("It reports no formats"))
 
 
 CLASSES = (SCOPE_OT_camera_formats,)

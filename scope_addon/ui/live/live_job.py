@@ -21,7 +21,7 @@ from ....solver.errors import ScopeError
 from ....solver.loaders.body_file import load_body
 from ...atomic_write import remove_abandoned
 from ...errors import OfflineError, UsageError, VideoError
-from ...footage import shown
+from ...footage import display_text
 from ...job.live.cameras import camera_source
 from ...job.live.process import PRESENCES, LiveProcess, ShownPose
 from ...job.live.request import LiveRequest
@@ -190,7 +190,7 @@ class LiveJob:
                 for name in ("presence", "rate", "latency_ms", "dropped", "received", "recorded_s"):
                     setattr(self.status, name, message[name])
             elif message["event"] == "notice":
-                self.status.notice, self._notice_s = shown(message["text"]), time.monotonic()
+                self.status.notice, self._notice_s = display_text(message["text"]), time.monotonic()
             elif message["event"] == "ended":  # the source has, and nothing was recorded
                 self.recording = False
                 self.stop()

@@ -26,7 +26,7 @@ def end_live() -> None:
 
 
 class SCOPE_OT_live(JobOperator):
-    """Let a captured body follow the person in front of the camera, until it is stopped"""
+    """Make a captured body follow the person in front of the camera until the capture is stopped"""
 
     bl_idname = "scope.live"
     bl_label = "Start"
@@ -130,7 +130,7 @@ class _RunningOperator(bpy.types.Operator):
 
 
 class SCOPE_OT_record_live(_RunningOperator):
-    """Keep the motion from now on; Stop writes it as keyframes"""
+    """Record the motion from now on; Stop writes it as keyframes"""
 
     bl_idname = "scope.record_live"
     bl_label = "Record"

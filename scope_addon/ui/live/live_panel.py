@@ -78,7 +78,7 @@ def _draw_status(context: bpy.types.Context, layout: bpy.types.UILayout) -> None
     elif not status.presence:
         draw_text(context, layout, iface_("Waiting for the source"))
     elif job.quiet_s:
-        text = iface_("Nothing has come from the source for {seconds:.0f} s", seconds=job.quiet_s)
+        text = iface_("No image from the source for {seconds:.0f} s", seconds=job.quiet_s)
         draw_text(context, layout.box(), text, "ERROR")
     else:
         draw_text(context, layout, _speed(status.rate, status.latency_ms))

@@ -48,7 +48,7 @@ class SCOPE_PG_live(bpy.types.PropertyGroup):
         default="CAMERA",
         options=set(),
         update=_forget_message,
-        description="Where the pictures come from",
+        description="Source of the images",
     )
     camera: StringProperty(
         name="Camera",
@@ -77,7 +77,7 @@ class SCOPE_PG_live(bpy.types.PropertyGroup):
         name="Rig Follows",
         default=False,
         options=set(),
-        description="Let the rig of the Retarget section follow as well",
+        description="Make the rig of the Retarget section follow as well",
     )
     countdown_s: IntProperty(
         name="Countdown (s)",
@@ -91,7 +91,7 @@ class SCOPE_PG_live(bpy.types.PropertyGroup):
         name="Keep Footage",
         default=False,
         options=set(),
-        description="Write the recorded pictures of a camera or stream as a video beside the .blend file, from which a "
+        description="Write the recorded images of a camera or stream as a video beside the .blend file, from which a "
         "more accurate motion of the same take can be captured",
     )
     with_scene: BoolProperty(

@@ -173,14 +173,14 @@ class ExchangeOperator(CorrectSpanOperator):
 
 
 class SCOPE_OT_exchange_sides(ExchangeOperator):
-    """Exchange left and right from the first to the last frame; the same once more undoes it"""
+    """Exchange left and right from the first to the last frame; applying it again undoes it"""
 
     bl_idname = "scope.exchange_sides"
     bl_label = "Exchange Left and Right"
 
 
 class SCOPE_OT_remove_correction(CorrectionOperator):
-    """Remove the correction; the motion around it is again what it was without it"""
+    """Remove the correction and restore the motion around it"""
 
     bl_idname = "scope.remove_correction"
     bl_label = "Remove Correction"

@@ -62,8 +62,8 @@ def _others_under_floor(motion: Motion, body: Body) -> str:
     if not under.any():
         return ""
     return rpt_(
-        "With this floor, a foot is up to {depth:.0f} cm under it in {count} of {total} frames: press Floor Here in a "
-        "frame in which it stands, or use Snap Feet to Floor",
+        "A foot is up to {depth:.0f} cm under this floor in {count} of {total} frames: press Floor Here in a frame in "
+        "which it rests on the floor, or use Snap Feet to Floor",
         depth=-100 * lowest.min(),
         count=int(under.sum()),
         total=len(motion),

@@ -87,7 +87,7 @@ class _Line:
 
 
 class SCOPE_OT_upright_line(bpy.types.Operator):
-    """Draw a line in the footage or from a side along what is upright; the capture and its camera turn with it"""
+    """Draw a line along something upright, in the footage or a side view; it rotates the capture and its camera"""
 
     bl_idname = "scope.upright_line"
     bl_label = "Upright Line"
@@ -99,7 +99,7 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
         areas = context.window.screen.areas if context.window else ()
         if space is None or space.type != "VIEW_3D" or not any(_takes_line(context.scene, area) for area in areas):
             cls.poll_message_set(
-                tip_("Press Compare with Footage, or show an orthographic view from a side: the line is drawn there")
+                tip_("Press Compare with Footage or switch to an orthographic side view, where the line is drawn")
             )
             return False
         return may_edit(cls, context)

@@ -49,9 +49,9 @@ class SCOPE_PG_expression_pair(bpy.types.PropertyGroup):
         name="Channel",
         items=(
             ("key", "Shape Key", "Value of a shape key", 0),
-            ("left", "Left", "Moves to the person's left; of the mouth's width, the eyes' distance, the lids' gap", 1),
-            ("up", "Up", "Moves up; of the mouth's width, the eyes' distance, the lids' gap", 2),
-            ("forward", "Forward", "Moves forward; of the mouth's width, the eyes' distance, the lids' gap", 3),
+            ("left", "Left", "Moves to the person's left, relative to mouth width, eye distance or lid gap", 1),
+            ("up", "Up", "Moves up, relative to mouth width, eye distance or lid gap", 2),
+            ("forward", "Forward", "Moves forward, relative to mouth width, eye distance or lid gap", 3),
             ("pitch", "Pitch", "Turns down, in degrees", 4),
             ("yaw", "Yaw", "Turns to the person's left, in degrees", 5),
             ("roll", "Roll", "Turns with the left side up, in degrees", 6),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names that are not UTF-8 are passed on to libraries in a form that they can take, and shown as text."""
+"""Names that are not UTF-8 are passed on to libraries in a form that they can take, and display_text as text."""
 
 import os
 import shutil
@@ -9,16 +9,16 @@ import sys
 import pytest
 from scope.scope_addon.capture.media.file_names import utf8_name
 from scope.scope_addon.cli import SAMPLE
-from scope.scope_addon.footage import is_utf8, shown
+from scope.scope_addon.footage import display_text, is_utf8
 
 NAME = os.fsdecode(b"caf\xe9.png")
 
 
 def test_names_are_shown_as_text_that_can_be_encoded():
-    assert shown("café.png") == "café.png"
-    shown(NAME).encode()
-    assert shown(NAME).startswith("caf")
-    assert shown(NAME).endswith(".png")
+    assert display_text("café.png") == "café.png"
+    display_text(NAME).encode()
+    assert display_text(NAME).startswith("caf")
+    assert display_text(NAME).endswith(".png")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="file names are Unicode on this system")

@@ -72,7 +72,7 @@ def test_a_recording_begins_when_it_is_asked_for(folder, body):
     recorder.begin(SimpleNamespace(sessions=[SimpleNamespace(camera=None)]), (640, 480))
     recorder.send(pose_of(body), 0.0)
     assert recorder.recording is None
-    commands.hear(RECORD)
+    commands.receive(RECORD)
     for time_s in (1.0, 1.5):
         recorder.send(replace(pose_of(body), timestamp_s=time_s), 0.0)
     assert recorder.recording.seconds == 0.5
@@ -84,7 +84,7 @@ def test_a_recording_with_footage_begins_with_its_first_picture(folder, body):
     recorder = _Recorder([folder / "person1.npz"], body, FakeSource(), commands, footage)
     recorder.begin(SimpleNamespace(sessions=[SimpleNamespace(camera=None)]), (640, 480))
     recorder.receive("too early")
-    commands.hear(RECORD)
+    commands.receive(RECORD)
     recorder.send(replace(pose_of(body), index=4), 0.0)  # of a picture that came before
     assert recorder.recording is None
     recorder.receive("first")

@@ -10,7 +10,7 @@ def test_commands_arrive_in_any_pieces(size):
     commands, sent = Commands(), b"nonsense\n" + RECORD + STOP
     for at in range(0, len(sent), size):
         assert not commands.stopped.is_set()
-        commands.hear(sent[at : at + size])
+        commands.receive(sent[at : at + size])
     assert commands.recording.is_set()
     assert commands.stopped.is_set()
 
@@ -18,7 +18,7 @@ def test_commands_arrive_in_any_pieces(size):
 def test_what_is_no_command_does_nothing_and_is_not_kept():
     commands = Commands()
     for piece in (b"stop", b" now\n", b"\xff\x00", b"record" * 10_000):
-        commands.hear(piece)
+        commands.receive(piece)
     assert not commands.recording.is_set()
     assert not commands.stopped.is_set()
     assert len(commands._unfinished) < 10_000

@@ -56,7 +56,7 @@ def test_a_camera_that_does_not_answer_is_given_up(asking, monkeypatch):
     process = asking("time.sleep(600)")
     assert process.answer() is None
     monkeypatch.setattr(formats, "ANSWER_S", 0.0)
-    with pytest.raises(WorkerFailedError, match="camera 2 has not told its formats within 0 s; if the system asks"):
+    with pytest.raises(WorkerFailedError, match="camera 2 has not reported its formats within 0 s; if the system asks"):
         process.answer()
 
 

@@ -78,7 +78,7 @@ def test_another_device_is_no_camera():
 
 def test_the_node_of_a_camera_s_metadata_gives_no_pictures(device):
     both = CAPTURE | METADATA | HAS_OWN_ANSWER
-    assert "gives no pictures" in device_problem(device, answering(both, METADATA))
+    assert "delivers no images" in device_problem(device, answering(both, METADATA))
     assert device_problem(device, answering(both, CAPTURE)) == ""
     assert device_problem(device, answering(CAPTURE)) == ""  # of a driver that does not tell its nodes apart
 

@@ -127,7 +127,9 @@ def test_damaged_frames_are_counted_and_said_not_again_and_again():
         reader._thread.join(300)
     assert (reader.received, reader.damaged) == (6, 4)
     assert [picture.timestamp_s for picture in taken] == pytest.approx([0.0, 0.1, 0.2, 0.6, 0.7, 0.9])
-    said = [text for text in said if text.startswith("data of fake was lost or damaged on its way; damaged pictures")]
+    said = [
+        text for text in said if text.startswith("data of fake was lost or damaged in transmission; damaged images")
+    ]
     assert len(said) == 2
 
 
@@ -141,7 +143,7 @@ def test_a_source_that_is_frozen_is_said_once_each_time():
 
     with NewestFrame(FakeSource(times, images=images, before=before), clock, 0.0, said.append) as reader:
         reader._thread.join(300)
-    assert said == ["fake has shown the same picture for 5 s; check whether it is frozen"] * 2
+    assert said == ["fake has shown the same image for 5 s; check whether it is frozen"] * 2
 
 
 def test_a_computer_that_slept_says_so_and_shows_no_backlog():

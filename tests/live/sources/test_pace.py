@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from scope.scope_addon.live.sources.pace import CALM_S, SLOWEST_S, Pace
+from scope.scope_addon.live.sources.pace import IN_TIME_S, SLOWEST_S, Pace
 
 
 def processed(rate, seconds, took_s, pace=None):
@@ -19,7 +19,7 @@ def processed(rate, seconds, took_s, pace=None):
             started_s, waiting = max(busy_until_s, taken[-1] / rate), None
             pace.take(taken[-1] / rate)
             busy_until_s = started_s + took_s(started_s)
-            pace.spend(busy_until_s - started_s)
+            pace.add_duration(busy_until_s - started_s)
         if pace.is_due(due_s):
             waiting = k
         if waiting is not None and busy_until_s <= due_s:
@@ -27,7 +27,7 @@ def processed(rate, seconds, took_s, pace=None):
             waiting = None
             pace.take(taken[-1] / rate)
             busy_until_s = due_s + took_s(due_s)
-            pace.spend(busy_until_s - due_s)
+            pace.add_duration(busy_until_s - due_s)
     return np.array(taken)
 
 
@@ -37,7 +37,7 @@ def steps_after(frames, rate, seconds):
 
 @pytest.mark.parametrize(("rate", "took_s", "every"), [(60, 0.02, 2), (60, 0.03, 2), (120, 0.012, 2), (120, 0.022, 4)])
 def test_frames_that_take_too_long_are_processed_evenly(rate, took_s, every):
-    steps = steps_after(processed(rate, 10, lambda _: took_s), rate, CALM_S + 1.0)
+    steps = steps_after(processed(rate, 10, lambda _: took_s), rate, IN_TIME_S + 1.0)
     assert set(steps) == {every}
 
 
@@ -65,7 +65,7 @@ def test_a_slow_machine_that_becomes_faster_processes_more_frames_again():
     pace = Pace()
     frames = processed(60, 20, lambda now_s: 0.06 if now_s < 8.0 else 0.02, pace)
     assert set(np.diff(frames[(frames > 3 * 60) & (frames < 8 * 60)])) == {4}
-    assert set(steps_after(frames, 60, 8.0 + CALM_S + 1.0)) == {2}
+    assert set(steps_after(frames, 60, 8.0 + IN_TIME_S + 1.0)) == {2}
 
 
 def test_the_first_seconds_begin_evenly():
@@ -82,7 +82,7 @@ def test_uneven_times_too_give_even_frames():
 
 def test_a_fast_machine_processes_every_frame_though_some_take_longer():
     frames = processed(60, 15, lambda s: 0.025 if s % 1.0 < 0.02 else 0.012)
-    assert np.mean(steps_after(frames, 60, CALM_S + 1.0) == 1) > 0.95
+    assert np.mean(steps_after(frames, 60, IN_TIME_S + 1.0) == 1) > 0.95
 
 
 @pytest.mark.parametrize(("rate", "took_s"), [(30, 0.04), (50, 0.03), (25, 0.2)])
@@ -106,7 +106,7 @@ def test_a_machine_that_becomes_faster_processes_every_frame_again_and_does_not_
 
     frames = processed(60, 20, took_s, pace)
     assert [n for _, n in changes] == [2, 1]
-    assert changes[-1][0] < 3.0 + CALM_S + 1.0
+    assert changes[-1][0] < 3.0 + IN_TIME_S + 1.0
     assert set(steps_after(frames, 60, 10)) == {1}
 
 
@@ -136,5 +136,5 @@ def test_a_source_that_becomes_slower_is_not_thinned_any_more():
         time_s = 5.0 + k / 30
         if pace.is_due(time_s):
             pace.take(time_s)
-            pace.spend(0.03)
+            pace.add_duration(0.03)
     assert pace.every == 1

@@ -80,7 +80,7 @@ def test_a_camera_without_an_answer_is_said(answering):
 def test_a_camera_that_tells_none_is_said(answering):
     answering(f"print(json.dumps({ANSWER | {'formats': []}!r}))")
     ask()
-    assert drawn() == "1: USB Camera It tells no formats"
+    assert drawn() == "1: USB Camera It reports no formats"
 
 
 def test_what_is_no_camera_is_not_asked(answering):
@@ -95,7 +95,7 @@ def test_disabling_the_extension_ends_the_question(answering):
     bpy.context.scene.scope_live.camera = "1"
     bpy.ops.scope.camera_formats()
     process = state.asking
-    assert drawn() == "Asking the camera"
+    assert drawn() == "Querying the camera"
     end_live()
     assert not runs(process.pid)
     assert camera_formats.step() is None

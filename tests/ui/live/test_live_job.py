@@ -26,7 +26,7 @@ from ..conftest import inventory
 def live(tmp_path, monkeypatch, standing):
     """Return a function that starts a live capture with a scripted process.
 
-    The script may use ``pose(index)``, ``send(event, **values)``, ``hear()``, which waits for a command,
+    The script may use ``pose(index)``, ``send(event, **values)``, ``receive()``, which waits for a command,
     ``wait_for(path)``, which waits for a file, and ``finish()``, which sends the motion ``standing``.
     """
     standing.save(tmp_path / "standing.npz")
@@ -45,7 +45,7 @@ def live(tmp_path, monkeypatch, standing):
                 folder, request = sys.argv[2], json.loads(sys.stdin.readline())
                 def send(event, **values):
                     print(json.dumps({{"event": event}} | values), flush=True)
-                def hear():
+                def receive():
                     return sys.stdin.readline().strip()
                 def wait_for(path):
                     while not os.path.exists(path):
@@ -80,7 +80,7 @@ def to_end(job):
 
 
 def test_the_newest_pose_is_shown_and_stays_after_stop(live):
-    job = live("pose(1); pose(2); pose(7, [0.5] * 10); hear()")
+    job = live("pose(1); pose(2); pose(7, [0.5] * 10); receive()")
     until(job, lambda: job.poses)
     while job.poses < 3 and job._worker._newest:
         job.step()
@@ -101,7 +101,7 @@ def test_the_newest_pose_is_shown_and_stays_after_stop(live):
 
 def test_a_recording_becomes_a_capture_and_the_body_goes(live):
     bpy.context.scene.scope.take = "Jump"
-    job = live('pose(1); assert hear() == "record"; pose(2); assert hear() == "stop"; finish()')
+    job = live('pose(1); assert receive() == "record"; pose(2); assert receive() == "stop"; finish()')
     until(job, lambda: job.has_body)
     job.record()
     until(job, lambda: job.poses == 2)
@@ -121,7 +121,7 @@ def test_a_recording_becomes_a_capture_and_the_body_goes(live):
 
 def test_a_recorded_take_is_kept_by_the_blend_file(live, tmp_path):
     """It is smoothed, saved, opened again, and smoothed again from the motion that the file contains."""
-    job = live('pose(1); assert hear() == "record"; pose(2); assert hear() == "stop"; finish()')
+    job = live('pose(1); assert receive() == "record"; pose(2); assert receive() == "stop"; finish()')
     until(job, lambda: job.has_body)
     job.record()
     job.stop()
@@ -154,7 +154,7 @@ def test_a_body_follows_each_of_the_people_and_all_are_recorded(live):
     job = live("""
         assert request["live_people"] == 2
         pose(1); pose(1, person=1); pose(1, person=2)
-        assert hear() == "record"; pose(3); pose(5, person=1); assert hear() == "stop"; finish(2)
+        assert receive() == "record"; pose(3); pose(5, person=1); assert receive() == "stop"; finish(2)
     """)
     until(job, lambda: len(job._worker._newest) == 0 and all(body.armature for body in job._bodies))
     assert [body.armature.name for body in job._bodies] == ["Live", "Live 2"]
@@ -176,7 +176,7 @@ def test_a_body_follows_each_of_the_people_and_all_are_recorded(live):
 def test_cancelling_removes_the_bodies_of_all_people(live):
     bpy.context.scene.scope_live.people = 3
     before = inventory()
-    job = live("[pose(1, person=k) for k in range(3)]; hear()")
+    job = live("[pose(1, person=k) for k in range(3)]; receive()")
     until(job, lambda: all(body.armature for body in job._bodies))
     job.cancel()
     assert inventory() == before
@@ -187,7 +187,7 @@ def test_kept_footage_is_chosen_for_another_capture(live, tmp_path, monkeypatch)
     monkeypatch.setattr(live_job, "kept_footage", lambda scene: kept)
     settings = bpy.context.scene.scope_live
     settings.source, settings.keep_footage = "CAMERA", True
-    job = live(f'pose(1); hear(); hear(); assert request["keep_footage"] == {str(kept)!r}; '
+    job = live(f'pose(1); receive(); receive(); assert request["keep_footage"] == {str(kept)!r}; '
                f'shutil.copy({str(SAMPLE)!r}, request["keep_footage"]); finish()')  # fmt: skip
     until(job, lambda: job.has_body)
     job.record()
@@ -208,7 +208,7 @@ def test_cancelling_leaves_nothing_of_the_footage(live, tmp_path, monkeypatch):
         from pathlib import Path
         from scope.scope_addon.atomic_write import atomic_path
         with atomic_path(Path(request["keep_footage"])):
-            pose(1); hear(); hear()
+            pose(1); receive(); receive()
     """)
     until(job, lambda: job.has_body)
     assert len(list((tmp_path / "takes").iterdir())) == 1
@@ -231,7 +231,7 @@ def test_footage_is_kept_beside_a_saved_file_only(tmp_path):
 def test_a_countdown_comes_before_the_recording(live, monkeypatch):
     now = [1000.0]
     monkeypatch.setattr(live_job.time, "monotonic", lambda: now[0])
-    job = live('pose(1); assert hear() == "record"; pose(2); hear()')
+    job = live('pose(1); assert receive() == "record"; pose(2); receive()')
     while not job.has_body:
         job.step()
     job.record(2.5)
@@ -247,7 +247,7 @@ def test_a_countdown_comes_before_the_recording(live, monkeypatch):
 
 
 def test_stop_during_the_countdown_records_nothing(live):
-    job = live("pose(1); hear()")
+    job = live("pose(1); receive()")
     until(job, lambda: job.has_body)
     job.record(60.0)
     job.stop()
@@ -257,7 +257,7 @@ def test_stop_during_the_countdown_records_nothing(live):
 
 
 def test_a_recorded_file_that_ends_by_itself_becomes_a_capture(live):
-    job = live('pose(1); assert hear() == "record"; pose(2); finish()')
+    job = live('pose(1); assert receive() == "record"; pose(2); finish()')
     until(job, lambda: job.has_body)
     job.record()
     to_end(job)
@@ -273,7 +273,7 @@ def test_a_file_that_ends_leaves_the_last_pose(live, tmp_path):
 
 
 def test_a_recording_that_was_asked_for_too_late_leaves_the_last_pose(live):
-    job = live('pose(1); hear(); send("ended")')
+    job = live('pose(1); receive(); send("ended")')
     until(job, lambda: job.has_body)
     job.record()
     to_end(job)
@@ -284,7 +284,7 @@ def test_a_recording_whose_retargeting_fails_is_kept(live, monkeypatch):
     rig, _ = build_rig("mixamo")
     scene = bpy.context.scene
     scene.scope_live.with_rig, scene.scope_retarget.rig = True, rig
-    job = live("pose(1); hear(); hear(); finish()")
+    job = live("pose(1); receive(); receive(); finish()")
     until(job, lambda: job.has_body)
     job.record()
     scene.scope_retarget.pairs.add().bone, scene.scope_retarget.pairs[0].part = "gone", "pelvis"
@@ -298,7 +298,7 @@ def test_a_stream_ends_when_online_access_does(live, monkeypatch):
     settings, system = bpy.context.scene.scope_live, bpy.context.preferences.system
     settings.source, settings.stream = "STREAM", "rtsp://camera/stream"
     system.use_online_access = True
-    jobs = [live("pose(1); hear()"), live('pose(1); hear(); assert hear() == "stop"; finish()')]
+    jobs = [live("pose(1); receive()"), live('pose(1); receive(); assert receive() == "stop"; finish()')]
     for job in jobs:
         until(job, lambda job=job: job.poses)
     jobs[1].record()
@@ -317,7 +317,7 @@ def test_cancelling_leaves_the_scene_as_it_was(live, recording):
     scene = bpy.context.scene
     scene.scope_live.with_rig, scene.scope_retarget.rig = True, rig
     before, posed = inventory(), [bone.matrix_basis.copy() for bone in rig.pose.bones]
-    job = live("pose(1); hear(); hear()")
+    job = live("pose(1); receive(); receive()")
     until(job, lambda: job.has_body)
     assert [bone.matrix_basis for bone in rig.pose.bones] != posed
     assert job._bodies[0].armature.hide_get()  # as the Retarget section says
@@ -336,7 +336,7 @@ def test_a_recording_is_retargeted_to_the_rig_that_followed(live):
     rig, _ = build_rig("mixamo")
     scene = bpy.context.scene
     scene.scope_live.with_rig, scene.scope_retarget.rig = True, rig
-    job = live('pose(1); assert hear() == "record"; assert hear() == "stop"; finish()')
+    job = live('pose(1); assert receive() == "record"; assert receive() == "stop"; finish()')
     until(job, lambda: job.has_body)
     job.record()
     job.stop()
@@ -349,7 +349,7 @@ def test_a_recording_is_retargeted_to_the_rig_that_followed(live):
     ("script", "says"),
     [
         ('send("error", message="camera 0 cannot be opened; check that it is plugged in")', "plugged in"),
-        ('send("pose", person=0, rotations=[], positions=[], betas=[]); hear()', "cannot be used"),
+        ('send("pose", person=0, rotations=[], positions=[], betas=[]); receive()', "cannot be used"),
         ("os._exit(3)", "ended with status 3"),
     ],
 )
@@ -369,7 +369,7 @@ def test_an_interruption_is_said_until_poses_come_again(live, tmp_path, monkeypa
     monkeypatch.setattr(live_job, "NOTICE_S", 0.0)
     job = live(f"""
         pose(1); wait_for({str(tmp_path / "shown")!r})
-        send("notice", text="it was interrupted"); hear(); pose(2); hear()
+        send("notice", text="it was interrupted"); receive(); pose(2); receive()
     """)
     until(job, lambda: job.poses == 1)
     (tmp_path / "shown").touch()
@@ -382,14 +382,14 @@ def test_an_interruption_is_said_until_poses_come_again(live, tmp_path, monkeypa
 
 def test_silence_of_the_source_is_noticed(live, monkeypatch):
     monkeypatch.setattr(live_job, "QUIET_S", 0.05)
-    job = live("pose(1); hear()")
+    job = live("pose(1); receive()")
     until(job, lambda: job.poses == 1)
     time.sleep(0.1)
     assert job.quiet_s > 0.05
 
 
 def test_a_body_that_undo_removed_comes_back_and_the_others_selection_stays(live):
-    job = live("pose(1); hear(); pose(2); hear()")
+    job = live("pose(1); receive(); pose(2); receive()")
     until(job, lambda: job.has_body)
     bpy.data.objects.remove(job._bodies[0].armature)
     bpy.ops.object.empty_add()
@@ -402,7 +402,7 @@ def test_a_body_that_undo_removed_comes_back_and_the_others_selection_stays(live
 
 
 def test_a_removed_scene_ends_the_capture(live):
-    job = live("pose(1); hear()")
+    job = live("pose(1); receive()")
     bpy.data.scenes.new("other")
     bpy.data.scenes.remove(bpy.context.scene)
     with pytest.raises(UsageError, match="scene was removed"):

@@ -131,7 +131,7 @@ def test_feet_under_the_floor_in_other_frames_are_said(rig, capfd):
     depth = -min(lowest(rig, frame) for frame in range(1, 62))
     assert depth > 0.01
     said = capfd.readouterr().out
-    assert f"a foot is up to {100 * depth:.0f} cm under it in" in said
+    assert f"A foot is up to {100 * depth:.0f} cm under this floor in" in said
     assert "of 61 frames" in said
 
 

@@ -253,7 +253,7 @@ class LongClip:
         if self._trackers is None:
             self._trackers = open_trackers(self._options, self._threads, self._execution, self._kept)
         people, hands, faces = self._trackers
-        own = Trackers(people.another(regions), hands and hands.another(), faces and faces.another())
+        own = Trackers(people.restarted(regions), hands and hands.restarted(), faces and faces.restarted())
         network = people.mask_network if self._options.ablation.outline else None
         masks = MaskSchedule(network, self._video.expected_frames)
         following = self._windows[window.number + 1] if window.number + 1 < len(self._windows) else None

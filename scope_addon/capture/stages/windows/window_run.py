@@ -17,7 +17,7 @@ from ...perception.observation import Observation
 from ...perception.region import Region
 from ...tracking.track import Tracklet
 from ..clock import StageClock
-from ..frame_observer import FrameObserver, LitFrame, largest_of
+from ..frame_observer import BrightenedFrame, FrameObserver, largest_of
 from .plan import Window
 from .window_record import WindowRecord, known_reference
 
@@ -43,7 +43,7 @@ class WindowRun:
         self.window, self._following = window, following
         self._observer, self._background, self._pool, self._clock = observer, background, pool, clock
         self._exposure = AutoExposure()
-        self._upcoming: LitFrame | None = None
+        self._upcoming: BrightenedFrame | None = None
         self._pending: Future[None] | None = None
         self._indices: list[int] = []
         self._times: list[float] = []
@@ -59,8 +59,8 @@ class WindowRun:
         :param upcoming: the frame after it, also if that is in the next window; None at the end of the clip.
         """
         with self._clock.stage("decode"):  # as for a short clip
-            now = self._upcoming or self._light(frame)
-            self._upcoming = None if upcoming is None else self._light(upcoming)
+            now = self._upcoming or self._brighten(frame)
+            self._upcoming = None if upcoming is None else self._brighten(upcoming)
         time_s, row = frame.timestamp_s, len(self._times)
         is_own = self.window.has_begun(time_s)
         observations, is_cut = self._observer.step(now, self._upcoming, with_masks=is_own)
@@ -102,8 +102,8 @@ class WindowRun:
             tuple(warnings),
         )
 
-    def _light(self, frame: Frame) -> LitFrame:
-        return LitFrame(frame, self._exposure.brighten(frame.image_rgb))
+    def _brighten(self, frame: Frame) -> BrightenedFrame:
+        return BrightenedFrame(frame, self._exposure.brighten(frame.image_rgb))
 
     def _follow_background(
         self, image_rgb: NDArray[np.uint8], time_s: float, people: list[Observation], flags: tuple[bool, bool]

@@ -59,7 +59,7 @@ class FaceTracker:
             opened.result()
         self._faces: dict[int, _Face] = {}
 
-    def another(self) -> FaceTracker:
+    def restarted(self) -> FaceTracker:
         """Return a tracker with the same networks that has seen nothing."""
         tracker = copy.copy(self)
         tracker._faces = {}

@@ -85,7 +85,7 @@ class HandTracker:
         self._missed: dict[Key, list[_Missed]] = {}
         self._time_s = 0.0
 
-    def another(self) -> HandTracker:
+    def restarted(self) -> HandTracker:
         """Return a tracker with the same networks that has seen nothing."""
         tracker = copy.copy(self)
         tracker._hands, tracker._missed, tracker._time_s = {}, {}, 0.0

@@ -12,7 +12,7 @@ OPERATORS = {
     "Cancel Live Capture": "Live-Erfassung abbrechen",
     "Capture": "Erfassen",
     "Choose Footage": "Filmmaterial wählen",
-    "Choose Video or Picture": "Video oder Bild wählen",
+    "Choose Video or Image": "Video oder Bild wählen",
     "Clear Cache": "Cache leeren",
     "Compare with Footage": "Mit Filmmaterial vergleichen",
     "Documentation": "Dokumentation",

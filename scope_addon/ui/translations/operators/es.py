@@ -12,7 +12,7 @@ OPERATORS = {
     "Cancel Live Capture": "Cancelar la captura en vivo",
     "Capture": "Capturar",
     "Choose Footage": "Elegir filmación",
-    "Choose Video or Picture": "Elegir video o imagen",
+    "Choose Video or Image": "Elegir video o imagen",
     "Clear Cache": "Vaciar caché",
     "Compare with Footage": "Comparar con la filmación",
     "Documentation": "Documentación",

@@ -12,7 +12,7 @@ OPERATORS = {
     "Cancel Live Capture": "Annuler la capture en direct",
     "Capture": "Capturer",
     "Choose Footage": "Choisir le métrage",
-    "Choose Video or Picture": "Choisir une vidéo ou une image",
+    "Choose Video or Image": "Choisir une vidéo ou une image",
     "Clear Cache": "Vider le cache",
     "Compare with Footage": "Comparer avec le métrage",
     "Documentation": "Documentation",

@@ -12,7 +12,7 @@ OPERATORS = {
     "Cancel Live Capture": "ライブキャプチャをキャンセル",
     "Capture": "キャプチャ",
     "Choose Footage": "フッテージを選択",
-    "Choose Video or Picture": "動画または画像を選択",
+    "Choose Video or Image": "動画または画像を選択",
     "Clear Cache": "キャッシュをクリア",
     "Compare with Footage": "フッテージと比較",
     "Documentation": "ドキュメント",

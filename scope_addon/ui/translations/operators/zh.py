@@ -12,7 +12,7 @@ OPERATORS = {
     "Cancel Live Capture": "取消实时捕捉",
     "Capture": "捕捉",
     "Choose Footage": "选择素材",
-    "Choose Video or Picture": "选择视频或图片",
+    "Choose Video or Image": "选择视频或图片",
     "Clear Cache": "清除缓存",
     "Compare with Footage": "与素材对比",
     "Documentation": "文档",
