@@ -50,6 +50,23 @@ def test_a_camera_that_speeds_up():
     assert np.abs(found - center)[:, 0].max() < 0.15 * center[-1, 0]
 
 
+def test_a_camera_that_slows_down_and_speeds_up_again():
+    phase = 2 * np.pi * TIMES / 3.0
+    center = np.stack([0.8 * TIMES - 0.3 * np.cos(phase), 0 * TIMES, 0.3 * (1 - np.cos(phase))], axis=1)
+    center -= center[0]
+    found = camera_travel(seen_from(steps(1.2), center, 0.004), np.ones(T, bool), UP, TIMES)
+    assert np.linalg.norm(found - center, axis=1).mean() < 0.02 * np.linalg.norm(center[-1])
+
+
+def test_distances_that_drift_do_not_move_a_camera_that_pans():
+    """Where distances are wrong by more and more, all feet seem to slide along the line of sight."""
+    soles = steps(1.0)
+    sight = soles * [1, 0, 1]
+    sight /= np.linalg.norm(sight, axis=-1, keepdims=True)
+    found = camera_travel(soles + 0.4 * TIMES[:, None, None] * sight, np.ones(T, bool), UP, TIMES)
+    np.testing.assert_array_equal(found, 0.0)
+
+
 def test_a_camera_does_not_travel_from_one_scene_into_the_next():
     center = np.stack([1.4 * TIMES, 0 * TIMES, 0 * TIMES], axis=1)
     times = TIMES + np.where(np.arange(T) < T // 2, 0.0, 10.0)
