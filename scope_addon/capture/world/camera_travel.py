@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...kinematics.smoothing import gaussian_smooth
-from ...kinematics.standing import line_of_sight, logistic
+from ...kinematics.standing import horizontal_line_of_sight, logistic
 from ..tracking.scene_cuts import SCENE_GAP_S
 
 MIN_SAMPLES = 12
@@ -59,8 +59,7 @@ def camera_travel(
     velocity = np.diff(gaussian_smooth(soles, times, FOOT_CUTOFF_HZ), axis=0) / durations[:, None, None]
     carries = _carrying_probability(soles, velocity, up) * (valid[1:] & valid[:-1])[:, None]
     velocity = velocity - (velocity @ up)[..., None] * up
-    sight = soles[1:].mean(axis=1)
-    sight = line_of_sight(sight - (sight @ up)[:, None] * up)
+    sight = horizontal_line_of_sight(soles[1:].mean(axis=1), up)
     information = _information(sight, SIGHT_M_S)
     camera = _smooth_velocity(carries, velocity, information, middles)
     for scale in ROBUST_SCALES:
