@@ -10,7 +10,8 @@ relative to the camera and p_k tells whether it is low and neither rises nor fal
 
 by iteratively reweighted means over a Gaussian window, whose robust scale narrows. Swinging feet, and jumps of the
 distance, are outliers. Distances also change smoothly where they are wrong, along the line of sight, so the camera
-counts as travelling only if clearly more soles agree with it than with a camera at rest.
+counts as travelling only if clearly more soles agree with it than with a camera at rest; fewer are enough if the
+background's near corners pass by.
 
 This is used only for a camera that rotates: on a treadmill, feet slide in front of a static camera.
 """
@@ -33,7 +34,10 @@ MAX_HEIGHT_M = 0.04  # of such a sole above the lowest of its frame
 MAX_RISE_M = 0.1  # of the lowest one above the median of all frames: in a jump, it is lower than the other but not down
 SIDE_M_S, SIGHT_M_S = 0.25, 0.5  # σ, speeds at which soles at rest seem to move
 TRAVEL_SIGHT_M_S = 1.0  # σ_sight where a travelling camera is compared with one at rest
-MIN_GAIN = 0.13  # of the soles that carry the body; up to 0.10 for cameras that only pan, 0.14 for ones that travel
+MIN_GAIN = 0.3  # of the soles that carry the body: by how much more of them agree with a travelling camera
+# The same where near corners of the background pass by, so that few agree with a rotation alone: 0.29 to 0.44 in
+# most scenes with a travelling camera, 0.46 to 0.57 in those with one that pans.
+MIN_GAIN_OF_PASSING, PASSING_SHARE = 0.1, 0.45
 SMOOTH_HZ = 0.7  # a camera that is carried or driven changes its speed slowly
 ROBUST_SCALES = (*np.geomspace(4.0, 1.0, 10), 1.0, 1.0, 1.0)  # in units of σ
 MEAN_WEIGHT = 0.002  # of the mean velocity, relative to a sole's; it counts far from any sole that carries the body
@@ -44,6 +48,7 @@ def camera_travel(
     valid: NDArray[np.bool_],
     up: NDArray[np.floating[Any]],
     times: NDArray[np.float64],
+    inlier_share: float,
 ) -> NDArray[np.float64]:
     """Return the (T, 3) displacement of the camera's centre since the first frame, metres; zeros if it is unknown.
 
@@ -51,6 +56,7 @@ def camera_travel(
     :param valid: (T,) frames in which the person was seen.
     :param up: (3,) unit vector.
     :param times: (T,) seconds.
+    :param inlier_share: of the background's corners that agree with a rotation of the camera alone.
     """
     unknown = np.zeros((len(times), 3))
     if valid.sum() < MIN_SAMPLES:
@@ -69,7 +75,8 @@ def camera_travel(
     travels, rests = (
         (carries / (1.0 + _squares(velocity + each[:, None], information))).sum() for each in (camera, 0.0 * camera)
     )
-    if travels - rests < MIN_GAIN * carries.sum():
+    least = MIN_GAIN_OF_PASSING if inlier_share < PASSING_SHARE else MIN_GAIN
+    if travels - rests < least * carries.sum():
         return unknown
     durations[durations > SCENE_GAP_S] = 0.0  # after a cut, the camera counts as not having moved
     return np.concatenate([unknown[:1], np.cumsum(camera * durations[:, None], axis=0)])
