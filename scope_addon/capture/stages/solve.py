@@ -109,7 +109,8 @@ def find_camera_path(shot: Shot, first: PreparedTrack, fit: FittedTrack) -> Came
         return shot.path
     placed = place(shot, first.track, fit)
     up = find_world([placed], shot.lines).up
-    return replace(shot.path, center=camera_travel(placed.soles, placed.valid, up, placed.times))
+    center = camera_travel(placed.soles, placed.valid, up, placed.times, shot.inlier_share)
+    return replace(shot.path, center=center)
 
 
 def ground_all(

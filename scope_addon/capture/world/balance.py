@@ -25,6 +25,7 @@ from ....solver.body import Body
 from ....solver.rotations import exp
 from ...kinematics.contact_points import SOLES
 from ...kinematics.smoothing import gaussian_smooth
+from ...kinematics.standing import horizontal_line_of_sight
 from .placement import PlacedTrack
 
 STANDING_M_S = 0.5  # speed of the centre of mass at which the weight of the correction has fallen to 1/e
@@ -107,9 +108,7 @@ def balancing_rotations(
     times = placed.times
     mass = gaussian_smooth(center_of_mass(placed.body, placed.joints), times, CUTOFF_HZ)
     pivot = placed.contact_center(contact)
-    sight = mass - placed.center
-    sight = sight - (sight @ up)[:, None] * up
-    sight /= np.maximum(np.linalg.norm(sight, axis=1, keepdims=True), 1e-9)
+    sight = horizontal_line_of_sight(mass - placed.center, up)
     height = np.maximum((mass - pivot) @ up, MIN_HEIGHT_M)
     in_contact = contact > 0.5
     certainty = in_contact.any(axis=1) * leg_support(placed.body, placed.joints)
