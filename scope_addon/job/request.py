@@ -15,6 +15,9 @@ from ..errors import SetupError, UsageError
 from ..options import Place, options_at
 
 WARM_UP = json.dumps({"warm_up": True})  # the request to compile what a capture needs, without capturing anything
+# What decides the result of a capture: folders, and how the names of the files end. The panel and the sample do not.
+_DECIDES = {"solver": (".py",), "scope_addon": (".py",), "assets": (".onnx", ".npz", ".json")}
+_DECIDE_NOTHING = ("scope_addon/ui", "assets/sample")
 _SAMPLE_BYTES = 1 << 20  # hashed at the beginning and end of the footage; reading gigabytes would block the window
 
 
@@ -132,8 +135,12 @@ def program_version(root: Path) -> str:
 
 def _program_files(root: Path) -> list[tuple[str, Path]]:
     """Return the sources, networks, bodies and priors, sorted by their names below the root."""
-    files = [*(root / "solver").rglob("*.py"), *(root / "scope_addon").rglob("*.py")]
-    files += [f for kind in ("*.onnx", "*.npz", "*.json") for f in (root / "assets").rglob(kind)]
-    # Neither the panel nor the sample clip changes the result of a capture.
-    excluded = (root / "scope_addon" / "ui", root / "assets" / "sample")
-    return sorted((f.relative_to(root).as_posix(), f) for f in files if not any(map(f.is_relative_to, excluded)))
+    found = []
+    for top, suffixes in _DECIDES.items():
+        for place, folders, files in os.walk(root / top):
+            below = Path(place).relative_to(root).as_posix()
+            folders[:] = [
+                name for name in folders if name != "__pycache__" and f"{below}/{name}" not in _DECIDE_NOTHING
+            ]
+            found += [(f"{below}/{name}", Path(place, name)) for name in files if name.endswith(suffixes)]
+    return sorted(found)

@@ -49,28 +49,33 @@ def rest_alignment(
     A = np.tile(np.eye(3), (len(part_of), 1, 1))
     for b, part in enumerate(part_of):
         side, _, kind = part.partition("_")
-        parent = int(rig.carriers[b])
         if kind in ("ankle", "foot"):
             end = row.get(f"{side}_foot") if kind == "ankle" else None
             along = F @ ((rig.heads[end] if end is not None else rig.tails[b]) - rig.heads[b])
-            ankle, foot = rest[index[f"{side}_ankle"]], rest[index[f"{side}_foot"]]
-            flat, wanted = along * [1, 1, 0], (foot - ankle) * [1, 1, 0]
-            if np.linalg.norm(flat) > 0.3 * np.linalg.norm(along):
-                angle = np.arctan2(wanted[1], wanted[0]) - np.arctan2(flat[1], flat[0])
-                A[b] = exp(_UP * ((angle + np.pi) % (2 * np.pi) - np.pi))
+            A[b] = _heading_turn(along, rest[index[f"{side}_foot"]] - rest[index[f"{side}_ankle"]])
         elif kind in _NEXT:
-            A[b] = before = A[parent] if parent >= 0 and part_of[parent].partition("_")[2] in _NEXT else np.eye(3)
+            parent = int(rig.carriers[b])
+            before = A[parent] if parent >= 0 and part_of[parent].partition("_")[2] in _NEXT else np.eye(3)
             end = row.get(f"{side}_{_NEXT[kind]}")
             along = (rig.heads[end] if end is not None else rig.tails[b]) - rig.heads[b]
             # Zero for the last phalanges, which have no end joint: they keep the rig's angle to the one before.
             wanted = rest[index.get(f"{side}_{_NEXT[kind]}", index[part])] - rest[index[part]]
-            if np.linalg.norm(along) > 1e-9 and np.linalg.norm(wanted) > 1e-9:
-                A[b] = shortest_turn(before @ F @ along, wanted) @ before
-            if kind == "wrist":
-                palm = _palm_alignment(rig.heads @ F.T, row, rest, index, side)
-                if palm is not None and (np.trace(palm @ A[b].T) - 1) / 2 > np.cos(_MAX_PALM_TURN):
-                    A[b] = palm
+            can_turn = np.linalg.norm(along) > 1e-9 and np.linalg.norm(wanted) > 1e-9
+            A[b] = shortest_turn(before @ F @ along, wanted) @ before if can_turn else before
+            palm = _palm_alignment(rig.heads @ F.T, row, rest, index, side) if kind == "wrist" else None
+            if palm is not None and (np.trace(palm @ A[b].T) - 1) / 2 > np.cos(_MAX_PALM_TURN):
+                A[b] = palm
     return A
+
+
+def _heading_turn(along: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the turn (3, 3) about the vertical from one direction (3,) to another; none of a steep one."""
+    flat, goal = along * [1, 1, 0], wanted * [1, 1, 0]
+    if np.linalg.norm(flat) <= 0.3 * np.linalg.norm(along):
+        return np.eye(3)
+    angle = np.arctan2(goal[1], goal[0]) - np.arctan2(flat[1], flat[0])
+    turn: NDArray[np.float64] = exp(_UP * ((angle + np.pi) % (2 * np.pi) - np.pi))
+    return turn
 
 
 def _palm_alignment(

@@ -128,47 +128,66 @@ def show_footage(
     path = Path(footage).resolve()
     if not path.is_file():
         raise VideoError(f"the footage {path} does not exist; give the video or image the motion was captured from")
-    warnings: list[str] = []
     background = camera.data.background_images.new()
     background.alpha = 1.0
     background.display_depth = "BACK"
     background.frame_method = "FIT"
     camera.data.show_background_images = True
-    if path.suffix.lower() in PICTURE_SUFFIXES and not motion.dist.any():
-        background.source = "IMAGE"
-        background.image = bpy.data.images.load(str(path), check_existing=True)
-        background.image.display_aspect = pixel_aspect(motion)
-        size = tuple(background.image.size)
-        if len(motion.frames) > 1:
-            warnings += _show_picture_sequence(camera.data, background, path, motion, frames)
-    else:
-        # Always a new clip, because another capture may have another start or lens.
-        clip = bpy.data.movieclips.load(str(path))
-        clip.frame_start = _start(motion, frames)
-        size = tuple(clip.size)
-        if motion.dist.any():
-            background.source = "MOVIE_CLIP"
-            background.clip = clip
-            clip.display_aspect = pixel_aspect(motion)
-            _set_lens_distortion(clip, background, motion)
-            if (drift := _drift(motion, frames)) > 1.0:
-                warnings.append(
-                    f"the background image drifts from the motion by up to {drift:.0f} frames, because the scene "
-                    "does not have the footage's constant frame rate and the lens distorts; the motion keeps its "
-                    "speed"
-                )
-        else:
-            rate = clip.fps
-            bpy.data.movieclips.remove(clip)  # which was never shown
-            _show_video(camera.data, background, path, motion, frames, rate)
+    show = _show_picture if path.suffix.lower() in PICTURE_SUFFIXES and not motion.dist.any() else _show_clip
+    size, warnings = show(camera.data, background, path, motion, frames)
     if not min(size):
-        warnings = [f"Blender cannot decode {path.name}, so the camera shows no footage"]
-    elif tuple(motion.image_size) != size:
+        return [f"Blender cannot decode {path.name}, so the camera shows no footage"]
+    if tuple(motion.image_size) != size:
         warnings.append(
             f"Blender shows {path.name} at {size[0]} x {size[1]}, but it was captured at {motion.image_size[0]} x "
             f"{motion.image_size[1]}: turn or scale the camera's background image"
         )
     return warnings
+
+
+def _show_picture(
+    camera: bpy.types.Camera,
+    background: bpy.types.CameraBackgroundImage,
+    path: Path,
+    motion: Motion,
+    frames: NDArray[np.float64],
+) -> tuple[tuple[int, int], list[str]]:
+    """Show a picture, or numbered ones; return the size in pixels, and warnings."""
+    background.source = "IMAGE"
+    background.image = bpy.data.images.load(str(path), check_existing=True)
+    background.image.display_aspect = pixel_aspect(motion)
+    size = tuple(background.image.size)
+    several = len(motion.frames) > 1
+    return size, _show_picture_sequence(camera, background, path, motion, frames) if several else []
+
+
+def _show_clip(
+    camera: bpy.types.Camera,
+    background: bpy.types.CameraBackgroundImage,
+    path: Path,
+    motion: Motion,
+    frames: NDArray[np.float64],
+) -> tuple[tuple[int, int], list[str]]:
+    """Show a video, or footage of a distorting lens; return the size in pixels, and warnings."""
+    # Always a new clip, because another capture may have another start or lens.
+    clip = bpy.data.movieclips.load(str(path))
+    clip.frame_start = _start(motion, frames)
+    size = tuple(clip.size)
+    if not motion.dist.any():
+        rate = clip.fps
+        bpy.data.movieclips.remove(clip)  # which was never shown
+        _show_video(camera, background, path, motion, frames, rate)
+        return size, []
+    background.source = "MOVIE_CLIP"
+    background.clip = clip
+    clip.display_aspect = pixel_aspect(motion)
+    _set_lens_distortion(clip, background, motion)
+    if (drift := _drift(motion, frames)) <= 1.0:
+        return size, []
+    return size, [
+        f"the background image drifts from the motion by up to {drift:.0f} frames, because the scene does not have the "
+        "footage's constant frame rate and the lens distorts; the motion keeps its speed"
+    ]
 
 
 def show_footage_again(camera: bpy.types.Object, motion: Motion, frames: NDArray[np.float64]) -> list[str]:

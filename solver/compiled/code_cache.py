@@ -11,10 +11,11 @@ import inspect
 import logging
 import pickle
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
+import llvmlite.binding as llvm
 from numba.core import serialize
 from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
@@ -74,7 +75,7 @@ class CodeCache(_Cache):
             if payload is None:
                 continue
             try:
-                result = _rebuild(target_context, *pickle.loads(payload))
+                result = _loaded(target_context, *pickle.loads(payload))
             except Exception:  # whatever an unusable file leads to, compiling it again mends it
                 remove_code(path)
                 continue
@@ -124,9 +125,37 @@ class CodeCache(_Cache):
 
 
 def _payload(result: Any) -> bytes:
+    """Return the machine code, what else numba keeps of a result, and the names that the code defines."""
     reduced = list(result._reduce())
     reduced[_ANNOTATION] = ""
-    return _dumps(tuple(reduced))
+    module = result.library._get_module_for_linking()
+    values = [*module.functions, *module.global_variables]
+    return _dumps((tuple(reduced), {value.name for value in values if not value.is_declaration}))
+
+
+def _loaded(target_context: Any, reduced: tuple[Any, ...], names: set[str]) -> Any:
+    """Return what was kept of a result; as numba's `_rebuild`, but without reading LLVM's code.
+
+    Only kernels that are compiled later and call this one need that, and to read it takes a third of the time.
+    """
+    (name, kind, (code, bitcode)), *others = reduced
+    target_context.codegen()._engine._defined_symbols |= names
+    result = _rebuild(target_context, (name, kind, (code, _no_bitcode())), *others)
+    result.library._shared_module = None
+    result.library._get_module_for_linking = partial(_read_bitcode, result.library, bitcode)
+    return result
+
+
+def _read_bitcode(library: Any, bitcode: bytes) -> Any:
+    """Return the LLVM module of a library whose code was kept."""
+    if library._shared_module is None:
+        library._shared_module = llvm.parse_bitcode(bitcode)
+    return library._shared_module
+
+
+@cache
+def _no_bitcode() -> bytes:
+    return bytes(llvm.parse_assembly("").as_bitcode())
 
 
 @cache

@@ -149,7 +149,7 @@ def test_a_part_that_fails_is_left_to_the_capture_of_the_clip(cluster: Any, fold
 
 def test_real_windows_of_two_workers_give_the_result_in_one_piece(cluster: Any, folder: Path, networks: Path) -> None:
     (folder / "clip.mp4").write_bytes(SAMPLE.read_bytes())
-    options = ["--quality", "fast", "--end", "1.6", "--window-seconds", "0.5", "--formats", "npz"]
+    options = ["--quality", "fast", "--end", "1.1", "--window-seconds", "0.5", "--formats", "npz"]
     whole = folder.parent / "whole.npz"
     capture = ["capture", str(SAMPLE), "-o", str(whole), *options[:-2], "--threads", "1"]
     assert main(capture) == 0

@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable
-from pathlib import Path
+
+import psutil
 
 # A defect is found that late; a worker, whose priority is low, may take minutes on a computer that has other work.
 _LONGEST_S = 900.0
@@ -21,14 +21,8 @@ def wait_for(condition: Callable[[], object]) -> None:
 
 
 def runs(pid: int) -> bool:
-    """Return whether a process exists and, where there is /proc, is not a zombie."""
-    if not Path("/proc/self").exists():  # macOS
-        try:
-            os.kill(pid, 0)
-        except ProcessLookupError:
-            return False
-        return True
+    """Return whether a process exists and is no zombie."""
     try:
-        return Path(f"/proc/{pid}/stat").read_text("utf-8").rsplit(")", 1)[1].split()[0] != "Z"
-    except OSError:
+        return psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
         return False

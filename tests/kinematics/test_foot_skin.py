@@ -64,3 +64,11 @@ def test_rests_on_a_step_are_found(height, found):
     heights = np.tile([0.0, 0.0, height, 0.3], (60, 1))
     contact = np.tile([0.95, 0.95, 0.9, 0.0], (60, 1))
     assert steps(heights, contact, TIMES) == [(0, height)] * found
+
+
+def test_a_touch_of_a_step_is_no_rest():
+    heights, contact = np.full((60, 4), 0.18), np.zeros((60, 4))
+    contact[30:34, 1] = 0.95  # 0.1 s
+    assert steps(heights, contact, TIMES) == []
+    contact[45:, 1] = 0.95  # 0.47 s
+    assert steps(heights, contact, TIMES) == [(45, 0.18)]

@@ -60,7 +60,7 @@ def test_a_map_that_an_editor_has_marked_as_unicode_is_read(tmp_path):
     ["", "[]", "{" * 5000, "[" * 100000, '{"format": "scope bone map", "version": 1, "bones": {"a": 3}}',
      '{"format": "scope bone map", "version": 1, "bones": {"a": "tail"}}',
      '{"format": "scope bone map", "version": 1, "bones": {}}', '{"format": 1}', _legs_and(r"\ud800"),
-     _legs_and(r"a\u0000")],
+     _legs_and(r"a\u0000"), _legs_and("")],
 )  # fmt: skip
 def test_hostile_maps_are_refused(tmp_path, text):
     path = tmp_path / "map.json"

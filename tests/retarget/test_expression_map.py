@@ -76,6 +76,12 @@ def test_blinks_and_vowels_of_other_conventions(names, closed, open_mouth, round
         assert found.values(weights(eyeBlinkLeft=1, eyeBlinkRight=1))[closed] == 1
 
 
+@pytest.mark.parametrize("key", ["Sorrow", "sad", "Face.M_F00_000_00_Fcl_BRW_Sorrow"])
+def test_sorrow_is_as_strong_as_the_brows_are_raised(key):
+    found = guess_expression_map([key])
+    assert [found.values(weights(browInnerUp=value))[key][0] for value in (0.0, 0.4, 1.0)] == [0, 0.4, 1]
+
+
 def test_one_eye_alone():
     found = guess_expression_map(VRM0).values(weights(eyeBlinkLeft=0.9))
     assert (found["Blink_L"], found["Blink_R"], found["Blink"]) == (0.9, 0, 0.45)

@@ -6,6 +6,7 @@ import struct
 import tracemalloc
 
 import pytest
+from scope.scope_addon.retarget import fbx_check
 from scope.scope_addon.retarget.fbx_check import check_fbx
 from scope.solver.errors import InputError
 
@@ -33,6 +34,19 @@ def test_a_whole_file_passes(tmp_path):
 def test_a_file_that_contradicts_itself_is_refused(tmp_path, properties, says):
     with pytest.raises(InputError, match=rf"rig\.fbx: this FBX file is damaged .*{says}"):
         check_fbx(fbx(tmp_path / "rig.fbx", *properties))
+
+
+def test_nodes_without_end_are_refused(tmp_path, monkeypatch):
+    """They would be read for hours, or until nothing is left of the stack."""
+    path = fbx(tmp_path / "rig.fbx")  # two nodes, and the end of each list of them
+    monkeypatch.setattr(fbx_check, "_MOST_NODES", 4)
+    check_fbx(path)
+    monkeypatch.setattr(fbx_check, "_MOST_NODES", 3)
+    with pytest.raises(InputError, match="it has too many nodes"):
+        check_fbx(path)
+    monkeypatch.setattr(fbx_check, "_DEEPEST", 0)
+    with pytest.raises(InputError, match="nested too deeply"):
+        check_fbx(path)
 
 
 def test_a_bomb_takes_no_memory(tmp_path):

@@ -53,6 +53,24 @@ def test_shape_alone_is_enough(drop: float, order: int) -> None:
     assert by_geometry(RestBones(renamed, bones.parents, bones.heads)) == expected
 
 
+def test_a_short_upper_arm_is_no_collar() -> None:
+    """In a rig without collars, whose shape alone is known."""
+    bones, part_of = bones_of("unreal")
+    parts = [part_of[name] for name in bones.names]
+    kept = [i for i, part in enumerate(parts) if not part.endswith("collar")]
+    heads, parents = bones.heads.copy(), []
+    for i, part in enumerate(parts):
+        if part.endswith("elbow"):
+            shoulder = int(bones.parents[i])
+            heads[i] = heads[shoulder] + 0.5 * (heads[i] - heads[shoulder])
+    for i in kept:
+        parent = int(bones.parents[i])
+        parent = int(bones.parents[parent]) if parent >= 0 and parent not in kept else parent
+        parents.append(kept.index(parent) if parent >= 0 else -1)
+    found = by_geometry(RestBones([f"q{i}" for i in kept], np.array(parents), heads[kept]))
+    assert found == {f"q{i}": parts[i] for i in kept}
+
+
 def test_confidence_is_highest_where_names_and_shape_agree() -> None:
     bones, part_of = bones_of("unreal")
     assert set(guess(bones).confidence.values()) == {1.0}

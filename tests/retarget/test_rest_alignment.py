@@ -8,6 +8,7 @@ import pytest
 from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
 from scope.scope_addon.retarget.rest_alignment import heading_alignment, rest_alignment
 from scope.scope_addon.retarget.skeleton import Skeleton
+from scope.solver.loaders.body_file import load_body
 from scope.solver.rotations import exp
 
 from ..edit.walking import BETAS, BODY, NAMES
@@ -41,6 +42,27 @@ def test_arms_of_any_rest_pose_are_turned_to_the_t_pose(arms_down: float) -> Non
             a, b = f"{side}_{part}", f"{side}_{end}"
             found = A[ROW[a]] @ F @ (rig.heads[ROW[b]] - rig.heads[ROW[a]])
             np.testing.assert_allclose(found, 1.4 * (REST[INDEX[b]] - REST[INDEX[a]]), atol=1e-9)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.6, -1.2])
+def test_hands_of_any_rest_pose_are_turned_until_the_palms_are_the_bodys(turn: float) -> None:
+    """A rig whose hands and fingers are turned about the forearms at rest."""
+    body = load_body("scope_h")
+    rest, names = body.rest_joints(np.zeros(body.P)) @ R_WORLD_MODEL.T, list(body.joint_names)
+    heads = rest.copy()
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        wrist = rest[names.index(f"{side}_wrist")]
+        of_hand = [i for i, name in enumerate(names) if name.startswith(f"{side}_") and name[-1] in "123"]
+        heads[of_hand] = wrist + (heads[of_hand] - wrist) @ exp(np.array([sign * turn, 0.0, 0.0])).T
+    parents, tails = np.asarray(body.parents), heads + [0.0, 0.0, 0.02]
+    rig = Skeleton(names, parents, parents, heads, tails, np.tile(np.eye(3), (len(names), 1, 1)), floor=0.0)
+    row = {name: i for i, name in enumerate(names)}
+    A = rest_alignment(rig, names, row, rest, row, np.eye(3))
+    for side in ("left", "right"):
+        wrist, first, last = (row[f"{side}_{part}"] for part in ("wrist", "index1", "pinky1"))
+        for knuckle in (first, last):
+            found = A[wrist] @ (heads[knuckle] - heads[wrist])
+            np.testing.assert_allclose(found, rest[knuckle] - rest[wrist], atol=1e-9)
 
 
 def test_trunk_and_head_keep_the_posture_they_were_built_in() -> None:

@@ -6,6 +6,7 @@ import zipfile
 import numpy as np
 import pytest
 from scope.solver.loaders.body_file import BUILT_IN, CHILDREN, GROWTH, growth_of, load_body
+from scope.tools.build_body import population
 from scope.tools.build_body.anthropometry import ADULTS, draw_adults, draw_children
 from scope.tools.build_body.build import rig_body, shape_mesh
 from scope.tools.build_body.geometry.expressions import build_expressions
@@ -33,6 +34,21 @@ def targets(shaped):
     return read_survey_targets(fetch_wheel(), shaped.source)
 
 
+@pytest.fixture(scope="module")
+def one_solver(shaped, targets):
+    """One solver for all people: to make it takes a second, and to solve changes nothing in it."""
+    solver = population._Solver(shaped.source, targets)
+
+    def made_before(source, given):
+        assert source is shaped.source
+        assert given is targets
+        return solver
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(population, "_Solver", made_before)
+        yield
+
+
 @pytest.fixture(scope="module", params=NAMES)
 def body(request):
     return load_body(request.param)
@@ -53,12 +69,20 @@ def random_rotations(rng, count):
     return np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * (k @ k)
 
 
-def winding_number(points, triangles):
-    """Solid angle of the surface around each point over 4π (van Oosterom and Strackee): 1 inside, 0 outside."""
-    a, b, c = (triangles[None, :, k] - points[:, None] for k in range(3))
-    la, lb, lc = (np.linalg.norm(each, axis=2) for each in (a, b, c))
-    triple = np.einsum("ptx,ptx->pt", a, np.cross(b, c))
-    below = la * lb * lc + (a * b).sum(2) * lc + (b * c).sum(2) * la + (c * a).sum(2) * lb
+def winding_number(points, vertices, triangles):
+    """Solid angle of the surface around each point over 4π (van Oosterom and Strackee): 1 inside, 0 outside.
+
+    With a, b, c the corners seen from a point p, the products are expanded by powers of p, so that (points, triangles)
+    matrices are products of small ones: a·(b×c) = A·(B×C) - p·(B×C + C×A + A×B), a·b = A·B - p·(A + B) + p·p.
+    """
+    A, B, C = (vertices[triangles[:, k]] for k in range(3))
+    BC = np.cross(B, C)
+    triple = (A * BC).sum(1) - points @ (BC + np.cross(C, A) + np.cross(A, B)).T
+    distances = np.linalg.norm(vertices - points[:, None], axis=2)
+    la, lb, lc = (distances[:, triangles[:, k]] for k in range(3))
+    square = (points**2).sum(1)[:, None]
+    ab, bc, ca = ((X * Y).sum(1) - points @ (X + Y).T + square for X, Y in ((A, B), (B, C), (C, A)))
+    below = la * lb * lc + ab * lc + bc * la + ca * lb
     return 2.0 * np.arctan2(triple, below).sum(axis=1) / (4.0 * np.pi)
 
 
@@ -109,6 +133,7 @@ def test_the_expressions_are_those_of_the_source(shaped):
             np.testing.assert_allclose(1e-4 * built["moves"][rows], [truth[v] for v in sources], atol=1e-7)
 
 
+@pytest.mark.usefixtures("one_solver")
 def test_growth_is_that_of_the_source(shaped, targets):
     built = build_growth(shaped, targets)
     with np.load(GROWTH) as file:
@@ -187,6 +212,7 @@ def test_weight_and_its_gradient_are_those_of_a_closed_skin():
         )
 
 
+@pytest.mark.usefixtures("one_solver")
 def test_people_measure_what_the_surveys_say(shaped, targets):
     source = shaped.source
     people = draw_population(source, targets, 9, 3)
@@ -201,6 +227,7 @@ def test_people_measure_what_the_surveys_say(shaped, targets):
     np.testing.assert_allclose(np.ptp(vertices[:, skin, 1], axis=1), people.measured["stature"], atol=0.01)
 
 
+@pytest.mark.usefixtures("one_solver")
 @pytest.mark.parametrize("count", [1, 10])
 def test_few_people_are_all_adults(shaped, targets, count):
     source = shaped.source
@@ -330,7 +357,7 @@ def test_the_rest_pose_is_a_t(body):
 @pytest.mark.parametrize("first", [-2.0, 0.0, 2.0])
 def test_joints_lie_inside_the_mesh(body, first):
     betas = np.eye(body.P)[0] * first
-    inside = winding_number(body.rest_joints(betas), body.rest_vertices(betas)[body.triangles()])
+    inside = winding_number(body.rest_joints(betas), body.rest_vertices(betas), body.triangles())
     outside = [name for name, number in zip(body.joint_names, inside, strict=True) if number < 0.8]
     assert outside == []
 
@@ -365,7 +392,7 @@ def test_growth_leads_from_the_adult_to_a_child_of_six_years(name):
     assert np.linalg.norm(at["left_shoulder"] - at["left_elbow"]) / stature == pytest.approx(0.155, abs=0.015)
     head = v[(body.skin_weights * (body.skin_joints == body.joint_names.index("head"))).sum(axis=1) > 0.9]
     assert np.ptp(head[:, 0]) == pytest.approx(0.143, abs=0.015)  # as broad as the head, with parts of the ears
-    inside = winding_number(J, v[body.triangles()])
+    inside = winding_number(J, v, body.triangles())
     assert inside.min() > 0.8
 
 

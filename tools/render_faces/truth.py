@@ -39,15 +39,6 @@ def head_faces(body: Body) -> NDArray[np.bool_]:
     return near[body.faces].all(axis=1)
 
 
-def expression_matrix(body: Body) -> NDArray[np.float64]:
-    """Return the displacements (52, V, 3), metres, of all vertices."""
-    expressions = expressions_of(body)
-    out = np.zeros((len(expressions), len(body.v_template), 3))
-    for k, expression in enumerate(expressions):
-        out[k, expression.vertices] = expression.offsets
-    return out
-
-
 def head_vertices(body: Body, weights: NDArray[np.float64], identity: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the vertices (V, 3) in the model frame."""
     out = body.v_template.astype(float) + identity

@@ -2,6 +2,7 @@
 """Calibration files: their meaning, written out, and which ones are refused rather than misread."""
 
 import json
+import os
 import re
 from pathlib import Path
 
@@ -157,11 +158,15 @@ def test_a_missing_file_is_refused(path, tmp_path):
             choose_camera(640, 480, calibration=missing)
 
 
-@pytest.mark.parametrize("large", [False, True])
-def test_a_device_and_a_large_file_are_refused_unread(tmp_path, large):
-    path = tmp_path / "calibration.json" if large else Path("/dev/zero")
-    if large:
-        with path.open("wb") as file:
-            file.truncate(2 << 20)
-    with pytest.raises(InputError, match="too large for a calibration" if large else "is a pipe or a device"):
+@pytest.mark.skipif(not os.path.exists("/dev/zero"), reason="Windows has no such device")
+def test_a_device_is_refused_unread():
+    with pytest.raises(InputError, match="is a pipe or a device"):
+        read_calibration(Path("/dev/zero"))
+
+
+def test_a_large_file_is_refused_unread(tmp_path):
+    path = tmp_path / "calibration.json"
+    with path.open("wb") as file:
+        file.truncate(2 << 20)
+    with pytest.raises(InputError, match="too large for a calibration"):
         read_calibration(path)

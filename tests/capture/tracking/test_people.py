@@ -21,7 +21,7 @@ from scope.scope_addon.capture.tracking.tracker import PeopleTracker
 from ..composites import composite
 from ..fake_people import FakeDetector, FakeLandmarks, Person, pictures
 
-RED, BLUE, GREEN = (200, 40, 40), (40, 60, 200), (40, 160, 60)
+RED, BLUE = (200, 40, 40), (40, 60, 200)
 FPS = 30
 
 

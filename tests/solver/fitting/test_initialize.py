@@ -13,7 +13,7 @@ K, P, M = 6, 4, 21
 BODY = random_body(np.random.default_rng(1), K, P, M)
 TREE = make_tree(BODY)
 R0, T0, OMEGA, BETA = random_state(np.random.default_rng(2), K, P)
-R_CAMERA_PART, _, POINTS = forward(BODY, R0, T0, OMEGA, BETA)
+_, _, POINTS = forward(BODY, R0, T0, OMEGA, BETA)
 CONFIDENCE = np.random.default_rng(3).uniform(0.2, 1.0, M)
 
 

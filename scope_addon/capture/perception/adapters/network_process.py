@@ -45,7 +45,7 @@ class NetworkProcess:
         """
         self._path, self._lock = path, threading.Lock()
         self._limit_bytes = BASE_BYTES + WEIGHT_COPIES * _bytes_of_weights(path)
-        self._opening_s = self._limit_s = OPENING_S.get(provider, DEFAULT_OPENING_S)
+        self._limit_s = OPENING_S.get(provider, DEFAULT_OPENING_S)
         self._process = _start()
         self._end = weakref.finalize(self, _end, self._process)
         providers, mem_pattern = session_options_of(provider)
