@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import glob
 import json
 import shlex
 import subprocess
@@ -15,6 +16,10 @@ from typing import Any
 
 from ..frames import DATA, ROOT
 
+WITHOUT_TRUTH = (  # clips of people
+    *("run_moving_camera", "gesture_square", "squats_5fps", "sit_stand_close", "two_people_portrait"),
+    "walk_side_static",
+)
 SCRIPTS = {"bench": "scope.benchmarks", "gate": "scope.benchmarks.gate", "capture": "scope.scope_addon"}
 
 
@@ -65,11 +70,29 @@ def commands(quick: bool) -> list[Command]:
 
 
 def clips(quick: bool) -> list[tuple[str, Path]]:
-    """Return names and paths of the clips that are captured for the strips: our own, and those with truth beside it."""
+    """Return names and paths of the clips that are captured for the strips.
+
+    Our own, those with ground truth and, unless ``quick``, those without, in which somebody is.
+    """
     from ...scope_addon.cli import SAMPLE
 
-    found = sorted((DATA / "pose2sim").glob("cam?.mp4"))
-    return [("sample", SAMPLE), *((path.stem, path) for path in (found[:1] if quick else found))]
+    with_truth = sorted((DATA / "pose2sim").glob("cam?.mp4"))
+    without = [] if quick else [path for name in WITHOUT_TRUTH if (path := DATA / "clips" / f"{name}.mp4").is_file()]
+    return [("sample", SAMPLE), *((path.stem, path) for path in (with_truth[:1] if quick else with_truth) + without)]
+
+
+def truth_of(video: Path) -> Path | None:
+    """Return the file with the ground truth of a clip, None if there is none."""
+    for name in (f"truth_{video.stem}.npz", f"{video.stem}_truth.npz"):
+        if (path := video.with_name(name)).is_file():
+            return path
+    return None
+
+
+def motion_files(folder: Path, name: str) -> list[Path]:
+    """Return the motion files of the people of a clip, the most prominent first."""
+    one = folder / f"{name}.npz"
+    return [one] if one.is_file() else sorted(folder.glob(f"{glob.escape(name)}.person?.npz"))
 
 
 def run(command: Command, folder: Path, say: Callable[[str], None]) -> Outcome:
@@ -88,9 +111,14 @@ def run(command: Command, folder: Path, say: Callable[[str], None]) -> Outcome:
 
 
 def run_capture(video: Path, target: Path, say: Callable[[str], None]) -> Outcome:
-    """Capture a clip into the motion file ``target``; the figures are the capture's report."""
-    command = Command(video.name, "capture", (str(video), "-o", str(target), "--json", "--quiet"))
-    target.unlink(missing_ok=True)
+    """Capture a clip into the motion file ``target``; the figures are the capture's report.
+
+    Of clips without ground truth everybody is captured, each into a file of their own: see `motion_files`.
+    """
+    people = () if truth_of(video) else ("--people", "all")
+    command = Command(video.name, "capture", (str(video), "-o", str(target), *people, "--json", "--quiet"))
+    for path in motion_files(target.parent, target.stem):
+        path.unlink()
     say(f"running {command.text}")
     since = time.monotonic()
     arguments = [sys.executable, "-m", SCRIPTS["capture"], "capture", *command.arguments]

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from scope.benchmarks.__main__ import ELSEWHERE
 from scope.benchmarks.page import commands
-from scope.benchmarks.page.commands import SCRIPTS, Command, run, run_capture
+from scope.benchmarks.page.commands import SCRIPTS, Command, motion_files, run, run_capture
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -50,5 +50,21 @@ def test_figures_are_those_of_this_run_alone(tmp_path, monkeypatch):
     outcome = run_capture(Path("a b.mp4"), tmp_path / "a.npz", said.append)
     assert (outcome.status, outcome.figures) == (3, {})
     target = shlex.quote(str(tmp_path / "a.npz"))
-    assert said == [f"running ./scripts/capture 'a b.mp4' -o {target} --json --quiet"]
+    assert said == [f"running ./scripts/capture 'a b.mp4' -o {target} --people all --json --quiet"]
     assert not (tmp_path / "a.npz").exists()
+
+
+def test_everybody_is_captured_where_no_truth_says_who_it_is_about(tmp_path, monkeypatch):
+    def fake(arguments, **_):
+        return subprocess.CompletedProcess(arguments, 3, "", "")
+
+    monkeypatch.setattr(commands.subprocess, "run", fake)
+    for name in ("truth_cam1.npz", "roll_truth.npz"):
+        (tmp_path / name).touch()
+    for name, everybody in (("cam1", False), ("roll", False), ("walk", True)):
+        outcome = run_capture(tmp_path / f"{name}.mp4", tmp_path / f"{name}.npz", lambda text: None)
+        assert ("--people" in outcome.command.arguments) == everybody
+    for name in ("b.person2.npz", "b.person1.npz", "bb.person1.npz", "c.npz"):
+        (tmp_path / name).touch()
+    assert [path.name for path in motion_files(tmp_path, "b")] == ["b.person1.npz", "b.person2.npz"]
+    assert [path.name for path in motion_files(tmp_path, "c")] == ["c.npz"]

@@ -26,7 +26,7 @@ def test_a_person_in_t_pose_is_narrow_from_the_side(body):
     poses[0, 0] = log(R_WORLD_MODEL)
     trans = np.array([[0, 0, 0.95]]) - body.rest_joints()[0]
     motion = made_motion(body, poses, trans)
-    drawn = np.ptp(side_view(motion, body, 0).astype(int), axis=2) > 10
+    drawn = np.ptp(side_view([motion], body, 0).astype(int), axis=2) > 10
     rows, columns = np.flatnonzero(drawn.any(axis=1)), np.flatnonzero(drawn.any(axis=0))
     assert np.ptp(rows) > 200  # 1.7 of 2.4 m in 360 pixels
     assert np.ptp(columns) < 90  # the arms point at the camera
