@@ -16,11 +16,12 @@ from ...scope_addon.report.plots import Axis, Curve, line_plot
 from ..perception.accuracy import SHOWN
 from .commands import Outcome
 from .curves import Curves
+from .paper import convergence_plot, stated_table
 
 BODIES = ((23, "SMPL"), (51, "SMPL+H"))  # number of joints, and whose skeleton has as many
 PAPER = (
-    "The curves of the solver's paper (figures 5 to 7) are not drawn beside these: they are not available as data, and "
-    "were not digitized. Whoever has digitized them can give them as a table with --curves."
+    "The curves of the solver's paper (figures 5 to 7) are not drawn beside these: they are pictures, of which no data "
+    "were found, and were not digitized. Whoever has digitized them can give them as a table with --curves."
 )
 _RULE = re.compile(r"\|(\s*:?-+:?\s*\|)+")
 
@@ -55,6 +56,7 @@ def plots(outcome: Outcome, curves: Curves) -> list[Markup]:
     """
     figures, parts = outcome.figures, []
     if experiments := figures.get("experiments"):
+        parts += [stated_table(figures), convergence_plot(figures)]
         if not curves:
             parts.append(Markup(f"<p>{escape(PAPER)}</p>\n"))
         for number, rows in sorted(experiments.items()):
