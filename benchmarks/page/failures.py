@@ -20,7 +20,7 @@ from ...tools.readme_pictures.panel import OURS, TRUTH, Panel, next_to_each_othe
 from ...tools.readme_pictures.shapes import joints, posed, true_joints
 from ...tools.readme_pictures.view import View, from_around, from_the_camera
 
-MOMENTS, APART_S = 2, 0.3  # how many are shown, and how far they are apart
+MOMENTS, APART_S = 2, 0.5  # how many are shown, and how far they are apart
 SIZE, SHOWN_M, FILL = (320, 380), 2.35, 0.76  # of a panel, in pixels; height of the view from the side; share of it
 _BOTH = [("Scope", OURS), ("ground truth", TRUTH)]
 

@@ -24,7 +24,7 @@ COUNT = 8
 def capture(body, tmp_path):
     """A motion, and the file with its ground truth, from which it is off in three frames, and which the last lacks."""
     poses, trans = np.zeros((COUNT, 3 * (body.K + 1))), np.zeros((COUNT, 3))
-    motion = made_motion(body, poses, trans, rate=10.0)
+    motion = made_motion(body, poses, trans, rate=5.0)
     _, t = body.forward_kinematics(exp(poses.reshape(COUNT, -1, 3)), trans, np.zeros(body.P))
     T = np.linalg.inv(motion.world_from_camera[0])
     motion.joints_cam[:] = t @ T[:3, :3].T + T[:3, 3]
@@ -45,13 +45,13 @@ def test_errors_are_means_over_the_limb_joints(capture):
 
 def test_the_worst_moments_are_apart(capture):
     motion, truth = capture
-    assert worst_rows(limb_errors(motion, truth), motion.timestamps) == [3, 6]  # 2 is 0.1 s from 3
+    assert worst_rows(limb_errors(motion, truth), motion.timestamps) == [3, 6]  # 2 is 0.2 s from 3
     assert worst_rows(np.full(COUNT, np.nan), motion.timestamps) == []
 
 
 def test_the_page_says_how_far_off_they_are(capture, body):
     shown = worst_moments(*capture, body)
-    assert re.findall(r"<figcaption>([^<]*)<", shown) == ["frame 3, 0.30 s: 30 mm", "frame 6, 0.60 s: 10 mm"]
+    assert re.findall(r"<figcaption>([^<]*)<", shown) == ["frame 3, 0.60 s: 30 mm", "frame 6, 1.20 s: 10 mm"]
     assert "which is 9 mm over the clip" in shown  # 60 / 7
 
 
