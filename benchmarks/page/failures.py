@@ -52,10 +52,10 @@ def limb_errors(motion: Motion, truth: Path) -> NDArray[np.float64]:
 
 
 def worst_rows(errors: NDArray[np.float64], timestamps: NDArray[np.float64]) -> list[int]:
-    """Return the rows of the largest errors, at least `APART_S` from each other, the largest first."""
+    """Return the rows of the largest errors that are above the mean, `APART_S` or more apart, the largest first."""
     found: list[int] = []
     for row in np.argsort(-np.nan_to_num(errors, nan=-1.0)):
-        if len(found) == MOMENTS or not np.isfinite(errors[row]):
+        if len(found) == MOMENTS or not errors[row] > np.nanmean(errors):
             break
         if all(abs(timestamps[row] - timestamps[other]) >= APART_S for other in found):
             found.append(int(row))

@@ -46,7 +46,8 @@ def test_errors_are_means_over_the_limb_joints(capture):
 def test_the_worst_moments_are_apart(capture):
     motion, truth = capture
     assert worst_rows(limb_errors(motion, truth), motion.timestamps) == [3, 6]  # 2 is 0.2 s from 3
-    assert worst_rows(np.full(COUNT, np.nan), motion.timestamps) == []
+    assert worst_rows(np.full(COUNT, 5.0), motion.timestamps) == []
+    assert worst_rows(np.array([9.0, 8, 5, 5, 5, 5.5, 5, 5]), motion.timestamps) == [0]  # the mean is 5.9
 
 
 def test_the_page_says_how_far_off_they_are(capture, body):
