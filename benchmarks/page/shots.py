@@ -22,6 +22,7 @@ from ...solver.rotations import exp
 from ...tools.readme_pictures.view import level_camera
 
 SHOTS, SIDE_PX, SHOWN_M = 6, 360, 2.4  # of a strip; of a picture; height of what the view from the side shows
+_FILLED, _NEAREST_M = 0.95, 0.3  # share of the picture that may be covered; what is nearer is not looked at
 _GROUND, _FAINT = 236, 0.35  # grey behind the body; opacity of a pose that is filled in
 
 Image = NDArray[np.uint8]
@@ -58,9 +59,9 @@ def frames_of(video: Path, wanted: Sequence[int]) -> dict[int, Image]:
 
 
 def side_view(motions: Sequence[Motion], body: Body, row: int) -> Image:
-    """Return the bodies of a row as a camera sees them that went around the first by a quarter turn, at its height.
+    """Return the bodies of a row as a camera sees them that went a quarter turn around their middle, at its height.
 
-    People who were not seen are faint.
+    People who were not seen are faint. What is shown is `SHOWN_M` high, more where that does not hold everybody.
     """
     world, roots = [], []
     for motion in motions:
@@ -70,10 +71,15 @@ def side_view(motions: Sequence[Motion], body: Body, row: int) -> Image:
         )
         world.append(body.skin(R, t, betas))
         roots.append(t[0])
-    R_camera_world, eye = turned_camera(motions[0].world_from_camera[row], roots[0])
+    middle = np.mean(roots, axis=0)
+    R_camera_world, eye = turned_camera(motions[0].world_from_camera[row], middle)
     seen = [motion.valid[row] for motion in motions]
     vertices = [(points - eye) @ R_camera_world.T for points in world]
-    focal = SIDE_PX * float(np.linalg.norm(roots[0] - eye)) / SHOWN_M
+    ahead = np.concatenate(vertices)
+    ahead = ahead[ahead[:, 2] > _NEAREST_M]
+    widest = float(np.abs(ahead[:, :2] / ahead[:, 2:]).max(initial=0.0))
+    focal = SIDE_PX * float(np.linalg.norm(middle - eye)) / SHOWN_M
+    focal = min(focal, _FILLED * SIDE_PX / 2 / widest) if widest > 0 else focal
     K = np.array([[focal, 0, SIDE_PX / 2], [0, focal, SIDE_PX / 2], [0, 0, 1]])
     blank = np.full((SIDE_PX, SIDE_PX, 3), _GROUND, np.uint8)
     colors = [body_colors(body, k) for k in range(len(motions))]
