@@ -24,7 +24,7 @@ from ...solver.body import Body
 from ...solver.errors import ScopeError
 from ...solver.loaders.body_file import load_body
 from ..frames import ROOT
-from .commands import LONG, Outcome, clips, commands, motion_files, run, run_capture, truth_of
+from .commands import LONG, Outcome, clips, commands, motion_files, run, run_capture, truth_of, worst_clips
 from .content import outcome_section
 from .curves import Curves, read_curves
 from .failures import KNOWN, KnownFailure, worst_moments
@@ -89,6 +89,10 @@ def measure(quick: bool, resume: bool = False) -> Run:
         if command not in [each.command for each in done.measured]:
             done.measured.append(run(command, FOLDER, say))
             write_run(FOLDER, done)
+    for name, video, _ in worst_clips(done.measured):
+        if name not in [each[0] for each in done.captured]:
+            done.captured.append((name, video, run_capture(video, FOLDER / f"{name}.npz", say)))
+            write_run(FOLDER, done)
     return done
 
 
@@ -109,6 +113,7 @@ def report_page(folder: Path, done: Run, curves: Curves) -> str:
     rows = shown_rows([motion])
     pictures = overlay_pictures(video, [motion], body, rows)
     captions = [f"frame {motion.frames[rows[p.row]]}, {motion.timestamps[rows[p.row]]:.2f} s" for p in pictures]
+    why = {name: text for name, _, text in worst_clips(done.measured)}
     minutes = sum(outcome.seconds for outcome in done.everything) / 60
     left_out = [each.text for each in LONG if each not in [outcome.command for outcome in done.measured]]
     note = f"Left out of this run: {', '.join(left_out)}." if left_out else ""
@@ -117,7 +122,7 @@ def report_page(folder: Path, done: Run, curves: Curves) -> str:
         page.stage(len(rows), motion.image_size.tolist()),
         page.strip(pictures, captions),
         page.section("The capture above", *over_time([motion]), figures_table([motion], body)),
-        *(capture_section(folder, *each, body) for each in done.captured if each[2].status == 0),
+        *(capture_section(folder, *each, body, why.get(each[0], "")) for each in done.captured if not each[2].status),
         *(outcome_section(each, curves) for each in done.measured),
         page.section(
             "Commands", page.command_line("\n".join(each.command.text for each in done.everything)), note=note
@@ -153,8 +158,11 @@ def motions_of(folder: Path, name: str) -> list[Motion]:
     return [Motion.load(path) for path in motion_files(folder, name)]
 
 
-def capture_section(folder: Path, name: str, video: Path, outcome: Outcome, body: Body) -> page.Markup:
-    """Return the section of a captured clip: figures, strips of footage, overlay and side view, and its failures."""
+def capture_section(folder: Path, name: str, video: Path, outcome: Outcome, body: Body, why: str = "") -> page.Markup:
+    """Return the section of a captured clip: figures, strips of footage, overlay and side view, and its failures.
+
+    :param why: it is shown, in a sentence.
+    """
     motions, report, truth = motions_of(folder, name), outcome.figures, truth_of(video)
     shown = {
         "People": str(len(motions)),
@@ -172,7 +180,7 @@ def capture_section(folder: Path, name: str, video: Path, outcome: Outcome, body
         *([worst_moments(motions[0], truth, body)] if truth else []),
         *(known_failure(video, motions, body, KNOWN[name]) if name in KNOWN else []),
         *([page.list_of(report["warnings"])] if report["warnings"] else []),
-        note="Footage, overlay, and the same frames seen from the side; people who were not seen are faint.",
+        note=f"{why} Footage, overlay, and the same frames seen from the side; people who were not seen are faint.",
     )
 
 

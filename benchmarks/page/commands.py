@@ -9,12 +9,15 @@ import shlex
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..frames import DATA, ROOT
+import numpy as np
+
+from ...scope_addon.capture.options import CaptureOptions
+from ..frames import CACHE, DATA, ROOT
 
 WITHOUT_TRUTH = (  # clips of people
     *("run_moving_camera", "gesture_square", "squats_5fps", "sit_stand_close", "two_people_portrait"),
@@ -82,11 +85,36 @@ def clips(quick: bool) -> list[tuple[str, Path]]:
 
 
 def truth_of(video: Path) -> Path | None:
-    """Return the file with the ground truth of a clip, None if there is none."""
+    """Return the file with the true joints of a clip of one person, None if there is none."""
     for name in (f"truth_{video.stem}.npz", f"{video.stem}_truth.npz"):
         if (path := video.with_name(name)).is_file():
-            return path
+            with np.load(path) as file:
+                return path if "joints" in file.files else None
     return None
+
+
+def worst_clips(measured: Sequence[Outcome]) -> list[tuple[str, Path, str]]:
+    """Return names and paths of the worst rendered clips and scenes of those measured, and what was measured.
+
+    Two of the renders, and the scene of the worst person of each split, with the default preset and nothing given.
+    """
+    found = []
+    for outcome in measured:
+        if outcome.command.arguments[:1] == ("renders",) and outcome.figures:
+            clips = outcome.figures[CaptureOptions().quality]["nothing given"]
+            shots = {name: row for name, row in clips.items() if name not in ("mean", "sample")}
+            errors = {name: row["mpjpe_root"] for name, row in shots.items() if "mpjpe_root" in row}
+            for name in sorted(errors, key=lambda k: -errors[k])[:2]:
+                why = f"One of the two worst of the rendered clips: MPJPE-root is {errors[name]:.1f} mm."
+                found.append((name, CACHE / "renders" / f"{name}.mp4", why))
+        if outcome.command.arguments[:1] == ("scenes",):
+            for split, figures in outcome.figures.items():
+                people = [row for row in figures["people"]["default preset"] if np.isfinite(row["mpjpe_root"])]
+                if people:
+                    worst = max(people, key=lambda row: row["mpjpe_root"])
+                    why = f"The worst person of the scenes {split}: MPJPE-root is {worst['mpjpe_root']:.1f} mm."
+                    found.append((worst["clip"], CACHE / "scenes" / f"{worst['clip']}.mp4", why))
+    return [each for each in found if each[1].is_file()]
 
 
 def motion_files(folder: Path, name: str) -> list[Path]:
