@@ -96,7 +96,8 @@ def truth_of(video: Path) -> Path | None:
 def worst_clips(measured: Sequence[Outcome]) -> list[tuple[str, Path, str]]:
     """Return names and paths of the worst rendered clips and scenes of those measured, and what was measured.
 
-    Two of the renders, and the scene of the worst person of each split, with the default preset and nothing given.
+    Two of the renders, and of each split the scene of the worst person and one in which somebody was never found, with
+    the default preset and nothing given.
     """
     found = []
     for outcome in measured:
@@ -114,6 +115,9 @@ def worst_clips(measured: Sequence[Outcome]) -> list[tuple[str, Path, str]]:
                     worst = max(people, key=lambda row: row["mpjpe_root"])
                     why = f"The worst person of the scenes {split}: MPJPE-root is {worst['mpjpe_root']:.1f} mm."
                     found.append((worst["clip"], CACHE / "scenes" / f"{worst['clip']}.mp4", why))
+                for row in [row for row in figures["people"]["default preset"] if not row["found"]][:1]:
+                    why = f"A person of the scenes {split} who was not found in any frame."
+                    found.append((row["clip"], CACHE / "scenes" / f"{row['clip']}.mp4", why))
     return [each for each in found if each[1].is_file()]
 
 

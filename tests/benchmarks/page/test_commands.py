@@ -74,13 +74,13 @@ def test_everybody_is_captured_where_no_truth_says_who_it_is_about(tmp_path, mon
 
 def test_the_worst_rendered_clips_are_shown_too(tmp_path, monkeypatch):
     monkeypatch.setattr(commands, "CACHE", tmp_path)
-    for name in ("renders/roll.mp4", "renders/walk.mp4", "scenes/test_01.mp4"):
+    for name in ("renders/roll.mp4", "renders/walk.mp4", "scenes/test_00.mp4", "scenes/test_01.mp4"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).touch()
     shots = {"walk": {"mpjpe_root": 40.0}, "roll": {"mpjpe_root": 132.46}, "lost": {"coverage": 0.0}}
     given = {"nothing given": shots | {"sample": {"mpjpe_root": 900.0}, "mean": {"mpjpe_root": 950.0}}}
     people = [("test_00", float("nan")), ("test_01", 120.0), ("test_00", 60.0)]
-    rows = [{"clip": clip, "mpjpe_root": error} for clip, error in people]
+    rows = [{"clip": clip, "mpjpe_root": error, "found": float(error > 0)} for clip, error in people]
     outcomes = [
         Outcome(Command("Renders", "bench", ("renders",)), "", "", {"fast": {}, "best": given}, 1.0, 0),
         Outcome(
@@ -93,6 +93,8 @@ def test_the_worst_rendered_clips_are_shown_too(tmp_path, monkeypatch):
         ("roll", "renders"),
         ("walk", "renders"),
         ("test_01", "scenes"),
+        ("test_00", "scenes"),
     ]
     assert "132.5 mm" in found[0][2]
     assert "test: MPJPE-root is 120.0 mm" in found[2][2]
+    assert "not found" in found[3][2]
