@@ -34,11 +34,10 @@ def stated_table(figures: Mapping[str, Any]) -> Markup:
     if converged:
         found = ", ".join(f"{row['milliseconds']:.2f} {kind}" for kind, row in converged.items())
         rows.append(("one frame to convergence, ms", f"{FRAME_MS:g} on average", f"{found} (medians)"))
-    if experiments := figures.get("experiments"):
-        of_terms, of_joints = experiments["1"], experiments["1"]
-        by_terms = " and ".join(f"{growth(of_terms, K, 'sparse'):.2f}" for K in (23, 51))
+    if steps := figures.get("experiments", {}).get("1"):  # P = 0, growing N
+        by_terms = " and ".join(f"{growth(steps, K, 'sparse'):.2f}" for K in (23, 51))
         rows.append(("exponent of a step's time in measurements", f"{LINEAR:g}", f"{by_terms} (23 and 51 joints)"))
-        sparse, dense = (f"{growth_in_joints(of_joints, method):.2f}" for method in ("sparse", "dense"))
+        sparse, dense = (f"{growth_in_joints(steps, method):.2f}" for method in ("sparse", "dense"))
         rows.append(("exponent of a step's time in joints", f"{LINEAR:g}", sparse))
         rows.append(("the same of a dense step", f"{CUBIC:g}", dense))
     if not rows:

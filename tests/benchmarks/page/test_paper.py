@@ -38,6 +38,7 @@ def test_without_real_frames_only_the_exponents_are_there():
     assert "to convergence" not in shown
     assert "exponent" in shown
     assert (stated_table({}), convergence_plot({"convergence": []})) == ("", "")
+    assert stated_table({"experiments": {"3": ROWS}}) == ""
 
 
 def test_the_papers_time_is_a_line_above_ours():
