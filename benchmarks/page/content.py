@@ -80,7 +80,7 @@ def time_against_accuracy(figures: dict[str, dict[str, dict[str, float]]]) -> Ma
     y = np.concatenate([curve.y for curve in curves])
     x_axis = Axis(float(x.min()) / 1.3, float(x.max()) * 1.3, logarithmic=True, unit="ms")
     y_axis = Axis(0.0, 1.1 * float(y.max()))
-    title = "MPJPE-root in mm by milliseconds a frame, logarithmic; one point for each clip"
+    title = "MPJPE-root in mm by milliseconds a frame (Scope's by the clock), logarithmic; one point for each clip"
     svg = line_plot(curves, x_axis, y_axis, label=title, timed=False)
     return page.plot_figure(title, svg, {curve.name: curve.color for curve in curves})
 
