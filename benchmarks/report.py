@@ -55,7 +55,7 @@ def experiment_lines(number: int, rows: list[dict[str, float]]) -> str:
         lines.append([at, a["sparse"], a["dense"], b["sparse"], b["dense"], *speedups, *ratios])
     small, large = BODIES[23], BODIES[51]
     head = (key, f"{small} sparse", f"{small} dense", f"{large} sparse", f"{large} dense", f"speedup {small}",
-            f"speedup {large}", f"{large} / {small} sparse", "dense")  # fmt: skip
+            f"speedup {large}", f"{large} / {small} sparse", f"{large} / {small} dense")  # fmt: skip
     counts = " and ".join(str(N) for N in dict.fromkeys(row["N"] for row in rows)) if number == 3 else ""
     title = f"Experiment {number}{f', N = {counts}' if counts else ''}, us a step"
     text = f"{title}\n\n" + table(head, lines)

@@ -3,7 +3,7 @@
 
 A body has SMPL's joints. Two points that motion-capture skeletons have besides are placed on it: ``head_top``, the
 highest vertex at rest, rigid on the head; and ``spine``, SMPL's spine2, which lies midway between pelvis and neck.
-``head`` of MPI-INF-3DHP, the middle of the head, is compared with SMPL's head joint.
+``head`` of MPI-INF-3DHP, a third of the way from its neck to its top of the head, is compared with SMPL's head joint.
 """
 
 from __future__ import annotations

@@ -8,7 +8,8 @@ set. Sources, by the names under which the measures were published:
 - MPJPE: Ionescu et al., *Human3.6M*, TPAMI 2014. PA-MPJPE (also "reconstruction error"): Zhou et al., *Sparse
   Representation for 3D Shape Estimation*, TPAMI 2018, with the similarity of Umeyama, TPAMI 1991.
 - 3D PCK and its AUC: Mehta et al., *Monocular 3D Human Pose Estimation in the Wild*, 3DV 2017, and the evaluation
-  program of MPI-INF-3DHP: thresholds 0, 5, …, 150 mm, the first of which no error is below.
+  program of MPI-INF-3DHP: thresholds 0, 5, …, 150 mm, the first of which no error is below. PCK at 50 mm and its AUC up
+  to 199 mm: the evaluation program of the 3DPW challenge (ECCV 2020), where an error of just the threshold counts.
 - Acceleration error: Kanazawa et al., *Learning 3D Human Dynamics from Video*, CVPR 2019.
 - WA-MPJPE and W-MPJPE over segments of 100 frames: Ye et al., *SLAHMR*, CVPR 2023. RTE, jitter and foot sliding: Shin
   et al., *WHAM*, CVPR 2024, whose evaluation program GVHMR and others use, and which decides what the papers leave
@@ -25,6 +26,7 @@ Points = NDArray[np.float64]
 MM = 1000.0
 PCK_MM = 150.0
 AUC_MM = np.arange(0.0, 151.0, 5.0)
+CHALLENGE_PCK_MM, CHALLENGE_AUC_MM = 50.0, np.arange(0.0, 200.0)  # of 3DPW's challenge, which ends below 200
 SEGMENT = 100  # frames
 STILL_M = 0.01  # per frame; a true foot point that moves less counts as standing
 
@@ -94,6 +96,19 @@ def pck(errors_mm: NDArray[np.float64], threshold_mm: float = PCK_MM) -> NDArray
 def auc(errors_mm: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the mean of PCK over the thresholds 0, 5, …, 150 mm, (T,); errors (T, J)."""
     return np.mean([pck(errors_mm, threshold) for threshold in AUC_MM], axis=0)
+
+
+def challenge_pck(errors_mm: NDArray[np.float64], threshold_mm: float = CHALLENGE_PCK_MM) -> NDArray[np.float64]:
+    """Return the percentage of joints with errors of at most the threshold, (T,); errors (T, J)."""
+    share: NDArray[np.float64] = 100.0 * (errors_mm <= threshold_mm).mean(axis=1)
+    return share
+
+
+def challenge_auc(errors_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the mean of `challenge_pck` over the thresholds from 0 to 199 mm, in steps of 1, (T,); errors (T, J)."""
+    shares = np.array([challenge_pck(errors_mm, threshold) for threshold in CHALLENGE_AUC_MM])
+    area: NDArray[np.float64] = (shares[:-1] + shares[1:]).mean(axis=0) / 2  # trapezoids of equal width
+    return area
 
 
 def acceleration_error(captured: Points, true: Points, rate: float) -> NDArray[np.float64]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .joint_sets import LSP14, PCK_3DHP, SMPL22, SMPL24, TEST_3DHP
+from .joint_sets import LIMBS, LSP14, PCK_3DHP, SMPL22, SMPL24, TEST_3DHP
 
 HIPS = ("left_hip", "right_hip")
 PELVIS = ("pelvis",)
@@ -17,6 +17,8 @@ MEASURES = {
     "mpvpe": "MPVPE mm",
     "pck": "PCK@150 %",
     "auc": "AUC %",
+    "pck_50": "PCK@50 %",
+    "auc_200": "AUC to 199 mm %",
     "acceleration": "acceleration error m/s²",
     "wa_mpjpe": "WA-MPJPE mm",
     "w_mpjpe": "W-MPJPE mm",
@@ -77,9 +79,10 @@ PROTOCOLS = {
         "3DPW, test split: the 24 joints of SMPL's skeleton",
         SMPL24,
         PELVIS,
-        ("mpjpe", "pa_mpjpe", "pck", "auc", "acceleration"),
-        "3DPW's own challenge: relative to the pelvis; the joints of most publications need --smpl and --regressor",
-        SMPL24,
+        ("mpjpe", "pa_mpjpe", "pck_50", "auc_200", "acceleration"),
+        "3DPW's own challenge, which adds the other splits: relative to the pelvis, PCK and AUC of the 12 limb joints, "
+        "frames with a 2D pose; the joints of most publications need --smpl and --regressor",
+        LIMBS,
     ),
     "emdb1": Protocol(
         "EMDB 1, in the camera: 24 joints",

@@ -130,7 +130,7 @@ def _score_person(
     if not len(rows):
         scores.missed = 1
         return scores
-    if {"mpjpe", "pck"} & set(protocol.measures):
+    if "mpjpe" in protocol.measures:
         captured = PosedBody.of_motion(body, motion, regressor).select(rows)
         found = _in_camera(captured, person.camera.select(true_rows), protocol, rate)
         scores.values |= {key: [value] for key, value in found.items()}
@@ -154,7 +154,11 @@ def _in_camera(
         found["acceleration"] = metrics.acceleration_error(x, y, rate)
     if protocol.pck_joints:
         errors = metrics.joint_errors(x, y)[:, [protocol.joints.index(name) for name in protocol.pck_joints]]
-        found |= {"pck": metrics.pck(errors), "auc": metrics.auc(errors)}
+        shares = {
+            **{"pck": metrics.pck, "auc": metrics.auc},
+            **{"pck_50": metrics.challenge_pck, "auc_200": metrics.challenge_auc},
+        }
+        found |= {key: share(errors) for key, share in shares.items() if key in protocol.measures}
     if "mpvpe" in protocol.measures and isinstance(true, PosedBody) and _same_mesh(captured, true):
         found["mpvpe"] = _vertex_errors(captured, true, roots)
     return found

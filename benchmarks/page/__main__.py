@@ -7,6 +7,7 @@ import argparse
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from ...scope_addon.atomic_write import atomic_path, reason
 from ...scope_addon.errors import SetupError, exit_status
 from ...scope_addon.motion import Motion
 from ...scope_addon.report import page
-from ...scope_addon.report.capture_page import figures_table, over_time, warning_list
+from ...scope_addon.report.capture_page import figures_table, over_time
 from ...scope_addon.report.footage_pictures import overlay_pictures
 from ...scope_addon.report.machine import machine, versions
 from ...scope_addon.report.viewer_data import shown_rows, viewer_data
@@ -23,13 +24,15 @@ from ...solver.body import Body
 from ...solver.errors import ScopeError
 from ...solver.loaders.body_file import load_body
 from ..frames import ROOT
-from .commands import LONG, Outcome, clips, commands, run, run_capture
+from .commands import LONG, Outcome, clips, commands, motion_files, run, run_capture, truth_of, worst_clips
 from .content import outcome_section
 from .curves import Curves, read_curves
+from .failures import KNOWN, KnownFailure, worst_moments
 from .recorded import Run, read_run, write_run
 from .shots import strips
 
 FOLDER = ROOT / "build" / "report"
+INTERRUPTED = 130
 
 
 def main() -> int:
@@ -37,6 +40,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="report", description="One page about this machine.")
     parser.add_argument("out", nargs="?", type=Path, metavar="OUT.html", default=FOLDER / "report.html")
     parser.add_argument("--quick", action="store_true", help="a few minutes: fewer repetitions, fewer clips")
+    parser.add_argument("--resume", action="store_true", help="go on with a run that was interrupted")
     parser.add_argument("--recorded", type=Path, metavar="FOLDER", help="of an earlier run: write its page again")
     parser.add_argument("--curves", type=Path, metavar="CSV", help="digitized speedups of others, drawn beside ours")
     args = parser.parse_args()
@@ -45,12 +49,16 @@ def main() -> int:
         check_output(args.out, (".html",))
         curves = read_curves(args.curves) if args.curves else {}
         folder = args.recorded or FOLDER
-        content = report_page(folder, read_run(folder) if args.recorded else measure(args.quick), curves)
+        done = read_run(folder) if args.recorded else measure(args.quick, args.resume)
+        content = report_page(folder, done, curves)
         with atomic_path(args.out) as temporary:
             temporary.write_text(content, encoding="utf-8")
     except ScopeError as error:
         print(f"report: {error}", file=sys.stderr)
         return exit_status(error)
+    except KeyboardInterrupt:
+        print("report: interrupted; --resume goes on, --recorded build/report shows what there is", file=sys.stderr)
+        return INTERRUPTED
     except OSError as error:
         print(f"report: cannot write {args.out}: {reason(error)}", file=sys.stderr)
         return 1
@@ -58,22 +66,39 @@ def main() -> int:
     return 0
 
 
-def measure(quick: bool) -> Run:
-    """Run the commands; return what they gave, which is kept in `FOLDER` too.
+def measure(quick: bool, resume: bool = False) -> Run:
+    """Run the commands; return what they gave, which is kept in `FOLDER` too, after each of them.
 
+    :param resume: keep what an interrupted run gave, and run what it lacks.
     :raises SetupError: the first clip cannot be captured.
+    :raises InputError: there is no run to go on with.
     """
-    load = other_load()
-    captured = [(name, video, run_capture(video, FOLDER / f"{name}.npz", say)) for name, video in clips(quick)]
-    if captured[0][2].status:
-        last = captured[0][2].said.strip().splitlines()[-1:] or ["it said nothing"]
-        raise SetupError(f"{captured[0][2].command.text} failed ({last[0]}); mend that and run this again")
-    measured = [run(command, FOLDER, say) for command in commands(quick)]
-    seconds = sum(outcome.seconds for outcome in [*(each for _, _, each in captured), *measured])
-    time = datetime.now().astimezone().strftime("%Y-%m-%d %H:%M")
-    done = Run(captured, measured, time, facts(seconds, load))
-    write_run(FOLDER, done)
+    done = read_run(FOLDER) if resume else Run([], [], now(), facts(other_load()))
+    if resume and revision() != done.facts.get("Revision"):
+        done.facts["Resumed by revision"] = revision()
+    for name, video in clips(quick):
+        if name in [each[0] for each in done.captured]:
+            continue
+        outcome = run_capture(video, FOLDER / f"{name}.npz", say)
+        if not done.captured and outcome.status:
+            last = outcome.said.strip().splitlines()[-1:] or ["it said nothing"]
+            raise SetupError(f"{outcome.command.text} failed ({last[0]}); mend that and run this again")
+        done.captured.append((name, video, outcome))
+        write_run(FOLDER, done)
+    for command in commands(quick):
+        if command not in [each.command for each in done.measured]:
+            done.measured.append(run(command, FOLDER, say))
+            write_run(FOLDER, done)
+    for name, video, _ in worst_clips(done.measured):
+        if name not in [each[0] for each in done.captured]:
+            done.captured.append((name, video, run_capture(video, FOLDER / f"{name}.npz", say)))
+            write_run(FOLDER, done)
     return done
+
+
+def now() -> str:
+    """Return the local time, to the minute."""
+    return datetime.now().astimezone().strftime("%Y-%m-%d %H:%M")
 
 
 def report_page(folder: Path, done: Run, curves: Curves) -> str:
@@ -84,18 +109,20 @@ def report_page(folder: Path, done: Run, curves: Curves) -> str:
     """
     body = load_body("scope")
     name, video, _ = done.captured[0]
-    motion = Motion.load(folder / f"{name}.npz")
+    (motion,) = motions_of(folder, name)
     rows = shown_rows([motion])
     pictures = overlay_pictures(video, [motion], body, rows)
     captions = [f"frame {motion.frames[rows[p.row]]}, {motion.timestamps[rows[p.row]]:.2f} s" for p in pictures]
+    why = {name: text for name, _, text in worst_clips(done.measured)}
+    minutes = sum(outcome.seconds for outcome in done.everything) / 60
     left_out = [each.text for each in LONG if each not in [outcome.command for outcome in done.measured]]
     note = f"Left out of this run: {', '.join(left_out)}." if left_out else ""
     content = [
-        page.header("Scope on this machine", done.time, done.facts),
+        page.header("Scope on this machine", done.time, done.facts | {"Measured in": f"{minutes:.0f} minutes"}),
         page.stage(len(rows), motion.image_size.tolist()),
         page.strip(pictures, captions),
         page.section("The capture above", *over_time([motion]), figures_table([motion], body)),
-        *(capture_section(folder, *each, body) for each in done.captured if each[2].status == 0),
+        *(capture_section(folder, *each, body, why.get(each[0], "")) for each in done.captured if not each[2].status),
         *(outcome_section(each, curves) for each in done.measured),
         page.section(
             "Commands", page.command_line("\n".join(each.command.text for each in done.everything)), note=note
@@ -111,28 +138,34 @@ def other_load() -> str:
     return f"{os.getloadavg()[0]:.1f} processes on {os.cpu_count()} cores; more than a tenth of a core distorts times"
 
 
-def facts(seconds: float, load: str) -> dict[str, str]:
+def facts(load: str) -> dict[str, str]:
     """Return the facts at the head of the page.
 
-    :param seconds: of all commands.
     :param load: of the machine before the first command.
     """
-    done = subprocess.run(
-        ["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True, check=False
-    )
-    return {
-        "Machine": machine(),
-        "Versions": versions(),
-        "Revision": done.stdout.strip() or "not a checkout",
-        "Load before": load,
-        "Measured in": f"{seconds / 60:.0f} minutes",
-    }
+    return {"Machine": machine(), "Versions": versions(), "Revision": revision(), "Load before": load}
 
 
-def capture_section(folder: Path, name: str, video: Path, outcome: Outcome, body: Body) -> page.Markup:
-    """Return the section of a captured clip: strips of footage, overlay and the view from the side, and figures."""
-    motion, report = Motion.load(folder / f"{name}.npz"), outcome.figures
+def revision() -> str:
+    """Return the checkout's commit, and whether files differ from it."""
+    command = ("git", "describe", "--always", "--dirty")
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    return done.stdout.strip() or "not a checkout"
+
+
+def motions_of(folder: Path, name: str) -> list[Motion]:
+    """Return the people of a captured clip, the most prominent first."""
+    return [Motion.load(path) for path in motion_files(folder, name)]
+
+
+def capture_section(folder: Path, name: str, video: Path, outcome: Outcome, body: Body, why: str = "") -> page.Markup:
+    """Return the section of a captured clip: figures, strips of footage, overlay and side view, and its failures.
+
+    :param why: it is shown, in a sentence.
+    """
+    motions, report, truth = motions_of(folder, name), outcome.figures, truth_of(video)
     shown = {
+        "People": str(len(motions)),
         "Frames": f"{report['frames']} at {report['frame_rate'][0] / report['frame_rate'][1]:.6g} per second",
         "Preset": report["quality"],
         "Camera": report["camera"],
@@ -143,10 +176,17 @@ def capture_section(folder: Path, name: str, video: Path, outcome: Outcome, body
         f"Clip {name}",
         page.command_line(outcome.command.text),
         page.fact_list(shown),
-        strips(video, motion, body),
-        *(warning_list(report["warnings"]) if report["warnings"] else []),
-        note="Footage, overlay, and the same frames from the side.",
+        strips(video, motions, body),
+        *([worst_moments(motions[0], truth, body)] if truth else []),
+        *(known_failure(video, motions, body, KNOWN[name]) if name in KNOWN else []),
+        *([page.list_of(report["warnings"])] if report["warnings"] else []),
+        note=f"{why} Footage, overlay, and the same frames seen from the side; people who were not seen are faint.",
     )
+
+
+def known_failure(video: Path, motions: Sequence[Motion], body: Body, failure: KnownFailure) -> list[page.Markup]:
+    """Return what is wrong in a part of a clip, and the strips of it."""
+    return [page.paragraph(failure.what), strips(video, motions, body, failure.first_s, failure.last_s)]
 
 
 def say(text: str) -> None:

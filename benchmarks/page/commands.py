@@ -3,18 +3,26 @@
 
 from __future__ import annotations
 
+import glob
 import json
 import shlex
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..frames import DATA, ROOT
+import numpy as np
 
+from ...scope_addon.capture.options import CaptureOptions
+from ..frames import CACHE, DATA, ROOT
+
+WITHOUT_TRUTH = (  # clips of people
+    *("run_moving_camera", "gesture_square", "squats_5fps", "sit_stand_close", "two_people_portrait"),
+    "walk_side_static",
+)
 SCRIPTS = {"bench": "scope.benchmarks", "gate": "scope.benchmarks.gate", "capture": "scope.scope_addon"}
 
 
@@ -65,11 +73,58 @@ def commands(quick: bool) -> list[Command]:
 
 
 def clips(quick: bool) -> list[tuple[str, Path]]:
-    """Return names and paths of the clips that are captured for the strips: our own, and those with truth beside it."""
+    """Return names and paths of the clips that are captured for the strips.
+
+    Our own, those with ground truth and, unless ``quick``, those without, in which somebody is.
+    """
     from ...scope_addon.cli import SAMPLE
 
-    found = sorted((DATA / "pose2sim").glob("cam?.mp4"))
-    return [("sample", SAMPLE), *((path.stem, path) for path in (found[:1] if quick else found))]
+    with_truth = sorted((DATA / "pose2sim").glob("cam?.mp4"))
+    without = [] if quick else [path for name in WITHOUT_TRUTH if (path := DATA / "clips" / f"{name}.mp4").is_file()]
+    return [("sample", SAMPLE), *((path.stem, path) for path in (with_truth[:1] if quick else with_truth) + without)]
+
+
+def truth_of(video: Path) -> Path | None:
+    """Return the file with the true joints of a clip of one person, None if there is none."""
+    for name in (f"truth_{video.stem}.npz", f"{video.stem}_truth.npz"):
+        if (path := video.with_name(name)).is_file():
+            with np.load(path) as file:
+                return path if "joints" in file.files else None
+    return None
+
+
+def worst_clips(measured: Sequence[Outcome]) -> list[tuple[str, Path, str]]:
+    """Return names and paths of the worst rendered clips and scenes of those measured, and what was measured.
+
+    Two of the renders, and of each split the scene of the worst person and one in which somebody was never found, with
+    the default preset and nothing given.
+    """
+    found = []
+    for outcome in measured:
+        if outcome.command.arguments[:1] == ("renders",) and outcome.figures:
+            clips = outcome.figures[CaptureOptions().quality]["nothing given"]
+            shots = {name: row for name, row in clips.items() if name not in ("mean", "sample")}
+            errors = {name: row["mpjpe_root"] for name, row in shots.items() if "mpjpe_root" in row}
+            for name in sorted(errors, key=lambda k: -errors[k])[:2]:
+                why = f"One of the two worst of the rendered clips: MPJPE-root is {errors[name]:.1f} mm."
+                found.append((name, CACHE / "renders" / f"{name}.mp4", why))
+        if outcome.command.arguments[:1] == ("scenes",):
+            for split, figures in outcome.figures.items():
+                people = [row for row in figures["people"]["default preset"] if np.isfinite(row["mpjpe_root"])]
+                if people:
+                    worst = max(people, key=lambda row: row["mpjpe_root"])
+                    why = f"The worst person of the scenes {split}: MPJPE-root is {worst['mpjpe_root']:.1f} mm."
+                    found.append((worst["clip"], CACHE / "scenes" / f"{worst['clip']}.mp4", why))
+                for row in [row for row in figures["people"]["default preset"] if not row["found"]][:1]:
+                    why = f"A person of the scenes {split} who was not found in any frame."
+                    found.append((row["clip"], CACHE / "scenes" / f"{row['clip']}.mp4", why))
+    return [each for each in found if each[1].is_file()]
+
+
+def motion_files(folder: Path, name: str) -> list[Path]:
+    """Return the motion files of the people of a clip, the most prominent first."""
+    one = folder / f"{name}.npz"
+    return [one] if one.is_file() else sorted(folder.glob(f"{glob.escape(name)}.person?.npz"))
 
 
 def run(command: Command, folder: Path, say: Callable[[str], None]) -> Outcome:
@@ -88,9 +143,14 @@ def run(command: Command, folder: Path, say: Callable[[str], None]) -> Outcome:
 
 
 def run_capture(video: Path, target: Path, say: Callable[[str], None]) -> Outcome:
-    """Capture a clip into the motion file ``target``; the figures are the capture's report."""
-    command = Command(video.name, "capture", (str(video), "-o", str(target), "--json", "--quiet"))
-    target.unlink(missing_ok=True)
+    """Capture a clip into the motion file ``target``; the figures are the capture's report.
+
+    Of clips without ground truth everybody is captured, each into a file of their own: see `motion_files`.
+    """
+    people = () if truth_of(video) else ("--people", "all")
+    command = Command(video.name, "capture", (str(video), "-o", str(target), *people, "--json", "--quiet"))
+    for path in motion_files(target.parent, target.stem):
+        path.unlink()
     say(f"running {command.text}")
     since = time.monotonic()
     arguments = [sys.executable, "-m", SCRIPTS["capture"], "capture", *command.arguments]

@@ -16,11 +16,12 @@ from ...scope_addon.report.plots import Axis, Curve, line_plot
 from ..perception.accuracy import SHOWN
 from .commands import Outcome
 from .curves import Curves
+from .paper import convergence_plot, stated_table
 
-BODIES = ((23, "SMPL"), (51, "SMPL+H"))  # number of joints, and whose skeleton has as many
+BODIES = ((23, "SMPL"), (51, "SMPL+H"))  # number of joints of ours, and whose skeleton has as many
 PAPER = (
-    "The curves of the solver's paper (figures 5 to 7) are not drawn beside these: they are not available as data, and "
-    "were not digitized. Whoever has digitized them can give them as a table with --curves."
+    "The curves of the solver's paper (figures 5 to 7) are not drawn beside these: they are pictures, of which no data "
+    "were found, and were not digitized. Whoever has digitized them can give them as a table with --curves."
 )
 _RULE = re.compile(r"\|(\s*:?-+:?\s*\|)+")
 
@@ -55,6 +56,7 @@ def plots(outcome: Outcome, curves: Curves) -> list[Markup]:
     """
     figures, parts = outcome.figures, []
     if experiments := figures.get("experiments"):
+        parts += [stated_table(figures), convergence_plot(figures)]
         if not curves:
             parts.append(Markup(f"<p>{escape(PAPER)}</p>\n"))
         for number, rows in sorted(experiments.items()):
@@ -78,7 +80,7 @@ def time_against_accuracy(figures: dict[str, dict[str, dict[str, float]]]) -> Ma
     y = np.concatenate([curve.y for curve in curves])
     x_axis = Axis(float(x.min()) / 1.3, float(x.max()) * 1.3, logarithmic=True, unit="ms")
     y_axis = Axis(0.0, 1.1 * float(y.max()))
-    title = "MPJPE-root in mm by milliseconds a frame, logarithmic; one point for each clip"
+    title = "MPJPE-root in mm by milliseconds a frame (Scope's by the clock), logarithmic; one point for each clip"
     svg = line_plot(curves, x_axis, y_axis, label=title, timed=False)
     return page.plot_figure(title, svg, {curve.name: curve.color for curve in curves})
 
@@ -86,12 +88,12 @@ def time_against_accuracy(figures: dict[str, dict[str, dict[str, float]]]) -> Ma
 def clip_plot(rows: Sequence[dict[str, float]]) -> Markup:
     """Return the plot of a whole clip as one problem: milliseconds a frame by the number of frames."""
     curves: list[Curve] = []
-    for K, body in BODIES:
+    for K, _ in BODIES:
         chosen = [row for row in rows if row["K"] == K]
         x = np.array([row["frames"] for row in chosen], float)
         for key, name in (("linearize_ms", "linearize"), ("step_ms", "step")):
             y = np.array([row[key] for row in chosen], float)
-            curves.append(Curve(x, y, page.person_color(len(curves)), f"{body}, {name}", with_points=True))
+            curves.append(Curve(x, y, page.person_color(len(curves)), f"{K} joints, {name}", with_points=True))
     return plot("A whole clip as one problem: milliseconds a frame by its frames, logarithmic", curves)
 
 
@@ -101,21 +103,21 @@ def experiment_plots(number: str, rows: Sequence[dict[str, float]], digitized: C
     :param number: such as 3, or 3_N600 with another number of terms.
     :param digitized: speedups of others, see `read_curves`.
     """
-    key = "P" if number.startswith("3") else "N"
+    key, title = "P" if number.startswith("3") else "N", f"Experiment {number.replace('_N', ', N = ')}"
     times, speedups = [], []
     for n, (K, body) in enumerate(BODIES):
         chosen = [row for row in rows if row["K"] == K]
         x = np.array([row[key] for row in chosen], float)
         dense, sparse = (np.array([row[method] for row in chosen], float) for method in ("dense", "sparse"))
-        times.append(Curve(x, sparse, page.person_color(2 * n), f"{body}, sparse", with_points=True))
-        times.append(Curve(x, dense, page.person_color(2 * n + 1), f"{body}, dense", with_points=True))
-        speedups.append(Curve(x, dense / sparse, page.person_color(2 * n), body, with_points=True))
+        times.append(Curve(x, sparse, page.person_color(2 * n), f"{K} joints, sparse", with_points=True))
+        times.append(Curve(x, dense, page.person_color(2 * n + 1), f"{K} joints, dense", with_points=True))
+        speedups.append(Curve(x, dense / sparse, page.person_color(2 * n), f"{K} joints", with_points=True))
         if points := (digitized or {}).get((number, body)):
             x, y = np.array(points, float).T
             speedups.append(Curve(x, y, page.person_color(2 * n + 1), f"{body}, digitized", with_points=True))
     return [
-        plot(f"Experiment {number}: µs of a step by {key}, logarithmic", times),
-        plot(f"Experiment {number}: time of a dense step over a sparse one's, by {key}, logarithmic", speedups),
+        plot(f"{title}: µs of a step by {key}, logarithmic", times),
+        plot(f"{title}: time of a dense step over a sparse one's, by {key}, logarithmic", speedups),
     ]
 
 

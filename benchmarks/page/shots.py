@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
@@ -21,24 +22,30 @@ from ...solver.rotations import exp
 from ...tools.readme_pictures.view import level_camera
 
 SHOTS, SIDE_PX, SHOWN_M = 6, 360, 2.4  # of a strip; of a picture; height of what the view from the side shows
-_GROUND = 236  # grey behind the body
+_FILLED, _NEAREST_M = 0.95, 0.3  # share of the picture that may be covered; what is nearer is not looked at
+_GROUND, _FAINT = 236, 0.35  # grey behind the body; opacity of a pose that is filled in
 
 Image = NDArray[np.uint8]
 
 
-def strips(video: Path, motion: Motion, body: Body) -> Markup:
-    """Return three rows of pictures at the same frames, with captions."""
-    rows = spread_rows(len(motion), SHOTS)
-    wanted = motion.frames[rows].tolist()
+def strips(
+    video: Path, motions: Sequence[Motion], body: Body, first_s: float = 0.0, last_s: float = math.inf
+) -> Markup:
+    """Return three rows of pictures at the same frames, spread over a part of the clip, each with a caption."""
+    times = motions[0].timestamps
+    part = np.flatnonzero((times >= first_s) & (times <= last_s))
+    rows = part[spread_rows(len(part), SHOTS)]
+    wanted = motions[0].frames[rows].tolist()
     footage = frames_of(video, wanted)
-    overlay = dict(painted_frames(video, [motion], body, wanted))
-    side = {frame: side_view(motion, body, int(row)) for frame, row in zip(wanted, rows, strict=True)}
+    overlay = dict(painted_frames(video, motions, body, wanted))
+    side = {frame: side_view(motions, body, int(row)) for frame, row in zip(wanted, rows, strict=True)}
+    at = dict(zip(wanted, times[rows].tolist(), strict=True))
     parts = []
-    for name, pictures in (("footage", footage), ("overlay", overlay), ("turned by 90 degrees", side)):
+    for name, pictures in (("footage", footage), ("overlay", overlay), ("turned by 90°", side)):
         images = [(frame, small_picture(0, pictures[frame], SIDE_PX)) for frame in wanted if frame in pictures]
         shown = "".join(
-            f'<img src="{picture.url}" width="{picture.width}" height="{picture.height}" '
-            f'alt="{escape(name)}, frame {frame}" title="{escape(name)}, frame {frame}">'
+            f'<figure><img src="{picture.url}" width="{picture.width}" height="{picture.height}" '
+            f'alt="{escape(name)}, frame {frame}"><figcaption>{escape(name)}, {at[frame]:.2f} s</figcaption></figure>'
             for frame, picture in images
         )
         parts.append(f'<div class="shots">{shown}</div>\n')
@@ -51,18 +58,32 @@ def frames_of(video: Path, wanted: Sequence[int]) -> dict[int, Image]:
         return {frame.index: frame.image_rgb for frame in footage if frame.index in wanted}
 
 
-def side_view(motion: Motion, body: Body, row: int) -> Image:
-    """Return the body of a row as a camera sees it that went around it by a quarter turn, at the same height."""
-    betas = motion.betas.astype(float)
-    R, t = body.forward_kinematics(
-        exp(motion.poses[row].reshape(-1, 3).astype(float)), motion.trans[row].astype(float), betas
-    )
-    R_camera_world, eye = turned_camera(motion.world_from_camera[row], t[0])
-    vertices = (body.skin(R, t, betas) - eye) @ R_camera_world.T
-    focal = SIDE_PX * float(np.linalg.norm(t[0] - eye)) / SHOWN_M
+def side_view(motions: Sequence[Motion], body: Body, row: int) -> Image:
+    """Return the bodies of a row as a camera sees them that went a quarter turn around their middle, at its height.
+
+    People who were not seen are faint. What is shown is `SHOWN_M` high, more where that does not hold everybody.
+    """
+    world, roots = [], []
+    for motion in motions:
+        betas = motion.betas.astype(float)
+        R, t = body.forward_kinematics(
+            exp(motion.poses[row].reshape(-1, 3).astype(float)), motion.trans[row].astype(float), betas
+        )
+        world.append(body.skin(R, t, betas))
+        roots.append(t[0])
+    middle = np.mean(roots, axis=0)
+    R_camera_world, eye = turned_camera(motions[0].world_from_camera[row], middle)
+    seen = [motion.valid[row] for motion in motions]
+    vertices = [(points - eye) @ R_camera_world.T for points in world]
+    ahead = np.concatenate(vertices)
+    ahead = ahead[ahead[:, 2] > _NEAREST_M]
+    widest = float(np.abs(ahead[:, :2] / ahead[:, 2:]).max(initial=0.0))
+    focal = SIDE_PX * float(np.linalg.norm(middle - eye)) / SHOWN_M
+    focal = min(focal, _FILLED * SIDE_PX / 2 / widest) if widest > 0 else focal
     K = np.array([[focal, 0, SIDE_PX / 2], [0, focal, SIDE_PX / 2], [0, 0, 1]])
     blank = np.full((SIDE_PX, SIDE_PX, 3), _GROUND, np.uint8)
-    return draw_overlay(blank, [vertices], body.faces, K, None, [body_colors(body, 0)], 1.0)
+    colors = [body_colors(body, k) for k in range(len(motions))]
+    return draw_overlay(blank, vertices, body.faces, K, None, colors, [1.0 if each else _FAINT for each in seen])
 
 
 def turned_camera(world_from_camera: NDArray[Any], target: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:

@@ -23,6 +23,7 @@ from ...solver.loaders.body_file import ASSETS
 from ...solver.rotations import exp
 from ..frames import DATA
 from ..report import table
+from ..scenes.statistics import Estimate, mean_over_people
 from .accuracy import evaluate_clip
 from .depth_flips import BONES, FITS, depth_flips, flips_table, total
 from .held_out import feet_world, held_out_takes
@@ -68,7 +69,36 @@ def renders(quick: bool) -> dict[str, Any]:
             flips = {fit: total(row["flips"][fit] for row in shots if "flips" in row) for fit in FITS}
             figures[quality][known]["mean"]["flips"] = flips
             print(flips_table(f"{quality}, {known}", flips), end="\n\n", flush=True)
+    print(intervals_table(figures), end="\n\n", flush=True)
     return figures
+
+
+def intervals_table(figures: dict[str, Any]) -> str:
+    """Return the means of the errors, with 95 % intervals by the bootstrap over the clips, each of another person.
+
+    The last column is by how much MPJPE-root is larger than the default preset's with the same given, clip by clip.
+
+    :param figures: by preset, then by what is given, then by clip.
+    """
+    rows = []
+    for quality, by_known in figures.items():
+        for known, clips in by_known.items():
+            errors = [mean_over_people(list(_of_clips(clips, key).values())) for key in ("mpjpe_root", "pa_mpjpe")]
+            default = _of_clips(figures.get(CaptureOptions().quality, {}).get(known, {}), "mpjpe_root")
+            ours = _of_clips(clips, "mpjpe_root")
+            more = mean_over_people([ours[name] - default[name] for name in ours if name in default])
+            same = quality == CaptureOptions().quality or not more.people
+            rows.append([f"{quality}, {known}", errors[0].people, *map(_shown, errors), "" if same else _shown(more)])
+    return table(("preset", "clips", "MPJPE-root mm", "PA-MPJPE mm", "more than the default, mm"), rows)
+
+
+def _of_clips(clips: dict[str, Any], key: str) -> dict[str, float]:
+    """Return a figure of every clip but the sample, in which somebody was found."""
+    return {name: row[key] for name, row in clips.items() if name not in ("sample", "mean") and key in row}
+
+
+def _shown(estimate: Estimate) -> str:
+    return f"{estimate.mean:.1f} ({estimate.low:.1f} to {estimate.high:.1f})"
 
 
 def evaluate_render(body: Body, video: Path, truth: Path, quality: str, known: str) -> dict[str, Any]:

@@ -33,6 +33,7 @@ PRIOR_EVERY = 10  # of the recordings' frames
 SHOWN_PX = 220
 SIDES = {"L": "left", "R": "right"}
 Points = NDArray[np.float64]
+MS = "ms per frame: SMPLify's of the processor, Scope's by the clock"
 Columns = tuple[tuple[str, Points, float], ...]  # name, joints (F, K+1, 3) in the camera frame, ms per frame
 
 
@@ -52,7 +53,7 @@ def smplify(quick: bool) -> dict[str, Any]:
     for clip, (video, truth) in clips.items():
         figures[clip] = _clip(body, prior, video, truth, QUICK if quick else EVERY)
         rows = [[name, *row.values()] for name, row in figures[clip].items()]
-        print(table((clip, "MPJPE-root mm", "PA-MPJPE mm", "ms per frame"), rows), end="\n\n", flush=True)
+        print(table((clip, "MPJPE-root mm", "PA-MPJPE mm", MS), rows), end="\n\n", flush=True)
     return figures
 
 

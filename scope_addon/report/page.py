@@ -100,6 +100,17 @@ def plot_figure(
     return Markup(f'<figure class="graph"><figcaption>{escape(title)}{entries}</figcaption>{svg}</figure>\n')
 
 
+def paragraph(text: str) -> Markup:
+    """Return a text as a note."""
+    return Markup(f'<p class="note">{escape(text)}</p>\n')
+
+
+def list_of(texts: Sequence[str]) -> Markup:
+    """Return texts, such as warnings, as a list."""
+    items = "".join(f"<li>{escape(text)}</li>" for text in texts)
+    return Markup(f'<ul class="warnings">{items}</ul>\n')
+
+
 def command_line(command: str) -> Markup:
     """Return a command as a block of code."""
     return Markup(f"<pre><code>{escape(command)}</code></pre>\n")

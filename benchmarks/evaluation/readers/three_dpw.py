@@ -6,6 +6,7 @@ sequenceFiles/test/downtown_arguing_00.pkl       a pickle of Python 2; lists hav
     poses[p] (T, 72), betas[p] (10 or more), trans[p] (T, 3), genders[p] m or f
     cam_poses (T, 4, 4)            camera from world;   cam_intrinsics (3, 3)
     campose_valid[p] (T,)          1 where the camera's pose fits the image: the frames that are evaluated
+    poses2d[p] (T, 3, 18)          all 0 where no 2D pose was found: the challenge leaves these frames out
 imageFiles/downtown_arguing_00/image_00000.jpg   30 frames per second
 """
 
@@ -55,7 +56,10 @@ def _truth(path: Path, frames: int, models: Models) -> Truth:
     number = len(table["jointPositions"]) if isinstance(table.get("jointPositions"), list) else 0
     people = []
     for p in range(number):
-        rows = np.flatnonzero(array(path, table, "campose_valid", (count,), p) > 0)
+        evaluated = array(path, table, "campose_valid", (count,), p) > 0
+        if not _by_mesh(models):
+            evaluated &= array(path, table, "poses2d", (count, 3, 18), p).any(axis=(1, 2))
+        rows = np.flatnonzero(evaluated)
         if not len(rows):
             continue
         subject = _posed(path, table, p, count, models) if _by_mesh(models) else _joints(path, table, p, count)

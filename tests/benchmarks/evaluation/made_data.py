@@ -79,7 +79,7 @@ def table_3dpw(name: str, joints_world: list[np.ndarray], T_camera_world: np.nda
         "genders": ["m", "f"][: len(joints_world)],
         "v_template_clothed": [np.zeros((10, 3)) for _ in people],
         "texture_maps": [],
-        "poses2d": [np.zeros((count, 3, 18)) for _ in people],
+        "poses2d": [np.ones((count, 3, 18)) for _ in people],
         "jointPositions": [joints.reshape(count, 72) for joints in joints_world],
         "img_frame_ids": np.arange(count),
         "cam_poses": T_camera_world,

@@ -37,7 +37,8 @@ def test_a_data_set_is_captured_compared_and_kept(dataset, tmp_path, capsys, mon
     found = json.loads((tmp_path / "figures.json").read_text("utf-8"))
     figures = found["protocols"]["3dpw"]["figures"]
     assert 10 < figures["pa_mpjpe"] < figures["mpjpe"] < 150
-    assert 50 < figures["pck"] <= 100
+    assert 50 < figures["pck_50"] <= 100
+    assert 50 < figures["auc_200"] < 100
     assert found["options"]["camera"] is True
 
     def never(*_):

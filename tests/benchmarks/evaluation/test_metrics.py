@@ -92,6 +92,13 @@ def test_the_best_auc_is_below_100_as_in_the_official_program():
     assert metrics.auc(np.zeros((1, 14))) == pytest.approx([100 * 30 / 31])
 
 
+def test_the_challenges_pck_and_auc_by_hand():
+    errors = np.array([[50.0, 50.1, 198.5, 199.5], [0.0, 0.0, 0.0, 0.0]])
+    assert metrics.challenge_pck(errors) == pytest.approx([25.0, 100.0])
+    # Half a step, and whole ones from there to 199 mm: of 50 mm from 49 on, of 50.1 from 50, of 198.5 from 198.
+    assert metrics.challenge_auc(errors) == pytest.approx([100 * (149.5 + 148.5 + 0.5 + 0) / (4 * 199), 100.0])
+
+
 def test_acceleration_error_of_a_known_motion():
     t = np.arange(6) / 30
     still = np.zeros((6, 2, 3))

@@ -74,7 +74,7 @@ def test_errors_are_those_of_the_joints_that_differ(body):
     means = module.score_clip(clip(), Truth([measured]), body, [motion], PROTOCOLS["3dpw"]).means()
     assert means["mpjpe"] == pytest.approx(40 / 24, rel=1e-4)
     assert 0 < means["pa_mpjpe"] < 40 / 24 * 4  # squares are least, so that one large error becomes many small ones
-    assert means["pck"] == pytest.approx(100)
+    assert means["pck_50"] == pytest.approx(100)
     assert "mpvpe" not in means  # there is no mesh of the truth
 
 

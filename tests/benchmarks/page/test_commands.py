@@ -8,10 +8,11 @@ import shlex
 import subprocess
 from pathlib import Path
 
+import numpy as np
 import pytest
 from scope.benchmarks.__main__ import ELSEWHERE
 from scope.benchmarks.page import commands
-from scope.benchmarks.page.commands import SCRIPTS, Command, run, run_capture
+from scope.benchmarks.page.commands import SCRIPTS, Command, Outcome, motion_files, run, run_capture, worst_clips
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -50,5 +51,50 @@ def test_figures_are_those_of_this_run_alone(tmp_path, monkeypatch):
     outcome = run_capture(Path("a b.mp4"), tmp_path / "a.npz", said.append)
     assert (outcome.status, outcome.figures) == (3, {})
     target = shlex.quote(str(tmp_path / "a.npz"))
-    assert said == [f"running ./scripts/capture 'a b.mp4' -o {target} --json --quiet"]
+    assert said == [f"running ./scripts/capture 'a b.mp4' -o {target} --people all --json --quiet"]
     assert not (tmp_path / "a.npz").exists()
+
+
+def test_everybody_is_captured_where_no_truth_says_who_it_is_about(tmp_path, monkeypatch):
+    def fake(arguments, **_):
+        return subprocess.CompletedProcess(arguments, 3, "", "")
+
+    monkeypatch.setattr(commands.subprocess, "run", fake)
+    for name in ("truth_cam1.npz", "roll_truth.npz"):
+        np.savez(tmp_path / name, joints=np.zeros(3))
+    np.savez(tmp_path / "test_00_truth.npz", limbs=np.zeros(3))  # of several people
+    for name, everybody in (("cam1", False), ("roll", False), ("walk", True), ("test_00", True)):
+        outcome = run_capture(tmp_path / f"{name}.mp4", tmp_path / f"{name}.npz", lambda text: None)
+        assert ("--people" in outcome.command.arguments) == everybody
+    for name in ("b.person2.npz", "b.person1.npz", "bb.person1.npz", "c.npz"):
+        (tmp_path / name).touch()
+    assert [path.name for path in motion_files(tmp_path, "b")] == ["b.person1.npz", "b.person2.npz"]
+    assert [path.name for path in motion_files(tmp_path, "c")] == ["c.npz"]
+
+
+def test_the_worst_rendered_clips_are_shown_too(tmp_path, monkeypatch):
+    monkeypatch.setattr(commands, "CACHE", tmp_path)
+    for name in ("renders/roll.mp4", "renders/walk.mp4", "scenes/test_00.mp4", "scenes/test_01.mp4"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).touch()
+    shots = {"walk": {"mpjpe_root": 40.0}, "roll": {"mpjpe_root": 132.46}, "lost": {"coverage": 0.0}}
+    given = {"nothing given": shots | {"sample": {"mpjpe_root": 900.0}, "mean": {"mpjpe_root": 950.0}}}
+    people = [("test_00", float("nan")), ("test_01", 120.0), ("test_00", 60.0)]
+    rows = [{"clip": clip, "mpjpe_root": error, "found": float(error > 0)} for clip, error in people]
+    outcomes = [
+        Outcome(Command("Renders", "bench", ("renders",)), "", "", {"fast": {}, "best": given}, 1.0, 0),
+        Outcome(
+            Command("Scenes", "bench", ("scenes",)), "", "", {"test": {"people": {"default preset": rows}}}, 1.0, 0
+        ),
+        Outcome(Command("Scenes", "bench", ("scenes",)), "", "", {}, 1.0, 1),
+    ]
+    found = worst_clips(outcomes)
+    assert [(name, path.parent.name) for name, path, _ in found] == [
+        ("roll", "renders"),
+        ("walk", "renders"),
+        ("test_01", "scenes"),
+        ("test_00", "scenes"),
+    ]
+    assert "132.5 mm" in found[0][2]
+    assert "test: MPJPE-root is 120.0 mm" in found[2][2]
+    assert "not found" in found[3][2]

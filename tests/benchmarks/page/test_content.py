@@ -32,11 +32,13 @@ def test_experiments_are_plotted_where_their_values_are():
         for N in (120, 600)
     ]
     times, speedups = experiment_plots("1", rows)
-    assert "SMPL+H, dense" in times
+    assert "51 joints, dense" in times
     found = [float(y) for y in re.findall(r'class="curve" d="M0\.0 ([\d.]+)L1000\.0', speedups)]
     share = math.log(1.3) / math.log(100 * 1.3**2 / 10)  # the axis goes from 10 / 1.3 to 100 * 1.3
     assert found == pytest.approx([100 * (1 - share), 100 * share], abs=0.01)
     assert 'class="cursor"' not in times
+    of_more_terms = experiment_plots("3_N600", [{**row, "P": row["N"] // 60} for row in rows])
+    assert "Experiment 3, N = 600: µs of a step by P" in of_more_terms[0]
 
 
 def test_keys_of_the_evaluation_get_their_headings():

@@ -17,7 +17,7 @@ from scope.benchmarks.perception.held_out import (
     held_out_takes,
     standing_feet,
 )
-from scope.benchmarks.perception.renders import against_world, mean_of
+from scope.benchmarks.perception.renders import against_world, intervals_table, mean_of
 from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
 from scope.solver.loaders.body_file import ASSETS
 from scope.solver.rotations import log
@@ -113,3 +113,25 @@ def test_a_mean_leaves_out_what_a_clip_does_not_have():
     assert means["floor_cm"] == 2.0
     assert means["coverage"] == pytest.approx(2 / 3)
     assert means["up_deg"] is None
+
+
+def test_intervals_are_over_clips_and_differences_between_the_same_clips():
+    best = {"a": 40.0, "b": 60.0, "c": 50.0, "sample": 900.0, "mean": 950.0}
+    figures = {
+        quality: {
+            "nothing given": {name: {"mpjpe_root": mm + more, "pa_mpjpe": mm / 2} for name, mm in best.items()}
+            | {"lost": {"coverage": 0.0}}
+        }
+        for quality, more in (("fast", 7.0), ("best", 0.0))
+    }
+    head, _, fast, ours = intervals_table(figures).splitlines()
+    assert [cell.strip() for cell in fast.strip("|").split("|")] == [
+        "fast, nothing given",
+        "3",
+        "57.0 (47.0 to 67.0)",
+        "25.0 (20.0 to 30.0)",
+        "7.0 (7.0 to 7.0)",
+    ]
+    assert [cell.strip() for cell in ours.strip("|").split("|")][1:3] == ["3", "50.0 (40.0 to 60.0)"]
+    assert ours.rstrip("| ").endswith("(20.0 to 30.0)")
+    assert "more than the default" in head
