@@ -37,7 +37,6 @@ class CameraMotion:
 
     R_first_camera: NDArray[np.float64]  # (T, 3, 3) the camera's axes in those of the first frame
     known: NDArray[np.bool_]  # (T,) frames in which it was estimated; elsewhere it is interpolated
-    inlier_share: float = 1.0  # of the background's corners, mean: those that agree with a rotation alone
 
     @property
     def is_static(self) -> bool:
@@ -87,10 +86,9 @@ class BackgroundRecord:
             rate = log(R[a].T @ R[b]) / (times[b] - times[a])
             filled[after] = R[b] @ exp((times[after] - times[b])[:, None] * rate)
         R = filled[0].T @ filled
-        inlier_share = float(np.mean(self.inlier_shares)) if self.inlier_shares else 1.0
-        if inlier_share < TRAVELLING_SHARE:
+        if self.inlier_shares and np.mean(self.inlier_shares) < TRAVELLING_SHARE:
             R = remove_heading_drift(R, times, self.edge_frames, camera, image_size)
-        return CameraMotion(R, known, inlier_share)
+        return CameraMotion(R, known)
 
     @property
     def segments(self) -> Segments:

@@ -109,8 +109,7 @@ def find_camera_path(shot: Shot, first: PreparedTrack, fit: FittedTrack) -> Came
         return shot.path
     placed = place(shot, first.track, fit)
     up = find_world([placed], shot.lines).up
-    center = camera_travel(placed.soles, placed.valid, up, placed.times, shot.inlier_share)
-    return replace(shot.path, center=center)
+    return replace(shot.path, center=camera_travel(placed.soles, placed.valid, up, placed.times))
 
 
 def ground_all(

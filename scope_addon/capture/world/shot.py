@@ -28,7 +28,6 @@ class Shot:
     source: str  # name of the footage
     smoothing: bool = True  # False: every frame is fitted alone
     ablation: Ablation = NO_ABLATION
-    inlier_share: float = 1.0  # of the background's corners: those that agree with a rotation of the camera alone
 
     @property
     def is_still(self) -> bool:
