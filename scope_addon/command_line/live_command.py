@@ -83,7 +83,7 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
 def _list_formats(source: str, *, quiet: bool) -> dict[str, Any]:
     """Ask a camera for its formats.
 
-    :raises ScopeError: it is no camera, or does not answer.
+    :raises ScopeError: it is not a camera, or does not answer.
     """
     from ..job.live.formats import ask_for_formats
 

@@ -104,7 +104,7 @@ def resample(clip: Clip, rate: float) -> Clip:
     :raises UsageError: when the rate is not positive.
     """
     if not np.isfinite(rate) or rate <= 0:
-        raise UsageError(f"a motion cannot be baked to {rate} frames a second; choose a rate above zero")
+        raise UsageError(f"a motion cannot be baked to {rate} frames per second; choose a rate above zero")
     count = int(np.floor((clip.times[-1] - clip.times[0]) * rate + 1e-6)) + 1
     times = clip.times[0] + np.arange(count) / rate
     return sample(band_limited(clip, rate), times)

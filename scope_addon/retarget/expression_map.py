@@ -191,7 +191,7 @@ def _check_factors(what: str, factors: dict[str, float], largest: float) -> None
     for expression, factor in factors.items():
         if expression not in EXPRESSIONS:
             raise InputError(
-                f"{what} is mapped to '{expression}', which is no expression; use one of {', '.join(EXPRESSIONS)}"
+                f"{what} is mapped to '{expression}', which is not an expression; use one of {', '.join(EXPRESSIONS)}"
             )
         if not abs(factor) <= largest:
             raise InputError(f"{what} has the factor {factor:g}; use at most {largest:g}")

@@ -97,4 +97,4 @@ class _Checker:
                 size += len(unpack.decompress(rest, _STEP))
                 rest = unpack.unconsumed_tail
         if size != wanted:
-            raise ValueError("an array has not the size that it declares")
+            raise ValueError("an array does not have the size that it declares")

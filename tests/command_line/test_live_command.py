@@ -41,8 +41,8 @@ from ..live.outputs.test_vmc import parsed
         (["x.mp4", "--height", "170,180"], 2, "2 heights are given, but --people is 1"),
         (["x.mp4", "--json-port", "70000"], 2, "--json-port must be from 0 to 65535, not 70000"),
         (["x.mp4", "--reconnect", "-1"], 2, "--reconnect must be from 0 to 3600 s, not -1"),
-        (["x.mp4", "--list-formats"], 2, "x.mp4 is no camera; give its number, 0 for the first"),
-        (["rtsp://me:secret@host/a", "--list-formats"], 2, "scope: a stream is no camera; give its number"),
+        (["x.mp4", "--list-formats"], 2, "x.mp4 is not a camera; give its number, 0 for the first"),
+        (["rtsp://me:secret@host/a", "--list-formats"], 2, "scope: a stream is not a camera; give its number"),
         (["x.mp4", "--focal-mm", "26", "--fov", "60"], 2, "--focal-mm and --fov contradict each other"),
     ],
 )

@@ -21,9 +21,9 @@ def test_a_whole_file_passes(tmp_path):
 @pytest.mark.parametrize(
     ("properties", "says"),
     [
-        ([array(b"d", 4, bytes(24))], "not the size"),
-        ([array(b"d", 2, bytes(24))], "not the size"),
-        ([array(b"i", 3, bytes(8), compressed=False)], "not the size"),
+        ([array(b"d", 4, bytes(24))], "not have the size"),
+        ([array(b"d", 2, bytes(24))], "not have the size"),
+        ([array(b"i", 3, bytes(8), compressed=False)], "not have the size"),
         ([array(b"i", 2, bytes(8), size=1000)], "does not lie within"),
         ([array(b"d", 0xFFFFFFFF, bytes(24))], "too large"),
         ([b"S" + struct.pack("<I", 0xFFFFFFFF)], "does not lie within"),
@@ -54,7 +54,7 @@ def test_a_bomb_takes_no_memory(tmp_path):
     path = fbx(tmp_path / "rig.fbx", array(b"d", 3, bytes(100_000_000)))
     assert path.stat().st_size < 200_000
     tracemalloc.start()
-    with pytest.raises(InputError, match="not the size"):
+    with pytest.raises(InputError, match="not have the size"):
         check_fbx(path)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()

@@ -295,7 +295,9 @@ def from_arrays(arrays: Mapping[str, NDArray[Any]]) -> tuple[Correction, ...]:
     floors = column("floor_frames"), column("floor_heights")
     interpolated, snaps = column("interpolated_spans", 2), (column("snap_level"), column("snap_lift"))
     if len(interpolated) > _MOST_INTERPOLATIONS:
-        raise MotionFileError(f"the motion has {len(interpolated)} interpolated spans, at most {_MOST_INTERPOLATIONS}")
+        raise MotionFileError(
+            f"the motion has {len(interpolated)} interpolated spans, but may have at most {_MOST_INTERPOLATIONS}"
+        )
     if any(len(flags) and flags.dtype != np.bool_ for flags in snaps):
         raise MotionFileError("the motion's corrections are damaged: snap_level and snap_lift are not true or false")
     try:

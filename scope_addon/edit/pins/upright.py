@@ -77,7 +77,7 @@ def _transform(motion: Motion, body: Body, normal: NDArray[np.float64]) -> NDArr
     angle = np.arcsin(np.clip(abs(_UP @ normal), 0.0, 1.0))
     if angle > _LARGEST:
         raise UsageError(
-            f"the line is {np.degrees(angle):.0f} degrees from upright; draw it along something that stands, such as a "
+            f"the line is {np.degrees(angle):.0f} degrees from upright; draw it along something upright, such as a "
             "door or a wall's edge"
         )
     turn = shortest_turn(u / np.linalg.norm(u), _UP)

@@ -86,7 +86,7 @@ def camera_with_formats(source: str) -> Camera:
 
 
 def camera_source(text: str) -> str | None:
-    """Return the number or device that a text begins with, which may be a label; None if it is no camera."""
+    """Return the number or device that a text begins with, which may be a label; None if it is not a camera."""
     match = re.match(r"(\d{1,3}|/dev/video\d{1,3})\s*(?::.*)?$", text.strip(), re.S | re.ASCII)
     return match[1] if match else None
 

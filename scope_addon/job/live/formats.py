@@ -76,13 +76,13 @@ def ask_for_formats(text: str) -> Camera:
     """Return a camera with its formats, waiting for the answer.
 
     :param text: number or device.
-    :raises UsageError: it is no camera.
+    :raises UsageError: it is not a camera.
     :raises ScopeError: there is no answer.
     """
     source = camera_source(text)
     if source is None:
         said = "a stream" if "://" in text else text  # whose address may contain a password
-        raise UsageError(f"{said} is no camera; give its number, 0 for the first")
+        raise UsageError(f"{said} is not a camera; give its number, 0 for the first")
     with tempfile.TemporaryDirectory(prefix="scope-formats-", ignore_cleanup_errors=True) as folder:
         process = FormatsProcess(source, Path(folder), [sys.executable])
         try:

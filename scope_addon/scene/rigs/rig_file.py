@@ -52,7 +52,7 @@ def load_rig(source: RigSource, collection: bpy.types.Collection) -> bpy.types.O
 def _check_finite(path: Path, rig: bpy.types.Object) -> None:
     matrices = [rig.matrix_world, *(bone.matrix_local for bone in rig.data.bones)]
     if not all(math.isfinite(value) for matrix in matrices for row in matrix for value in row):
-        raise InputError(f"{path}: bones of '{rig.name}' have positions that are no numbers; export the rig again")
+        raise InputError(f"{path}: bones of '{rig.name}' have positions that are not numbers; export the rig again")
 
 
 def with_meshes(rig: bpy.types.Object, objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:

@@ -46,7 +46,7 @@ class SCOPE_OT_camera_formats(bpy.types.Operator):
         python = [sys.executable, *getattr(bpy.app, "python_args", ("-I",))]
         try:
             if (source := camera_source(typed)) is None:
-                raise UsageError(f"'{typed.strip()}' is no camera; enter its number, 0 for the first")
+                raise UsageError(f"'{typed.strip()}' is not a camera; enter its number, 0 for the first")
             state.asking = FormatsProcess(source, cache().new_job_folder(), python)
         except (ScopeError, OSError) as error:
             state.message = sentence(error)

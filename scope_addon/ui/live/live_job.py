@@ -303,7 +303,7 @@ def live_request(scene: bpy.types.Scene) -> LiveRequest:
     else:
         source = camera_source(settings.camera) or ""
         if not source:
-            raise UsageError(f"'{settings.camera.strip()}' is no camera; enter its number, 0 for the first")
+            raise UsageError(f"'{settings.camera.strip()}' is not a camera; enter its number, 0 for the first")
     names = {option.name for option in options_at(Place.LIVE_WORKER)}
     values = {name: value for name, value in chosen_values(scene).items() if name in names}
     values["body"] = chosen_body(values)

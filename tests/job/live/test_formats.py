@@ -81,7 +81,7 @@ def test_what_is_no_answer_is_an_error(asking, code, sentence):
 
 @pytest.mark.parametrize("text", ["rtsp://a/b", "walk.mp4", ""])
 def test_only_cameras_are_asked(text):
-    with pytest.raises(UsageError, match="is no camera"):
+    with pytest.raises(UsageError, match="is not a camera"):
         ask_for_formats(text)
 
 

@@ -190,7 +190,7 @@ def test_bones_that_are_nowhere_are_refused(tmp_path):
     data[at : at + 64 * accessor["count"]] = np.full(16 * accessor["count"], np.nan, "<f4").tobytes()
     path.write_bytes(data)
     with pytest.raises(
-        InputError, match=r"rig\.glb: .*(bones of 'Rig0' have positions that are no numbers|cannot import)"
+        InputError, match=r"rig\.glb: .*(bones of 'Rig0' have positions that are not numbers|cannot import)"
     ):
         check_rig(rig_source(path))
     assert not bpy.data.armatures

@@ -85,7 +85,7 @@ def test_a_camera_that_tells_none_is_said(answering):
 
 def test_what_is_no_camera_is_not_asked(answering):
     bpy.context.scene.scope_live.camera = "front"
-    with pytest.raises(RuntimeError, match="'front' is no camera; enter its number"):
+    with pytest.raises(RuntimeError, match="'front' is not a camera; enter its number"):
         bpy.ops.scope.camera_formats()
     assert state.asking is None
 

@@ -413,9 +413,9 @@ def test_a_removed_scene_ends_the_capture(live):
 @pytest.mark.parametrize(
     ("source", "value", "says"),
     [
-        ("CAMERA", "front", "is no camera"),
-        ("CAMERA", "rtsp://a/b", "is no camera"),
-        ("CAMERA", "/dev/video0/../sda", "is no camera"),
+        ("CAMERA", "front", "is not a camera"),
+        ("CAMERA", "rtsp://a/b", "is not a camera"),
+        ("CAMERA", "/dev/video0/../sda", "is not a camera"),
         ("STREAM", "", "no stream is given"),
         ("FILE", "", "no video is chosen"),
     ],

@@ -104,6 +104,6 @@ def test_a_face_that_is_cleared_is_not_moved(settings):
 def test_a_map_that_cannot_be_used_changes_nothing(settings):
     bpy.ops.scope.guess_expressions()
     settings.face_pairs[0].expression = "grin"
-    with pytest.raises(RuntimeError, match="'grin', which is no expression"):
+    with pytest.raises(RuntimeError, match="'grin', which is not an expression"):
         bpy.ops.scope.retarget()
     assert settings.rig.animation_data is None

@@ -112,7 +112,7 @@ def test_what_could_not_be_loaded_again_is_not_saved(settings, tmp_path):
         bpy.ops.scope.save_expression_map(filepath=str(path))
     bpy.ops.scope.guess_expressions()
     settings.face_pairs[0].expression = "grin"
-    with pytest.raises(RuntimeError, match="'grin', which is no expression"):
+    with pytest.raises(RuntimeError, match="'grin', which is not an expression"):
         bpy.ops.scope.save_expression_map(filepath=str(path))
     assert not path.exists()
 

@@ -56,7 +56,7 @@ def is_picture(path: Path) -> bool:
         return True
     with utf8_name(path) as name:
         if head.startswith(_OPENEXR) or cv2.haveImageReader(name):
-            raise VideoError(f"{path} is an image in a format that is not read here; export it as PNG, TIFF or JPEG")
+            raise VideoError(f"{path} is an image in a format that is not supported; export it as PNG, TIFF or JPEG")
     return False
 
 

@@ -79,7 +79,7 @@ def test_other_formats_are_refused_with_advice(tmp_path: Path, suffix: str) -> N
         path.write_bytes(b"v/1\x01" + bytes(99))
     else:
         cv2.imwrite(str(path), GREY.astype(np.float32 if suffix in (".hdr", ".pfm") else np.uint8))
-    with pytest.raises(VideoError, match=rf"render\{suffix} is an image in a format that is not read here; .*PNG"):
+    with pytest.raises(VideoError, match=rf"render\{suffix} is an image in a format that is not supported; .*PNG"):
         open_video(path)
     for k in (1, 2):  # whatever the name
         (tmp_path / f"a_{k}.png").write_bytes(path.read_bytes())
