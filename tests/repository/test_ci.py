@@ -16,6 +16,7 @@ import pytest
 from ..required import package
 
 ROOT = Path(__file__).resolve().parents[2]
+AFTER_THE_BUILD = {"fuzz", "matrix", "browser"}  # what takes minutes otherwise, so that the build has begun
 PREPARES = {"./scripts/setup", "./scripts/debian"}  # which the others call where they need it
 
 
@@ -35,7 +36,8 @@ def run_locally(folder: Path, *failing: str) -> subprocess.CompletedProcess[str]
         (folder / "scripts").mkdir(exist_ok=True)
         script = folder / name
         status = 3 if script.name in failing else 0
-        script.write_text(f'#!/bin/sh\necho "$0 $*," && exit {status}\n')
+        waits = "until test -s build/build.log; do sleep 0.05; done; " if script.name in AFTER_THE_BUILD else ""
+        script.write_text(f'#!/bin/sh\n{waits}echo "$0 $*," && exit {status}\n')
         script.chmod(0o755)
     (folder / ".ci").mkdir()
     shutil.copy2(ROOT / ".ci" / "run", folder / ".ci" / "run")
