@@ -122,7 +122,7 @@ def report_page(folder: Path, done: Run, curves: Curves) -> str:
         page.stage(len(rows), motion.image_size.tolist()),
         page.strip(pictures, captions),
         page.section("The capture above", *over_time([motion]), figures_table([motion], body)),
-        *(capture_section(folder, *each, body, why.get(each[0], "")) for each in done.captured if not each[2].status),
+        *(capture_section(folder, *each, body, why.get(each[0], "")) for each in done.captured),
         *(outcome_section(each, curves) for each in done.measured),
         page.section(
             "Commands", page.command_line("\n".join(each.command.text for each in done.everything)), note=note
@@ -161,8 +161,14 @@ def motions_of(folder: Path, name: str) -> list[Motion]:
 def capture_section(folder: Path, name: str, video: Path, outcome: Outcome, body: Body, why: str = "") -> page.Markup:
     """Return the section of a captured clip: figures, strips of footage, overlay and side view, and its failures.
 
+    Of a clip that could not be captured, it says what the capture said.
+
     :param why: it is shown, in a sentence.
     """
+    if outcome.status:
+        said = outcome.said.strip().splitlines()[-1:] or ["It said nothing."]
+        note = f"{why} The capture ended with status {outcome.status}.".strip()
+        return page.section(f"Clip {name}", page.command_line(outcome.command.text), page.paragraph(said[0]), note=note)
     motions, report, truth = motions_of(folder, name), outcome.figures, truth_of(video)
     shown = {
         "People": str(len(motions)),

@@ -4,18 +4,21 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from html import escape
 from itertools import groupby
 
+import cv2
 import numpy as np
 
 from ...scope_addon.report import page
 from ...scope_addon.report.page import Markup
 from ...scope_addon.report.plots import Axis, Curve, line_plot
+from ..frames import CACHE
 from ..perception.accuracy import SHOWN
 from .commands import Outcome
 from .curves import Curves
+from .failures import captioned
 from .paper import convergence_plot, stated_table
 
 BODIES = ((23, "SMPL"), (51, "SMPL+H"))  # number of joints of ours, and whose skeleton has as many
@@ -23,16 +26,17 @@ PAPER = (
     "The curves of the solver's paper (figures 5 to 7) are not drawn beside these: they are pictures, of which no data "
     "were found, and were not digitized. Whoever has digitized them can give them as a table with --curves."
 )
+_PICTURE = re.compile(r"^\S+\.jpg: .*\n?", re.MULTILINE)  # that a benchmark has written and says so
 _RULE = re.compile(r"\|(\s*:?-+:?\s*\|)+")
 
 
 def printed_parts(text: str) -> list[Markup]:
     """Return Markdown tables as tables and everything else as paragraphs, in their order.
 
-    In the first column, the keys of the evaluation are replaced by its headings.
+    In the first column, the keys of the evaluation are replaced by its headings. Lines about pictures are left out.
     """
     parts: list[Markup] = []
-    for block in re.split(r"\n\s*\n", text.strip()):
+    for block in re.split(r"\n\s*\n", _PICTURE.sub("", text).strip()):
         for is_table, group in groupby(block.splitlines(), lambda line: line.startswith("|")):
             lines = list(group)
             if is_table and len(lines) > 1 and _RULE.fullmatch(lines[1]):
@@ -64,8 +68,19 @@ def plots(outcome: Outcome, curves: Curves) -> list[Markup]:
     if clip := figures.get("clip"):
         parts.append(clip_plot(clip))
     if figures and outcome.command.arguments[:1] == ("smplify",):
-        parts.append(time_against_accuracy(figures))
+        parts += [time_against_accuracy(figures), smplify_pictures(figures)]
     return parts
+
+
+def smplify_pictures(figures: Iterable[str]) -> Markup:
+    """Return the pictures that ``bench smplify`` has made of its clips, as far as they are there."""
+    pictures = []
+    for clip in figures:
+        image = cv2.imread(str(CACHE / f"smplify_{clip}.jpg"))
+        if image is not None:
+            pictures.append((np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), np.uint8), clip))
+    note = "Footage; SMPLify's body over it and turned by 90 degrees; Scope's body over it and turned by 90 degrees."
+    return captioned(pictures, note) if pictures else Markup("")
 
 
 def time_against_accuracy(figures: dict[str, dict[str, dict[str, float]]]) -> Markup:
@@ -75,7 +90,7 @@ def time_against_accuracy(figures: dict[str, dict[str, dict[str, float]]]) -> Ma
     for n, method in enumerate(methods):
         rows = sorted((clip[method]["ms"], clip[method]["mpjpe_root"]) for clip in figures.values() if method in clip)
         x, y = np.array(rows, float).T
-        curves.append(Curve(x, y, page.person_color(n), method, with_points=True))
+        curves.append(Curve(x, y, page.person_color(n), method, with_points=True, with_line=False))
     x = np.concatenate([curve.x for curve in curves])
     y = np.concatenate([curve.y for curve in curves])
     x_axis = Axis(float(x.min()) / 1.3, float(x.max()) * 1.3, logarithmic=True, unit="ms")

@@ -57,13 +57,17 @@ class Axis:
 
 @dataclass(frozen=True)
 class Curve:
-    """y (n,) over x (n,), drawn in a colour of CSS; where y is not finite, the curve has a gap."""
+    """y (n,) over x (n,), drawn in a colour of CSS; where y is not finite, the curve has a gap.
+
+    ``with_line``: whether neighbouring points are connected.
+    """
 
     x: Array
     y: Array
     color: str
     name: str = ""
     with_points: bool = False
+    with_line: bool = True
 
 
 @dataclass(frozen=True)
@@ -169,7 +173,8 @@ def thinned(x: Array, y: Array) -> tuple[Array, Array]:
 
 def _drawn(curve: Curve, x_axis: Axis, y_axis: Axis) -> str:
     name = f"<title>{escape(curve.name)}</title>" if curve.name else ""
-    path = f'<path class="curve" d="{line_path(curve.x, curve.y, x_axis, y_axis)}" stroke="{curve.color}">{name}</path>'
+    line = line_path(curve.x, curve.y, x_axis, y_axis)
+    path = f'<path class="curve" d="{line}" stroke="{curve.color}">{name}</path>' if curve.with_line else ""
     if not curve.with_points:
         return path
     dots = [line_path(np.array([a]), np.array([b]), x_axis, y_axis) for a, b in zip(curve.x, curve.y, strict=True)]

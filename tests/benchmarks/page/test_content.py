@@ -6,8 +6,11 @@ from __future__ import annotations
 import math
 import re
 
+import cv2
+import numpy as np
 import pytest
 from scope.benchmarks import report
+from scope.benchmarks.page import content
 from scope.benchmarks.page.commands import Command, Outcome
 from scope.benchmarks.page.content import experiment_plots, outcome_section, printed_parts, time_against_accuracy
 
@@ -67,6 +70,19 @@ def test_time_and_accuracy_of_a_method_are_a_point_for_each_clip():
     assert points(scope) == pytest.approx([at(4), 100 - 25 * height, at(4), 100 - 50 * height], abs=0.06)
     outcome = Outcome(Command("SMPLify", "bench", ("smplify",)), "", "", figures, 1.0, 0)
     assert drawn in outcome_section(outcome)
+
+
+def test_clips_are_not_connected_and_their_pictures_are_shown(tmp_path, monkeypatch):
+    monkeypatch.setattr(content, "CACHE", tmp_path)
+    cv2.imwrite(str(tmp_path / "smplify_b.jpg"), np.full((40, 60, 3), 200, np.uint8))
+    figures = {clip: {"Scope": {"mpjpe_root": 50.0, "ms": ms}} for clip, ms in (("a", 3.0), ("b", 5.0))}
+    printed = "/somewhere/smplify_b.jpg: 60 x 40, 1 kB, quality 34\n" + report.table(("b", "mm"), [("Scope", 50.0)])
+    section = outcome_section(Outcome(Command("SMPLify", "bench", ("smplify",)), printed, "", figures, 1.0, 0))
+    assert 'class="curve"' not in section
+    assert 'class="points"' in section
+    assert re.findall(r'width="60" height="40" alt="b"><figcaption>([^<]*)<', section) == ["b"]
+    assert "somewhere" not in section
+    assert cells(section)[-1] == ["Scope", "50"]
 
 
 def test_a_command_that_failed_says_so():

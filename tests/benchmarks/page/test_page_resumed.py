@@ -56,3 +56,11 @@ def test_without_an_earlier_run_there_is_nothing_to_go_on_with(done):
     with pytest.raises(InputError, match="holds no run"):
         module.measure(False, resume=True)
     assert done == []
+
+
+def test_a_clip_that_could_not_be_captured_says_why(body, tmp_path):
+    outcome = Outcome(Command("b.mp4", "capture", ("b.mp4",)), "", "first\nnobody <was> found\n", {}, 1.0, 3)
+    section = module.capture_section(tmp_path, "b", Path("b.mp4"), outcome, body)
+    assert "The capture ended with status 3." in section
+    assert "nobody &lt;was&gt; found" in section
+    assert "./scripts/capture b.mp4" in section
