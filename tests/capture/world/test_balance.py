@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Balance: bodies that lean away from the camera, some of which may."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scope.scope_addon.capture.world.balance import balancing_rotations, center_of_mass
@@ -73,6 +75,14 @@ def test_a_body_out_of_balance_is_rotated_back_over_the_feet(lean):
     turned = pivot + np.einsum("tij,tj->ti", turn, center_of_mass(placed.body, placed.joints) - pivot)
     before, after = ((c - pivot)[T // 2] @ AWAY for c in (center_of_mass(placed.body, placed.joints), turned))
     assert abs(after) < 0.75 * abs(before)
+
+
+@pytest.mark.parametrize("lean", [-20.0, 20.0])
+def test_a_camera_within_a_metre_sees_the_same_lean(lean):
+    placed = standing(lean)
+    near = replace(placed, center=np.tile([0.0, 0.0, 3.5], (T, 1)))
+    turns = [balancing_rotations(each, FEET, UP)[0] for each in (placed, near)]
+    np.testing.assert_allclose(turned_deg(turns[1]), turned_deg(turns[0]), rtol=0.01)
 
 
 def test_an_upright_body_is_not_rotated():
