@@ -271,7 +271,8 @@ def check(archive: Path, target: Target) -> None:
     networks += ("palm_detection", "hand_landmark", "face_landmark", "face_expression")
     wanted = [f"assets/networks/{n}.onnx" for n in networks]
     wanted += ["assets/networks/LICENSE-mediapipe.txt", "assets/body/scope.npz", "assets/body/scope_h.npz"]
-    wanted += ["assets/body/expressions.npz", "assets/body/growth.npz", "assets/face/response.npz"]
+    wanted += ["assets/body/expressions.npz", "assets/body/growth.npz", "assets/body/mouth.npz"]
+    wanted += ["assets/face/response.npz"]
     wanted += [f"assets/face/controls/{rig}.json" for rig in ("rigify", "rigify_skin", "mpfb")]
     wanted += ["assets/lifter/lifter.onnx", "assets/prior/joint_prior.npz", "assets/sample/sample.mp4"]
     wanted += [f"assets/{folder}/LICENSE.md" for folder in ("body", "lifter", "sample")]

@@ -17,6 +17,7 @@ from ...solver.body import Body
 from ...solver.errors import ModelFileError
 from ...solver.loaders.body_file import BUILT_IN
 from ...solver.loaders.npz import read_npz
+from .mouth import read_mouth, with_teeth_and_tongue
 
 FILE = Path(BUILT_IN["scope"]).with_name("expressions.npz")
 
@@ -38,7 +39,18 @@ def expressions_of(body: Body) -> tuple[Expression, ...]:
     if body.name not in BUILT_IN or body.file:
         return ()
     count, found, _ = _read()
-    return found if count == len(body.v_template) else ()
+    if len(body.v_template) == count:
+        return found
+    return _with_mouth() if len(body.v_template) == count + len(read_mouth().vertices) else ()
+
+
+def body_with_mouth(body: Body) -> Body:
+    """Return the body as its face is shown: with teeth and tongue, whose vertices come last, where it has expressions.
+
+    :raises ModelFileError: one of the files is damaged.
+    """
+    plain = bool(expressions_of(body)) and len(body.v_template) == _read()[0]
+    return with_teeth_and_tongue(body) if plain else body
 
 
 def mouth_faces_of(body: Body) -> NDArray[np.intp]:
@@ -47,6 +59,16 @@ def mouth_faces_of(body: Body) -> NDArray[np.intp]:
     :raises ModelFileError: the file of the expressions is damaged.
     """
     return _read()[2] if expressions_of(body) else np.zeros(0, np.intp)
+
+
+@cache
+def _with_mouth() -> tuple[Expression, ...]:
+    count, found, _ = _read()
+    joined = zip(found, read_mouth().moves, strict=True)
+    return tuple(
+        Expression(e.name, np.concatenate([e.vertices, count + vertices]), np.concatenate([e.offsets, offsets]))
+        for e, (vertices, offsets) in joined
+    )
 
 
 @cache

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ...solver.body import Body
 from ..errors import MotionFileError, UsageError
 from ..footage import display_text
-from ..kinematics.expressions import expressions_of
+from ..kinematics.expressions import body_with_mouth, expressions_of
 from ..kinematics.foot_skin import under_floor
 from ..motion import Motion
 from . import camera
@@ -185,10 +185,11 @@ def _build_person(
     rest = armature.rest_pose(body, motion.betas)
     rig = armature.build_armature(label, body, rest, collection)
     baked = options.shape == "baked"
-    vertices = body_mesh.rest_vertices_world(body, rest.lift, motion.betas if baked else None)
-    mesh = body_mesh.build_mesh(f"{label}_body", body, vertices, collection)
+    drawn = body_with_mouth(body) if motion.face else body
+    vertices = body_mesh.rest_vertices_world(drawn, rest.lift, motion.betas if baked else None)
+    mesh = body_mesh.build_mesh(f"{label}_body", drawn, vertices, collection)
     frames = timing.key_frames(motion.timestamps, rate, options.start_frame)
-    shaped = vertices if baked else body_mesh.rest_vertices_world(body, rest.lift, motion.betas)
+    shaped = body_mesh.rest_vertices_world(body, rest.lift, motion.betas)
     bone_display.show_bones(rig, body, rest, shaped)
     action = bpy.data.actions.new(label)
     action.use_fake_user = True  # kept in the file when the armature gets another action or NLA strips
@@ -199,12 +200,12 @@ def _build_person(
         rig["scope_resampled"] = True  # smoothing again resamples too
     of_keys = None
     if not baked and body.P:
-        shape_keys.add_shape_keys(mesh, body, motion.betas)
+        shape_keys.add_shape_keys(mesh, drawn, motion.betas)
         of_keys = shape_keys.key_shape(mesh, action, motion.betas, frames, per_frame=options.shape == "per_frame")
-    if motion.face and expression_keys.add_expression_keys(mesh, body):
+    if motion.face and expression_keys.add_expression_keys(mesh, drawn):
         of_keys = of_keys or Channels(mesh.data.shape_keys, action)
         expression_keys.key_expressions(mesh, of_keys, motion, frames, options.frame_rate == "resample")
-    body_mesh.skin_to_armature(mesh, rig, body)
+    body_mesh.skin_to_armature(mesh, rig, drawn)
     rig["scope_source"] = motion.source
     rig["scope_body"] = body.name
     rig["scope_body_file"] = body.file

@@ -21,6 +21,7 @@ DATA = {
     "scope/assets/body/README.md",
     "scope/assets/body/expressions.npz",
     "scope/assets/body/growth.npz",
+    "scope/assets/body/mouth.npz",
     "scope/assets/body/scope.npz",
     "scope/assets/body/scope_h.npz",
     "scope/assets/face/controls/mpfb.json",

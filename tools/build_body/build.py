@@ -66,11 +66,8 @@ def shape_mesh(downloads: Path = DOWNLOADS, surveyed: bool = False) -> ShapedMes
 def rig_body(shaped: ShapedMesh, skeleton: Skeleton) -> dict[str, NDArray[Any]]:
     """Place the joints, weight the skin, turn everything into the T-pose; the arrays of the body file."""
     source, mesh, basis = shaped.source, shaped.mesh, shaped.basis
-    J = skeleton.regressor @ basis
-    index, little = (basis[0, source.cubes[f"l-finger-{k}-1"]].mean(axis=0) for k in (2, 5))
-    R = part_rotations(skeleton, J[0], index - little)
+    J, posed_J, R = rest_joints(shaped, skeleton)
     W = skin_weights(source, mesh, skeleton, basis[0])
-    posed_J = pose_joints(skeleton, R, J)
     vertices = pose_vertices(skeleton, R, W, J, posed_J, basis[:, mesh.kept])
     keypoints = make_keypoints(source, skeleton)
     points = pose_keypoints(keypoints, R, J, posed_J, basis)
@@ -95,6 +92,17 @@ def rig_body(shaped: ShapedMesh, skeleton: Skeleton) -> dict[str, NDArray[Any]]:
         **_shaped("keypoint_template", "keypoint_shapedirs", points),
         "license": np.array(LICENSE),
     }
+
+
+def rest_joints(
+    shaped: ShapedMesh, skeleton: Skeleton
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return the joints (1 + P, K+1, 3) in the source pose and in the T-pose, and each part's rotation (K+1, 3, 3)."""
+    source, basis = shaped.source, shaped.basis
+    J = skeleton.regressor @ basis
+    index, little = (basis[0, source.cubes[f"l-finger-{k}-1"]].mean(axis=0) for k in (2, 5))
+    R = part_rotations(skeleton, J[0], index - little)
+    return J, pose_joints(skeleton, R, J), R
 
 
 def _shaped(template: str, shapedirs: str, basis: NDArray[np.float64]) -> dict[str, NDArray[Any]]:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scope_addon.capture.perception.face.expression_network import EXPRESSION_POINTS, ExpressionNetwork
+from ...scope_addon.capture.perception.face.eye_light import eye_light
 from ...scope_addon.capture.perception.face.face_landmarks import FaceNetwork
 from ...scope_addon.capture.perception.region import Region
 from ..render_faces.truth import FOLDER, SIZE
@@ -68,6 +69,6 @@ def _observe(folder: Path, count: int, scale: float, out: Path) -> None:
             region = estimate.next_region
         landmarks = estimate.landmarks / scale
         expression = expressions.estimate(estimate.landmarks[EXPRESSION_POINTS, :2])
-        rows.append((landmarks.astype(np.float32), estimate.presence, expression, estimate.eye_light))
+        rows.append((landmarks.astype(np.float32), estimate.presence, expression, eye_light(rgb, estimate.landmarks)))
     landmarks, presence, weights, light = (np.array(column) for column in zip(*rows, strict=True))
     np.savez(out, landmarks=landmarks, presence=presence, weights=weights, eye_light=light)

@@ -14,7 +14,7 @@ from ...scope_addon.capture.media.video import open_video
 from ...scope_addon.errors import OutputError
 from ...scope_addon.motion import Motion
 from ...solver import Body
-from .clips import SAMPLE, body_with_fingers, captured, captured_in_total, default_body, talk
+from .clips import SAMPLE, body_with_face, captured, captured_in_total, default_body, talk
 from .footage import cropped
 from .panel import OURS, Panel, next_to_each_other
 from .shapes import colors_with_face, joints, posed
@@ -52,7 +52,7 @@ def animation_frames(name: str) -> list[NDArray[np.uint8]]:
     """Return (H, W, 3) RGB frames of an animation: footage, overlay and side view next to each other."""
     if name == "sample":
         return _frames(SAMPLE, captured(SAMPLE)[0], None, CUTS[name])
-    return _frames(talk(), captured_in_total(talk()), body_with_fingers(), CUTS[name])
+    return _frames(talk(), captured_in_total(talk()), body_with_face(), CUTS[name])
 
 
 def _frames(clip: Path, motion: Motion, body: Body | None, cut: Cut) -> list[NDArray[np.uint8]]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ...scope_addon.capture.options import CaptureOptions
 from ...scope_addon.capture.pipeline import capture
+from ...scope_addon.kinematics.expressions import body_with_mouth
 from ...scope_addon.motion import Motion
 from ...solver import Body, load_body
 from ...solver.loaders.body_file import ASSETS
@@ -36,6 +37,12 @@ def default_body() -> Body:
 def body_with_fingers() -> Body:
     """Load Scope's own body with fingers."""
     return load_body("scope_h")
+
+
+@cache
+def body_with_face() -> Body:
+    """Load the body with fingers as its face is shown, with teeth and tongue."""
+    return body_with_mouth(load_body("scope_h"))
 
 
 @cache

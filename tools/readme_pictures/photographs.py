@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ...scope_addon.capture.overlay.overlay_video import draw_overlay
 from ...scope_addon.motion import Motion
 from ..pinned_wheel import DOWNLOADS, PinnedWheel
-from .clips import body_with_fingers, captured_in_total
+from .clips import body_with_face, captured_in_total
 from .panel import FINER, GROUND, OURS, next_to_each_other
 from .shapes import colors_with_face, posed_in_camera
 
@@ -114,7 +114,7 @@ def _enlarged(image: NDArray[np.uint8], part: NDArray[np.float64]) -> NDArray[np
 
 def _head(motion: Motion, part: NDArray[np.float64]) -> NDArray[np.uint8]:
     """Draw the body at the photograph's moment in the same part of its camera's view."""
-    body = body_with_fingers()
+    body = body_with_face()
     blank = np.full((FINER * _SIZE[1], FINER * _SIZE[0], 3), GROUND, np.uint8)
     vertices, colors = posed_in_camera(motion, body, 0), colors_with_face(body, OURS)
     return draw_overlay(blank, vertices, body.faces, part @ motion.intrinsics, colors=colors, opacity=1)

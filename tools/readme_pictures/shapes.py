@@ -23,7 +23,10 @@ STICKS = (
 )  # fmt: skip
 HIPS = (1, 2)  # SMPL's joints
 _SIDES = 12  # of a stick
-_EYES = {"eye_white": (0.93, 0.95, 0.98), "eye_iris": (0.13, 0.20, 0.33), "eye_pupil": (0.05, 0.07, 0.12)}
+_OWN = {  # colours of materials
+    "eye_white": (0.93, 0.95, 0.98), "eye_iris": (0.13, 0.20, 0.33), "eye_pupil": (0.05, 0.07, 0.12),
+    "teeth": (0.70, 0.78, 0.89), "gums": (0.16, 0.25, 0.42), "tongue": (0.20, 0.32, 0.53),
+}  # fmt: skip
 
 
 def posed(motion: Motion, body: Body, row: int) -> NDArray[np.float64]:
@@ -42,8 +45,8 @@ def colors_with_face(body: Body, color: tuple[float, ...]) -> NDArray[np.float64
     out = np.tile(color, (len(body.faces), 1))
     assert body.face_material is not None  # the built-in bodies have materials
     for number, name in enumerate(body.material_names):
-        if name in _EYES:
-            out[body.face_material == number] = _EYES[name]
+        if name in _OWN:
+            out[body.face_material == number] = _OWN[name]
     out[mouth_faces_of(body)] = 0.3 * np.array(color)
     return out
 

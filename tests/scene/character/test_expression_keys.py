@@ -76,6 +76,73 @@ def test_a_body_without_expressions_says_so(body, make_motion):
     assert built.people[0].mesh.data.shape_keys.key_blocks.keys()[-1] == f"Shape{body.P - 1:03d}"
 
 
+def test_teeth_and_tongue_come_with_the_face(whole_body, motion, make_motion):
+    """As vertices after the body's, which deform with the head, in materials of their own."""
+    mesh = build_scene([motion], whole_body, options=NEW_SCENE).people[0].mesh
+    plain = build_scene([make_motion(whole_body, 4)], whole_body, options=NEW_SCENE).people[0].mesh
+    assert len(plain.data.vertices) == len(whole_body.v_template)
+    assert not {"teeth", "gums", "tongue"} & {m.name.partition(".")[0] for m in plain.data.materials}
+    slots = [m.name.partition(".")[0] for m in mesh.data.materials]
+    inside = [p for p in mesh.data.polygons if slots[p.material_index] in ("teeth", "gums", "tongue")]
+    vertices = {v for polygon in inside for v in polygon.vertices}
+    assert vertices == set(range(len(plain.data.vertices), len(mesh.data.vertices)))
+    head = mesh.vertex_groups["head"].index
+    for v in vertices:
+        assert [(g.group, g.weight) for g in mesh.data.vertices[v].groups] == [(head, 1.0)]
+    for name, before in plain.data.shape_keys.key_blocks.items():  # the body's own vertices are the same
+        same = mesh.data.shape_keys.key_blocks[name].data
+        assert all(same[v].co == before.data[v].co for v in range(0, len(plain.data.vertices), 97))
+
+
+def primitive_of(path: Path, material: str) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """The positions (n, 3) of a .glb's triangles of a material, and how far each target moves them; without Blender."""
+    data = path.read_bytes()
+    length = struct.unpack("<I", data[12:16])[0]
+    gltf, binary = json.loads(data[20 : 20 + length]), data[28 + length :]
+
+    def floats(index: int) -> np.ndarray:
+        accessor = gltf["accessors"][index]
+        assert (accessor["componentType"], accessor["type"]) == (5126, "VEC3")
+        values = np.zeros((accessor["count"], 3), np.float32)
+        if "bufferView" in accessor:
+            view = gltf["bufferViews"][accessor["bufferView"]]
+            start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
+            values[:] = np.frombuffer(binary, "<f4", values.size, start).reshape(-1, 3)
+        if "sparse" in accessor:
+            sparse = accessor["sparse"]
+            kind = {5121: "<u1", 5123: "<u2", 5125: "<u4"}[sparse["indices"]["componentType"]]
+            starts = [
+                gltf["bufferViews"][sparse[key]["bufferView"]].get("byteOffset", 0) + sparse[key].get("byteOffset", 0)
+                for key in ("indices", "values")
+            ]
+            rows = np.frombuffer(binary, kind, sparse["count"], starts[0])
+            values[rows] = np.frombuffer(binary, "<f4", 3 * sparse["count"], starts[1]).reshape(-1, 3)
+        return values
+
+    (mesh,) = [m for m in gltf["meshes"] if "extras" in m]
+    names = [m["name"] for m in gltf["materials"]]
+    (found,) = [p for p in mesh["primitives"] if names[p["material"]] == material]
+    targets = [floats(t["POSITION"]) for t in found["targets"]]
+    return floats(found["attributes"]["POSITION"]), dict(zip(mesh["extras"]["targetNames"], targets, strict=True))
+
+
+def test_a_glb_has_teeth_and_a_tongue_that_the_jaw_moves(whole_body, motion, tmp_path):
+    """As the source's targets say: at most 31 mm for the lower teeth, 28 mm for the tongue, 27 mm for its own key."""
+    path = tmp_path / "talk.glb"
+    export_motions([motion], whole_body, path)
+    teeth, tongue = (primitive_of(path, material) for material in ("teeth", "tongue"))
+    at, opened = teeth[0], np.linalg.norm(teeth[1]["jawOpen"], axis=1)
+    lower = opened > 0
+    assert 0.4 < lower.mean() < 0.6
+    assert at[lower, 1].mean() < at[~lower, 1].mean() - 0.005
+    assert 0.025 < opened.max() <= 0.0316
+    assert np.linalg.norm(tongue[1]["jawOpen"], axis=1).max() == pytest.approx(0.0281, abs=2e-4)
+    assert np.linalg.norm(tongue[1]["tongueOut"], axis=1).max() == pytest.approx(0.0275, abs=2e-4)
+    assert not teeth[1]["tongueOut"].any()
+    assert not teeth[1]["mouthSmileLeft"].any()
+    assert teeth[1]["Shape000"].any()
+
+
 def morph_animation(path: Path) -> dict[str, np.ndarray]:
     """The (T,) animated weights of a .glb by target, read without Blender: the file is JSON and float32 arrays."""
     data = path.read_bytes()

@@ -27,12 +27,17 @@ def build_growth(shaped: ShapedMesh, targets: SurveyTargets) -> dict[str, NDArra
 
     :param targets: of all ages.
     """
-    child = smooth_nipples(shaped.source, mean_child(shaped.source, targets, YEARS)[None])
-    child = smooth_perineum(shaped.mesh, np.concatenate([shaped.basis[:1], child]))[1:]
-    grown = ShapedMesh(shaped.source, shaped.mesh, np.concatenate([shaped.basis, shaped.basis[:1] - child]))
+    grown = with_growth(shaped, targets)
     columns: dict[str, NDArray[Any]] = {}
     for with_hands in (False, True):
         skeleton = make_skeleton(shaped.source, with_hands)
         arrays = rig_body(grown, skeleton)
         columns |= {f"{skeleton.name}/{key}": arrays[key][..., -1] for key in KEYS}
     return columns
+
+
+def with_growth(shaped: ShapedMesh, targets: SurveyTargets) -> ShapedMesh:
+    """Return the mesh with one more component, by which the child follows from the adult."""
+    child = smooth_nipples(shaped.source, mean_child(shaped.source, targets, YEARS)[None])
+    child = smooth_perineum(shaped.mesh, np.concatenate([shaped.basis[:1], child]))[1:]
+    return ShapedMesh(shaped.source, shaped.mesh, np.concatenate([shaped.basis, shaped.basis[:1] - child]))

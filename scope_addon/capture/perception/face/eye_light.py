@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,32 +28,36 @@ def eye_light(image_rgb: NDArray[np.uint8], landmarks: NDArray[np.float64]) -> f
     :param landmarks: (478, 2) or (478, 3) pixels; a third column is not used.
     """
     found = []
-    for corners, *places in zip(_EYES, _CHEEKS, _FOREHEAD, strict=True):
-        a, b = landmarks[list(corners), :2]
-        width = float(np.linalg.norm(a - b))
+    for (first, second), *places in zip(_EYES, _CHEEKS, _FOREHEAD, strict=True):
+        (ax, ay), (bx, by) = landmarks[[first, second], :2].tolist()
+        width = math.hypot(ax - bx, ay - by)
         if width < _LEAST_PX:
             continue
-        eye = _brightness(image_rgb, (a + b) / 2, _HALF * width)
-        spots = [[_brightness(image_rgb, landmarks[k, :2], _SPOT * width) for k in place] for place in places]
-        skin = min(_middle(np.array(place)) for place in spots)
-        if np.isfinite([eye, skin]).all() and skin > _DARK:
+        eye = _brightness(image_rgb, (ax + bx) / 2, (ay + by) / 2, _HALF * width)
+        half = _SPOT * width
+        spots = [[_brightness(image_rgb, x, y, half) for x, y in landmarks[list(k), :2].tolist()] for k in places]
+        skin = min(_middle(place) for place in spots)
+        if not math.isnan(eye) and skin > _DARK:
             found.append(eye / skin)
     return max(found, default=1.0)
 
 
-def _brightness(image: NDArray[np.uint8], center: NDArray[np.float64], half: float) -> float:
+def _brightness(image: NDArray[np.uint8], x: float, y: float, half: float) -> float:
     """Return the median of green in a square around a point; NaN outside the image."""
-    (left, top), (right, bottom) = np.floor(center - half), np.ceil(center + half) + 1
+    left, top = math.floor(x - half), math.floor(y - half)
+    right, bottom = math.ceil(x + half) + 1, math.ceil(y + half) + 1
     height, width = image.shape[:2]
-    rows, columns = (slice(max(int(a), 0), max(int(b), 0)) for a, b in ((top, bottom), (left, right)))
-    part = image[rows, columns, 1] if top < height and left < width else image[:0, 0, 1]
-    return _middle(part.ravel()) if part.size else float("nan")
+    if top >= height or left >= width or bottom <= 0 or right <= 0:
+        return math.nan
+    part = image[max(top, 0) : bottom, max(left, 0) : right, 1]
+    low, high = (part.size - 1) // 2, part.size // 2
+    ordered = np.partition(part, (low, high), axis=None)
+    return (int(ordered[low]) + int(ordered[high])) / 2
 
 
-def _middle(values: NDArray[Any]) -> float:
-    """Return the median of values (n,), n > 0, NaN if one is; `np.median` takes four times as long for so few."""
-    low, high = (len(values) - 1) // 2, len(values) // 2
-    ordered = np.sort(values)  # NaN comes last
-    if ordered[-1] != ordered[-1]:
-        return float("nan")
-    return (float(ordered[low]) + float(ordered[high])) / 2
+def _middle(values: list[float]) -> float:
+    """Return the median of a few values, NaN if one is; `np.median` takes far longer for so few."""
+    if any(map(math.isnan, values)):
+        return math.nan
+    ordered = sorted(values)
+    return (ordered[(len(ordered) - 1) // 2] + ordered[len(ordered) // 2]) / 2

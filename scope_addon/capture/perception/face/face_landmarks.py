@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import cv2
@@ -13,7 +14,6 @@ from numpy.typing import NDArray
 from ..execution import Execution
 from ..region import Region
 from ..sessions import network_path, open_session
-from .eye_light import eye_light
 from .face_region import region_from_landmarks
 
 INPUT_SIZE = 256
@@ -25,7 +25,7 @@ class FaceEstimate:
     """The network's estimate for one region.
 
     ``landmarks`` (478, 3): image pixels, and depth in pixels in the region's axes, away from the camera; ``presence``:
-    probability that there is a face; ``region``: the input region; ``eye_light``: see `eye_light`.
+    probability that there is a face; ``region``: the input region; ``eye_light``: see `eye_light`; of faces only.
     """
 
     landmarks: NDArray[np.float64]
@@ -33,7 +33,7 @@ class FaceEstimate:
     region: Region
     eye_light: float = 1.0
 
-    @property
+    @cached_property
     def next_region(self) -> Region:
         """The region to look at in the next frame."""
         return region_from_landmarks(self.landmarks[:, :2])
@@ -60,5 +60,4 @@ class FaceNetwork:
             landmarks=placed,
             presence=float(1.0 / (1.0 + np.exp(-presence.item()))),
             region=region,
-            eye_light=eye_light(image_rgb, placed) if np.isfinite(placed).all() else 1.0,
         )

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ...perception.execution import Execution
 from ...perception.face.expression_network import ExpressionNetwork
+from ...perception.face.eye_light import eye_light
 from ...perception.face.face_landmarks import FaceEstimate, FaceNetwork
 from ...perception.face.face_record import record
 from ...perception.face.face_region import HEAD, facing, region_from_body
@@ -83,6 +84,7 @@ class FaceTracker:
             face.region, face.head_px = (estimate.next_region if estimate else None), head
             if estimate:
                 face.seen_s = time_s
+                estimate = replace(estimate, eye_light=eye_light(image_rgb, estimate.landmarks))
             self._faces[number] = face
             found.append((number, replace(person, face=record(estimate))))
         return found

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
+from scope.scope_addon.capture.perception.face.eye_light import eye_light
 from scope.scope_addon.capture.perception.face.face_landmarks import FACE_POINTS, FaceEstimate
-from scope.scope_addon.capture.perception.face.face_record import parts
+from scope.scope_addon.capture.perception.face.face_record import eye_light_of, parts
 from scope.scope_addon.capture.perception.face.face_region import region_from_body
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.observation import Observation
@@ -85,6 +86,17 @@ def test_a_face_is_found_and_then_followed_with_one_run_of_the_network(tracker):
     tracker._network.faces = [(*middle(360, 200), 92.0)]  # farther than it would be seen from where it was
     assert face_of(tracker, {7: person(360, 200)}, 1 / 30)[7][0][0] > 0
     assert tracker._network.calls == 3
+
+
+def test_a_face_has_the_light_around_its_eyes(tracker):
+    x, y = middle(300, 200)
+    tracker._network.faces = [(x, y, 92.0)]
+    landmarks = 92.0 * SHAPE[:, :2] + [x, y]
+    image = np.random.default_rng(3).integers(100, 200, IMAGE.shape, np.uint8)
+    ((_, seen),) = tracker.step(image, [(1, person(300, 200))], 0.0)
+    (light,) = eye_light_of(seen.face[None])
+    assert light == eye_light(image, landmarks)
+    assert light != 1  # which it is where nothing is known
 
 
 def test_there_is_nothing_where_no_face_is(tracker):

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Teeth and tongue: after the body's own vertices, behind closed lips whatever the shape, and moved by the jaw."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scope.scope_addon.kinematics.expressions import body_with_mouth, expressions_of, mouth_faces_of
+from scope.solver.loaders.body_file import load_body
+
+from .test_expressions import by_name
+
+
+@pytest.fixture(scope="module", params=["scope", "scope_h", "scope_child_h"])
+def plain(request):
+    return load_body(request.param)
+
+
+@pytest.fixture(scope="module")
+def body(plain):
+    return body_with_mouth(plain)
+
+
+def vertices_of(body, *materials) -> np.ndarray:
+    slots = [body.material_names.index(name) for name in materials]
+    return np.unique(body.faces[np.isin(body.face_material, slots)])
+
+
+def moved(body, beta, **weights) -> np.ndarray:
+    """(V, 3) the body at rest with a shape and expressions."""
+    out = body.rest_vertices(beta).copy()
+    for name, weight in weights.items():
+        expression = by_name(body)[name]
+        out[expression.vertices] += weight * expression.offsets
+    return out
+
+
+def nearest_skin(body, vertices: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """The largest z of the skin outside the mouth at each point's x and y; -inf where there is none."""
+    own = np.setdiff1d(np.arange(body.faces.shape[0]), mouth_faces_of(body))
+    own = own[~np.isin(body.face_material[own], [body.material_names.index(n) for n in ("teeth", "gums", "tongue")])]
+    triangles = vertices[np.concatenate([body.faces[own][:, [0, 1, 2]], body.faces[own][:, [0, 2, 3]]])]
+    points = points + [1e-6, 0.0, 0.0]  # off the edges in the middle
+    low, high = points.min(axis=0), points.max(axis=0)
+    beside = (triangles.max(axis=1) < low)[:, :2] | (triangles.min(axis=1) > high)[:, :2]
+    a, b, c = triangles[~beside.any(axis=1)].transpose(1, 0, 2)
+    out = np.full(len(points), -np.inf)
+    for i, point in enumerate(points):
+        p, q, r = (each[:, :2] - point[:2] for each in (a, b, c))
+        areas = np.stack([q[:, 0] * r[:, 1] - q[:, 1] * r[:, 0], r[:, 0] * p[:, 1] - r[:, 1] * p[:, 0]], axis=1)
+        areas = np.concatenate([areas, (p[:, :1] * q[:, 1:] - p[:, 1:] * q[:, :1])], axis=1)
+        inside = (areas > 0).all(axis=1) | (areas < 0).all(axis=1)
+        z = (areas * np.stack([a[:, 2], b[:, 2], c[:, 2]], axis=1)).sum(axis=1)[inside] / areas[inside].sum(axis=1)
+        out[i] = z.max(initial=-np.inf)
+    return out
+
+
+def test_the_body_keeps_its_vertices_faces_and_expressions(plain, body):
+    V, F, U = len(plain.v_template), len(plain.faces), len(plain.uv)
+    assert len(body.v_template) > V
+    for name, count in (("v_template", V), ("shapedirs", V), ("skin_joints", V), ("skin_weights", V), ("uv", U)):
+        np.testing.assert_array_equal(getattr(body, name)[:count], getattr(plain, name))
+    for name in ("faces", "uv_faces", "face_material"):
+        np.testing.assert_array_equal(getattr(body, name)[:F], getattr(plain, name))
+    assert body.material_names == (*plain.material_names, "teeth", "gums", "tongue")
+    assert body.faces[F:].min() == V
+    np.testing.assert_array_equal(np.unique(body.faces[F:]), np.arange(V, len(body.v_template)))
+    assert body.uv_faces[F:].min() == U
+    for small, large in zip(expressions_of(plain), expressions_of(body), strict=True):
+        own = large.vertices < V
+        np.testing.assert_array_equal(large.vertices[own], small.vertices)
+        np.testing.assert_array_equal(large.offsets[own], small.offsets)
+    np.testing.assert_array_equal(mouth_faces_of(body), mouth_faces_of(plain))
+
+
+def test_other_bodies_and_one_that_has_it_already_stay_as_they_are(plain, body):
+    for each in (body, replace(plain, file="mine.npz"), replace(plain, name="smpl")):
+        assert body_with_mouth(each) is each
+
+
+def test_teeth_and_tongue_follow_the_head_alone(plain, body):
+    rng = np.random.default_rng(1)
+    rotations = np.tile(np.eye(3), (body.K + 1, 1, 1))
+    for i in range(body.K + 1):
+        rotations[i] = np.linalg.qr(np.eye(3) + 0.1 * rng.normal(size=(3, 3)))[0]
+        rotations[i] *= np.sign(np.diag(rotations[i]))
+    R, t = body.forward_kinematics(rotations, np.array([0.3, 0.1, -0.2]))
+    head = body.joint_names.index("head")
+    rest = body.v_template[len(plain.v_template) :] - body.J_template[head]
+    np.testing.assert_allclose(body.skin(R, t)[len(plain.v_template) :], rest @ R[head].T + t[head], atol=1e-9)
+
+
+def test_the_jaw_takes_the_lower_teeth_and_the_tongue(plain, body):
+    rest, teeth, tongue = body.v_template, vertices_of(body, "teeth"), vertices_of(body, "tongue")
+    opened = moved(body, None, jawOpen=1.0) - rest
+    lower = np.abs(opened[teeth]).max(axis=1) > 1e-9
+    assert lower.mean() == pytest.approx(0.5, abs=0.01)
+    front = teeth[rest[teeth, 2] > rest[teeth, 2].max() - 0.02]
+    assert opened[np.intersect1d(front, teeth[lower]), 1].max() < -0.015
+    assert rest[teeth[lower], 1].mean() < rest[teeth[~lower], 1].mean() - 0.005
+    assert opened[tongue, 1].min() < -0.015
+    for name, side in (("jawLeft", 1), ("jawRight", -1)):  # the person's left is +x
+        aside = moved(body, None, **{name: 1.0})[teeth[lower], 0] - rest[teeth[lower], 0]
+        np.testing.assert_allclose(aside, side * 0.008, atol=3e-3)
+    shown = moved(body, None, jawOpen=0.6, tongueOut=1.0)
+    assert shown[tongue, 2].max() > shown[teeth[lower], 2].max() + 0.005
+
+
+CLOSED: dict[str, dict[str, float]] = {
+    "at rest": {},
+    "smile": {"mouthSmileLeft": 1.0, "mouthSmileRight": 1.0},
+    "pucker": {"mouthPucker": 1.0},
+    "lips over an open jaw": {"jawOpen": 1.0, "mouthClose": 1.0},
+    "rolled lips": {"mouthRollLower": 1.0, "mouthRollUpper": 1.0},
+    "jaw to the left": {"jawLeft": 1.0},
+}
+
+
+@pytest.mark.parametrize("weights", CLOSED.values(), ids=list(CLOSED))
+def test_no_tooth_sticks_through_the_lips_of_any_shape(body, weights):
+    """Seen from in front, lips that are closed hide them, but for some in the gap between."""
+    inside = vertices_of(body, "teeth", "gums", "tongue")
+    rng = np.random.default_rng(2)
+    shapes = [np.zeros(body.P), *rng.normal(size=(3, body.P))]
+    if body.P > 10:
+        shapes = [np.append(beta[:10], growth) for beta, growth in zip(shapes, (0, -0.3, -0.7, -1), strict=True)]
+    for beta in shapes:
+        vertices = moved(body, beta, **weights)
+        assert (nearest_skin(body, vertices, vertices[inside]) < vertices[inside, 2]).mean() < 0.02
+
+
+def test_an_open_mouth_shows_them(body):
+    inside = vertices_of(body, "teeth", "tongue")
+    vertices = moved(body, None, jawOpen=0.6)
+    assert (nearest_skin(body, vertices, vertices[inside]) < vertices[inside, 2]).mean() > 0.1
