@@ -14,6 +14,7 @@ from . import (
     compiled_solver,
     drop,
     export_operators,
+    file_field,
     import_operators,
     keymap,
     menus,
@@ -38,7 +39,7 @@ from .view import view_after_undo, view_operators
 
 _MODULES = (
     *(capture_properties, preferences, capture_operators, export_operators, import_operators, view_operators, drop),
-    *(video_import, presets, menus, action_operators, asset_operators, frame_rate_operators),
+    *(file_field, video_import, presets, menus, action_operators, asset_operators, frame_rate_operators),
     *(edit_operators, key_operators, kept_edits, correction_operators, pin_tool, upright_operators, floor_operators),
     *(retarget_properties, retarget_operators, face_operators, live_properties, live_operators, camera_formats),
     *(captures, capture_panel, live_panel, edit_panel, correction_panel, retarget_panel, face_panel),

@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import bpy
-from bpy.props import StringProperty
 
-from ...footage import FOOTAGE_SUFFIXES
 from .. import warm_up
+from ..file_field import FootageBrowser
 from ..live.live_state import state as live_state
 from ..reporting import iface_, rpt_, tip_
 from ..view.sidebar import redraw_sidebars, show_tab
@@ -46,22 +45,18 @@ def end_capture() -> None:
     state.message = ""
 
 
-class SCOPE_OT_choose_footage(bpy.types.Operator):
+class SCOPE_OT_choose_footage(FootageBrowser, bpy.types.Operator):
     """Choose a video or image of a person"""
 
     bl_idname = "scope.choose_footage"
     bl_label = "Choose Footage"  # short: the button of the file browser shows it, too
     bl_options = {"UNDO"}
 
-    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
-    filter_glob: StringProperty(default=";".join(f"*{s}" for s in FOOTAGE_SUFFIXES), options={"HIDDEN"})
-
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Use a dropped file, or ask for one."""
         if self.filepath:
             return self.execute(context)
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
+        return self.ask(context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Set the footage to the file."""

@@ -65,6 +65,7 @@ TEXTS = STAGES | {
     "Body with Hands": "Körper mit Händen",
     "Bone": "Knochen",
     "Bone of your rig": "Knochen des eigenen Rigs",
+    "Choose the file in the file browser": "Die Datei im Dateibrowser wählen",
     "CPU threads for the networks; 0: all cores": "CPU-Threads für die Netze; 0: alle Kerne",
     "Cache Folder": "Cache-Ordner",
     "Cache Size": "Cache-Größe",

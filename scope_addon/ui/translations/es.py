@@ -65,6 +65,7 @@ TEXTS = STAGES | {
     "Body with Hands": "Cuerpo con manos",
     "Bone": "Hueso",
     "Bone of your rig": "Hueso de su rig",
+    "Choose the file in the file browser": "Elegir el archivo en el explorador de archivos",
     "CPU threads for the networks; 0: all cores": "Hilos de CPU para las redes; 0: todos los núcleos",
     "Cache Folder": "Carpeta de caché",
     "Cache Size": "Tamaño de caché",

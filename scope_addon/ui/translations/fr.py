@@ -65,6 +65,7 @@ TEXTS = STAGES | {
     "Body with Hands": "Corps avec mains",
     "Bone": "Os",
     "Bone of your rig": "Os de votre rig",
+    "Choose the file in the file browser": "Choisir le fichier dans le navigateur de fichiers",
     "CPU threads for the networks; 0: all cores": "Threads CPU pour les réseaux ; 0 : tous les cœurs",
     "Cache Folder": "Dossier du cache",
     "Cache Size": "Taille du cache",

@@ -65,6 +65,7 @@ TEXTS = STAGES | {
     "Body with Hands": "手付きボディ",
     "Bone": "ボーン",
     "Bone of your rig": "自分のリグのボーン",
+    "Choose the file in the file browser": "ファイルブラウザーでファイルを選択します",
     "CPU threads for the networks; 0: all cores": "ネットワーク用の CPU スレッド数。0：全コア",
     "Cache Folder": "キャッシュフォルダー",
     "Cache Size": "キャッシュサイズ",

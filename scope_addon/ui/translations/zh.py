@@ -65,6 +65,7 @@ TEXTS = STAGES | {
     "Body with Hands": "带手的身体",
     "Bone": "骨骼",
     "Bone of your rig": "您的绑定中的骨骼",
+    "Choose the file in the file browser": "在文件浏览器中选择文件",
     "CPU threads for the networks; 0: all cores": "网络使用的 CPU 线程数；0：全部核心",
     "Cache Folder": "缓存文件夹",
     "Cache Size": "缓存大小",

@@ -11,6 +11,7 @@ OPERATORS = {
     "Cancel Capture": "Erfassung abbrechen",
     "Cancel Live Capture": "Live-Erfassung abbrechen",
     "Capture": "Erfassen",
+    "Choose File": "Datei wählen",
     "Choose Footage": "Filmmaterial wählen",
     "Choose Video or Picture": "Video oder Bild wählen",
     "Clear Cache": "Cache leeren",

@@ -11,6 +11,7 @@ OPERATORS = {
     "Cancel Capture": "Cancelar captura",
     "Cancel Live Capture": "Cancelar la captura en vivo",
     "Capture": "Capturar",
+    "Choose File": "Elegir archivo",
     "Choose Footage": "Elegir filmación",
     "Choose Video or Picture": "Elegir video o imagen",
     "Clear Cache": "Vaciar caché",

@@ -11,6 +11,7 @@ OPERATORS = {
     "Cancel Capture": "Annuler la capture",
     "Cancel Live Capture": "Annuler la capture en direct",
     "Capture": "Capturer",
+    "Choose File": "Choisir un fichier",
     "Choose Footage": "Choisir le métrage",
     "Choose Video or Picture": "Choisir une vidéo ou une image",
     "Clear Cache": "Vider le cache",

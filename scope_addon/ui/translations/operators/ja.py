@@ -11,6 +11,7 @@ OPERATORS = {
     "Cancel Capture": "キャプチャをキャンセル",
     "Cancel Live Capture": "ライブキャプチャをキャンセル",
     "Capture": "キャプチャ",
+    "Choose File": "ファイルを選択",
     "Choose Footage": "フッテージを選択",
     "Choose Video or Picture": "動画または画像を選択",
     "Clear Cache": "キャッシュをクリア",

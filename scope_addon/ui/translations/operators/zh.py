@@ -11,6 +11,7 @@ OPERATORS = {
     "Cancel Capture": "取消捕捉",
     "Cancel Live Capture": "取消实时捕捉",
     "Capture": "捕捉",
+    "Choose File": "选择文件",
     "Choose Footage": "选择素材",
     "Choose Video or Picture": "选择视频或图片",
     "Clear Cache": "清除缓存",
