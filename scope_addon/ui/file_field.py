@@ -7,6 +7,7 @@ text of the same value, with a button of our own. Every browser's filter can be 
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import bpy
@@ -14,6 +15,7 @@ from bpy.props import BoolProperty, StringProperty
 
 from ..footage import FOOTAGE_SUFFIXES, VIDEO_SUFFIXES, shown
 
+_ASSETS = Path(__file__).resolve().parents[2] / "assets"
 _TEXT = "_text"  # ends the name of the text of a path
 _VIDEOS = ";".join(f"*{suffix}" for suffix in VIDEO_SUFFIXES)
 FOOTAGE = ";".join(f"*{suffix}" for suffix in FOOTAGE_SUFFIXES)
@@ -36,9 +38,18 @@ class FootageBrowser:
 
     def ask(self, context: bpy.types.Context) -> set[str]:
         """Open the browser, in the folder of the present footage."""
-        self.filepath = bpy.path.abspath(context.scene.scope.footage)
+        self.filepath = present(context.scene.scope.footage)
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
+
+
+def present(path: str) -> str:
+    """Return a setting's file for the browser to begin with; empty where Blender's usual folder is better.
+
+    It is if the file is gone, and if it is the sample clip, beside which are only the extension's own files.
+    """
+    file = Path(bpy.path.abspath(path))
+    return str(file) if path and file.is_file() and _ASSETS not in file.parents else ""
 
 
 def path_text(path: str, **keywords: Any) -> Any:
@@ -88,7 +99,7 @@ class SCOPE_OT_choose_file(bpy.types.Operator):
 
     filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
     filter_glob: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
-    owner: StringProperty(options={"HIDDEN", "SKIP_SAVE"})  # of the setting: scope or scope_live of a scene, preferences
+    owner: StringProperty(options={"HIDDEN", "SKIP_SAVE"})  # has the setting: a scene's scope or scope_live, preferences
     setting: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -96,7 +107,7 @@ class SCOPE_OT_choose_file(bpy.types.Operator):
         settings = self._settings(context)
         if settings is None:
             return {"CANCELLED"}
-        self.filepath, self.filter_glob = bpy.path.abspath(getattr(settings, self.setting)), _FILTERS[self.setting]
+        self.filepath, self.filter_glob = present(getattr(settings, self.setting)), _FILTERS[self.setting]
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 

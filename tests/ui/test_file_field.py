@@ -3,7 +3,8 @@
 
 import bpy
 import pytest
-from scope.scope_addon.ui.file_field import FOOTAGE
+from scope.scope_addon.ui.capture.capture_operators import SAMPLE
+from scope.scope_addon.ui.file_field import FOOTAGE, present
 
 SETTINGS = [("scope", "body_file"), ("scope", "calibration_file"), ("scope_live", "file")]
 
@@ -36,6 +37,18 @@ def test_only_files_of_scope_are_set(owner, setting):
     before = bpy.context.scene.render.filepath
     assert bpy.ops.scope.choose_file(filepath="/a", owner=owner, setting=setting) == {"CANCELLED"}
     assert bpy.context.scene.render.filepath == before
+
+
+def test_the_browser_begins_at_the_present_file_unless_it_is_gone_or_the_sample(tmp_path):
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    (tmp_path / "walk.mp4").touch()
+    assert present(str(tmp_path / "walk.mp4")) == str(tmp_path / "walk.mp4")
+    assert present("//walk.mp4") == str(tmp_path / "walk.mp4")
+    assert present(str(tmp_path / "gone.mp4")) == ""
+    assert present(str(tmp_path)) == ""
+    assert present("") == ""
+    assert SAMPLE.is_file()
+    assert present(str(SAMPLE)) == ""
 
 
 def test_the_filter_fits_into_blenders_field():
