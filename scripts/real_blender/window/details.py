@@ -25,14 +25,15 @@ from shared.session import FOOTAGE, OUT, captured, invoke, key, picture, press, 
 FBX_BUTTON, RAW_BUTTON, FOLD = (1090, 453), (1085, 622), 768
 FOLDER_BUTTON = (1252, 128)  # beside the footage
 # Names of files, and by operator which of them the file browser shows at first.
-FILES = (*("a.mp4", "b.MTS", "c.ts", "d.webm", "e.flv", "f.heic", "g_0001.png"), "notes.txt", "odd.xyz", "pose.npz", "x.json")
+FOOTAGE_FILES = ("a.mp4", "b.MTS", "c.ts", "d.webm", "e.flv", "f.heic", "g_0001.png")
+FILES = (*FOOTAGE_FILES, "notes.txt", "odd.xyz", "pose.npz", "x.json")
 BROWSERS = (
-    ("import_video", {}, FILES[:7]),
+    ("import_video", {}, FOOTAGE_FILES),
     ("import_motion", {}, ("pose.npz",)),
     ("load_bone_map", {}, ("x.json",)),
     ("choose_file", {"owner": "scope", "setting": "body_file"}, ("pose.npz",)),
     ("choose_file", {"owner": "scope", "setting": "calibration_file"}, ("x.json",)),
-    ("choose_file", {"owner": "scope_live", "setting": "file"}, FILES[:4]),
+    ("choose_file", {"owner": "scope_live", "setting": "file"}, FOOTAGE_FILES[:4]),
 )
 STILL, LOW = OUT / "still.npz", OUT / "low.npz"
 FRAMES, RATE = 120, 60.0
@@ -171,14 +172,14 @@ def searched() -> Iterator[float]:
 
 
 def file_browsers() -> Iterator[float]:
-    """Open the file browsers: at first they show what fits, and with the filter off, everything, which can be chosen."""
+    """Open the file browsers: at first they show what fits, and with the filter off, all that there is."""
     windows, settings, folder = bpy.context.window_manager.windows, bpy.context.scene.scope, OUT / "files"
     folder.mkdir()
     for name in FILES:
         shutil.copy(FOOTAGE, folder / name)
     settings.footage = str(folder / "a.mp4")
     yield from press(FOLDER_BUTTON, lambda: len(windows) > 1)
-    assert (yield from listed(folder)) == list(FILES[:7])
+    assert (yield from listed(folder)) == list(FOOTAGE_FILES)
     browser = windows[-1].screen.areas[0].spaces.active
     browser.params.use_filter = False
     assert (yield from listed(folder)) == list(FILES)

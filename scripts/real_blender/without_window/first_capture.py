@@ -19,7 +19,8 @@ import bpy
 
 MOST_LONGER_S = 15.0
 COMPILING = "compiling the solver"
-SHIPPED, LARGE = ".config/blender/*/extensions/user_default/scope/assets/kernels", ("optimizer.optimize", "problem.linearize_half")
+SHIPPED = ".config/blender/*/extensions/user_default/scope/assets/kernels"
+LARGE = ("optimizer.optimize", "problem.linearize_half")
 NAME = next(addon.module for addon in bpy.context.preferences.addons if addon.module.endswith(".scope"))
 
 
