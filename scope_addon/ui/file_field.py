@@ -99,7 +99,7 @@ class SCOPE_OT_choose_file(bpy.types.Operator):
 
     filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
     filter_glob: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
-    owner: StringProperty(options={"HIDDEN", "SKIP_SAVE"})  # has the setting: a scene's scope or scope_live, preferences
+    owner: StringProperty(options={"HIDDEN", "SKIP_SAVE"})  # has the setting: scope, scope_live, preferences
     setting: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
