@@ -63,7 +63,8 @@ def path_text(path: str, **keywords: Any) -> Any:
         return shown(getattr(settings, path))
 
     def put(settings: bpy.types.PropertyGroup, text: str) -> None:
-        setattr(settings, path, text)
+        is_quoted = len(text) > 1 and text[0] == text[-1] == '"'  # as Windows copies a path
+        setattr(settings, path, text[1:-1] if is_quoted else text)
 
     return StringProperty(get=get, set=put, **keywords)
 

@@ -18,6 +18,15 @@ def test_the_text_of_a_path_shows_and_sets_it(owner, setting):
     assert getattr(settings, f"{setting}_text") == "//c.npz"
 
 
+@pytest.mark.parametrize(
+    ("typed", "path"), [('"C:\\clips\\a b.mp4"', "C:\\clips\\a b.mp4"), ('"', '"'), ('""', ""), ('/a/"b', '/a/"b')]
+)
+def test_the_quotes_of_a_copied_path_are_not_part_of_it(typed, path):
+    settings = bpy.context.scene.scope
+    settings.footage_text = typed
+    assert settings.footage == path
+
+
 def test_a_name_that_is_not_utf8_can_be_shown():
     settings = bpy.context.scene.scope
     settings.footage = "/a/caf\udce9.mp4"
