@@ -124,9 +124,9 @@ class SCOPE_OT_choose_file(bpy.types.Operator):
 
     def _settings(self, context: bpy.types.Context) -> Any:
         """Return what has the setting; None if nothing has."""
-        from .preferences import preferences
-
-        owner = preferences() if self.owner == "preferences" else getattr(context.scene, self.owner, None)
+        addon = context.preferences.addons.get(__package__.rpartition(".scope_addon")[0])
+        of_addon = addon.preferences if addon else None
+        owner = of_addon if self.owner == "preferences" else getattr(context.scene, self.owner, None)
         return owner if self.setting in _FILTERS and hasattr(owner, self.setting) else None
 
 
