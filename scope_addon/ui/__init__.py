@@ -12,9 +12,7 @@ import bpy
 from . import (
     command,
     compiled_solver,
-    drop,
     export_operators,
-    file_field,
     import_operators,
     keymap,
     menus,
@@ -32,6 +30,7 @@ from .capture import (
     video_import,
 )
 from .edit import action_operators, asset_operators, edit_operators, edit_panel, key_operators
+from .files import drop, file_field
 from .live import camera_formats, live_operators, live_panel, live_properties
 from .pins import correction_operators, correction_panel, floor_operators, kept_edits, pin_tool, upright_operators
 from .retarget import face_operators, face_panel, retarget_operators, retarget_panel, retarget_properties

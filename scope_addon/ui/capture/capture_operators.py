@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import bpy
 
 from .. import warm_up
-from ..file_field import FootageBrowser
+from ..files.file_field import FootageBrowser
 from ..live.live_state import state as live_state
 from ..reporting import iface_, rpt_, tip_
 from ..view.sidebar import redraw_sidebars, show_tab

@@ -11,7 +11,7 @@ import bpy
 from ...footage import shown
 from .. import warm_up
 from ..export_operators import FORMATS, is_available
-from ..file_field import draw_file
+from ..files.file_field import draw_file
 from ..presets import SCOPE_PT_capture_presets
 from ..reporting import iface_
 from ..translations import CONTEXT

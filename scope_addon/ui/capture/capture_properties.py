@@ -16,7 +16,7 @@ from bpy.props import (
 
 from ...options import Place
 from ..declared_properties import PATH_OPTIONS, with_options
-from ..file_field import path_text
+from ..files.file_field import path_text
 from .capture_operators import state
 from .captures import show_index, shown_capture, shown_index
 

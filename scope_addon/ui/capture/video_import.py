@@ -7,7 +7,7 @@ from pathlib import Path
 
 import bpy
 
-from ..file_field import FootageBrowser
+from ..files.file_field import FootageBrowser
 from ..reporting import rpt_, tip_
 from ..view.sidebar import show_tab
 from .capture_operators import state

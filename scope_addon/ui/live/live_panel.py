@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 
 from ..capture.capture_panel import Tab, draw_text
-from ..file_field import draw_file
+from ..files.file_field import draw_file
 from ..reporting import iface_
 from . import camera_formats
 from .live_state import state

@@ -8,7 +8,7 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty, PointerProperty, 
 
 from ...options import Place
 from ..declared_properties import PATH_OPTIONS, with_options
-from ..file_field import path_text
+from ..files.file_field import path_text
 from .live_state import state
 from .stream_logins import take_login
 

@@ -4,7 +4,7 @@
 import bpy
 import pytest
 from scope.scope_addon.ui.capture.capture_operators import SAMPLE
-from scope.scope_addon.ui.file_field import FOOTAGE, present
+from scope.scope_addon.ui.files.file_field import FOOTAGE, present
 
 SETTINGS = [("scope", "body_file"), ("scope", "calibration_file"), ("scope_live", "file")]
 

@@ -13,9 +13,9 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
-from ..footage import FOOTAGE_SUFFIXES, VIDEO_SUFFIXES, shown
+from ...footage import FOOTAGE_SUFFIXES, VIDEO_SUFFIXES, shown
 
-_ASSETS = Path(__file__).resolve().parents[2] / "assets"
+_ASSETS = Path(__file__).resolve().parents[3] / "assets"
 _TEXT = "_text"  # ends the name of the text of a path
 _VIDEOS = ";".join(f"*{suffix}" for suffix in VIDEO_SUFFIXES)
 FOOTAGE = ";".join(f"*{suffix}" for suffix in FOOTAGE_SUFFIXES)
