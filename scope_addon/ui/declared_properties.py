@@ -11,6 +11,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..options import Choice, Option, Place, options_at
+from .files.file_field import path_text, text_name
 from .translations import CONTEXT
 
 _NOT_ANIMATABLE: set[str] = set()  # the options of a property without ANIMATABLE
@@ -25,6 +26,10 @@ def with_options(place: Place) -> Callable[[_Class], _Class]:
     def add(cls: _Class) -> _Class:
         for option in options_at(place):
             cls.__annotations__[property_name(option)] = blender_property(option, _keywords(place))
+            if option.value_type is Path:
+                cls.__annotations__[text_name(property_name(option))] = path_text(
+                    property_name(option), **_texts(option)
+                )
         return cls
 
     return add
@@ -41,11 +46,7 @@ def blender_property(option: Option, place_keywords: dict[str, Any]) -> Any:
     :param place_keywords: arguments of all properties of the same place.
     """
     declared = option.blender
-    keywords: dict[str, Any] = {
-        "name": declared.label or property_name(option).replace("_", " ").title(),
-        "description": declared.description or option.help[0].upper() + option.help[1:],
-        "translation_context": CONTEXT,
-    }
+    keywords = _texts(option)
     if option.value_type is Path:
         options = {"options": PATH_OPTIONS} if place_keywords else {}
         return StringProperty(subtype="FILE_PATH", **keywords, **options, **declared.keywords)
@@ -62,6 +63,15 @@ def blender_property(option: Option, place_keywords: dict[str, Any]) -> Any:
     low, high = limits_of(option)
     keywords |= {name: limit for name, limit in (("min", low), ("max", high)) if limit is not None}
     return number(default=default, **keywords)
+
+
+def _texts(option: Option) -> dict[str, Any]:
+    """Return the arguments of an option's property that say what it is."""
+    return {
+        "name": option.blender.label or property_name(option).replace("_", " ").title(),
+        "description": option.blender.description or option.help[0].upper() + option.help[1:],
+        "translation_context": CONTEXT,
+    }
 
 
 def choices_of(option: Option) -> tuple[Choice, ...]:

@@ -14,6 +14,7 @@ from bpy.props import IntProperty, StringProperty
 from ..options import Place
 from . import keymap
 from .declared_properties import with_options
+from .files.file_field import draw_file, path_text
 from .reporting import iface_, rpt_
 
 if TYPE_CHECKING:
@@ -33,6 +34,11 @@ class SCOPE_AP_preferences(bpy.types.AddonPreferences):
     body_file: StringProperty(
         name="Body File",
         subtype="FILE_PATH",
+        description="Custom SMPL, SMPL+H, SMPL-X or STAR model, for scenes without a body file of their own",
+    )
+    body_file_text: path_text(
+        "body_file",
+        name="Body File",
         description="Custom SMPL, SMPL+H, SMPL-X or STAR model, for scenes without a body file of their own",
     )
     cache_folder: StringProperty(
@@ -57,9 +63,9 @@ class SCOPE_AP_preferences(bpy.types.AddonPreferences):
         layout.use_property_decorate = False
         layout.prop(self, "threads")
         layout.prop(self, "provider")
-        layout.prop(self, "detector_file")
-        layout.prop(self, "keypoints_file")
-        layout.prop(self, "body_file")
+        draw_file(layout, self, "detector_file")
+        draw_file(layout, self, "keypoints_file")
+        draw_file(layout, self, "body_file")
         layout.prop(self, "cache_folder")
         layout.prop(self, "cache_limit_gb", text="Keep at Most (GB)")
         keymap.draw(layout, context)

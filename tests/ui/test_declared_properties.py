@@ -25,7 +25,8 @@ STORED = {
     "shape": {"KEYED": 0, "PER_FRAME": 1, "BAKED": 2},
     "provider": {"AUTO": 0, "CPU": 1, "CUDA": 2, "TENSORRT": 3, "DIRECTML": 4, "COREML": 5},
 }
-_NOT_OPTIONS = ("rna_type", "name", "capture", "capture_index", "no_result")
+_TEXTS = ("footage_text", "body_file_text", "calibration_file_text")  # of paths; they store nothing themselves
+_NOT_OPTIONS = ("rna_type", "name", "capture", "capture_index", "no_result", *_TEXTS)
 LABELS = {
     "footage": "Footage",
     "quality": "Quality",

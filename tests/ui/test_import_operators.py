@@ -5,7 +5,6 @@ import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.scene.packed_motion import stored_motion
-from scope.scope_addon.ui import drop
 from scope.scope_addon.ui.captured_person import captured_armature
 
 from ..edit.walking import motion_of, walk
@@ -84,8 +83,3 @@ def test_a_file_that_cannot_be_used_changes_nothing(amass, tmp_path, what):
         bpy.ops.scope.import_motion(**arguments)
     assert "Traceback" not in str(caught.value)
     assert inventory() == before
-
-
-def test_dropped_motions_are_imported(amass):
-    assert drop.SCOPE_FH_motion.bl_file_extensions == ".npz"
-    assert bpy.ops.scope.import_motion("INVOKE_DEFAULT", filepath=str(amass)) == {"FINISHED"}

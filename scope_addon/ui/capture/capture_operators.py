@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import bpy
-from bpy.props import StringProperty
 
-from ...footage import FOOTAGE_SUFFIXES
 from .. import warm_up
+from ..files.file_field import FootageBrowser
 from ..live.live_state import state as live_state
 from ..reporting import iface_, rpt_, tip_
 from ..view.sidebar import redraw_sidebars, show_tab
@@ -46,22 +45,18 @@ def end_capture() -> None:
     state.message = ""
 
 
-class SCOPE_OT_choose_footage(bpy.types.Operator):
+class SCOPE_OT_choose_footage(FootageBrowser, bpy.types.Operator):
     """Choose a video or image of a person"""
 
     bl_idname = "scope.choose_footage"
     bl_label = "Choose Footage"  # short: the button of the file browser shows it, too
     bl_options = {"UNDO"}
 
-    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
-    filter_glob: StringProperty(default=";".join(f"*{s}" for s in FOOTAGE_SUFFIXES), options={"HIDDEN"})
-
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Use a dropped file, or ask for one."""
         if self.filepath:
             return self.execute(context)
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
+        return self.ask(context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Set the footage to the file."""
@@ -205,19 +200,10 @@ class SCOPE_OT_cancel(bpy.types.Operator):
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Ask first if the capture has run for a while."""
-        seconds = time.monotonic() - state.started
-        if seconds <= ASK_AFTER_S or bpy.app.background:
+        if time.monotonic() - state.started <= ASK_AFTER_S or bpy.app.background:
             return self.execute(context)
-        from ...job.progress.job_progress import duration
-
-        outcome: set[str] = context.window_manager.invoke_confirm(
-            self,
-            event,
-            title="Stop the Capture?",
-            message=iface_("It has run for {time}. The scene stays unchanged", time=duration(seconds)),
-            confirm_text="Stop Capture",
-        )
-        return outcome
+        ask_to_stop()
+        return {"INTERFACE"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """End the worker, and ask the modal operator to end."""
@@ -225,6 +211,50 @@ class SCOPE_OT_cancel(bpy.types.Operator):
         state.job.cancelled = True
         state.job.close()
         return {"FINISHED"}
+
+
+class SCOPE_OT_keep_capturing(bpy.types.Operator):
+    """Let the capture go on"""
+
+    bl_idname = "scope.keep_capturing"
+    bl_label = "Keep Capturing"
+    bl_options = {"INTERNAL"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Do nothing: the question closes."""
+        return {"FINISHED"}
+
+
+class SCOPE_PT_question(bpy.types.Panel):
+    """The question before a capture that has run for a while is stopped. Escape closes it, and the capture goes on."""
+
+    bl_idname = "SCOPE_PT_question"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "WINDOW"  # for a popover: in no sidebar
+    bl_label = "Stop the Capture?"
+    bl_ui_units_x = 16
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw both answers; Return gives the one that was asked for."""
+        from ...job.progress.job_progress import duration
+
+        column = self.layout.column()
+        column.operator_context = "EXEC_DEFAULT"  # or it would ask again
+        column.label(text="Stop the Capture?", icon="QUESTION")
+        seconds = time.monotonic() - state.started
+        text = iface_("It has run for {time}. The scene stays unchanged", time=duration(seconds))
+        column.label(text=text, translate=False, icon="BLANK1")
+        row = column.row()
+        row.scale_y = 1.3
+        row.operator("scope.keep_capturing", icon="PLAY")
+        cell = row.row()
+        cell.active_default = True
+        cell.operator("scope.cancel", text="Stop Capture", icon="CANCEL")
+
+
+def ask_to_stop() -> None:
+    """Open the question. In Blender's own, its Cancel beside our answer would leave open what is cancelled."""
+    bpy.ops.wm.call_panel(name=SCOPE_PT_question.bl_idname, keep_open=False)
 
 
 def stop_job() -> None:
@@ -235,4 +265,11 @@ def stop_job() -> None:
     preview_picture.clear()
 
 
-CLASSES = (SCOPE_OT_choose_footage, SCOPE_OT_use_sample, SCOPE_OT_capture, SCOPE_OT_cancel)
+CLASSES = (
+    SCOPE_OT_choose_footage,
+    SCOPE_OT_use_sample,
+    SCOPE_OT_capture,
+    SCOPE_OT_cancel,
+    SCOPE_OT_keep_capturing,
+    SCOPE_PT_question,
+)

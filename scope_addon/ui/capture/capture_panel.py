@@ -11,6 +11,7 @@ import bpy
 from ...footage import display_text
 from .. import warm_up
 from ..export_operators import FORMATS, is_available
+from ..files.file_field import draw_file
 from ..presets import SCOPE_PT_capture_presets
 from ..reporting import iface_
 from ..translations import CONTEXT
@@ -60,8 +61,7 @@ class SCOPE_PT_capture(Tab, bpy.types.Panel):
             column.operator("scope.use_sample", icon="PLAY")
             column.operator("scope.import_motion", icon="IMPORT")
             return
-        row = column.row(align=True)
-        row.prop(settings, "footage", text="", icon="FILE_MOVIE")
+        row = draw_file(column, settings, "footage", text="", icon="FILE_MOVIE")
         row.operator("scope.import_motion", text="", icon="IMPORT")
         column.row(align=True).prop(settings, "quality", expand=True)
         if state.job is not None:
@@ -104,7 +104,7 @@ class SCOPE_PT_person(Tab, bpy.types.Panel):
             layout.prop(settings, "people_count", text="Number")
         layout.prop(settings, "body")
         if settings.body == "FILE":
-            layout.prop(settings, "body_file", text="File")
+            draw_file(layout, settings, "body_file", text="File")
         layout.prop(settings, "height_cm")
         layout.prop(settings, "hands")
         layout.prop(settings, "face")
@@ -115,7 +115,7 @@ class SCOPE_PT_person(Tab, bpy.types.Panel):
         elif settings.lens == "FOV":
             layout.prop(settings, "fov", text="Angle")
         elif settings.lens == "FILE":
-            layout.prop(settings, "calibration_file", text="File")
+            draw_file(layout, settings, "calibration_file", text="File")
         layout.prop(settings, "smoothing")
         layout.prop(settings, "use_range")
         if settings.use_range:

@@ -16,6 +16,7 @@ from bpy.props import (
 
 from ...options import Place
 from ..declared_properties import PATH_OPTIONS, with_options
+from ..files.file_field import path_text
 from .capture_operators import state
 from .captures import show_index, shown_capture, shown_index
 
@@ -67,6 +68,7 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
         update=_clear_message,
         description="Video or image of a person to capture",
     )
+    footage_text: path_text("footage", name="Footage", description="Video or image of a person to capture")
     capture: PointerProperty(
         name="Capture", type=bpy.types.Collection, description="Capture whose result the panel shows"
     )

@@ -6,23 +6,19 @@ from __future__ import annotations
 from pathlib import Path
 
 import bpy
-from bpy.props import StringProperty
 
-from ...footage import FOOTAGE_SUFFIXES
+from ..files.file_field import FootageBrowser
 from ..reporting import rpt_, tip_
 from ..view.sidebar import show_tab
 from .capture_operators import state
 
 
-class SCOPE_OT_import_video(bpy.types.Operator):
+class SCOPE_OT_import_video(FootageBrowser, bpy.types.Operator):
     """Motion capture: animate a body with the motion of the person in a video or image"""
 
     bl_idname = "scope.import_video"
     bl_label = "Motion from Video"  # short: the button of the file browser shows it, too
     bl_options = {"UNDO"}
-
-    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
-    filter_glob: StringProperty(default=";".join(f"*{s}" for s in FOOTAGE_SUFFIXES), options={"HIDDEN"})
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -34,8 +30,7 @@ class SCOPE_OT_import_video(bpy.types.Operator):
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Ask for the file."""
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
+        return self.ask(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the settings of the capture in the sidebar of the file browser."""

@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 
 from ..capture.capture_panel import Tab, draw_text
+from ..files.file_field import draw_file
 from ..reporting import iface_
 from . import camera_formats
 from .live_state import state
@@ -33,7 +34,7 @@ class SCOPE_PT_live(Tab, bpy.types.Panel):
         elif settings.source == "STREAM":
             column.prop(settings, "stream", text="", icon="URL")
         else:
-            column.prop(settings, "file", text="", icon="FILE_MOVIE")
+            draw_file(column, settings, "file", text="", icon="FILE_MOVIE")
         column.row(align=True).prop(settings, "quality", expand=True)
         column.prop(settings, "people")
         _draw_rig(column, context)

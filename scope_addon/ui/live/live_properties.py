@@ -8,6 +8,7 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty, PointerProperty, 
 
 from ...options import Place
 from ..declared_properties import PATH_OPTIONS, with_options
+from ..files.file_field import path_text
 from .live_state import state
 from .stream_logins import take_login
 
@@ -73,6 +74,7 @@ class SCOPE_PG_live(bpy.types.PropertyGroup):
         update=_forget_message,
         description="Video of a person, which is played in real time",
     )
+    file_text: path_text("file", name="Video", description="Video of a person, which is played in real time")
     with_rig: BoolProperty(
         name="Rig Follows",
         default=False,

@@ -160,6 +160,7 @@ class Steps(FileSteps):
             **dict.fromkeys(("choose_footage", "import_video"), {"filepath": self.footage}),
             "import_motion": {"filepath": str(folder / "kept.npz"), "directory": "", "body": "SCOPE"},
             "load_bone_map": {"filepath": str(folder / "bones.json")},
+            "choose_file": {"filepath": str(folder / "kept.npz"), "owner": "scope", "setting": "body_file"},
             "export": {
                 "filepath": str(folder / "made"),
                 "format": chance.choice(("FBX", "GLB", "BVH", "USDC", "NPZ")),

@@ -7,11 +7,13 @@ Usage: ``blender --python details.py -- VIDEO OUT_FOLDER``
 from __future__ import annotations
 
 import json
+import shutil
 import struct
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -21,6 +23,18 @@ from shared.session import FOOTAGE, OUT, captured, invoke, key, picture, press, 
 
 # On a screen of 1600 x 1000, of which a laptop of 1366 x 768 shows the first 768 pixels, with two captures in the list.
 FBX_BUTTON, RAW_BUTTON, FOLD = (1090, 453), (1085, 622), 768
+FOLDER_BUTTON = (1252, 128)  # beside the footage
+# Names of files, and by operator which of them the file browser shows at first.
+FOOTAGE_FILES = ("a.mp4", "b.MTS", "c.ts", "d.webm", "e.flv", "f.heic", "g_0001.png")
+FILES = (*FOOTAGE_FILES, "notes.txt", "odd.xyz", "pose.npz", "x.json")
+BROWSERS = (
+    ("import_video", {}, FOOTAGE_FILES),
+    ("import_motion", {}, ("pose.npz",)),
+    ("load_bone_map", {}, ("x.json",)),
+    ("choose_file", {"owner": "scope", "setting": "body_file"}, ("pose.npz",)),
+    ("choose_file", {"owner": "scope", "setting": "calibration_file"}, ("x.json",)),
+    ("choose_file", {"owner": "scope_live", "setting": "file"}, FOOTAGE_FILES[:4]),
+)
 STILL, LOW = OUT / "still.npz", OUT / "low.npz"
 FRAMES, RATE = 120, 60.0
 SEARCHED = (  # words, how many of Blender's own entries they find first, the operator after these, and its format
@@ -157,6 +171,54 @@ def searched() -> Iterator[float]:
     report["searched"] = [words for words, *_ in SEARCHED]
 
 
+def file_browsers() -> Iterator[float]:
+    """Open the file browsers: at first they show what fits, and with the filter off, all that there is."""
+    windows, settings, folder = bpy.context.window_manager.windows, bpy.context.scene.scope, OUT / "files"
+    folder.mkdir()
+    for name in FILES:
+        shutil.copy(FOOTAGE, folder / name)
+    settings.footage = str(folder / "a.mp4")
+    yield from press(FOLDER_BUTTON, lambda: len(windows) > 1)
+    assert (yield from listed(folder)) == list(FOOTAGE_FILES)
+    browser = windows[-1].screen.areas[0].spaces.active
+    browser.params.use_filter = False
+    assert (yield from listed(folder)) == list(FILES)
+    browser.params.filename = "odd.xyz"
+    yield 0.5
+    with bpy.context.temp_override(window=windows[-1], area=windows[-1].screen.areas[0]):
+        bpy.ops.file.execute()
+    yield from until(lambda: settings.footage == str(folder / "odd.xyz"), 10, "the chosen file")
+    for operator, chosen, expected in BROWSERS:
+        invoke(getattr(bpy.ops.scope, operator), "INVOKE_DEFAULT", **chosen)
+        yield from until(lambda: len(windows) > 1, 10, f"the file browser of {operator}")
+        found = yield from listed(folder)
+        assert found == list(expected), (operator, chosen, found)
+        with bpy.context.temp_override(window=windows[-1]):
+            bpy.ops.wm.window_close()
+        yield 0.5
+    settings.footage = FOOTAGE
+    report["file_browsers"] = "filtered"
+
+
+def listed(folder: Path) -> Generator[float, None, list[str]]:
+    """Return which files the open file browser shows of a folder: those that can be selected."""
+    window = bpy.context.window_manager.windows[-1]
+    area = window.screen.areas[0]
+    area.spaces.active.params.directory = str(folder).encode()
+    found: list[str] = []
+    for _ in range(40):  # the browser reads the folder in the background, and lists it when it is drawn
+        yield 0.25
+        region = next(each for each in area.regions if each.type == "WINDOW")
+        with bpy.context.temp_override(window=window, area=area, region=region):
+            bpy.ops.file.select_all(action="SELECT")
+            before, found = found, sorted(each.name for each in bpy.context.selected_files)
+            bpy.ops.file.select_all(action="DESELECT")
+        area.tag_redraw()
+        if found and found == before:
+            break
+    return found
+
+
 def popup() -> bytes:
     """Return the pixels where Blender's search is, with the mouse in the middle of the viewport."""
     command = ["import", "-window", "root", "-crop", "500x230+510+390", "-depth", "8", "rgb:-"]
@@ -211,6 +273,8 @@ def usd() -> None:
     """Say why USD cannot be exported where this Blender was built without it."""
     if "usd_export" in dir(bpy.ops.wm):
         return
+    tooltip = bpy.types.SCOPE_OT_export.description(bpy.context, SimpleNamespace(format="USDC"))
+    assert "built without USD" in tooltip, tooltip  # of the grey button
     try:
         use(bpy.ops.scope.export, filepath=str(OUT / "first.usdc"), format="USDC")
     except RuntimeError as error:
@@ -262,6 +326,7 @@ def steps() -> Iterator[float]:
     yield from searched()
     rigs()
     yield 0.5
+    yield from file_browsers()
     exported()
     yield 0.5
     usd()

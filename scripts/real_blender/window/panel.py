@@ -24,6 +24,7 @@ from shared.session import FOOTAGE, OUT, addon, inventory, invoke, key, picture,
 # Where the panel's buttons are on a screen of 1600 x 1000, in pixels from its top left.
 FAST_BUTTON, CAPTURE_BUTTON = (1086, 151), (1174, 183)
 OVER_PANEL = (1174, 300)
+KEEP_BUTTON = (1087, 301)  # of the question, which opens where the mouse is: over the panel
 ASKS_AFTER_S = 11.0
 report: dict = {"blender": bpy.app.version_string, "python": sys.version.split()[0], "exports": []}
 
@@ -43,12 +44,13 @@ def clocks() -> np.ndarray:
 
 
 def cancel_after_the_question() -> Iterator[float]:
-    """Press Escape over the panel: the capture goes on while it asks, and if Escape answers; Return ends it.
+    """Press Escape over the panel: the capture goes on while it asks, and unless Return answers.
 
-    The worker stands still meanwhile.
+    Neither Escape nor Keep Capturing ends it. The worker stands still meanwhile.
     """
-    operator, asked = addon().SCOPE_OT_cancel, []
-    invoke_itself = operator.invoke
+    operator, asked, kept = addon().SCOPE_OT_cancel, [], []
+    invoke_itself, keep = operator.invoke, addon().SCOPE_OT_keep_capturing
+    keep_itself = keep.execute
 
     def counted(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         asked.append(invoke_itself(self, context, event))
@@ -56,19 +58,23 @@ def cancel_after_the_question() -> Iterator[float]:
 
     yield from until(lambda: time.monotonic() - addon().state.started > ASKS_AFTER_S, 30, "a capture that asks")
     operator.invoke = counted
-    for times, answer in enumerate(("Escape", "Return"), 1):
+    keep.execute = lambda self, context: kept.append(True) or keep_itself(self, context)
+    for times, answer in enumerate(("Escape", "Keep Capturing", "Return"), 1):
         key("Escape", OVER_PANEL)
         yield from until(lambda wanted=times: len(asked) == wanted, 20, "the question")  # not if one is still open
         yield 2.0
         assert addon().state.job is not None, "Escape over the panel ended a long capture without a question"
         picture("4_question")
-        key(answer, OVER_PANEL)
+        if answer == "Keep Capturing":
+            yield from press(KEEP_BUTTON, lambda: bool(kept))
+        else:
+            key(answer, OVER_PANEL)
         yield 2.0
-        if answer == "Escape":
-            assert addon().state.job is not None, "Escape did not decline to stop the capture"
+        if answer != "Return":
+            assert addon().state.job is not None, f"{answer} did not decline to stop the capture"
     yield from until(lambda: addon().state.job is None, 20, "the capture to stop")
-    operator.invoke = invoke_itself
-    report["question"] = "asked, declined, asked, stopped"
+    operator.invoke, keep.execute = invoke_itself, keep_itself
+    report["question"] = "asked, declined, asked, kept, asked, stopped"
 
 
 def frame_covered() -> float:

@@ -66,10 +66,10 @@ def capturing() -> Iterator[float]:
     yield from until(lambda: addon().state.job.messages > 0, 120, "the worker")
 
 
-def live() -> Iterator[float]:
+def live(footage: str = FOOTAGE) -> Iterator[float]:
     """Begin a live capture of a file."""
     settings = bpy.context.scene.scope_live
-    settings.source, settings.file = "FILE", FOOTAGE
+    settings.source, settings.file = "FILE", footage
     assert use(bpy.ops.scope.live, "INVOKE_DEFAULT") == {"RUNNING_MODAL"}
     state = module("live.live_state").state
     yield from until(lambda: state.job is None or state.job.has_body, 120, "the first pose")
@@ -103,6 +103,29 @@ def undone() -> Iterator[float]:
     yield 0.0
 
 
+def removed_in_another_scene() -> Iterator[float]:
+    """Cancel a live capture while the window shows another scene, whose graph alone Blender updates by itself.
+
+    Drawing would read the removed objects from the graph of the first scene, and may crash.
+    """
+    scene = bpy.context.scene
+    before = blocks_in_graph(scene)
+    yield from live(str(addon().SAMPLE))  # which lasts longer
+    yield 0.3
+    assert blocks_in_graph(scene) > before
+    use(bpy.ops.scene.new, type="NEW")
+    yield 0.1
+    use(bpy.ops.scope.cancel_live)
+    yield from until(lambda: module("live.live_state").state.job is None, 60, "the end of the live capture")
+    found = blocks_in_graph(scene)
+    assert found == before, f"the hidden scene's graph has {found} datablocks, not {before}"
+
+
+def blocks_in_graph(scene: bpy.types.Scene) -> int:
+    """Return how many datablocks a scene's dependency graph has; those that were removed cannot be looked at."""
+    return len(scene.view_layers[0].depsgraph.ids)
+
+
 def steps() -> Iterator[float]:
     """Run the session; yield the seconds to wait before each next step."""
     show_tab()
@@ -111,6 +134,7 @@ def steps() -> Iterator[float]:
     settings.footage, settings.quality = FOOTAGE, "FAST"
     yield from captured()
     bpy.ops.wm.save_as_mainfile(filepath=str(SAVED))
+    yield from removed_in_another_scene()
     before = None
     for way, begin in itertools.product(ways(), (capturing, pins, undone, upright, live)):
         yield from prepared()

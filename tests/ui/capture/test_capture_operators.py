@@ -13,6 +13,7 @@ from scope.scope_addon.ui.capture.capture_operators import (
     SAMPLE,
     SCOPE_OT_cancel,
     SCOPE_OT_capture,
+    SCOPE_PT_question,
     end_capture,
     state,
 )
@@ -133,19 +134,39 @@ def test_escape_cancels_only_over_the_panel(fake_worker, footage, x, y, window, 
     end_capture()
 
 
+class Drawn:
+    """A layout that notes what is drawn."""
+
+    def __init__(self):
+        self.texts, self.operators = [], []
+
+    def column(self):
+        return self
+
+    row = column
+
+    def label(self, text, **_):
+        self.texts.append(text)
+
+    def operator(self, name, **_):
+        self.operators.append(name)
+
+
 @pytest.mark.parametrize(("seconds", "asks"), [(3.0, False), (30.0, True)])
 def test_cancelling_asks_when_more_than_ten_seconds_are_done(monkeypatch, seconds, asks):
     state.job, state.started = SimpleNamespace(cancelled=False, close=lambda: None), 100.0
     monkeypatch.setattr(capture_operators, "time", SimpleNamespace(monotonic=lambda: 100.0 + seconds))
-    questions = []
-    manager = SimpleNamespace(invoke_confirm=lambda *_, **texts: questions.append(texts) or {"RUNNING_MODAL"})
+    questions, drawn = [], Drawn()
+    monkeypatch.setattr(capture_operators, "ask_to_stop", lambda: questions.append(True))
     monkeypatch.setattr(capture_operators.bpy, "app", SimpleNamespace(background=False))
     operator = SimpleNamespace(execute=lambda _: setattr(state.job, "cancelled", True) or {"FINISHED"})
     try:
-        SCOPE_OT_cancel.invoke(operator, SimpleNamespace(window_manager=manager), None)
+        SCOPE_OT_cancel.invoke(operator, None, None)
         assert bool(questions) is asks
         assert state.job.cancelled is not asks
-        assert not asks or "30 s" in questions[0]["message"]
+        SCOPE_PT_question.draw(SimpleNamespace(layout=drawn), None)
+        assert any(f"{seconds:.0f} s" in text for text in drawn.texts)
+        assert drawn.operators == ["scope.keep_capturing", "scope.cancel"]
     finally:
         monkeypatch.undo()
         state.job = None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings in .blend files, dropped files, export buttons, the camera button, progress."""
+"""Settings in .blend files, export buttons, the camera button, progress."""
 
 from types import SimpleNamespace
 
@@ -9,7 +9,6 @@ import pytest
 from scope.scope_addon.job.progress.job_progress import JobProgress, duration
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene.footage_strip import start_of, strips_of
-from scope.scope_addon.ui import drop
 from scope.scope_addon.ui.capture import capture_job
 from scope.scope_addon.ui.capture.capture_operators import end_capture, state
 from scope.scope_addon.ui.preferences import cache
@@ -69,17 +68,6 @@ def test_a_scene_with_copied_settings_shows_no_result(fake_worker, footage):
     assert not panel.poll(bpy.context)
     bpy.ops.scene.new(type="FULL_COPY")
     assert not panel.poll(bpy.context)
-
-
-def test_dropped_files_become_the_footage(footage):
-    suffixes = drop.SCOPE_FH_footage.bl_file_extensions.split(";")
-    assert {".mp4", ".mov", ".png", ".jpg"} <= set(suffixes)
-    # What Blender does with a dropped file: the handler's operator, with a path.
-    assert bpy.ops.scope.choose_footage("INVOKE_DEFAULT", filepath=str(footage)) == {"FINISHED"}
-    assert bpy.context.scene.scope.footage == str(footage)
-    with pytest.raises(RuntimeError, match="not a file"):
-        bpy.ops.scope.choose_footage(filepath=str(footage.parent))
-    assert bpy.context.scene.scope.footage == str(footage)
 
 
 def test_buttons_are_disabled_until_their_input_exists(fake_worker, footage):

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..footage import FOOTAGE_SUFFIXES
+from ...footage import FOOTAGE_SUFFIXES
 
 
 class SCOPE_FH_footage(bpy.types.FileHandler):

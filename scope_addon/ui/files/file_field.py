@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Fields for files, and file browsers that show at first only what fits.
+
+Blender draws a folder beside every path, which opens a browser that shows all files. A field is therefore drawn as a
+text of the same value, with a button of our own. Every browser's filter can be switched off in its header.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty, StringProperty
+
+from ...footage import FOOTAGE_SUFFIXES, VIDEO_SUFFIXES, shown
+
+_ASSETS = Path(__file__).resolve().parents[3] / "assets"
+_TEXT = "_text"  # ends the name of the text of a path
+_VIDEOS = ";".join(f"*{suffix}" for suffix in VIDEO_SUFFIXES)
+FOOTAGE = ";".join(f"*{suffix}" for suffix in FOOTAGE_SUFFIXES)
+_FILTERS = {  # by the name of the setting
+    "file": _VIDEOS,
+    "body_file": "*.npz;*.pkl;*.pickle",
+    "calibration_file": "*.json",
+    "detector_file": "*.onnx",
+    "keypoints_file": "*.onnx",
+}
+
+
+class FootageBrowser:
+    """Properties of an operator that asks for footage: the browser shows folders, pictures and videos of any suffix."""
+
+    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    filter_glob: StringProperty(default=FOOTAGE, options={"HIDDEN", "SKIP_SAVE"})
+    filter_movie: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})  # what Blender knows as such, too
+    filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+
+    def ask(self, context: bpy.types.Context) -> set[str]:
+        """Open the browser, in the folder of the present footage."""
+        self.filepath = present(context.scene.scope.footage)
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+
+def present(path: str) -> str:
+    """Return a setting's file for the browser to begin with; empty where Blender's usual folder is better.
+
+    It is if the file is gone, and if it is the sample clip, beside which are only the extension's own files.
+    """
+    file = Path(bpy.path.abspath(path))
+    return str(file) if path and file.is_file() and _ASSETS not in file.parents else ""
+
+
+def path_text(path: str, **keywords: Any) -> Any:
+    """Return the text property of a path property, which stores nothing itself.
+
+    :param path: name of the path property in the same group. That of the text is the same with ``_text`` after it.
+    :param keywords: of the property.
+    """
+
+    def get(settings: bpy.types.PropertyGroup) -> str:
+        return shown(getattr(settings, path))
+
+    def put(settings: bpy.types.PropertyGroup, text: str) -> None:
+        is_quoted = len(text) > 1 and text[0] == text[-1] == '"'  # as Windows copies a path
+        setattr(settings, path, text[1:-1] if is_quoted else text)
+
+    return StringProperty(get=get, set=put, **keywords)
+
+
+def text_name(path: str) -> str:
+    """Return the name of the text property of a path property."""
+    return path + _TEXT
+
+
+def draw_file(layout: bpy.types.UILayout, settings: Any, path: str, **keywords: Any) -> bpy.types.UILayout:
+    """Draw the field of a path and the button that chooses a file; return their row.
+
+    :param path: name of the path property in ``settings``, which has a ``path_text`` of it.
+    :param keywords: of ``UILayout.prop``.
+    """
+    row = layout.row(align=True)
+    row.prop(settings, text_name(path), **keywords)
+    if path == "footage":
+        row.operator("scope.choose_footage", text="", icon="FILEBROWSER")
+        return row
+    button = row.operator("scope.choose_file", text="", icon="FILEBROWSER")
+    is_preferences = isinstance(settings, bpy.types.AddonPreferences)
+    button.owner, button.setting = "preferences" if is_preferences else settings.path_from_id(), path
+    return row
+
+
+class SCOPE_OT_choose_file(bpy.types.Operator):
+    """Choose the file in the file browser"""
+
+    bl_idname = "scope.choose_file"
+    bl_label = "Choose File"
+    bl_options = {"UNDO", "INTERNAL"}
+
+    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    filter_glob: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
+    owner: StringProperty(options={"HIDDEN", "SKIP_SAVE"})  # has the setting: scope, scope_live, preferences
+    setting: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Ask for the file, in the folder of the present one."""
+        settings = self._settings(context)
+        if settings is None:
+            return {"CANCELLED"}
+        self.filepath, self.filter_glob = present(getattr(settings, self.setting)), _FILTERS[self.setting]
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Set the setting to the file."""
+        settings = self._settings(context)
+        if settings is None:
+            return {"CANCELLED"}
+        setattr(settings, self.setting, self.filepath)
+        if self.owner == "preferences":
+            context.preferences.is_dirty = True
+        return {"FINISHED"}
+
+    def _settings(self, context: bpy.types.Context) -> Any:
+        """Return what has the setting; None if nothing has."""
+        addon = context.preferences.addons.get(__package__.rpartition(".scope_addon")[0])
+        of_addon = addon.preferences if addon else None
+        owner = of_addon if self.owner == "preferences" else getattr(context.scene, self.owner, None)
+        return owner if self.setting in _FILTERS and hasattr(owner, self.setting) else None
+
+
+CLASSES = (SCOPE_OT_choose_file,)

@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Files that are dropped into a viewport: footage and motions."""
+
+import bpy
+import numpy as np
+import pytest
+from scope.scope_addon.ui.files import drop
+
+from ...edit.walking import motion_of, walk
+
+
+def test_dropped_files_become_the_footage(footage):
+    suffixes = drop.SCOPE_FH_footage.bl_file_extensions.split(";")
+    assert {".mp4", ".mov", ".png", ".jpg"} <= set(suffixes)
+    # What Blender does with a dropped file: the handler's operator, with a path.
+    assert bpy.ops.scope.choose_footage("INVOKE_DEFAULT", filepath=str(footage)) == {"FINISHED"}
+    assert bpy.context.scene.scope.footage == str(footage)
+    with pytest.raises(RuntimeError, match="not a file"):
+        bpy.ops.scope.choose_footage(filepath=str(footage.parent))
+    assert bpy.context.scene.scope.footage == str(footage)
+
+
+def test_dropped_motions_are_imported(tmp_path):
+    motion, path = motion_of(walk(1.0)), tmp_path / "walk_poses.npz"
+    np.savez(path, poses=motion.poses, trans=motion.trans, betas=np.ones(16), mocap_framerate=np.array(120.0))
+    assert drop.SCOPE_FH_motion.bl_file_extensions == ".npz"
+    assert bpy.ops.scope.import_motion("INVOKE_DEFAULT", filepath=str(path)) == {"FINISHED"}

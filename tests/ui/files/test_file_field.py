@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Fields of files: their texts, and the operator that chooses a file for any of them."""
+
+import bpy
+import pytest
+from scope.scope_addon.ui.capture.capture_operators import SAMPLE
+from scope.scope_addon.ui.files.file_field import FOOTAGE, present
+
+SETTINGS = [("scope", "body_file"), ("scope", "calibration_file"), ("scope_live", "file")]
+
+
+@pytest.mark.parametrize(("owner", "setting"), [*SETTINGS, ("scope", "footage")])
+def test_the_text_of_a_path_shows_and_sets_it(owner, setting):
+    settings = getattr(bpy.context.scene, owner)
+    setattr(settings, f"{setting}_text", "/a/b.mp4")
+    assert getattr(settings, setting) == "/a/b.mp4"
+    setattr(settings, setting, "//c.npz")
+    assert getattr(settings, f"{setting}_text") == "//c.npz"
+
+
+@pytest.mark.parametrize(
+    ("typed", "path"), [('"C:\\clips\\a b.mp4"', "C:\\clips\\a b.mp4"), ('"', '"'), ('""', ""), ('/a/"b', '/a/"b')]
+)
+def test_the_quotes_of_a_copied_path_are_not_part_of_it(typed, path):
+    settings = bpy.context.scene.scope
+    settings.footage_text = typed
+    assert settings.footage == path
+
+
+def test_a_name_that_is_not_utf8_can_be_shown():
+    settings = bpy.context.scene.scope
+    settings.footage = "/a/caf\udce9.mp4"
+    assert settings.footage_text == "/a/caf\ufffd.mp4"
+    assert settings.footage == "/a/caf\udce9.mp4"
+
+
+@pytest.mark.parametrize(("owner", "setting"), SETTINGS)
+def test_a_chosen_file_is_the_settings(owner, setting):
+    chosen = {"filepath": "/a/any.suffix", "owner": owner, "setting": setting}
+    assert bpy.ops.scope.choose_file(**chosen) == {"FINISHED"}
+    assert getattr(getattr(bpy.context.scene, owner), setting) == "/a/any.suffix"
+
+
+@pytest.mark.parametrize(("owner", "setting"), [("", ""), ("scope", "quality"), ("render", "filepath"), ("no", "file")])
+def test_only_files_of_scope_are_set(owner, setting):
+    before = bpy.context.scene.render.filepath
+    assert bpy.ops.scope.choose_file(filepath="/a", owner=owner, setting=setting) == {"CANCELLED"}
+    assert bpy.context.scene.render.filepath == before
+
+
+def test_the_browser_begins_at_the_present_file_unless_it_is_gone_or_the_sample(tmp_path):
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    (tmp_path / "walk.mp4").touch()
+    assert present(str(tmp_path / "walk.mp4")) == str(tmp_path / "walk.mp4")
+    assert present("//walk.mp4") == str(tmp_path / "walk.mp4")
+    assert present(str(tmp_path / "gone.mp4")) == ""
+    assert present(str(tmp_path)) == ""
+    assert present("") == ""
+    assert SAMPLE.is_file()
+    assert present(str(SAMPLE)) == ""
+
+
+def test_the_filter_fits_into_blenders_field():
+    assert len(FOOTAGE) < 256  # Blender cuts a longer one
+    assert {"*.mts", "*.ts", "*.webm", "*.heic"} <= set(FOOTAGE.split(";"))
