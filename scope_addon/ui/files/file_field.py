@@ -13,7 +13,7 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
-from ...footage import FOOTAGE_SUFFIXES, VIDEO_SUFFIXES, shown
+from ...footage import FOOTAGE_SUFFIXES, VIDEO_SUFFIXES, display_text
 
 _ASSETS = Path(__file__).resolve().parents[3] / "assets"
 _TEXT = "_text"  # ends the name of the text of a path
@@ -60,7 +60,7 @@ def path_text(path: str, **keywords: Any) -> Any:
     """
 
     def get(settings: bpy.types.PropertyGroup) -> str:
-        return shown(getattr(settings, path))
+        return display_text(getattr(settings, path))
 
     def put(settings: bpy.types.PropertyGroup, text: str) -> None:
         is_quoted = len(text) > 1 and text[0] == text[-1] == '"'  # as Windows copies a path
