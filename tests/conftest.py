@@ -24,11 +24,13 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = ROOT.parent / "shared"
 IS_SECOND = os.environ.get("PYTEST_XDIST_WORKER", "gw0")[-1] in "13579"
-BLENDER_FOLDER = "scope-tests-blender-"  # begins the name of the user folder of Blender's module
 
-# Blender reads this once, when bpy is first imported: tests must not write in the home folder.
+# Blender reads this once, when bpy is first imported: tests must not write in the home folder. Processes that this one
+# starts use the same folder, and leave it.
+OWN_BLENDER_FOLDER = None
 if "BLENDER_USER_RESOURCES" not in os.environ:
-    os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix=BLENDER_FOLDER)
+    OWN_BLENDER_FOLDER = tempfile.mkdtemp(prefix="scope-tests-blender-")
+    os.environ["BLENDER_USER_RESOURCES"] = OWN_BLENDER_FOLDER
 
 # Tests that use onnxruntime itself, not through Scope, do not report to its makers either.
 os.environ["ORT_DISABLE_TELEMETRY"] = "1"
@@ -161,9 +163,8 @@ def body() -> Body:
 @pytest.hookimpl(trylast=True)
 def pytest_unconfigure(config: pytest.Config) -> None:
     """Leave without Blender's exit handlers, which can wait forever for a thread of their own (see ``cli.run``)."""
-    resources = Path(os.environ.get("BLENDER_USER_RESOURCES", ""))
-    if resources.name.startswith(BLENDER_FOLDER) and "PYTEST_XDIST_WORKER" not in os.environ:  # others may still use it
-        shutil.rmtree(resources, ignore_errors=True)
+    if OWN_BLENDER_FOLDER is not None:
+        shutil.rmtree(OWN_BLENDER_FOLDER, ignore_errors=True)
     if "bpy" in sys.modules:
         sys.stdout.flush()
         sys.stderr.flush()

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ...solver.body import Body
 from ..errors import MotionFileError, UsageError
 from ..footage import display_text
-from ..kinematics.expressions import body_with_mouth, expressions_of
+from ..kinematics.face.expressions import body_with_mouth, expressions_of
 from ..kinematics.foot_skin import under_floor
 from ..motion import Motion
 from . import camera

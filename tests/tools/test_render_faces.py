@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.scope_addon.kinematics.expressions import expressions_of
+from scope.scope_addon.kinematics.face.expressions import expressions_of
 from scope.tools.render_faces.beard import bearded, grow_beard
 from scope.tools.render_faces.glasses import STYLES, glasses
 from scope.tools.render_faces.sequences import in_motion, talk_and_grimaces, turned_away

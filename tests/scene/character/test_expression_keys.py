@@ -11,7 +11,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from scope.scope_addon.kinematics.expressions import expressions_of
+from scope.scope_addon.kinematics.face.expressions import expressions_of
 from scope.scope_addon.scene.animation_data import actions
 from scope.scope_addon.scene.build import NEW_SCENE, BuildOptions, build_scene
 from scope.scope_addon.scene.character.shape_keys import mixed_vertices

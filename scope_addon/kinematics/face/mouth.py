@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...solver.body import Body
-from ...solver.errors import ModelFileError
-from ...solver.loaders.body_file import BUILT_IN
-from ...solver.loaders.npz import read_npz
+from ....solver.body import Body
+from ....solver.errors import ModelFileError
+from ....solver.loaders.body_file import BUILT_IN
+from ....solver.loaders.npz import read_npz
 
 FILE = Path(BUILT_IN["scope"]).with_name("mouth.npz")
 _HEAD = "head"

@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...solver.body import Body
-from ...solver.errors import ModelFileError
-from ...solver.loaders.body_file import BUILT_IN
-from ...solver.loaders.npz import read_npz
+from ....solver.body import Body
+from ....solver.errors import ModelFileError
+from ....solver.loaders.body_file import BUILT_IN
+from ....solver.loaders.npz import read_npz
 from .mouth import read_mouth, with_teeth_and_tongue
 
 FILE = Path(BUILT_IN["scope"]).with_name("expressions.npz")
