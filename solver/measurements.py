@@ -281,9 +281,17 @@ def _foot_contact_rows(m: FootContacts, points: int) -> tuple[Array, Array]:
     return _usable_rows(foot_contact.pack(indices, stand, weight))
 
 
+def _has_rows(value: ArrayLike) -> bool:
+    """Whether a value is a list of lists; a ragged one is, too, and is refused where it is converted."""
+    try:
+        return np.ndim(value) > 1
+    except ValueError:
+        return True
+
+
 def _floor_rows(m: Floor, points: int) -> tuple[Array, Array]:
     indices = as_indices(m.indices, points, "Indices of the floor's points")
-    planes = (len(indices),) if np.ndim(m.normal) > 1 else ()
+    planes = (len(indices),) if _has_rows(m.normal) else ()
     normal = as_array(m.normal, (*planes, 3), "Normal of the floor")
     contact = as_array(m.contact, (len(indices),), "Contact with the floor")
     below = np.ones(len(indices)) if m.below is None else m.below

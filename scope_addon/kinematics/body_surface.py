@@ -27,6 +27,7 @@ _FRAMES = 256  # whose distances are computed at once: some 20 MB
 _TRUNK = ("pelvis", "spine1", "spine2", "spine3", "neck", "head")
 _LEGS = ("hip", "knee", "ankle")
 _ON_ARMS = ("elbow", "wrist", "index", "pinky", "thumb_tip", "middle_finger_tip")
+_FOREARMS = tuple(f"forearm/{side}_{which}" for side in ("left", "right") for which in ("upper", "lower"))
 
 
 def with_arm_points(body: Body) -> Body:
@@ -45,9 +46,6 @@ def with_arm_points(body: Body) -> Body:
         keypoint_template=np.concatenate([body.keypoint_template, template]),
         keypoint_shapedirs=np.concatenate([body.keypoint_shapedirs, shapedirs]),
     )
-
-
-_FOREARMS = tuple(f"forearm/{side}_{which}" for side in ("left", "right") for which in ("upper", "lower"))
 
 
 @dataclass(frozen=True)
@@ -69,25 +67,30 @@ class BodySurface:
         :param body: whose keypoints on the arms are used, those of `with_arm_points` and the palms if it has them.
         :param betas: (P,) shape coefficients.
         """
-        v, J = body.rest_vertices(betas), body.rest_joints(betas)
+        v, J, normals = body.rest_vertices(betas), body.rest_joints(betas), _vertex_normals(body, betas)
         strongest = body.skin_joints[np.arange(len(v)), body.skin_weights.argmax(1)]
-        own = [k for k, name in enumerate(body.joint_names) if name in _TRUNK or name.endswith(_LEGS)]
-        rows = np.flatnonzero(np.isin(strongest, own))
+        sampled = [k for k, name in enumerate(body.joint_names) if name in _TRUNK or name.endswith(_LEGS)]
+        rows = np.flatnonzero(np.isin(strongest, sampled) & normals.any(axis=1))
         rows = rows[_one_per_cell(v[rows])]
-        self._count, self._skin = len(rows), list(_skin(body, rows, v[rows], J, _vertex_normals(body, v)[rows]))
-        self._body, self.indices = body, _points_on_arms(body)
-        self._room = self._distance_to_skin(betas, v[np.isin(strongest, _arm_parts(body))])
+        arms = v[np.isin(strongest, _arm_parts(body))]
+        self._body, self._betas = body, betas
+        self._count, self._skin = len(rows), list(_skin(body, rows, v[rows], J, normals[rows]))
+        self.indices = _points_on_arms(body) if len(rows) and len(arms) else np.zeros(0, np.intp)
+        self._room = self._distance_to_skin(arms)
 
     def planes(self, R: NDArray[np.floating[Any]], t: NDArray[np.floating[Any]]) -> TangentPlanes:
         """Return the tangent planes next to the points `indices` of a posed body.
 
         :param R, t: (T, K+1, 3, 3) and (T, K+1, 3) part poses in any frame; the result is in that frame.
         """
+        if not len(self.indices):  # a body without skin on its arms or its trunk
+            none = np.zeros((len(R), 0))
+            return TangentPlanes(np.zeros((len(R), 0, 3)), none, none, none.astype(bool))
         return TangentPlanes(*by_blocks(self._planes, R, t, frames=_FRAMES))
 
     def _planes(self, R: NDArray[np.floating[Any]], t: NDArray[np.floating[Any]]) -> tuple[NDArray[Any], ...]:
         v, normals = self._posed(R, t)
-        points = self._body.keypoints(R, t)[:, self.indices]
+        points = self._body.keypoints(R, t, self._betas, self.indices.tolist())
         squared = (points**2).sum(-1)[..., None] + (v**2).sum(-1)[:, None] - 2.0 * points @ np.swapaxes(v, 1, 2)
         nearest = squared.argmin(-1)
         frame = np.arange(len(R))[:, None]
@@ -107,12 +110,10 @@ class BodySurface:
             normals[:, rows] += normal @ R_transposed
         return v, normals / np.linalg.norm(normals, axis=-1, keepdims=True)
 
-    def _distance_to_skin(
-        self, betas: NDArray[np.floating[Any]], skin: NDArray[np.floating[Any]]
-    ) -> NDArray[np.float64]:
-        """Return the (C,) distances from the points to the arms' nearest vertex (n, 3) in the rest pose."""
-        points = (self._body.keypoint_template + self._body.keypoint_shapedirs @ betas)[self.indices]
-        distance: NDArray[np.float64] = np.linalg.norm(points[:, None] - skin, axis=-1).min(axis=1)
+    def _distance_to_skin(self, arms: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+        """Return the (C,) distances from the points to the nearest of the arms' vertices (n, 3) in the rest pose."""
+        points = (self._body.keypoint_template + self._body.keypoint_shapedirs @ self._betas)[self.indices]
+        distance: NDArray[np.float64] = np.linalg.norm(points[:, None] - arms, axis=-1).min(axis=1, initial=np.inf)
         return distance
 
 
@@ -128,9 +129,10 @@ def _skin(
     Places are from the joint, and both are times the weight.
     """
     for joint in range(len(body.joint_names)):
-        moved, column = np.nonzero((body.skin_joints[rows] == joint) & (body.skin_weights[rows] > 0.0))
+        total = np.where(body.skin_joints[rows] == joint, body.skin_weights[rows], 0.0).sum(axis=1)
+        moved = np.flatnonzero(total)
         if len(moved):
-            weights = body.skin_weights[rows][moved, column][:, None]
+            weights = total[moved, None]
             yield joint, moved, weights, weights * (v[moved] - J[joint]), weights * normals[moved]
 
 
@@ -153,11 +155,18 @@ def _arm_parts(body: Body) -> list[int]:
     return arms
 
 
-def _vertex_normals(body: Body, v: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
-    triangles, normals = body.triangles(), np.zeros(v.shape)
+def _vertex_normals(body: Body, betas: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+    """Return outward unit normals (V, 3) in the rest pose; zero where a vertex has no area around it.
+
+    In plain numpy, unlike the rasterizer's, because motions are also edited where nothing is compiled.
+    """
+    v, triangles = body.rest_vertices(betas), body.triangles()
     a, b, c = (v[triangles[:, corner]] for corner in range(3))
+    areas = np.cross(b - a, c - a)
+    volume = (a * areas).sum()
+    normals = np.zeros(v.shape)
     for corner in range(3):
-        np.add.at(normals, triangles[:, corner], np.cross(b - a, c - a))
+        np.add.at(normals, triangles[:, corner], areas if volume > 0.0 else -areas)
     length: NDArray[np.float64] = np.linalg.norm(normals, axis=1, keepdims=True)
     unit: NDArray[np.float64] = normals / np.maximum(length, np.finfo(float).tiny)
     return unit

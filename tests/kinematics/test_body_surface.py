@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scope.scope_addon.kinematics.body_surface import AHEAD_M, BodySurface, with_arm_points
@@ -68,7 +70,7 @@ def test_heights_are_the_distances_from_the_skin_less_the_room_that_the_arm_need
     (R, t), own = POSES[pose], surface()
     body = with_contact_points(with_arm_points(BODY), BETAS)
     planes = own.planes(R, t)
-    points = body.keypoints(R, t)[0, own.indices]
+    points = body.keypoints(R, t, BETAS)[0, own.indices]
     true = distances_outside(points, R, t)
     at_rest = (body.keypoint_template + body.keypoint_shapedirs @ BETAS)[own.indices]
     rest = np.linalg.norm(at_rest[:, None] - BODY.rest_vertices(BETAS), axis=-1).min(axis=1)
@@ -103,3 +105,49 @@ def test_each_place_on_the_arms_counts_once_and_forearms_have_points() -> None:
     places = body.keypoint_template[own.indices]
     apart = np.linalg.norm(places[:, None] - places, axis=-1)[np.triu_indices(len(names), 1)]
     assert apart.min() > 0.005
+
+
+def test_points_are_where_the_shape_has_them() -> None:
+    """Of a child, whose arms are much shorter than those of the body without coefficients."""
+    child = load_body("scope_child")
+    betas = np.zeros(child.P)
+    betas[-1] = -1.0
+    body = with_contact_points(with_arm_points(child), betas)
+    own = BodySurface(body, betas)
+    omega = np.tile(np.eye(3), (child.K + 1, 1, 1))
+    for side, angle in (("left", -1.65), ("right", 1.65)):
+        omega[child.joint_names.index(f"{side}_shoulder")] = exp(np.array([0.0, 0.0, angle]))
+    R, t = child.forward_kinematics(omega, np.zeros(3), betas)
+    planes = own.planes(R[None], t[None])
+    skin, points = child.skin(R, t, betas), body.keypoints(R, t, betas)[own.indices]
+    part = child.skin_joints[np.arange(len(skin)), child.skin_weights.argmax(1)]
+    trunk = [k for k, name in enumerate(child.joint_names) if name.startswith("spine") or name.endswith(("hip", "pelvis"))]
+    nearest = np.linalg.norm(points[:, None] - skin[np.isin(part, trunk)], axis=-1).min(axis=1)
+    foot = planes.normal[0] * (planes.offset[0] - own._room)[:, None]  # of each plane, which the nearest vertex is on
+    assert planes.near.all()
+    np.testing.assert_allclose(np.abs((planes.normal[0] * (points - foot)).sum(-1)), nearest, atol=0.02)
+
+
+def shifted(**changes: object) -> BodySurface:
+    body = with_contact_points(with_arm_points(replace(BODY, **changes)), BETAS)
+    return BodySurface(body, BETAS)
+
+
+def test_a_mesh_with_inward_faces_or_a_joint_named_twice_gives_the_same_planes() -> None:
+    R, t = POSES["seated, a hand in the thigh"]
+    here = surface().planes(R, t)
+    halves = np.concatenate([BODY.skin_weights, BODY.skin_weights], axis=1) / 2
+    twice = {"skin_joints": np.concatenate([BODY.skin_joints, BODY.skin_joints], axis=1), "skin_weights": halves}
+    for changes in ({"faces": BODY.faces[:, [0, 3, 2, 1]]}, twice):
+        there = shifted(**changes).planes(R, t)
+        np.testing.assert_allclose(there.height, here.height, atol=1e-6)
+        np.testing.assert_array_equal(there.near, here.near)
+
+
+@pytest.mark.parametrize("only", ["pelvis", "left_elbow"])
+def test_a_body_without_skin_on_arms_or_trunk_has_no_planes(only: str) -> None:
+    joints = np.full_like(BODY.skin_joints, BODY.joint_names.index(only))
+    R, t = POSES["arms through the hips"]
+    planes = shifted(skin_joints=joints).planes(np.repeat(R, 3, axis=0), np.repeat(t, 3, axis=0))
+    assert planes.near.shape == (3, 0)
+    assert planes.normal.shape == (3, 0, 3)

@@ -47,7 +47,6 @@ class Ablation:
             keypoints3d=weights.keypoints3d * self.keypoints3d,
             orientation_field=weights.orientation_field * self.orientation_field,
             joint_prior=weights.joint_prior * self.joint_prior,
-            floor=weights.floor * self.floor,
             shape=weights.shape if self.shape else FIXED,
         )
 

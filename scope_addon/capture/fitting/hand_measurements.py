@@ -29,10 +29,14 @@ HAND_KEYPOINT_NAMES = tuple(f"hand/{side}_{name}" for side in SIDES for name in 
 # places the wrist further into the palm than the body has its joint.
 PIXEL_WEIGHT, WRIST_PIXEL_WEIGHT = 0.3, 0.05
 DIRECTION_WEIGHT = 0.25  # of a bone in a hand of presence 1: twice the standard deviation of a bone of the body
+# The smaller a hand is in the image, the less is seen of which way its palm faces, and the weight falls with the square
+# of the distance from wrist to middle knuckle. In hands of 15 pixels, wrong palms turned the whole arm.
+FULL_SIZE_PX = 100.0
 RELIABLE = 0.8  # presence below which directions count by its cube: of a blurred hand, the place is right, not the pose
 # Flexion of a finger joint towards the palm, at least and at most, and largest deviation from this axis; radians.
 _KNUCKLE, _HINGE = (-0.5, 1.7, 0.4), (-0.2, 2.0, 0.2)
 _THUMB = (-0.4, 0.4, 1.2)  # rotation of a thumb joint about its own bone, and deviation from it
+_MIDDLE_KNUCKLE = HAND_NAMES.index("middle_finger_mcp")
 SHORT_GAP_S, LONG_GAP_S = 0.3, 1.0  # unseen fingers begin to return to rest after the first, and rest after the second
 
 
@@ -96,7 +100,7 @@ class HandMeasurer:
         if not seen:
             return measured
         confidence = hands[seen, :, 2]
-        reliable = confidence * np.minimum(confidence / RELIABLE, 1.0) ** 2
+        reliable = confidence * np.minimum(confidence / RELIABLE, 1.0) ** 2 * _weight_by_size(hands[seen])[:, None]
         directions = self._directions(hands[seen])
         return replace(
             measured,
@@ -127,6 +131,13 @@ class HandMeasurer:
             for joint in (self.wrists[side], *joints):
                 out[:, joint] = hands[:, side, 0, 2]
         return out
+
+
+def _weight_by_size(hands: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    """Return the (n,) factors 0..1 on the directions of hands (n, 21, 6)."""
+    size = np.linalg.norm(hands[:, _MIDDLE_KNUCKLE, :2] - hands[:, 0, :2], axis=-1)
+    factor: NDArray[np.floating[Any]] = np.minimum(size / FULL_SIZE_PX, 1.0) ** 2
+    return factor
 
 
 def _bones() -> list[tuple[int, int]]:

@@ -122,6 +122,8 @@ def ground_all(
     grounded, starts = [], []
     for k, (each, fit) in enumerate(zip(prepared, fits, strict=True)):
         stance = stance_on_floor(placed[k], world.floor_from_camera(k), shot.ablation.balance)
+        if not shot.ablation.floor:
+            stance = replace(stance, contact=np.zeros_like(stance.contact))
         if not shot.ablation.contact:
             stance = replace(stance, resting=np.zeros_like(stance.resting))
         measured, start = ground(each, fit, shot.path.stance_to_frames(stance))

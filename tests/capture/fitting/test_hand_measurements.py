@@ -20,7 +20,7 @@ from scope.scope_addon.capture.fitting.hand_measurements import (
     with_finger_limits,
 )
 from scope.scope_addon.capture.fitting.weights import ROBUST, WEIGHTS, cold_stages
-from scope.scope_addon.capture.perception.hand_landmarks import HAND_POINTS
+from scope.scope_addon.capture.perception.hand_landmarks import HAND_NAMES, HAND_POINTS
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.perception.region import Region
@@ -248,19 +248,29 @@ def test_tracks_keep_hands_in_their_rows_and_swap_them_with_left_and_right():
     assert repaired.hands[1, 0].max() == 0
 
 
+def weights_of(body, presence: float, size_px: float) -> tuple[float, float]:
+    """Sums of the weights of the keypoints and of the directions of a hand of a presence and a size."""
+    hands = np.zeros((2, HAND_POINTS, 6))
+    hands[0, :, :2] = 300.0 + size_px * np.linspace(0.0, 1.0, HAND_POINTS)[:, None] * [0.6, 0.8]
+    hands[0, HAND_NAMES.index("middle_finger_mcp"), :2] = 300.0 + size_px * np.array([0.6, 0.8])
+    hands[0, :, 2] = presence
+    hands[0, :, 3:] = np.random.default_rng(0).normal(0, 0.05, (HAND_POINTS, 3))
+    empty = Measurements(
+        keypoints2d=Keypoints2D(np.zeros(0, int), np.zeros((0, 2)), np.zeros(0)),
+        orientation_field=OrientationField(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 3)), np.zeros(0)),
+    )
+    added = HandMeasurer(body, np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]])).add(empty, hands)
+    return added.keypoints2d.confidence.sum(), added.orientation_field.confidence.sum()
+
+
 def test_directions_of_a_hand_that_is_hardly_present_count_less_than_its_place(body):
-    weights = []
-    for presence in (0.9, 0.3):
-        hands = np.zeros((2, HAND_POINTS, 6))
-        hands[0, :, :2] = 300.0
-        hands[0, :, 2] = presence
-        hands[0, :, 3:] = np.random.default_rng(0).normal(0, 0.05, (HAND_POINTS, 3))
-        empty = Measurements(
-            keypoints2d=Keypoints2D(np.zeros(0, int), np.zeros((0, 2)), np.zeros(0)),
-            orientation_field=OrientationField(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 3)), np.zeros(0)),
-        )
-        added = HandMeasurer(body, np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]])).add(empty, hands)
-        weights.append((added.keypoints2d.confidence.sum(), added.orientation_field.confidence.sum()))
-    (place, turn), (place_low, turn_low) = weights
+    (place, turn), (place_low, turn_low) = (weights_of(body, presence, 100.0) for presence in (0.9, 0.3))
     assert place_low / place == pytest.approx(1 / 3)
     assert turn_low / turn < 0.1
+
+
+def test_directions_of_a_small_hand_count_less_than_its_place(body):
+    large, full, half, tiny = (weights_of(body, 0.9, size) for size in (300.0, 100.0, 50.0, 1.0))
+    assert large == pytest.approx(full)
+    assert half == pytest.approx((full[0], full[1] / 4))
+    assert tiny == pytest.approx((full[0], full[1] / 1e4))

@@ -169,6 +169,7 @@ def test_a_point_that_is_not_finite_is_left_out_and_no_probability_is_no_contact
         ({"floor": Floor([10000], UP, 0.0, [0.0])}, "10000"),
         ({"floor": Floor(FEET, np.tile(UP, (3, 1)), np.zeros(4), np.zeros(4))}, r"Normal .* \(4, 3\)"),
         ({"floor": Floor(FEET, np.tile(UP, (4, 1)), 0.0, np.zeros(4))}, r"Offset .* \(4,\)"),
+        ({"floor": Floor(FEET, [[1.0, 0.0, 0.0], [0.0, 1.0]], np.zeros(4), np.zeros(4))}, "Normal of the floor"),
         ({"floor": Floor(FEET, np.outer([1, 1, 3, 1], UP), np.zeros(4), np.zeros(4))}, "length 3"),
         ({"foot_contacts": FootContacts(FEET, np.zeros((3, 3)), np.ones(4))}, r"\(4, 3\)"),
     ],
