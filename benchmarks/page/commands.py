@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-import glob
 import json
+import re
 import shlex
 import subprocess
 import sys
@@ -124,7 +124,11 @@ def worst_clips(measured: Sequence[Outcome]) -> list[tuple[str, Path, str]]:
 def motion_files(folder: Path, name: str) -> list[Path]:
     """Return the motion files of the people of a clip, the most prominent first."""
     one = folder / f"{name}.npz"
-    return [one] if one.is_file() else sorted(folder.glob(f"{glob.escape(name)}.person?.npz"))
+    if one.is_file():
+        return [one]
+    numbered = re.compile(rf"{re.escape(name)}\.person(\d+)\.npz")
+    found = {int(match[1]): path for path in folder.iterdir() if (match := numbered.fullmatch(path.name))}
+    return [found[number] for number in sorted(found)]
 
 
 def run(command: Command, folder: Path, say: Callable[[str], None]) -> Outcome:

@@ -66,9 +66,12 @@ def test_everybody_is_captured_where_no_truth_says_who_it_is_about(tmp_path, mon
     for name, everybody in (("cam1", False), ("roll", False), ("walk", True), ("test_00", True)):
         outcome = run_capture(tmp_path / f"{name}.mp4", tmp_path / f"{name}.npz", lambda text: None)
         assert ("--people" in outcome.command.arguments) == everybody
-    for name in ("b.person2.npz", "b.person1.npz", "bb.person1.npz", "c.npz"):
+
+
+def test_motion_files_are_those_of_everybody_in_their_order(tmp_path):
+    for name in ("bb.person1.npz", "b.personal.npz", "c.npz", *(f"b.person{n}.npz" for n in range(12, 0, -1))):
         (tmp_path / name).touch()
-    assert [path.name for path in motion_files(tmp_path, "b")] == ["b.person1.npz", "b.person2.npz"]
+    assert [path.name for path in motion_files(tmp_path, "b")] == [f"b.person{n}.npz" for n in range(1, 13)]
     assert [path.name for path in motion_files(tmp_path, "c")] == ["c.npz"]
 
 
