@@ -101,3 +101,15 @@ def test_the_worst_rendered_clips_are_shown_too(tmp_path, monkeypatch):
     assert "132.5 mm" in found[0][2]
     assert "test: MPJPE-root is 120.0 mm" in found[2][2]
     assert "not found" in found[3][2]
+
+
+def test_a_scene_that_is_shown_for_two_reasons_gives_both(tmp_path, monkeypatch):
+    monkeypatch.setattr(commands, "CACHE", tmp_path)
+    (tmp_path / "scenes").mkdir()
+    (tmp_path / "scenes" / "test_00.mp4").touch()
+    rows = [{"clip": "test_00", "mpjpe_root": error, "found": float(error > 0)} for error in (120.0, float("nan"))]
+    figures = {"test": {"people": {"default preset": rows}}}
+    ((name, _, why),) = worst_clips([Outcome(Command("Scenes", "bench", ("scenes",)), "", "", figures, 1.0, 0)])
+    assert name == "test_00"
+    assert "MPJPE-root is 120.0 mm. A person" in why
+    assert "not found" in why
