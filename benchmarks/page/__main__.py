@@ -40,7 +40,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="report", description="One page about this machine.")
     parser.add_argument("out", nargs="?", type=Path, metavar="OUT.html", default=FOLDER / "report.html")
     parser.add_argument("--quick", action="store_true", help="a few minutes: fewer repetitions, fewer clips")
-    parser.add_argument("--resume", action="store_true", help="go on with a run that was interrupted")
+    parser.add_argument("--resume", action="store_true", help="go on with an interrupted run, quick or not")
     parser.add_argument("--recorded", type=Path, metavar="FOLDER", help="of an earlier run: write its page again")
     parser.add_argument("--curves", type=Path, metavar="CSV", help="digitized speedups of others, drawn beside ours")
     args = parser.parse_args()
@@ -69,14 +69,15 @@ def main() -> int:
 def measure(quick: bool, resume: bool = False) -> Run:
     """Run the commands; return what they gave, which is kept in `FOLDER` too, after each of them.
 
-    :param resume: keep what an interrupted run gave, and run what it lacks.
+    :param quick: leave out what takes long.
+    :param resume: keep what an interrupted run gave, and run what it lacks, quick or not as it began.
     :raises SetupError: the first clip cannot be captured.
     :raises InputError: there is no run to go on with.
     """
-    done = read_run(FOLDER) if resume else Run([], [], now(), facts(other_load()))
+    done = read_run(FOLDER) if resume else Run([], [], now(), facts(other_load()), quick)
     if resume and revision() != done.facts.get("Revision"):
         done.facts["Resumed by revision"] = revision()
-    for name, video in clips(quick):
+    for name, video in clips(done.quick):
         if name in [each[0] for each in done.captured]:
             continue
         outcome = run_capture(video, FOLDER / f"{name}.npz", say)
@@ -85,7 +86,7 @@ def measure(quick: bool, resume: bool = False) -> Run:
             raise SetupError(f"{outcome.command.text} failed ({last[0]}); mend that and run this again")
         done.captured.append((name, video, outcome))
         write_run(FOLDER, done)
-    for command in commands(quick):
+    for command in commands(done.quick):
         if command not in [each.command for each in done.measured]:
             done.measured.append(run(command, FOLDER, say))
             write_run(FOLDER, done)

@@ -52,6 +52,20 @@ def test_what_was_measured_is_not_measured_again(done, tmp_path, monkeypatch, ca
     assert (run.facts["Revision"], run.facts["Resumed by revision"]) == ("abc", "def")
 
 
+def test_a_run_goes_on_as_quick_or_whole_as_it_began(done, monkeypatch):
+    asked = []
+    monkeypatch.setattr(module, "clips", lambda quick: CLIPS[: 1 if quick else 2])
+    monkeypatch.setattr(module, "commands", lambda quick: asked.append(quick) or COMMANDS)
+    for began in (True, False):
+        done.clear()
+        with pytest.raises(KeyboardInterrupt):
+            module.measure(began)
+        run = module.measure(not began, resume=True)
+        assert [each[0] for each in run.captured] == (["sample"] if began else ["sample", "b"])
+        assert run.quick is began
+    assert asked == [True, True, False, False]
+
+
 def test_without_an_earlier_run_there_is_nothing_to_go_on_with(done):
     with pytest.raises(InputError, match="holds no run"):
         module.measure(False, resume=True)
