@@ -21,14 +21,14 @@ from ...scope_addon.report.machine import machine, versions
 from ...scope_addon.report.viewer_data import shown_rows, viewer_data
 from ...scope_addon.scene.export.output_paths import check_output
 from ...solver.body import Body
-from ...solver.errors import ScopeError
+from ...solver.errors import InputError, ScopeError
 from ...solver.loaders.body_file import load_body
 from ..frames import ROOT
 from .commands import LONG, Outcome, clips, commands, motion_files, run, run_capture, truth_of, worst_clips
 from .content import outcome_section
 from .curves import Curves, read_curves
 from .failures import KNOWN, KnownFailure, worst_moments
-from .recorded import Run, read_run, write_run
+from .recorded import FILE, Run, read_run, set_aside, write_run
 from .shots import strips
 
 FOLDER = ROOT / "build" / "report"
@@ -57,7 +57,8 @@ def main() -> int:
         print(f"report: {error}", file=sys.stderr)
         return exit_status(error)
     except KeyboardInterrupt:
-        print("report: interrupted; --resume goes on, --recorded build/report shows what there is", file=sys.stderr)
+        kept = "--resume goes on, --recorded build/report shows what there is"
+        print(f"report: interrupted; {kept if (FOLDER / FILE).is_file() else 'nothing is kept yet'}", file=sys.stderr)
         return INTERRUPTED
     except OSError as error:
         print(f"report: cannot write {args.out}: {reason(error)}", file=sys.stderr)
@@ -74,7 +75,11 @@ def measure(quick: bool, resume: bool = False) -> Run:
     :raises SetupError: the first clip cannot be captured.
     :raises InputError: there is no run to go on with.
     """
-    done = read_run(FOLDER) if resume else Run([], [], now(), facts(other_load()), quick)
+    if resume:
+        done = read_run(FOLDER)
+    else:
+        set_aside(FOLDER)  # the first capture removes the motion of its first clip
+        done = Run([], [], now(), facts(other_load()), quick)
     if resume and revision() != done.facts.get("Revision"):
         done.facts["Resumed by revision"] = revision()
     for name, video in clips(done.quick):
@@ -107,10 +112,13 @@ def report_page(folder: Path, done: Run, curves: Curves) -> str:
 
     :param folder: the run's, with the motion files of its clips.
     :param curves: digitized speedups of others.
+    :raises InputError: the motion of the run's first clip is not there.
     """
+    shown = motions_of(folder, done.captured[0][0])[:1] if done.captured else []
+    if not shown:
+        raise InputError(f"{folder} holds no motion of its first clip; run ./scripts/report again, without --resume")
     body = load_body("scope")
-    name, video, _ = done.captured[0]
-    (motion,) = motions_of(folder, name)
+    (motion,), video = shown, done.captured[0][1]
     rows = shown_rows([motion])
     pictures = overlay_pictures(video, [motion], body, rows)
     captions = [f"frame {motion.frames[rows[p.row]]}, {motion.timestamps[rows[p.row]]:.2f} s" for p in pictures]

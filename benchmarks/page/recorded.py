@@ -13,6 +13,7 @@ from ...solver.errors import InputError
 from .commands import Command, Outcome
 
 FILE = "run.json"  # in the folder of the run, beside the motion files of its clips
+PREVIOUS = "run.previous.json"  # the run before it, whose motion files may be gone
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,15 @@ def write_run(folder: Path, run: Run) -> None:
     content |= {"captured": captured, "measured": measured}
     with atomic_path(folder / FILE) as temporary:
         temporary.write_text(json.dumps(content, indent=1), encoding="utf-8")
+
+
+def set_aside(folder: Path) -> None:
+    """Rename the run in a folder, if there is one, to `PREVIOUS`: one that starts is not to be mistaken for it.
+
+    :raises OSError: the file cannot be renamed.
+    """
+    if (folder / FILE).is_file():
+        (folder / FILE).replace(folder / PREVIOUS)
 
 
 def read_run(folder: Path) -> Run:
