@@ -24,7 +24,7 @@ from ...solver.body import Body
 from ...solver.errors import InputError, ScopeError
 from ...solver.loaders.body_file import load_body
 from ..frames import ROOT
-from .commands import LONG, Outcome, clips, commands, motion_files, run, run_capture, truth_of, worst_clips
+from .commands import LONG, Command, Outcome, clips, commands, motion_files, run, run_capture, truth_of, worst_clips
 from .content import outcome_section
 from .curves import Curves, read_curves
 from .failures import KNOWN, KnownFailure, worst_moments
@@ -124,8 +124,8 @@ def report_page(folder: Path, done: Run, curves: Curves) -> str:
     captions = [f"frame {motion.frames[rows[p.row]]}, {motion.timestamps[rows[p.row]]:.2f} s" for p in pictures]
     why = {name: text for name, _, text in worst_clips(done.measured)}
     minutes = sum(outcome.seconds for outcome in done.everything) / 60
-    left_out = [each.text for each in LONG if each not in [outcome.command for outcome in done.measured]]
-    note = f"Left out of this run: {', '.join(left_out)}." if left_out else ""
+    lacking = ", ".join(command.text for command in left_out(done))
+    note = f"Left out of this run: {lacking}." if lacking else ""
     content = [
         page.header("Scope on this machine", done.time, done.facts | {"Measured in": f"{minutes:.0f} minutes"}),
         page.stage(len(rows), motion.image_size.tolist()),
@@ -138,6 +138,12 @@ def report_page(folder: Path, done: Run, curves: Curves) -> str:
         ),
     ]
     return page.document("Scope on this machine", content, viewer_data([motion], body, rows, [page.person_color(0)]))
+
+
+def left_out(done: Run) -> list[Command]:
+    """Return the commands that a run has not measured, of its own and of those that a whole one has."""
+    measured = [outcome.command for outcome in done.measured]
+    return [each for each in dict.fromkeys([*commands(done.quick), *LONG]) if each not in measured]
 
 
 def other_load() -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from scope.benchmarks.page import __main__ as module
 from scope.benchmarks.page.commands import Command, Outcome
+from scope.benchmarks.page.commands import commands as listed
 from scope.benchmarks.page.recorded import FILE, PREVIOUS, Run, read_run, write_run
 from scope.scope_addon.errors import SetupError
 from scope.solver.errors import InputError
@@ -95,6 +96,16 @@ def test_a_run_without_the_motion_of_its_first_clip_has_no_page(tmp_path, monkey
         monkeypatch.setattr(module.sys, "argv", ["report", "--recorded", str(tmp_path), str(tmp_path / "out.html")])
         assert module.main() == 1
         assert "no motion of its first clip" in capsys.readouterr().err
+
+
+def test_all_that_an_unfinished_run_lacks_is_named():
+    gate, solver, *long = listed(quick=False)
+    quick_solver = listed(quick=True)[1]
+    measured = [Outcome(gate, "", "", {}, 1.0, 0)]
+    assert module.left_out(Run([], measured, "", {}, quick=False)) == [solver, *long]
+    assert module.left_out(Run([], measured, "", {}, quick=True)) == [quick_solver, *long]
+    everything = [Outcome(each, "", "", {}, 1.0, 0) for each in (gate, solver, *long)]
+    assert module.left_out(Run([], everything, "", {}, quick=False)) == []
 
 
 def test_without_an_earlier_run_there_is_nothing_to_go_on_with(done):
