@@ -21,14 +21,14 @@ from ...scope_addon.report.machine import machine, versions
 from ...scope_addon.report.viewer_data import shown_rows, viewer_data
 from ...scope_addon.scene.export.output_paths import check_output
 from ...solver.body import Body
-from ...solver.errors import ScopeError
+from ...solver.errors import InputError, ScopeError
 from ...solver.loaders.body_file import load_body
 from ..frames import ROOT
-from .commands import LONG, Outcome, clips, commands, motion_files, run, run_capture, truth_of, worst_clips
+from .commands import LONG, Command, Outcome, clips, commands, motion_files, run, run_capture, truth_of, worst_clips
 from .content import outcome_section
 from .curves import Curves, read_curves
 from .failures import KNOWN, KnownFailure, worst_moments
-from .recorded import Run, read_run, write_run
+from .recorded import FILE, Run, read_run, set_aside, write_run
 from .shots import strips
 
 FOLDER = ROOT / "build" / "report"
@@ -40,7 +40,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="report", description="One page about this machine.")
     parser.add_argument("out", nargs="?", type=Path, metavar="OUT.html", default=FOLDER / "report.html")
     parser.add_argument("--quick", action="store_true", help="a few minutes: fewer repetitions, fewer clips")
-    parser.add_argument("--resume", action="store_true", help="go on with a run that was interrupted")
+    parser.add_argument("--resume", action="store_true", help="go on with an interrupted run, quick or not")
     parser.add_argument("--recorded", type=Path, metavar="FOLDER", help="of an earlier run: write its page again")
     parser.add_argument("--curves", type=Path, metavar="CSV", help="digitized speedups of others, drawn beside ours")
     args = parser.parse_args()
@@ -57,7 +57,8 @@ def main() -> int:
         print(f"report: {error}", file=sys.stderr)
         return exit_status(error)
     except KeyboardInterrupt:
-        print("report: interrupted; --resume goes on, --recorded build/report shows what there is", file=sys.stderr)
+        kept = "--resume goes on, --recorded build/report shows what there is"
+        print(f"report: interrupted; {kept if (FOLDER / FILE).is_file() else 'nothing is kept yet'}", file=sys.stderr)
         return INTERRUPTED
     except OSError as error:
         print(f"report: cannot write {args.out}: {reason(error)}", file=sys.stderr)
@@ -69,14 +70,19 @@ def main() -> int:
 def measure(quick: bool, resume: bool = False) -> Run:
     """Run the commands; return what they gave, which is kept in `FOLDER` too, after each of them.
 
-    :param resume: keep what an interrupted run gave, and run what it lacks.
+    :param quick: leave out what takes long.
+    :param resume: keep what an interrupted run gave, and run what it lacks, quick or not as it began.
     :raises SetupError: the first clip cannot be captured.
     :raises InputError: there is no run to go on with.
     """
-    done = read_run(FOLDER) if resume else Run([], [], now(), facts(other_load()))
+    if resume:
+        done = read_run(FOLDER)
+    else:
+        set_aside(FOLDER)  # the first capture removes the motion of its first clip
+        done = Run([], [], now(), facts(other_load()), quick)
     if resume and revision() != done.facts.get("Revision"):
         done.facts["Resumed by revision"] = revision()
-    for name, video in clips(quick):
+    for name, video in clips(done.quick):
         if name in [each[0] for each in done.captured]:
             continue
         outcome = run_capture(video, FOLDER / f"{name}.npz", say)
@@ -85,7 +91,7 @@ def measure(quick: bool, resume: bool = False) -> Run:
             raise SetupError(f"{outcome.command.text} failed ({last[0]}); mend that and run this again")
         done.captured.append((name, video, outcome))
         write_run(FOLDER, done)
-    for command in commands(quick):
+    for command in commands(done.quick):
         if command not in [each.command for each in done.measured]:
             done.measured.append(run(command, FOLDER, say))
             write_run(FOLDER, done)
@@ -106,17 +112,20 @@ def report_page(folder: Path, done: Run, curves: Curves) -> str:
 
     :param folder: the run's, with the motion files of its clips.
     :param curves: digitized speedups of others.
+    :raises InputError: the motion of the run's first clip is not there.
     """
+    shown = motions_of(folder, done.captured[0][0])[:1] if done.captured else []
+    if not shown:
+        raise InputError(f"{folder} holds no motion of its first clip; run ./scripts/report again, without --resume")
     body = load_body("scope")
-    name, video, _ = done.captured[0]
-    (motion,) = motions_of(folder, name)
+    (motion,), video = shown, done.captured[0][1]
     rows = shown_rows([motion])
     pictures = overlay_pictures(video, [motion], body, rows)
     captions = [f"frame {motion.frames[rows[p.row]]}, {motion.timestamps[rows[p.row]]:.2f} s" for p in pictures]
     why = {name: text for name, _, text in worst_clips(done.measured)}
     minutes = sum(outcome.seconds for outcome in done.everything) / 60
-    left_out = [each.text for each in LONG if each not in [outcome.command for outcome in done.measured]]
-    note = f"Left out of this run: {', '.join(left_out)}." if left_out else ""
+    lacking = ", ".join(command.text for command in left_out(done))
+    note = f"Left out of this run: {lacking}." if lacking else ""
     content = [
         page.header("Scope on this machine", done.time, done.facts | {"Measured in": f"{minutes:.0f} minutes"}),
         page.stage(len(rows), motion.image_size.tolist()),
@@ -129,6 +138,12 @@ def report_page(folder: Path, done: Run, curves: Curves) -> str:
         ),
     ]
     return page.document("Scope on this machine", content, viewer_data([motion], body, rows, [page.person_color(0)]))
+
+
+def left_out(done: Run) -> list[Command]:
+    """Return the commands that a run has not measured, of its own and of those that a whole one has."""
+    measured = [outcome.command for outcome in done.measured]
+    return [each for each in dict.fromkeys([*commands(done.quick), *LONG]) if each not in measured]
 
 
 def other_load() -> str:

@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-import glob
 import json
+import re
 import shlex
 import subprocess
 import sys
@@ -94,12 +94,12 @@ def truth_of(video: Path) -> Path | None:
 
 
 def worst_clips(measured: Sequence[Outcome]) -> list[tuple[str, Path, str]]:
-    """Return names and paths of the worst rendered clips and scenes of those measured, and what was measured.
+    """Return names and paths of the worst rendered clips and scenes of those measured, each once, and the reasons.
 
     Two of the renders, and of each split the scene of the worst person and one in which somebody was never found, with
     the default preset and nothing given.
     """
-    found = []
+    found: list[tuple[Path, str]] = []
     for outcome in measured:
         if outcome.command.arguments[:1] == ("renders",) and outcome.figures:
             clips = outcome.figures[CaptureOptions().quality]["nothing given"]
@@ -107,24 +107,31 @@ def worst_clips(measured: Sequence[Outcome]) -> list[tuple[str, Path, str]]:
             errors = {name: row["mpjpe_root"] for name, row in shots.items() if "mpjpe_root" in row}
             for name in sorted(errors, key=lambda k: -errors[k])[:2]:
                 why = f"One of the two worst of the rendered clips: MPJPE-root is {errors[name]:.1f} mm."
-                found.append((name, CACHE / "renders" / f"{name}.mp4", why))
+                found.append((CACHE / "renders" / f"{name}.mp4", why))
         if outcome.command.arguments[:1] == ("scenes",):
             for split, figures in outcome.figures.items():
                 people = [row for row in figures["people"]["default preset"] if np.isfinite(row["mpjpe_root"])]
                 if people:
                     worst = max(people, key=lambda row: row["mpjpe_root"])
                     why = f"The worst person of the scenes {split}: MPJPE-root is {worst['mpjpe_root']:.1f} mm."
-                    found.append((worst["clip"], CACHE / "scenes" / f"{worst['clip']}.mp4", why))
+                    found.append((CACHE / "scenes" / f"{worst['clip']}.mp4", why))
                 for row in [row for row in figures["people"]["default preset"] if not row["found"]][:1]:
                     why = f"A person of the scenes {split} who was not found in any frame."
-                    found.append((row["clip"], CACHE / "scenes" / f"{row['clip']}.mp4", why))
-    return [each for each in found if each[1].is_file()]
+                    found.append((CACHE / "scenes" / f"{row['clip']}.mp4", why))
+    reasons: dict[Path, list[str]] = {}
+    for path, why in found:
+        reasons.setdefault(path, []).append(why)
+    return [(path.stem, path, " ".join(texts)) for path, texts in reasons.items() if path.is_file()]
 
 
 def motion_files(folder: Path, name: str) -> list[Path]:
     """Return the motion files of the people of a clip, the most prominent first."""
     one = folder / f"{name}.npz"
-    return [one] if one.is_file() else sorted(folder.glob(f"{glob.escape(name)}.person?.npz"))
+    if one.is_file():
+        return [one]
+    numbered = re.compile(rf"{re.escape(name)}\.person(\d+)\.npz")
+    found = {int(match[1]): path for path in folder.iterdir() if (match := numbered.fullmatch(path.name))}
+    return [found[number] for number in sorted(found)]
 
 
 def run(command: Command, folder: Path, say: Callable[[str], None]) -> Outcome:

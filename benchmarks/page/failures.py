@@ -5,13 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...scope_addon.motion import Motion
+from ...scope_addon.report import page
 from ...scope_addon.report.footage_pictures import small_picture
 from ...scope_addon.report.page import Markup
 from ...solver.body import Body
@@ -19,6 +19,7 @@ from ...tools.readme_pictures.clips import error_mm
 from ...tools.readme_pictures.panel import OURS, TRUTH, Panel, next_to_each_other
 from ...tools.readme_pictures.shapes import joints, posed, true_joints
 from ...tools.readme_pictures.view import View, from_around, from_the_camera
+from .shots import figures
 
 MOMENTS, APART_S = 2, 0.5  # how many are shown, and how far they are apart
 SIZE, SHOWN_M, FILL = (320, 380), 2.35, 0.76  # of a panel, in pixels; height of the view from the side; share of it
@@ -79,14 +80,8 @@ def worst_moments(motion: Motion, truth: Path, body: Body) -> Markup:
 
 def captioned(pictures: Sequence[tuple[NDArray[np.uint8], str]], note: str) -> Markup:
     """Return pictures with a caption each, below a note about all of them."""
-    figures = []
-    for image, text in pictures:
-        picture = small_picture(0, image)
-        figures.append(
-            f'<figure><img src="{picture.url}" width="{picture.width}" height="{picture.height}" '
-            f'alt="{escape(text)}"><figcaption>{escape(text)}</figcaption></figure>'
-        )
-    return Markup(f'<p class="note">{escape(note)}</p><div class="shots large">{"".join(figures)}</div>\n')
+    images, captions = [small_picture(0, image) for image, _ in pictures], [text for _, text in pictures]
+    return Markup(page.paragraph(note) + figures(images, captions, large=True))
 
 
 def _panel(motion: Motion, row: int, truth: Path, body: Body, side: bool) -> NDArray[np.uint8]:

@@ -13,16 +13,21 @@ from ...solver.errors import InputError
 from .commands import Command, Outcome
 
 FILE = "run.json"  # in the folder of the run, beside the motion files of its clips
+PREVIOUS = "run.previous.json"  # the run before it, whose motion files may be gone
 
 
 @dataclass(frozen=True)
 class Run:
-    """What the commands gave: clips with names and videos, and measurements; when; and facts about the machine."""
+    """What the commands gave: clips with names and videos, and measurements; when; facts about the machine.
+
+    ``quick``: whether it leaves out what takes long.
+    """
 
     captured: list[tuple[str, Path, Outcome]]
     measured: list[Outcome]
     time: str
     facts: dict[str, str]
+    quick: bool
 
     @property
     def everything(self) -> list[Outcome]:
@@ -39,9 +44,19 @@ def write_run(folder: Path, run: Run) -> None:
         {"name": name, "video": str(video), "outcome": asdict(outcome)} for name, video, outcome in run.captured
     ]
     measured = [asdict(outcome) for outcome in run.measured]
-    content = {"time": run.time, "facts": run.facts, "captured": captured, "measured": measured}
+    content = {"time": run.time, "facts": run.facts, "quick": run.quick}
+    content |= {"captured": captured, "measured": measured}
     with atomic_path(folder / FILE) as temporary:
         temporary.write_text(json.dumps(content, indent=1), encoding="utf-8")
+
+
+def set_aside(folder: Path) -> None:
+    """Rename the run in a folder, if there is one, to `PREVIOUS`: one that starts is not to be mistaken for it.
+
+    :raises OSError: the file cannot be renamed.
+    """
+    if (folder / FILE).is_file():
+        (folder / FILE).replace(folder / PREVIOUS)
 
 
 def read_run(folder: Path) -> Run:
@@ -58,7 +73,7 @@ def read_run(folder: Path) -> Run:
     try:
         captured = [(each["name"], Path(each["video"]), _outcome(each["outcome"])) for each in content["captured"]]
         measured = [_outcome(each) for each in content["measured"]]
-        return Run(captured, measured, content["time"], content["facts"])
+        return Run(captured, measured, content["time"], content["facts"], content.get("quick", False))
     except (KeyError, TypeError) as error:
         raise InputError(f"{folder / FILE} is not of this version; run ./scripts/report again") from error
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ...scope_addon.capture.media.video import open_video
 from ...scope_addon.capture.overlay.overlay_video import body_colors, draw_overlay, painted_frames
 from ...scope_addon.motion import Motion
-from ...scope_addon.report.footage_pictures import small_picture, spread_rows
+from ...scope_addon.report.footage_pictures import Picture, small_picture, spread_rows
 from ...scope_addon.report.page import Markup
 from ...solver.body import Body
 from ...solver.rotations import exp
@@ -42,14 +42,27 @@ def strips(
     at = dict(zip(wanted, times[rows].tolist(), strict=True))
     parts = []
     for name, pictures in (("footage", footage), ("overlay", overlay), ("turned by 90°", side)):
-        images = [(frame, small_picture(0, pictures[frame], SIDE_PX)) for frame in wanted if frame in pictures]
-        shown = "".join(
-            f'<figure><img src="{picture.url}" width="{picture.width}" height="{picture.height}" '
-            f'alt="{escape(name)}, frame {frame}"><figcaption>{escape(name)}, {at[frame]:.2f} s</figcaption></figure>'
-            for frame, picture in images
-        )
-        parts.append(f'<div class="shots">{shown}</div>\n')
+        shown = [frame for frame in wanted if frame in pictures]
+        images = [small_picture(0, pictures[frame], SIDE_PX) for frame in shown]
+        captions = [f"{name}, {at[frame]:.2f} s" for frame in shown]
+        parts.append(figures(images, captions, [f"{name}, frame {frame}" for frame in shown]))
     return Markup("".join(parts))
+
+
+def figures(
+    pictures: Sequence[Picture], captions: Sequence[str], descriptions: Sequence[str] | None = None, large: bool = False
+) -> Markup:
+    """Return pictures next to each other, each above its caption.
+
+    :param descriptions: what is shown instead of the pictures; None: the captions.
+    :param large: whether fewer fit into a row.
+    """
+    shown = "".join(
+        f'<figure><img src="{picture.url}" width="{picture.width}" height="{picture.height}" '
+        f'alt="{escape(description)}"><figcaption>{escape(caption)}</figcaption></figure>'
+        for picture, caption, description in zip(pictures, captions, descriptions or captions, strict=True)
+    )
+    return Markup(f'<div class="shots{" large" if large else ""}">{shown}</div>\n')
 
 
 def frames_of(video: Path, wanted: Sequence[int]) -> dict[int, Image]:

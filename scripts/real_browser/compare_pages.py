@@ -86,6 +86,7 @@ def made_run(report: dict[str, Any]) -> Run:
         ],
         "2026-01-02 03:04",
         {"Machine": "made", "Load before": "none"},
+        quick=True,
     )
 
 

@@ -96,8 +96,28 @@ def check_body(body: Body, path: Path) -> None:
     _check_indices(body, path)
     for key in (key for key, (kind, _) in (REQUIRED | OPTIONAL).items() if kind == "numbers"):
         array = getattr(body, key)
-        if array is not None and not np.isfinite(array).all():
-            raise ModelFileError(f"{path}: {key} contains NaN or infinity")
+        if array is not None:
+            check_finite_array(key, array, path)
+
+
+def check_index(key: str, index: NDArray[Any], top: int, path: Path) -> None:
+    """Refuse indices (...) that point outside of ``top`` entries.
+
+    :param key: the array's name.
+    :raises ModelFileError: one is negative, or ``top`` or more.
+    """
+    if index.size and (index.min() < 0 or index.max() >= top):
+        raise ModelFileError(f"{path}: {key} points outside 0..{top - 1}")
+
+
+def check_finite_array(key: str, array: NDArray[Any], path: Path) -> None:
+    """Refuse numbers (...) that are not finite.
+
+    :param key: the array's name.
+    :raises ModelFileError: one is NaN or infinite.
+    """
+    if not np.isfinite(array).all():
+        raise ModelFileError(f"{path}: {key} contains NaN or infinity")
 
 
 def check_extent(v_template: NDArray[np.float64], path: Path) -> None:
@@ -121,5 +141,5 @@ def _check_indices(body: Body, path: Path) -> None:
         tops["uv_faces"] = len(body.uv)
     for key, top in tops.items():
         index = getattr(body, key)
-        if index is not None and index.size and (index.min() < 0 or index.max() >= top):
-            raise ModelFileError(f"{path}: {key} points outside 0..{top - 1}")
+        if index is not None:
+            check_index(key, index, top, path)

@@ -15,11 +15,18 @@ from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ....solver.errors import ModelFileError
+from ....solver.loaders.arrays import Form, check_index
 from ....solver.loaders.body_file import BUILT_IN
-from ....solver.loaders.npz import read_npz
+from ....solver.names import EXPRESSIONS
+from .face_file import moves_of, read_face_file, told_to_install
 from .mouth import read_mouth, with_teeth_and_tongue
 
 FILE = Path(BUILT_IN["scope"]).with_name("expressions.npz")
+_FORMS: dict[str, Form] = {
+    "names": ("text", (None,)),
+    "vertex_count": ("whole numbers", ()),
+    "mouth_faces": ("whole numbers", (None,)),
+}
 
 
 @dataclass(frozen=True)
@@ -58,7 +65,12 @@ def mouth_faces_of(body: Body) -> NDArray[np.intp]:
 
     :raises ModelFileError: the file of the expressions is damaged.
     """
-    return _read()[2] if expressions_of(body) else np.zeros(0, np.intp)
+    if not expressions_of(body):
+        return np.zeros(0, np.intp)
+    faces = _read()[2]
+    with told_to_install():
+        check_index("mouth_faces", faces, len(body.faces), FILE)
+    return faces
 
 
 @cache
@@ -73,13 +85,11 @@ def _with_mouth() -> tuple[Expression, ...]:
 
 @cache
 def _read() -> tuple[int, tuple[Expression, ...], NDArray[np.intp]]:
-    data = read_npz(FILE, ModelFileError, "file of expressions")
-    try:
-        starts, step = data["starts"], float(data["step_m"])
-        found = tuple(
-            Expression(str(name), data["vertices"][a:b].astype(np.intp), step * data["moves"][a:b].astype(float))
-            for name, a, b in zip(data["names"], starts[:-1], starts[1:], strict=True)
-        )
-        return int(data["vertex_count"]), found, data["mouth_faces"].astype(np.intp)
-    except (KeyError, IndexError, TypeError, ValueError) as error:
-        raise ModelFileError(f"{FILE} is damaged ({error}); install Scope again") from error
+    data = read_face_file(FILE, "file of expressions", _FORMS)
+    count = int(data["vertex_count"])
+    with told_to_install():
+        if tuple(data["names"]) != EXPRESSIONS:
+            raise ModelFileError(f"{FILE}: names must be those of the {len(EXPRESSIONS)} expressions in their order")
+        moves = moves_of(data, count, FILE)
+    found = tuple(Expression(name, *each) for name, each in zip(EXPRESSIONS, moves, strict=True))
+    return count, found, data["mouth_faces"].astype(np.intp)

@@ -16,12 +16,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.body import Body
-from ....solver.errors import ModelFileError
+from ....solver.loaders.arrays import Form, check_arrays, check_index
 from ....solver.loaders.body_file import BUILT_IN
-from ....solver.loaders.npz import read_npz
+from .face_file import Moves, moves_of, read_face_file, told_to_install
 
 FILE = Path(BUILT_IN["scope"]).with_name("mouth.npz")
 _HEAD = "head"
+_FORMS: dict[str, Form] = {
+    "v_template": ("numbers", (None, 3)),
+    "shapedirs": ("numbers", (None, 3, None)),
+    "faces": ("whole numbers", (None, 4)),
+    "uv": ("numbers", (None, 2)),
+    "face_material": ("whole numbers", (None,)),
+    "material_names": ("text", (None,)),
+    "material_colors": ("numbers", (None, 4)),
+}
 
 
 @dataclass(frozen=True)
@@ -35,8 +44,7 @@ class Mouth:
     face_material: NDArray[np.uint8]  # (F,) into material_names
     material_names: tuple[str, ...]
     material_colors: NDArray[np.float64]  # (C, 4) linear RGBA
-    # (n,) vertices and (n, 3) offsets at weight 1, of each expression in the order of `solver.names.EXPRESSIONS`.
-    moves: tuple[tuple[NDArray[np.intp], NDArray[np.float64]], ...]
+    moves: tuple[Moves, ...]  # of each expression in the order of `solver.names.EXPRESSIONS`
 
 
 def with_teeth_and_tongue(body: Body) -> Body:
@@ -74,13 +82,18 @@ def read_mouth() -> Mouth:
 
     :raises ModelFileError: the file is damaged.
     """
-    data = read_npz(FILE, ModelFileError, "file of teeth and tongue")
-    try:
-        starts, step = data["starts"], float(data["step_m"])
-        moves = tuple(
-            (data["vertices"][a:b].astype(np.intp), step * data["moves"][a:b].astype(float))
-            for a, b in zip(starts[:-1], starts[1:], strict=True)
-        )
+    data = read_face_file(FILE, "file of teeth and tongue", _FORMS)
+    count, quads, materials = len(data["v_template"]), len(data["faces"]), len(data["material_names"])
+    forms: dict[str, Form] = {
+        "shapedirs": ("numbers", (count, 3, 11)),
+        "uv": ("numbers", (count, 2)),
+        "face_material": ("whole numbers", (quads,)),
+        "material_colors": ("numbers", (materials, 4)),
+    }
+    with told_to_install():
+        check_arrays(data, forms, FILE)
+        check_index("faces", data["faces"], count, FILE)
+        check_index("face_material", data["face_material"], materials, FILE)
         return Mouth(
             data["v_template"].astype(float),
             data["shapedirs"].astype(float),
@@ -89,7 +102,5 @@ def read_mouth() -> Mouth:
             data["face_material"].astype(np.uint8),
             tuple(map(str, data["material_names"])),
             data["material_colors"].astype(float),
-            moves,
+            moves_of(data, count, FILE),
         )
-    except (KeyError, IndexError, TypeError, ValueError) as error:
-        raise ModelFileError(f"{FILE} is damaged ({error}); install Scope again") from error

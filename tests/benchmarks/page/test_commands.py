@@ -66,9 +66,12 @@ def test_everybody_is_captured_where_no_truth_says_who_it_is_about(tmp_path, mon
     for name, everybody in (("cam1", False), ("roll", False), ("walk", True), ("test_00", True)):
         outcome = run_capture(tmp_path / f"{name}.mp4", tmp_path / f"{name}.npz", lambda text: None)
         assert ("--people" in outcome.command.arguments) == everybody
-    for name in ("b.person2.npz", "b.person1.npz", "bb.person1.npz", "c.npz"):
+
+
+def test_motion_files_are_those_of_everybody_in_their_order(tmp_path):
+    for name in ("bb.person1.npz", "b.personal.npz", "c.npz", *(f"b.person{n}.npz" for n in range(12, 0, -1))):
         (tmp_path / name).touch()
-    assert [path.name for path in motion_files(tmp_path, "b")] == ["b.person1.npz", "b.person2.npz"]
+    assert [path.name for path in motion_files(tmp_path, "b")] == [f"b.person{n}.npz" for n in range(1, 13)]
     assert [path.name for path in motion_files(tmp_path, "c")] == ["c.npz"]
 
 
@@ -98,3 +101,15 @@ def test_the_worst_rendered_clips_are_shown_too(tmp_path, monkeypatch):
     assert "132.5 mm" in found[0][2]
     assert "test: MPJPE-root is 120.0 mm" in found[2][2]
     assert "not found" in found[3][2]
+
+
+def test_a_scene_that_is_shown_for_two_reasons_gives_both(tmp_path, monkeypatch):
+    monkeypatch.setattr(commands, "CACHE", tmp_path)
+    (tmp_path / "scenes").mkdir()
+    (tmp_path / "scenes" / "test_00.mp4").touch()
+    rows = [{"clip": "test_00", "mpjpe_root": error, "found": float(error > 0)} for error in (120.0, float("nan"))]
+    figures = {"test": {"people": {"default preset": rows}}}
+    ((name, _, why),) = worst_clips([Outcome(Command("Scenes", "bench", ("scenes",)), "", "", figures, 1.0, 0)])
+    assert name == "test_00"
+    assert "MPJPE-root is 120.0 mm. A person" in why
+    assert "not found" in why

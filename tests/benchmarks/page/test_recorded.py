@@ -15,7 +15,7 @@ from scope.solver.errors import InputError
 def test_a_run_is_read_as_it_was_written(tmp_path):
     gate = Outcome(Command("Gate", "gate", ()), "| a |", "", {"pa_mpjpe": 48.1}, 2.5, 1)
     clip = Outcome(Command("a b.mp4", "capture", ("a b.mp4", "--json")), "", "said", {"frames": 3}, 1.0, 0)
-    run = Run([("a b", Path("a b.mp4"), clip)], [gate], "2026-01-02 03:04", {"Machine": "two cores"})
+    run = Run([("a b", Path("a b.mp4"), clip)], [gate], "2026-01-02 03:04", {"Machine": "two cores"}, quick=True)
     write_run(tmp_path, run)
     assert read_run(tmp_path) == run
     assert run.everything == [clip, gate]

@@ -22,11 +22,14 @@ def eye_light(image_rgb: NDArray[np.uint8], landmarks: NDArray[np.float64]) -> f
     """Return the median brightness of the square around an eye over that of the skin, for the brighter eye.
 
     The skin is the darker one of cheek and forehead: a mask is brighter than skin. 0.6 to 1.5 with bare eyes and clear
-    glasses, at most 0.4 with dark ones; 1 where the skin is too dark or the eye too small to tell.
+    glasses, at most 0.4 with dark ones; 1 where the skin is too dark or the eye too small to tell, and where a landmark
+    is not finite.
 
     :param image_rgb: (H, W, 3) uint8.
     :param landmarks: (478, 2) or (478, 3) pixels; a third column is not used.
     """
+    if not np.isfinite(landmarks[:, :2]).all():
+        return 1.0
     found = []
     for (first, second), *places in zip(_EYES, _CHEEKS, _FOREHEAD, strict=True):
         (ax, ay), (bx, by) = landmarks[[first, second], :2].tolist()

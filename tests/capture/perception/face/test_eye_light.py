@@ -56,3 +56,11 @@ def test_what_is_brighter_than_skin_is_no_measure(rows):
 def test_small_eyes_say_nothing():
     image, landmarks = painted(120, (10, 10))
     assert eye_light(np.ascontiguousarray(image[::4, ::4]), landmarks / 4) == 1.0
+
+
+@pytest.mark.parametrize("number", [33, 50, 151])  # of an eye, a cheek, the forehead
+def test_landmarks_that_are_not_finite_say_nothing(number):
+    image, landmarks = painted(200, (30, 30))
+    for value in (np.nan, np.inf):
+        landmarks[number, :2] = value
+        assert eye_light(image, landmarks) == 1.0
