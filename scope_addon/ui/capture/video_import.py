@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import bpy
@@ -43,7 +44,7 @@ class SCOPE_OT_import_video(FootageBrowser, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Set the footage to the file, and start the capture."""
         path = Path(bpy.path.abspath(self.filepath))
-        if not path.is_file():
+        if not os.path.isfile(path):  # Path.is_file raises where a name is too long
             self.report({"ERROR"}, rpt_("{path} is not a file; choose a video or image", path=path))
             return {"CANCELLED"}
         context.scene.scope.footage = str(path)

@@ -7,6 +7,7 @@ text of the same value, with a button of our own. Every browser's filter can be 
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +50,8 @@ def present(path: str) -> str:
     It is if the file is gone, and if it is the sample clip, beside which are only the extension's own files.
     """
     file = Path(bpy.path.abspath(path))
-    return str(file) if path and file.is_file() and _ASSETS not in file.parents else ""
+    # Path.is_file raises where a name is too long, or a folder cannot be read.
+    return str(file) if path and os.path.isfile(file) and _ASSETS not in file.parents else ""
 
 
 def path_text(path: str, **keywords: Any) -> Any:

@@ -60,6 +60,17 @@ def test_the_browser_begins_at_the_present_file_unless_it_is_gone_or_the_sample(
     assert present(str(SAMPLE)) == ""
 
 
+def test_the_browser_begins_elsewhere_if_the_name_is_too_long():
+    assert present("/" + "a" * 300) == ""
+
+
+@pytest.mark.parametrize("operator", ["choose_footage", "import_video"])
+def test_footage_whose_name_is_too_long_is_an_error(operator):
+    with pytest.raises(RuntimeError, match="aaa is not a file") as caught:
+        getattr(bpy.ops.scope, operator)(filepath="/" + "a" * 300)
+    assert "Traceback" not in str(caught.value)
+
+
 def test_the_filter_fits_into_blenders_field():
     assert len(FOOTAGE) < 256  # Blender cuts a longer one
     assert {"*.mts", "*.ts", "*.webm", "*.heic"} <= set(FOOTAGE.split(";"))
