@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import bpy
 
 from .. import warm_up
-from ..files.file_field import FootageBrowser
+from ..files.file_field import FootageBrowser, stored_path
 from ..live.live_state import state as live_state
 from ..reporting import iface_, rpt_, tip_
 from ..view.sidebar import redraw_sidebars, show_tab
@@ -65,7 +65,7 @@ class SCOPE_OT_choose_footage(FootageBrowser, bpy.types.Operator):
         if not os.path.isfile(path):  # Path.is_file raises where a name is too long
             self.report({"ERROR"}, rpt_("{path} is not a file; choose a video or image", path=path))
             return {"CANCELLED"}
-        context.scene.scope.footage = str(path)
+        context.scene.scope.footage = stored_path(context, str(path))
         show_tab(context)
         return {"FINISHED"}
 

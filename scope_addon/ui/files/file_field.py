@@ -54,6 +54,19 @@ def present(path: str) -> str:
     return str(file) if path and os.path.isfile(file) and _ASSETS not in file.parents else ""
 
 
+def stored_path(context: bpy.types.Context, path: str) -> str:
+    """Return how a setting of the scene stores a chosen file: relative to the .blend file if the user prefers that.
+
+    Blender's own button beside a path does the same.
+    """
+    if not bpy.data.filepath or not context.preferences.filepaths.use_relative_paths:
+        return path
+    try:
+        return str(bpy.path.relpath(path))
+    except ValueError:  # on another drive of Windows
+        return path
+
+
 def path_text(path: str, **keywords: Any) -> Any:
     """Return the text property of a path property, which stores nothing itself.
 
@@ -119,9 +132,11 @@ class SCOPE_OT_choose_file(bpy.types.Operator):
         settings = self._settings(context)
         if settings is None:
             return {"CANCELLED"}
-        setattr(settings, self.setting, self.filepath)
         if self.owner == "preferences":
+            setattr(settings, self.setting, self.filepath)
             context.preferences.is_dirty = True
+        else:
+            setattr(settings, self.setting, stored_path(context, self.filepath))
         return {"FINISHED"}
 
     def _settings(self, context: bpy.types.Context) -> Any:

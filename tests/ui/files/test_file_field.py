@@ -41,6 +41,41 @@ def test_a_chosen_file_is_the_settings(owner, setting):
     assert getattr(getattr(bpy.context.scene, owner), setting) == "/a/any.suffix"
 
 
+@pytest.fixture
+def saved(tmp_path):
+    """Save the scene, and return its folder."""
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    preferred = bpy.context.preferences.filepaths
+    before = preferred.use_relative_paths
+    yield tmp_path
+    preferred.use_relative_paths = before
+
+
+@pytest.mark.parametrize(("is_relative", "stored"), [(True, "//clips/a.mp4"), (False, "{folder}/clips/a.mp4")])
+def test_a_chosen_file_is_stored_as_the_user_prefers(saved, fake_worker, is_relative, stored):
+    fake_worker("finish()")
+    bpy.context.preferences.filepaths.use_relative_paths = is_relative
+    (saved / "clips").mkdir()
+    (saved / "clips" / "a.mp4").touch()
+    chosen, settings = {"filepath": str(saved / "clips" / "a.mp4")}, bpy.context.scene.scope
+    for owner, setting in SETTINGS:
+        bpy.ops.scope.choose_file(owner=owner, setting=setting, **chosen)
+        assert getattr(getattr(bpy.context.scene, owner), setting) == stored.format(folder=saved)
+    for operator in (bpy.ops.scope.choose_footage, bpy.ops.scope.import_video):
+        settings.footage = ""
+        assert operator(**chosen) == {"FINISHED"}
+        assert settings.footage == stored.format(folder=saved)
+
+
+def test_a_chosen_file_of_another_drive_is_stored_as_it_is(saved, monkeypatch):
+    def relpath(path):  # as on Windows
+        raise ValueError("path is on mount 'D:', start on mount 'C:'")
+
+    monkeypatch.setattr(bpy.path, "relpath", relpath)
+    bpy.ops.scope.choose_file(filepath="D:\\a.npz", owner="scope", setting="body_file")
+    assert bpy.context.scene.scope.body_file == "D:\\a.npz"
+
+
 @pytest.mark.parametrize(("owner", "setting"), [("", ""), ("scope", "quality"), ("render", "filepath"), ("no", "file")])
 def test_only_files_of_scope_are_set(owner, setting):
     before = bpy.context.scene.render.filepath
