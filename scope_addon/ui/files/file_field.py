@@ -78,6 +78,8 @@ def path_text(path: str, **keywords: Any) -> Any:
         return display_text(getattr(settings, path))
 
     def put(settings: bpy.types.PropertyGroup, text: str) -> None:
+        if text == get(settings):  # nothing was typed: of a name that is not UTF-8, the text is not the name
+            return
         is_quoted = len(text) > 1 and text[0] == text[-1] == '"'  # as Windows copies a path
         setattr(settings, path, text[1:-1] if is_quoted else text)
 

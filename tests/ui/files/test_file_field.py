@@ -27,10 +27,11 @@ def test_the_quotes_of_a_copied_path_are_not_part_of_it(typed, path):
     assert settings.footage == path
 
 
-def test_a_name_that_is_not_utf8_can_be_shown():
+def test_a_name_that_is_not_utf8_can_be_shown_and_confirmed():
     settings = bpy.context.scene.scope
     settings.footage = "/a/caf\udce9.mp4"
     assert settings.footage_text == "/a/caf\ufffd.mp4"
+    settings.footage_text = settings.footage_text
     assert settings.footage == "/a/caf\udce9.mp4"
 
 
