@@ -117,6 +117,8 @@ class SCOPE_OT_choose_file(bpy.types.Operator):
 
     filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
     filter_glob: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
+    filter_movie: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})  # what Blender knows as such, too
+    filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
     owner: StringProperty(options={"HIDDEN", "SKIP_SAVE"})  # has the setting: scope, scope_live, preferences
     setting: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
 
@@ -126,6 +128,7 @@ class SCOPE_OT_choose_file(bpy.types.Operator):
         if settings is None:
             return {"CANCELLED"}
         self.filepath, self.filter_glob = present(getattr(settings, self.setting)), _FILTERS[self.setting]
+        self.filter_movie = self.filter_glob == _VIDEOS
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 

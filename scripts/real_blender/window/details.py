@@ -33,7 +33,7 @@ BROWSERS = (
     ("load_bone_map", {}, ("x.json",)),
     ("choose_file", {"owner": "scope", "setting": "body_file"}, ("pose.npz",)),
     ("choose_file", {"owner": "scope", "setting": "calibration_file"}, ("x.json",)),
-    ("choose_file", {"owner": "scope_live", "setting": "file"}, FOOTAGE_FILES[:4]),
+    ("choose_file", {"owner": "scope_live", "setting": "file"}, FOOTAGE_FILES[:5]),
 )
 STILL, LOW = OUT / "still.npz", OUT / "low.npz"
 FRAMES, RATE = 120, 60.0

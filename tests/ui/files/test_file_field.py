@@ -1,12 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fields of files: their texts, and the operator that chooses a file for any of them."""
 
+from types import SimpleNamespace
+
 import bpy
 import pytest
 from scope.scope_addon.ui.capture.capture_operators import SAMPLE
-from scope.scope_addon.ui.files.file_field import FOOTAGE, present
+from scope.scope_addon.ui.files.file_field import FOOTAGE, SCOPE_OT_choose_file, present
 
 SETTINGS = [("scope", "body_file"), ("scope", "calibration_file"), ("scope_live", "file")]
+
+
+@pytest.fixture
+def saved(tmp_path):
+    """Save the scene, and return its folder."""
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    preferred = bpy.context.preferences.filepaths
+    before = preferred.use_relative_paths
+    yield tmp_path
+    preferred.use_relative_paths = before
 
 
 @pytest.mark.parametrize(("owner", "setting"), [*SETTINGS, ("scope", "footage")])
@@ -42,14 +54,15 @@ def test_a_chosen_file_is_the_settings(owner, setting):
     assert getattr(getattr(bpy.context.scene, owner), setting) == "/a/any.suffix"
 
 
-@pytest.fixture
-def saved(tmp_path):
-    """Save the scene, and return its folder."""
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
-    preferred = bpy.context.preferences.filepaths
-    before = preferred.use_relative_paths
-    yield tmp_path
-    preferred.use_relative_paths = before
+@pytest.mark.parametrize(("owner", "setting"), SETTINGS)
+def test_only_the_browser_of_a_video_shows_every_movie_that_blender_knows(owner, setting):
+    opened = []
+    context = SimpleNamespace(window_manager=SimpleNamespace(fileselect_add=opened.append))
+    operator = SimpleNamespace(setting=setting, _settings=lambda _: getattr(bpy.context.scene, owner))
+    assert SCOPE_OT_choose_file.invoke(operator, context, None) == {"RUNNING_MODAL"}
+    assert opened == [operator]
+    assert operator.filter_movie is (setting == "file")
+    assert ("*.mp4" in operator.filter_glob.split(";")) is (setting == "file")
 
 
 @pytest.mark.parametrize(("is_relative", "stored"), [(True, "//clips/a.mp4"), (False, "{folder}/clips/a.mp4")])
