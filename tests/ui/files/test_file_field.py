@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import bpy
 import pytest
 from scope.scope_addon.ui.capture.capture_operators import SAMPLE
-from scope.scope_addon.ui.files.file_field import FOOTAGE, SCOPE_OT_choose_file, present
+from scope.scope_addon.ui.files.file_field import FOOTAGE, SCOPE_OT_choose_file, draw_file, present
 
 SETTINGS = [("scope", "body_file"), ("scope", "calibration_file"), ("scope_live", "file")]
 
@@ -19,6 +19,32 @@ def saved(tmp_path):
     before = preferred.use_relative_paths
     yield tmp_path
     preferred.use_relative_paths = before
+
+
+@pytest.fixture
+def preferences():
+    """Return the preferences of the extension as it is where it is enabled."""
+    addon = bpy.context.preferences.addons.new()
+    addon.module = "scope"
+    yield addon.preferences
+    bpy.context.preferences.addons.remove(addon)
+
+
+class Row:
+    """A layout that notes the fields and the buttons that are drawn."""
+
+    def __init__(self):
+        self.fields, self.buttons = [], []
+
+    def row(self, align):
+        return self
+
+    def prop(self, _settings, name):
+        self.fields.append(name)
+
+    def operator(self, name, **_):
+        self.buttons.append(SimpleNamespace(name=name))
+        return self.buttons[-1]
 
 
 @pytest.mark.parametrize(("owner", "setting"), [*SETTINGS, ("scope", "footage")])
@@ -63,6 +89,30 @@ def test_only_the_browser_of_a_video_shows_every_movie_that_blender_knows(owner,
     assert opened == [operator]
     assert operator.filter_movie is (setting == "file")
     assert ("*.mp4" in operator.filter_glob.split(";")) is (setting == "file")
+
+
+@pytest.mark.parametrize("setting", ["body_file", "detector_file", "keypoints_file"])
+def test_a_chosen_file_is_that_of_the_preferences(saved, preferences, setting):
+    bpy.context.preferences.is_dirty = False
+    chosen = str(saved / "any.suffix")
+    assert bpy.ops.scope.choose_file(filepath=chosen, owner="preferences", setting=setting) == {"FINISHED"}
+    assert getattr(preferences, setting) == chosen  # no matter which .blend file is open
+    assert getattr(preferences, f"{setting}_text") == chosen
+    assert bpy.context.preferences.is_dirty  # or Blender would not save them
+
+
+def test_without_preferences_no_file_is_chosen_for_them():
+    assert bpy.ops.scope.choose_file(filepath="/a", owner="preferences", setting="body_file") == {"CANCELLED"}
+
+
+def test_the_button_beside_a_field_chooses_the_file_of_that_field(preferences):
+    scene, row = bpy.context.scene, Row()
+    for settings, path in ((scene.scope, "body_file"), (scene.scope_live, "file"), (preferences, "body_file")):
+        draw_file(row, settings, path)
+    assert row.fields == ["body_file_text", "file_text", "body_file_text"]
+    assert {button.name for button in row.buttons} == {"scope.choose_file"}
+    drawn = [(button.owner, button.setting) for button in row.buttons]
+    assert drawn == [("scope", "body_file"), ("scope_live", "file"), ("preferences", "body_file")]
 
 
 @pytest.mark.parametrize(("is_relative", "stored"), [(True, "//clips/a.mp4"), (False, "{folder}/clips/a.mp4")])
