@@ -28,10 +28,9 @@ from .smoothing import PoseFilter
 CALIBRATED_S = 2.0  # after the person was first seen
 CALIBRATE_AT_S = (0.0, 0.3, 0.7, 1.2, CALIBRATED_S)
 FOLLOW_S, FOLLOWED_S = 1.0, 4.0  # between two estimates of the world afterwards, and how much each of them sees
-SETTLING_S, FOLLOWING_S = (
-    0.1,
-    10.0,
-)  # time constants towards the estimates, see `GradualCalibration`; the second at least
+# Time constants towards the estimates, see `GradualCalibration`.
+SETTLING_S = 0.1
+FOLLOWING_S = 10.0  # at least
 SETTLED_S = 1.5  # after the last of the first estimates, when these have long been reached
 CERTAIN_S = 60.0  # for which the world has been known when it has moved almost for the last time
 HOLD_S = 0.5  # for which the pose of a person who is not seen is held, rather than lost
@@ -130,10 +129,8 @@ class LiveSession:
                 self._calibrator = Calibrator(self._body, known, self._size, self._height_m)
             self._calibrator.observe(frame.image_rgb, observation)
             self._target = self._calibrator.estimate([time_s], [observation])
-            self._current, self._gradual = (
-                self._in_first_persons_world(self._target),
-                GradualCalibration(self._target, SETTLING_S),
-            )
+            self._current = self._in_first_persons_world(self._target)
+            self._gradual = GradualCalibration(self._target, SETTLING_S)
             self._fit = CausalFit(self._body, observation, self._current.camera, self._height_m)
             self._fit.set_shape(self._current.betas)
             self._first_s, self._calibrations = time_s, 1
