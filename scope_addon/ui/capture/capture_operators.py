@@ -226,10 +226,10 @@ class SCOPE_OT_keep_capturing(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SCOPE_PT_question(bpy.types.Panel):
+class SCOPE_PT_stop_capture(bpy.types.Panel):
     """The question before a capture that has run for a while is stopped. Escape closes it, and the capture goes on."""
 
-    bl_idname = "SCOPE_PT_question"
+    bl_idname = "SCOPE_PT_stop_capture"
     bl_space_type = "VIEW_3D"
     bl_region_type = "WINDOW"  # for a popover: in no sidebar
     bl_label = "Stop the Capture?"
@@ -255,7 +255,7 @@ class SCOPE_PT_question(bpy.types.Panel):
 
 def ask_to_stop() -> None:
     """Open the question. In Blender's own, its Cancel beside our answer would leave open what is cancelled."""
-    bpy.ops.wm.call_panel(name=SCOPE_PT_question.bl_idname, keep_open=False)
+    bpy.ops.wm.call_panel(name=SCOPE_PT_stop_capture.bl_idname, keep_open=False)
 
 
 def stop_job() -> None:
@@ -272,5 +272,5 @@ CLASSES = (
     SCOPE_OT_capture,
     SCOPE_OT_cancel,
     SCOPE_OT_keep_capturing,
-    SCOPE_PT_question,
+    SCOPE_PT_stop_capture,
 )
