@@ -215,7 +215,7 @@ class SCOPE_OT_cancel(bpy.types.Operator):
 
 
 class SCOPE_OT_keep_capturing(bpy.types.Operator):
-    """Let the capture go on"""
+    """Continue the capture"""
 
     bl_idname = "scope.keep_capturing"
     bl_label = "Keep Capturing"
