@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Several people of one source: a session for each of a given number of places, and who takes which of them.
+"""Several people of one source: a given number of sessions, and who is followed by which of them.
 
-Who is tracked from frame to frame keeps their place. Somebody who is found again gets the place of the person whose
+Who is tracked from frame to frame keeps their session. Somebody who is found again gets the session of the person whose
 position, motion, size and clothes match best, by the costs with which offline captures link tracklets, but decided at
-once. Otherwise a new person takes the first free place, then one whose person has been away for long, and else none.
+once. Otherwise a new person gets the first session that has followed nobody yet, then one whose person has been away
+for long, and else none.
 
-The person in the first place is who was largest when the capture began. Camera and floor are estimated from them, and
-the others stand in the same world.
+The first person is who was largest when the capture began. Camera and floor are estimated from them, and the others
+stand in the same world.
 """
 
 from __future__ import annotations
@@ -64,11 +65,11 @@ class _FollowedPerson:
 class LivePeople:
     """Turns the frames of one source into poses of up to some people; one call per frame, in order.
 
-    :param tracker: of all people if there are several places, otherwise of the largest one.
+    :param tracker: of all people if there are several sessions, otherwise of the largest one.
     :param camera: as known from the user or the source.
     :param size: width and height of the frames, pixels.
-    :param heights_m: statures, as far as they are known, metres, by place.
-    :param count: number of places.
+    :param heights_m: statures, as far as they are known, metres, by person.
+    :param count: number of people, and of sessions.
     :param executor: see `LiveSession`.
     """
 
@@ -87,52 +88,52 @@ class LivePeople:
         heights = [*heights_m, *[None] * count][:count]
         first = LiveSession(body, camera, size, heights[0], executor)
         others = [LiveSession(body, camera, size, height, executor, first) for height in heights[1:]]
-        self._places = [_FollowedPerson(session) for session in (first, *others)]
+        self._followed = [_FollowedPerson(session) for session in (first, *others)]
 
     @property
     def sessions(self) -> list[LiveSession]:
-        """The session of each place."""
-        return [place.session for place in self._places]
+        """The session of each person."""
+        return [person.session for person in self._followed]
 
     def step(self, frame: Frame) -> list[LivePose]:
-        """Return the poses in the next frame, one of each place."""
+        """Return the poses in the next frame, one of each person."""
         image_rgb = self._exposure.brighten(frame.image_rgb)
         observations = dict(self._tracker.step(image_rgb, None, frame.timestamp_s))
-        if len(self._places) == 1:
-            self._follow_largest(self._places[0], observations)
+        if len(self._followed) == 1:
+            self._follow_largest(self._followed[0], observations)
         else:
             self._assign_people(observations, frame.timestamp_s)
         poses = []
-        for number, place in enumerate(self._places):
-            observation = None if place.tracklet is None else observations.get(place.tracklet)
-            poses.append(replace(place.session.step(frame, observation), person=number))
+        for number, person in enumerate(self._followed):
+            observation = None if person.tracklet is None else observations.get(person.tracklet)
+            poses.append(replace(person.session.step(frame, observation), person=number))
         return poses
 
-    def _follow_largest(self, place: _FollowedPerson, observations: Mapping[int, Observation]) -> None:
+    def _follow_largest(self, followed: _FollowedPerson, observations: Mapping[int, Observation]) -> None:
         """Keep the person while they are seen, and then take the largest one."""
-        if place.tracklet not in observations:
-            place.tracklet = max(observations, key=lambda k: observations[k].region.side_px, default=None)
+        if followed.tracklet not in observations:
+            followed.tracklet = max(observations, key=lambda k: observations[k].region.side_px, default=None)
 
     def _assign_people(self, observations: Mapping[int, Observation], time_s: float) -> None:
-        """Give places to those who have none, as far as there are free ones, and note who was seen."""
-        followed: dict[int | None, _FollowedPerson] = {place.tracklet: place for place in self._places}
-        new = [tracklet for tracklet in observations if tracklet not in followed]
+        """Give sessions to those who have none, as far as there are free ones, and note who was seen."""
+        by_tracklet: dict[int | None, _FollowedPerson] = {person.tracklet: person for person in self._followed}
+        new = [tracklet for tracklet in observations if tracklet not in by_tracklet]
         new.sort(key=lambda tracklet: -observations[tracklet].region.side_px)
-        left = [place for place in self._places if place.tracklet not in observations]
-        known = [place for place in left if place.end is not None]
-        cost = np.array([[place.link_cost(observations[tracklet], time_s) for tracklet in new] for place in known])
+        away = [person for person in self._followed if person.tracklet not in observations]
+        known = [person for person in away if person.end is not None]
+        cost = np.array([[person.link_cost(observations[tracklet], time_s) for tracklet in new] for person in known])
         links = cheapest_links(cost.reshape(len(known), len(new)), MAX_LINK_COST)
         found_again = {new[j]: known[i] for i, j in links.items()}
-        free = [p for p in left if p not in found_again.values() and time_s - p.last_s > LONG_GAP_S]
-        free.sort(key=lambda place: place.last_s)
-        places = followed | found_again
+        free = [p for p in away if p not in found_again.values() and time_s - p.last_s > LONG_GAP_S]
+        free.sort(key=lambda person: person.last_s)
+        people = by_tracklet | found_again
         for tracklet in new:
-            if tracklet not in places and free:
-                places[tracklet] = free.pop(0)
-                places[tracklet].appearance = np.zeros(SIZE)
+            if tracklet not in people and free:
+                people[tracklet] = free.pop(0)
+                people[tracklet].appearance = np.zeros(SIZE)
         for tracklet, observation in observations.items():
-            if tracklet in places:
-                places[tracklet].update(tracklet, observation, time_s)
+            if tracklet in people:
+                people[tracklet].update(tracklet, observation, time_s)
 
 
 def _end(observation: Observation, time_s: float, before: End | None = None) -> End:

@@ -28,10 +28,9 @@ from .smoothing import PoseFilter
 CALIBRATED_S = 2.0  # after the person was first seen
 CALIBRATE_AT_S = (0.0, 0.3, 0.7, 1.2, CALIBRATED_S)
 FOLLOW_S, FOLLOWED_S = 1.0, 4.0  # between two estimates of the world afterwards, and how much each of them sees
-SETTLING_S, FOLLOWING_S = (
-    0.1,
-    10.0,
-)  # time constants towards the estimates, see `GradualCalibration`; the second at least
+# Time constants towards the estimates, see `GradualCalibration`.
+SETTLING_S = 0.1
+FOLLOWING_S = 10.0  # at least
 SETTLED_S = 1.5  # after the last of the first estimates, when these have long been reached
 CERTAIN_S = 60.0  # for which the world has been known when it has moved almost for the last time
 HOLD_S = 0.5  # for which the pose of a person who is not seen is held, rather than lost
@@ -75,7 +74,7 @@ class LiveSession:
     :param size: width and height of the frames, pixels.
     :param height_m: the person's stature, if it is known, metres.
     :param executor: of one thread, in which everything but the first calibration runs; None: in the calling thread.
-    :param leader: of another person of the same source, from whom camera and world are taken; None: they are estimated.
+    :param first_person: session of the source's first person, whose camera and world are taken; None: estimate them.
     """
 
     def __init__(
@@ -85,9 +84,9 @@ class LiveSession:
         size: tuple[int, int],
         height_m: float | None = None,
         executor: Executor | None = None,
-        leader: LiveSession | None = None,
+        first_person: LiveSession | None = None,
     ) -> None:
-        self._body, self._size, self._height_m, self._leader = body, size, height_m, leader
+        self._body, self._size, self._height_m, self._first_person = body, size, height_m, first_person
         self._start: Start = executor.submit if executor else start_at_once
         self._calibrator = Calibrator(body, camera, size, height_m)
         self._filter, self._feet = PoseFilter(), FootHold(body)
@@ -95,7 +94,7 @@ class LiveSession:
         self._fit: CausalFit | None = None
         self._current: Calibration | None = None
         self._target: Calibration | None = None
-        self._approach: GradualCalibration | None = None
+        self._gradual: GradualCalibration | None = None
         self._pending: Future[Calibration] | None = None
         self._seen: deque[_Seen] = deque()
         self._first_s = self._last_seen_s = self._last_s = -np.inf
@@ -123,17 +122,15 @@ class LiveSession:
         if not all(np.isfinite(value).all() for value in values):
             return None
         if self._fit is None:
-            if self._leader is not None:
-                if self._leader.camera is None:
+            if self._first_person is not None:
+                if self._first_person.camera is None:
                     return None
-                known = replace(self._leader.camera, focal_deviation=0.0)
+                known = replace(self._first_person.camera, focal_deviation=0.0)
                 self._calibrator = Calibrator(self._body, known, self._size, self._height_m)
             self._calibrator.observe(frame.image_rgb, observation)
             self._target = self._calibrator.estimate([time_s], [observation])
-            self._current, self._approach = (
-                self._in_first_persons_world(self._target),
-                GradualCalibration(self._target, SETTLING_S),
-            )
+            self._current = self._in_first_persons_world(self._target)
+            self._gradual = GradualCalibration(self._target, SETTLING_S)
             self._fit = CausalFit(self._body, observation, self._current.camera, self._height_m)
             self._fit.set_shape(self._current.betas)
             self._first_s, self._calibrations = time_s, 1
@@ -162,7 +159,7 @@ class LiveSession:
 
     def _settle(self, time_s: float) -> None:
         """Start estimates that are due, take those that are done, and approach the newest one."""
-        if self._fit is None or self._current is None or self._target is None or self._approach is None:
+        if self._fit is None or self._current is None or self._target is None or self._gradual is None:
             return
         if self._pending is not None and self._pending.done():
             self._target, self._pending = self._pending.result(), None
@@ -171,7 +168,7 @@ class LiveSession:
         step_s = float(np.clip(time_s - self._last_s, 0.0, HOLD_S)) if np.isfinite(self._last_s) else 0.0
         world_s = following_s(time_s - self._first_s) if self.is_settled(time_s) else SETTLING_S
         before = self._current
-        self._current = self._in_first_persons_world(self._approach.step(self._target, step_s, world_s))
+        self._current = self._in_first_persons_world(self._gradual.step(self._target, step_s, world_s))
         if self._current.camera is not before.camera:
             self._fit.set_camera(self._current.camera)
         if not np.array_equal(self._current.betas, before.betas):
@@ -179,7 +176,7 @@ class LiveSession:
 
     def _in_first_persons_world(self, calibration: Calibration) -> Calibration:
         """Return the calibration with camera and world of the person from whom they are taken, if there is one."""
-        world = self._leader._current if self._leader is not None else None
+        world = self._first_person._current if self._first_person is not None else None
         if world is None:
             return calibration
         return replace(calibration, camera=world.camera, up=world.up, camera_position=world.camera_position)
@@ -193,7 +190,7 @@ class LiveSession:
                 self._calibrations = int(np.searchsorted(CALIBRATE_AT_S, time_s - self._first_s, side="right"))
                 self._pending = self._start(self._calibrator.estimate, times, observations)
                 self._next_follow_s = time_s + FOLLOW_S
-        elif time_s >= self._next_follow_s and self._leader is None:
+        elif time_s >= self._next_follow_s and self._first_person is None:
             self._next_follow_s = time_s + FOLLOW_S
             track, fitted = track_of(times, observations), self._fitted_track()
             known, now = self._target, self._current

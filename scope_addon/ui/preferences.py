@@ -22,6 +22,10 @@ if TYPE_CHECKING:
 
 PACKAGE = __package__.rpartition(".scope_addon")[0]  # "bl_ext.<repository>.scope" in Blender, "scope" outside
 DEFAULT_CACHE_GB = 2
+_BODY_FILE = {
+    "name": "Body File",
+    "description": "Custom SMPL, SMPL+H, SMPL-X or STAR model, for scenes without a body file of their own",
+}
 _measured: dict[Path, tuple[int, float]] = {}  # cache folder: bytes, and time of the measurement
 
 
@@ -31,16 +35,8 @@ class SCOPE_AP_preferences(bpy.types.AddonPreferences):
 
     bl_idname = PACKAGE
 
-    body_file: StringProperty(
-        name="Body File",
-        subtype="FILE_PATH",
-        description="Custom SMPL, SMPL+H, SMPL-X or STAR model, for scenes without a body file of their own",
-    )
-    body_file_text: path_text(
-        "body_file",
-        name="Body File",
-        description="Custom SMPL, SMPL+H, SMPL-X or STAR model, for scenes without a body file of their own",
-    )
+    body_file: StringProperty(subtype="FILE_PATH", **_BODY_FILE)
+    body_file_text: path_text("body_file", **_BODY_FILE)
     cache_folder: StringProperty(
         name="Cache Folder",
         subtype="DIR_PATH",

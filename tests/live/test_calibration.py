@@ -21,8 +21,8 @@ BEFORE, AFTER = calibration(1.0), calibration(1.1)
 
 def course(step_s, seconds, world_s=SETTLING_S, before=BEFORE, after=AFTER):
     """The calibrations of an approach that has long been at one estimate, from when another one comes."""
-    approach = GradualCalibration(before, SETTLING_S)
-    return [approach.step(after, step_s, world_s) for _ in range(round(seconds / step_s))]
+    gradual = GradualCalibration(before, SETTLING_S)
+    return [gradual.step(after, step_s, world_s) for _ in range(round(seconds / step_s))]
 
 
 def heights(calibrations):

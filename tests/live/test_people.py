@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Several people: each keeps their place, also after they were away, and all stand in one world."""
+"""Several people: each keeps their session, also after they were away, and all stand in one world."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def person(x_px, clothes, side_px=300.0):
 
 @pytest.fixture
 def followed(body, monkeypatch):
-    """Return a function that gives the people of a scripted clip, two places: whom each place follows by frame."""
+    """Return a function that follows two people through a scripted clip: whom each session follows by frame."""
 
     class Session:
         def __init__(self, *_):
@@ -62,12 +62,12 @@ def followed(body, monkeypatch):
     return run
 
 
-def test_the_largest_person_takes_the_first_place_and_a_third_one_none(followed):
+def test_the_largest_person_gets_the_first_session_and_a_third_one_none(followed):
     a, b, c = person(100, 0, 200.0), person(300, 1, 300.0), person(500, 2, 100.0)
     assert followed({4: a, 7: b, 9: c}, {9: c, 7: b, 4: a}) == [[300, 300], [100, 100]]
 
 
-def test_who_is_found_again_gets_their_place_back(followed):
+def test_who_is_found_again_gets_their_session_back(followed):
     a, b = person(100, 0), person(500, 1, 290.0)
     seen = followed({0: a, 1: b}, {}, {5: person(490, 1), 6: person(110, 0)})
     assert seen == [[100, None, 110], [500, None, 490]]
@@ -79,7 +79,7 @@ def test_clothes_tell_people_apart_who_were_away_for_long(followed):
     assert (seen[0][-1], seen[1][-1]) == (480, 120)
 
 
-def test_a_stranger_takes_a_place_only_when_its_person_has_been_away_for_long(followed):
+def test_a_stranger_gets_a_session_only_when_its_person_has_been_away_for_long(followed):
     a, b = person(100, 0), person(500, 1, 290.0)
     seen = followed({0: a, 1: b}, {0: a}, {0: a, 5: person(700, 3)})
     assert seen[1] == [500, None, None]

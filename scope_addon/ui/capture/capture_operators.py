@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING
 import bpy
 
 from .. import warm_up
-from ..files.file_field import FootageBrowser
+from ..files.file_field import FootageBrowser, stored_path
 from ..live.live_state import state as live_state
 from ..reporting import iface_, rpt_, tip_
 from ..view.sidebar import redraw_sidebars, show_tab
@@ -61,10 +62,10 @@ class SCOPE_OT_choose_footage(FootageBrowser, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Set the footage to the file."""
         path = Path(bpy.path.abspath(self.filepath))
-        if not path.is_file():
+        if not os.path.isfile(path):  # Path.is_file raises where a name is too long
             self.report({"ERROR"}, rpt_("{path} is not a file; choose a video or image", path=path))
             return {"CANCELLED"}
-        context.scene.scope.footage = str(path)
+        context.scene.scope.footage = stored_path(context, str(path))
         show_tab(context)
         return {"FINISHED"}
 
@@ -214,7 +215,7 @@ class SCOPE_OT_cancel(bpy.types.Operator):
 
 
 class SCOPE_OT_keep_capturing(bpy.types.Operator):
-    """Let the capture go on"""
+    """Continue the capture"""
 
     bl_idname = "scope.keep_capturing"
     bl_label = "Keep Capturing"
@@ -225,10 +226,10 @@ class SCOPE_OT_keep_capturing(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SCOPE_PT_question(bpy.types.Panel):
+class SCOPE_PT_stop_capture(bpy.types.Panel):
     """The question before a capture that has run for a while is stopped. Escape closes it, and the capture goes on."""
 
-    bl_idname = "SCOPE_PT_question"
+    bl_idname = "SCOPE_PT_stop_capture"
     bl_space_type = "VIEW_3D"
     bl_region_type = "WINDOW"  # for a popover: in no sidebar
     bl_label = "Stop the Capture?"
@@ -254,7 +255,7 @@ class SCOPE_PT_question(bpy.types.Panel):
 
 def ask_to_stop() -> None:
     """Open the question. In Blender's own, its Cancel beside our answer would leave open what is cancelled."""
-    bpy.ops.wm.call_panel(name=SCOPE_PT_question.bl_idname, keep_open=False)
+    bpy.ops.wm.call_panel(name=SCOPE_PT_stop_capture.bl_idname, keep_open=False)
 
 
 def stop_job() -> None:
@@ -271,5 +272,5 @@ CLASSES = (
     SCOPE_OT_capture,
     SCOPE_OT_cancel,
     SCOPE_OT_keep_capturing,
-    SCOPE_PT_question,
+    SCOPE_PT_stop_capture,
 )

@@ -20,6 +20,8 @@ from ..files.file_field import path_text
 from .capture_operators import state
 from .captures import show_index, shown_capture, shown_index
 
+_FOOTAGE = {"name": "Footage", "description": "Video or image of a person to capture"}
+
 
 def _clear_message(_settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
     """Clear the error message, which was about other footage."""
@@ -61,14 +63,8 @@ class SCOPE_PG_result(bpy.types.PropertyGroup):
 class SCOPE_PG_settings(bpy.types.PropertyGroup):
     """The settings of a capture: the footage, the declared options of the panel, and the capture that is shown."""
 
-    footage: StringProperty(
-        name="Footage",
-        subtype="FILE_PATH",
-        options=PATH_OPTIONS,
-        update=_clear_message,
-        description="Video or image of a person to capture",
-    )
-    footage_text: path_text("footage", name="Footage", description="Video or image of a person to capture")
+    footage: StringProperty(subtype="FILE_PATH", options=PATH_OPTIONS, update=_clear_message, **_FOOTAGE)
+    footage_text: path_text("footage", **_FOOTAGE)
     capture: PointerProperty(
         name="Capture", type=bpy.types.Collection, description="Capture whose result the panel shows"
     )

@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import bpy
 
-from ..files.file_field import FootageBrowser
+from ..files.file_field import FootageBrowser, stored_path
 from ..reporting import rpt_, tip_
 from ..view.sidebar import show_tab
 from .capture_operators import state
@@ -43,10 +44,10 @@ class SCOPE_OT_import_video(FootageBrowser, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Set the footage to the file, and start the capture."""
         path = Path(bpy.path.abspath(self.filepath))
-        if not path.is_file():
+        if not os.path.isfile(path):  # Path.is_file raises where a name is too long
             self.report({"ERROR"}, rpt_("{path} is not a file; choose a video or image", path=path))
             return {"CANCELLED"}
-        context.scene.scope.footage = str(path)
+        context.scene.scope.footage = stored_path(context, str(path))
         show_tab(context)
         try:
             bpy.ops.scope.capture("INVOKE_DEFAULT")

@@ -19,7 +19,7 @@ def _offered_catalogs(_operator: bpy.types.Operator, _context: bpy.types.Context
 
 
 class SCOPE_OT_mark_asset(ActionOperator):
-    """Mark the captured motion as an asset with a preview image of its pose, for use in other files"""
+    """Mark the captured motion as an asset with a preview image of its pose, for other files' Asset Browser"""
 
     bl_idname = "scope.mark_asset"
     bl_label = "Mark as Asset"

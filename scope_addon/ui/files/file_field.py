@@ -7,6 +7,7 @@ text of the same value, with a button of our own. Every browser's filter can be 
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +50,21 @@ def present(path: str) -> str:
     It is if the file is gone, and if it is the sample clip, beside which are only the extension's own files.
     """
     file = Path(bpy.path.abspath(path))
-    return str(file) if path and file.is_file() and _ASSETS not in file.parents else ""
+    # Path.is_file raises where a name is too long, or a folder cannot be read.
+    return str(file) if path and os.path.isfile(file) and _ASSETS not in file.parents else ""
+
+
+def stored_path(context: bpy.types.Context, path: str) -> str:
+    """Return how a setting of the scene stores a chosen file: relative to the .blend file if the user prefers that.
+
+    Blender's own button beside a path does the same.
+    """
+    if not bpy.data.filepath or not context.preferences.filepaths.use_relative_paths:
+        return path
+    try:
+        return str(bpy.path.relpath(path))
+    except ValueError:  # on another drive of Windows
+        return path
 
 
 def path_text(path: str, **keywords: Any) -> Any:
@@ -63,6 +78,8 @@ def path_text(path: str, **keywords: Any) -> Any:
         return display_text(getattr(settings, path))
 
     def put(settings: bpy.types.PropertyGroup, text: str) -> None:
+        if text == get(settings):  # nothing was typed: of a name that is not UTF-8, the text is not the name
+            return
         is_quoted = len(text) > 1 and text[0] == text[-1] == '"'  # as Windows copies a path
         setattr(settings, path, text[1:-1] if is_quoted else text)
 
@@ -100,6 +117,8 @@ class SCOPE_OT_choose_file(bpy.types.Operator):
 
     filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
     filter_glob: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
+    filter_movie: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})  # what Blender knows as such, too
+    filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
     owner: StringProperty(options={"HIDDEN", "SKIP_SAVE"})  # has the setting: scope, scope_live, preferences
     setting: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
 
@@ -109,6 +128,7 @@ class SCOPE_OT_choose_file(bpy.types.Operator):
         if settings is None:
             return {"CANCELLED"}
         self.filepath, self.filter_glob = present(getattr(settings, self.setting)), _FILTERS[self.setting]
+        self.filter_movie = self.filter_glob == _VIDEOS
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
@@ -117,9 +137,11 @@ class SCOPE_OT_choose_file(bpy.types.Operator):
         settings = self._settings(context)
         if settings is None:
             return {"CANCELLED"}
-        setattr(settings, self.setting, self.filepath)
         if self.owner == "preferences":
+            setattr(settings, self.setting, self.filepath)
             context.preferences.is_dirty = True
+        else:
+            setattr(settings, self.setting, stored_path(context, self.filepath))
         return {"FINISHED"}
 
     def _settings(self, context: bpy.types.Context) -> Any:

@@ -12,6 +12,8 @@ from ..files.file_field import path_text
 from .live_state import state
 from .stream_logins import take_login
 
+_VIDEO = {"name": "Video", "description": "Video of a person, which is played in real time"}
+
 
 def _forget_message(_settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
     """Clear the error message, which was about another source."""
@@ -67,14 +69,8 @@ class SCOPE_PG_live(bpy.types.PropertyGroup):
         description="Address of the stream, such as rtsp://192.168.1.20/stream; name and password in it are kept until "
         "Blender ends, and never saved",
     )
-    file: StringProperty(
-        name="Video",
-        subtype="FILE_PATH",
-        options=PATH_OPTIONS,
-        update=_forget_message,
-        description="Video of a person, which is played in real time",
-    )
-    file_text: path_text("file", name="Video", description="Video of a person, which is played in real time")
+    file: StringProperty(subtype="FILE_PATH", options=PATH_OPTIONS, update=_forget_message, **_VIDEO)
+    file_text: path_text("file", **_VIDEO)
     with_rig: BoolProperty(
         name="Rig Follows",
         default=False,

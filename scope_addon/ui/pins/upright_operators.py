@@ -99,7 +99,7 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
         areas = context.window.screen.areas if context.window else ()
         if space is None or space.type != "VIEW_3D" or not any(_takes_line(context.scene, area) for area in areas):
             cls.poll_message_set(
-                tip_("Press Compare with Footage or switch to an orthographic side view, where the line is drawn")
+                tip_("Press Compare with Footage or switch to an orthographic side view; the line is drawn there")
             )
             return False
         return may_edit(cls, context)

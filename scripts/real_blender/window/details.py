@@ -26,14 +26,15 @@ FBX_BUTTON, RAW_BUTTON, FOLD = (1090, 453), (1085, 622), 768
 FOLDER_BUTTON = (1252, 128)  # beside the footage
 # Names of files, and by operator which of them the file browser shows at first.
 FOOTAGE_FILES = ("a.mp4", "b.MTS", "c.ts", "d.webm", "e.flv", "f.heic", "g_0001.png")
-FILES = (*FOOTAGE_FILES, "notes.txt", "odd.xyz", "pose.npz", "x.json")
+FILES = (*FOOTAGE_FILES, "net.onnx", "notes.txt", "odd.xyz", "pose.npz", "x.json")
 BROWSERS = (
     ("import_video", {}, FOOTAGE_FILES),
     ("import_motion", {}, ("pose.npz",)),
     ("load_bone_map", {}, ("x.json",)),
     ("choose_file", {"owner": "scope", "setting": "body_file"}, ("pose.npz",)),
     ("choose_file", {"owner": "scope", "setting": "calibration_file"}, ("x.json",)),
-    ("choose_file", {"owner": "scope_live", "setting": "file"}, FOOTAGE_FILES[:4]),
+    ("choose_file", {"owner": "scope_live", "setting": "file"}, FOOTAGE_FILES[:5]),
+    ("choose_file", {"owner": "preferences", "setting": "detector_file"}, ("net.onnx",)),
 )
 STILL, LOW = OUT / "still.npz", OUT / "low.npz"
 FRAMES, RATE = 120, 60.0

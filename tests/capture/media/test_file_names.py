@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names that are not UTF-8 are passed on to libraries in a form that they can take, and display_text as text."""
+"""Names that are not UTF-8 are passed on to libraries in a form that they can take, and shown as text."""
 
 import os
 import shutil

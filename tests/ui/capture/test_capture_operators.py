@@ -13,7 +13,7 @@ from scope.scope_addon.ui.capture.capture_operators import (
     SAMPLE,
     SCOPE_OT_cancel,
     SCOPE_OT_capture,
-    SCOPE_PT_question,
+    SCOPE_PT_stop_capture,
     end_capture,
     state,
 )
@@ -164,7 +164,7 @@ def test_cancelling_asks_when_more_than_ten_seconds_are_done(monkeypatch, second
         SCOPE_OT_cancel.invoke(operator, None, None)
         assert bool(questions) is asks
         assert state.job.cancelled is not asks
-        SCOPE_PT_question.draw(SimpleNamespace(layout=drawn), None)
+        SCOPE_PT_stop_capture.draw(SimpleNamespace(layout=drawn), None)
         assert any(f"{seconds:.0f} s" in text for text in drawn.texts)
         assert drawn.operators == ["scope.keep_capturing", "scope.cancel"]
     finally:
