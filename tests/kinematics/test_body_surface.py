@@ -121,7 +121,8 @@ def test_points_are_where_the_shape_has_them() -> None:
     planes = own.planes(R[None], t[None])
     skin, points = child.skin(R, t, betas), body.keypoints(R, t, betas)[own.indices]
     part = child.skin_joints[np.arange(len(skin)), child.skin_weights.argmax(1)]
-    trunk = [k for k, name in enumerate(child.joint_names) if name.startswith("spine") or name.endswith(("hip", "pelvis"))]
+    names = child.joint_names
+    trunk = [k for k, name in enumerate(names) if name.startswith("spine") or name.endswith(("hip", "pelvis"))]
     nearest = np.linalg.norm(points[:, None] - skin[np.isin(part, trunk)], axis=-1).min(axis=1)
     foot = planes.normal[0] * (planes.offset[0] - own._room)[:, None]  # of each plane, which the nearest vertex is on
     assert planes.near.all()
