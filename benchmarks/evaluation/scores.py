@@ -17,6 +17,12 @@ from .joint_sets import LIMBS, SMPL24
 from .protocols import Protocol
 from .subjects import PosedBody, Subject
 
+_SHARES = {
+    "pck": metrics.pck,
+    "auc": metrics.auc,
+    "pck_50": metrics.challenge_pck,
+    "auc_200": metrics.challenge_auc,
+}
 NEAR = 0.5  # of the size of a person in the image: the farthest that a captured person may be from the true one
 
 
@@ -154,11 +160,7 @@ def _in_camera(
         found["acceleration"] = metrics.acceleration_error(x, y, rate)
     if protocol.pck_joints:
         errors = metrics.joint_errors(x, y)[:, [protocol.joints.index(name) for name in protocol.pck_joints]]
-        shares = {
-            **{"pck": metrics.pck, "auc": metrics.auc},
-            **{"pck_50": metrics.challenge_pck, "auc_200": metrics.challenge_auc},
-        }
-        found |= {key: share(errors) for key, share in shares.items() if key in protocol.measures}
+        found |= {key: share(errors) for key, share in _SHARES.items() if key in protocol.measures}
     if "mpvpe" in protocol.measures and isinstance(true, PosedBody) and _same_mesh(captured, true):
         found["mpvpe"] = _vertex_errors(captured, true, roots)
     return found

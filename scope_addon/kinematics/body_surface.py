@@ -10,13 +10,14 @@ be: the tangent plane n^T p = d next to a point p of an arm is constant, and p s
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.body import Body
+from .added_keypoints import with_keypoints
 from .contact_points import PALMS
 from .frame_blocks import by_blocks
 
@@ -39,13 +40,7 @@ def with_arm_points(body: Body) -> Body:
             parts.append(elbow)
             template.append((1 - share) * body.J_template[elbow] + share * body.J_template[wrist])
             shapedirs.append((1 - share) * body.J_shapedirs[elbow] + share * body.J_shapedirs[wrist])
-    return replace(
-        body,
-        keypoint_names=(*body.keypoint_names, *_FOREARMS),
-        keypoint_part=np.concatenate([body.keypoint_part, np.array(parts, np.int32)]),
-        keypoint_template=np.concatenate([body.keypoint_template, template]),
-        keypoint_shapedirs=np.concatenate([body.keypoint_shapedirs, shapedirs]),
-    )
+    return with_keypoints(body, _FOREARMS, parts, np.array(template), np.array(shapedirs))
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,13 @@ Depends on numpy and the solver only, because motions are also edited where noth
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.body import Body
+from .added_keypoints import with_points_on_parts
 
 FOOT_PARTS = ("left_ankle", "left_foot", "right_ankle", "right_foot")
 SOLES = ("sole/left_heel", "sole/left_toe", "sole/right_heel", "sole/right_toe")
@@ -46,13 +46,7 @@ def with_contact_points(body: Body, betas: NDArray[np.floating[Any]]) -> Body:
         lowest = own[own[:, 1] <= own[:, 1].min() + 0.01].mean(0)
         lowest[1] = own[:, 1].min()
         local[k] = lowest - J[part]
-    return replace(
-        body,
-        keypoint_names=(*body.keypoint_names, *CONTACT_POINTS),
-        keypoint_part=np.concatenate([body.keypoint_part, parts]),
-        keypoint_template=np.concatenate([body.keypoint_template, body.J_template[parts] + local]),
-        keypoint_shapedirs=np.concatenate([body.keypoint_shapedirs, body.J_shapedirs[parts]]),
-    )
+    return with_points_on_parts(body, CONTACT_POINTS, parts, local)
 
 
 def contact_point_positions(

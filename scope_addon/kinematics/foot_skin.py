@@ -7,7 +7,6 @@ is lower at its end, by two centimetres and more, so the skin itself decides whe
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from ...solver.body import Body
 from ...solver.rotations import exp
 from ..motion import Motion
+from .added_keypoints import with_points_on_parts
 from .contact_points import FOOT_PARTS
 from .frame_blocks import by_blocks
 from .runs import runs
@@ -65,13 +65,8 @@ class FootSkin:
         """
         points = np.concatenate(self.points)
         parts = np.repeat(np.array(self.parts, np.int32), [len(own) for own in self.points])
-        extended = replace(
-            body,
-            keypoint_names=(*body.keypoint_names, *(f"foot_skin/{k}" for k in range(len(points)))),
-            keypoint_part=np.concatenate([body.keypoint_part, parts]),
-            keypoint_template=np.concatenate([body.keypoint_template, body.J_template[parts] + points]),
-            keypoint_shapedirs=np.concatenate([body.keypoint_shapedirs, body.J_shapedirs[parts]]),
-        )
+        names = (f"foot_skin/{k}" for k in range(len(points)))
+        extended = with_points_on_parts(body, names, parts, points)
         return extended, len(body.keypoint_names) + np.arange(len(points))
 
 

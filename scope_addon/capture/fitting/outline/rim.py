@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from .....solver import Body, Fit
 from .....solver.residuals.image.outline import FLOATS, INTS, pack
+from ....kinematics.added_keypoints import with_keypoints
 from ...camera.intrinsics import Camera
 from ...overlay.rasterizer import fill_silhouette, vertex_normals
 from ...perception.observation import PersonMask
@@ -60,13 +61,9 @@ class OutlineMeasurer:
         self._triangles = np.ascontiguousarray(body.triangles(), np.int32)
         self._around = self._triangles[np.isin(self._triangles, self.vertices).any(axis=1)]
         self.first = len(body.keypoint_names)
-        self.body = replace(
-            body,
-            keypoint_names=body.keypoint_names + tuple(f"outline/{v}" for v in self.vertices),
-            keypoint_part=np.concatenate([body.keypoint_part, self.part]),
-            keypoint_template=np.concatenate([body.keypoint_template, body.v_template[self.vertices]]),
-            keypoint_shapedirs=np.concatenate([body.keypoint_shapedirs, body.shapedirs[self.vertices]]),
-        )
+        added = (f"outline/{v}" for v in self.vertices)
+        places, shapedirs = body.v_template[self.vertices], body.shapedirs[self.vertices]
+        self.body = with_keypoints(body, added, self.part, places, shapedirs)
 
     def measure(self, fit: Fit, mask: PersonMask) -> tuple[NDArray[Any], NDArray[Any]]:
         """Return the residual's rows for the pose and shape of a fit: int64 (n, 1) and float64 (n, 11)."""
