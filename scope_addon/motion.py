@@ -56,6 +56,7 @@ class Motion:
     joint_sigma_m: NDArray[np.floating[Any]] | None = None  # (T, K+1), NaN where not known; always an array once made
     joint_sigma_depth_m: NDArray[np.floating[Any]] | None = None  # (T, K+1), likewise
     height_sigma_m: float = float("nan")  # standard deviation of the stature of `betas`; NaN where it is not known
+    uneven_ground: bool = False  # feet rest at any height, so none is under a floor
     # What the user corrected, which `poses` and `joints_cam` contain: the arrays named CORRECTION_KEYS, or none.
     corrections: dict[str, NDArray[Any]] = field(default_factory=dict)
     # The face, if it was looked for: the arrays named FACE_KEYS, or none.
@@ -70,6 +71,7 @@ class Motion:
             setattr(self, name, np.asarray(value, dtype) if dtype is not str else str(value))
         self.face = {name: np.asarray(value, _FACE_SCHEMA[name][1]) for name, value in self.face.items()}
         self.mocap_framerate, self.height_sigma_m = float(self.mocap_framerate), float(self.height_sigma_m)
+        self.uneven_ground = bool(self.uneven_ground)
         self.validate()
 
     @property
@@ -171,10 +173,11 @@ CORRECTION_KEYS = (
 # Not in files of earlier versions; NaN where nothing is known.
 SIGMA_KEYS = ("joint_sigma_m", "joint_sigma_depth_m")
 HEIGHT_SIGMA_KEY = "height_sigma_m"
+UNEVEN_GROUND_KEY = "uneven_ground"  # False in files of earlier versions
 # Only in files of captures that looked for the face: the first are what it expresses, the others where it was seen.
 FACE_KEYS = ("expressions", "expression_names", "expression_confidence", "gaze", "face_points", "face_landmarks")
 _GROUPS = ("corrections", "face")  # fields that are not keys themselves
-OPTIONAL_KEYS = {"source", *SIGMA_KEYS, HEIGHT_SIGMA_KEY, *CORRECTION_KEYS, *FACE_KEYS}
+OPTIONAL_KEYS = {"source", *SIGMA_KEYS, HEIGHT_SIGMA_KEY, UNEVEN_GROUND_KEY, *CORRECTION_KEYS, *FACE_KEYS}
 _FACE_SCHEMA: dict[str, tuple[tuple[str | int, ...], type]] = {
     "expressions": (("T", "E"), np.float32),
     "expression_names": (("E",), np.str_),

@@ -43,6 +43,7 @@ class CaptureOptions:
     calibration: Path | None = _DEFAULT["calibration"]
     wanted: FootageRange = VideoRange()  # range of frames
     smoothing: bool = _DEFAULT["smoothing"]
+    uneven_ground: bool = _DEFAULT["uneven_ground"]  # feet rest at any height, not on one horizontal floor
     threads: int = _DEFAULT["threads"]  # 0: as many as there are cores
     hands: bool = _DEFAULT["hands"]  # the fingers as well; the body needs finger joints
     face: bool = _DEFAULT["face"]  # expressions and gaze as well

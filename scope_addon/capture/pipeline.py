@@ -78,4 +78,5 @@ def shot_of(video: Video, body: Body, options: CaptureOptions, footage: Footage)
         display_text(Path(video.path).name),
         options.smoothing and frames > 1,
         options.ablation,
+        options.uneven_ground,
     )

@@ -90,8 +90,12 @@ def foot_heights(motion: Motion, body: Body, raw: bool = False) -> NDArray[np.fl
 def under_floor(motion: Motion, body: Body) -> NDArray[np.bool_]:
     """Return the (T,) frames of a motion in which a foot is more than `UNDER_FLOOR_M` under the floor.
 
+    There are none on uneven ground.
+
     :param body: that of the motion.
     """
+    if motion.uneven_ground:
+        return np.zeros(len(motion), np.bool_)
     under: NDArray[np.bool_] = foot_heights(motion, body).min(axis=1) < -UNDER_FLOOR_M
     return under
 

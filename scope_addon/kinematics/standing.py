@@ -19,6 +19,7 @@ CONTACT_CUTOFF_HZ = 4.0  # of the positions before their speed is computed, sinc
 # its depth is wrong: it is then displaced up or down along its line of sight.
 STILL_M_S, STILL_CUTOFF_HZ = 0.12, 0.6  # v₁, and of the mean of the speed
 WRONG_DEPTH_M = 0.4  # d
+UNEVEN_M = 0.6  # h_u, by which one foot may rest higher than the other on stairs or boxes
 LEVEL_M = 0.25  # h_l: feet standing farther above or below stand on something else
 
 
@@ -40,6 +41,7 @@ def standing_probability(
     up: NDArray[np.floating[Any]],
     times: NDArray[np.float64],
     center: NDArray[np.floating[Any]] | None = None,
+    uneven_ground: bool = False,
 ) -> NDArray[np.floating[Any]]:
     """Return the (T, F) probability that each sole point rests on the floor: it is slow and the lowest of its frame.
 
@@ -53,10 +55,12 @@ def standing_probability(
     :param up: (3,) unit vector.
     :param times: (T,) seconds.
     :param center: (T, 3) or (3,) the camera's centre, in the same axes; None: no camera is known.
+    :param uneven_ground: h₀ is the height of a step, h_u: on stairs, both feet rest.
     """
     height = soles @ up
     height = height - height.min(axis=1, keepdims=True)
-    speed, allowed = speed_across(soles, times, center), np.full(height.shape, CONTACT_HEIGHT_M)
+    speed = speed_across(soles, times, center)
+    allowed = np.full(height.shape, UNEVEN_M if uneven_ground else CONTACT_HEIGHT_M)
     if len(times) > 2 and center is not None:
         upwards = np.abs(line_of_sight(soles - np.expand_dims(center, -2)) @ up)
         mean_speed = np.sqrt(gaussian_smooth(np.square(speed), times, STILL_CUTOFF_HZ))
@@ -70,6 +74,7 @@ def resting_probability(
     up: NDArray[np.floating[Any]],
     times: NDArray[np.float64],
     center: NDArray[np.floating[Any]],
+    uneven_ground: bool = False,
 ) -> NDArray[np.floating[Any]]:
     """Return the (T, 6) probability that each sole point and palm rests on something.
 
@@ -82,10 +87,11 @@ def resting_probability(
     :param up: (3,) unit vector.
     :param times: (T,) seconds.
     :param center: (T, 3) or (3,) the camera's centre, in the same axes.
+    :param uneven_ground: as in `standing_probability`.
     """
     soles, palms = np.split(contact_points, [len(SOLES)], axis=1)
     height = palms @ up - (soles @ up).min(axis=1, keepdims=True)
-    stands = standing_probability(soles, up, times, center)
+    stands = standing_probability(soles, up, times, center, uneven_ground)
     slow = logistic(4 * (1 - speed_across(palms, times, center) / CONTACT_SPEED_M_S))
     above_hands = np.maximum(-height.min(axis=1, keepdims=True), 0.0)
     stands *= logistic(8 * (1 - above_hands / (2 * LEVEL_M))) / logistic(8)

@@ -269,5 +269,13 @@ CAPTURE_OPTIONS = (
         argument=Argument(help="keep the per-frame solution: no smoothing, no foot locking"),
         blender=Property(label="Smooth"),
     ),
+    Option(
+        "uneven_ground",
+        bool,
+        False,
+        _EVERYWHERE,
+        "people walk on stairs, steps or slopes: feet rest at any height instead of on one horizontal floor",
+        argument=Argument(help="feet rest at any height, as on stairs or slopes, not on one floor"),
+    ),
     Option("ablation", object, None, Place.CAPTURE, "parts of the pipeline to leave out; only experiments set it"),
 )

@@ -56,6 +56,19 @@ def test_a_foot_at_rest_at_a_wrong_depth_is_in_contact_and_a_raised_one_is_not(s
         np.testing.assert_allclose(elsewhere, standing.standing_probability(far, up, times, CAMERA), atol=1e-9)
 
 
+def test_both_feet_rest_on_stairs_where_the_ground_is_uneven(step):
+    _, omega, root, place, T_world_camera, times = step
+    up = T_world_camera[2, :3]
+    stairs = place(omega[:1], root[:1])[2][:, :4].repeat(len(times), axis=0)
+    stairs[:, :2] += 0.34 * up  # the left one, two steps higher
+    for center in (CAMERA, None):
+        assert (standing.standing_probability(stairs, up, times, center)[:, :2] < 0.2).all()
+        assert (standing.standing_probability(stairs, up, times, center, uneven_ground=True) > 0.8).all()
+    moving = stairs.copy()
+    moving[:, :2, 0] += 1.0 * times[:, None]
+    assert (standing.standing_probability(moving, up, times, CAMERA, uneven_ground=True)[3:-3, :2] < 0.01).all()
+
+
 def test_palms_at_rest_on_the_floor_are_in_contact(plank):
     _, omega, root, place, T_world_camera, times = plank
     up, contact_points = T_world_camera[2, :3], place(omega, root)[2]

@@ -24,8 +24,8 @@ from scope.solver.loaders.body_file import load_body
 # Listed again on purpose, because users' scripts rely on the flags.
 FLAGS = """
 --quality --people --start --end --fps --body --hands --face --height --focal-mm --fov --calibration --no-smoothing
---shape-keys --bvh-unit --file-per-person --retarget --rig-object --bone-map --expression-map --retarget-root --detector
---keypoints --provider --threads --json --quiet
+--uneven-ground --shape-keys --bvh-unit --file-per-person --retarget --rig-object --bone-map --expression-map
+--retarget-root --detector --keypoints --provider --threads --json --quiet
 """.split()
 EXTRA = Option(
     "stride",

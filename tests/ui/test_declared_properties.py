@@ -45,6 +45,7 @@ LABELS = {
     "range_start": "From",
     "range_end": "To",
     "smoothing": "Smooth",
+    "uneven_ground": "Uneven Ground",
     "frame_rate": "Frame Rate",
     "start_frame": "First Frame",
     "set_frame_range": "Set Frame Range",

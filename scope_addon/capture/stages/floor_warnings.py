@@ -16,11 +16,15 @@ from .clock import at_times
 def floor_warnings(name: str, body: Body, motions: list[Motion]) -> list[str]:
     """List in sentences where people stand on other floors or on steps, and where feet are under the floor.
 
+    There are none on uneven ground, which has no floor.
+
     :param name: the footage's.
     :param body: that of the motions.
     """
     warnings = []
     for number, motion in enumerate(motions, 1):
+        if motion.uneven_ground:
+            continue
         who = "the person" if len(motions) == 1 else f"person {number}"
         heights = foot_heights(motion, body)
         about = [*_other_floors(who, heights, motion), *_steps(who, body, motion), *_under_floor(who, heights, motion)]
@@ -37,7 +41,7 @@ def _other_floors(who: str, heights: NDArray[np.float64], motion: Motion) -> lis
             when = at_times([float(motion.timestamps[first]) for first, _ in spans])
             texts.append(
                 f"{who} stands up to {most:.1f} m {side} the floor {when}, so the clip has more than one floor: "
-                "capture the part that matters, with a start and end time"
+                "capture the part that matters, with a start and end time, or with uneven ground"
             )
     return texts
 
@@ -51,7 +55,8 @@ def _steps(who: str, body: Body, motion: Motion) -> list[str]:
     first, height = max(rests, key=lambda rest: abs(rest[1]))
     side, when = "above" if height > 0 else "below", at_times([float(motion.timestamps[first])])
     return [
-        f"the feet of {who} rest {100 * abs(height):.0f} cm {side} the floor {when}, as on a step; they were put on it"
+        f"the feet of {who} rest {100 * abs(height):.0f} cm {side} the floor {when}, as on a step; they were put on "
+        "it. For stairs and slopes, capture with uneven ground"
     ]
 
 

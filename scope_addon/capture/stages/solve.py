@@ -22,7 +22,7 @@ from ..world.clip.clip_fit import fit_clip
 from ..world.placement import PlacedTrack, place_track
 from ..world.raw_motion import RawMotion
 from ..world.shot import FittedPerson, Shot
-from ..world.stance import stance_on_floor
+from ..world.stance import stance_on_ground
 from ..world.world_frame import SharedWorld, find_world
 from .clock import Progress
 from .freed_memory import return_freed_memory
@@ -100,7 +100,7 @@ def prepare(shot: Shot, tracks: Iterable[Track], heights_m: Sequence[float]) -> 
 
 def place(shot: Shot, track: Track, fit: FittedTrack, smoothing: bool = True) -> PlacedTrack:
     """Fill the gaps of a fit, smooth it, and transform it to the first frame's camera axes."""
-    return place_track(shot.body, track, fit, smoothing, shot.path)
+    return place_track(shot.body, track, fit, smoothing, shot.path, shot.uneven_ground)
 
 
 def find_camera_path(shot: Shot, first: PreparedTrack, fit: FittedTrack) -> CameraPath:
@@ -121,7 +121,7 @@ def ground_all(
     return_freed_memory()
     grounded, starts = [], []
     for k, (each, fit) in enumerate(zip(prepared, fits, strict=True)):
-        stance = stance_on_floor(placed[k], world.floor_from_camera(k), shot.ablation.balance)
+        stance = stance_on_ground(placed[k], world.floor_from_camera(k), shot.ablation.balance)
         if not shot.ablation.floor:
             stance = replace(stance, contact=np.zeros_like(stance.contact))
         if not shot.ablation.contact:
@@ -149,6 +149,6 @@ def refine(
 def finish(shot: Shot, person: FittedPerson, placed: PlacedTrack, world: SharedWorld, number: int) -> Motion:
     """Raise the feet of one person, the ``number``-th of the world, out of the floor, and assemble the motion."""
     contact = placed.contact(world.up)
-    if shot.ablation.contact and (shot.smoothing or shot.is_still):
+    if shot.ablation.contact and not shot.uneven_ground and (shot.smoothing or shot.is_still):
         placed = raise_feet(placed, contact, world.floor_from_camera(number))
     return assemble_motion(shot, person, placed, contact, world.T_world_camera)

@@ -76,6 +76,7 @@ def assemble_motion(
         joint_sigma_m=None if sigma is None else np.sqrt((sigma[..., 0] ** 2 + 2.0 * sigma[..., 1] ** 2) / 3.0),
         joint_sigma_depth_m=None if sigma is None else sigma[..., 0],
         height_sigma_m=raw.height_sigma_m,
+        uneven_ground=shot.uneven_ground,
         face=_face(track, placed.times, shot.smoothing),
     )
 

@@ -28,6 +28,7 @@ def correct_depth(
     contact: NDArray[np.floating[Any]],
     T_world_camera: NDArray[np.float64],
     times: NDArray[np.float64],
+    one_floor: bool = True,
 ) -> NDArray[np.float64]:
     """Return the (T,) displacement of each frame's body along its root's line of sight, metres.
 
@@ -43,6 +44,7 @@ def correct_depth(
     :param contact: (T, F) contact probability of each point.
     :param T_world_camera: (4, 4) camera to world, the floor at z = 0.
     :param times: (T,) seconds.
+    :param one_floor: False: f_t = 0, as on stairs.
     """
     T = len(times)
     R, height0 = T_world_camera[:3, :3], T_world_camera[2, 3]
@@ -50,7 +52,7 @@ def correct_depth(
     points_world = points_cam @ R.T
     height = points_world[..., 2] + height0
     # A foot that is probably in the air says nothing about the floor.
-    certainty = np.clip(2 * contact - 1, 0, 1) * floor_probability(height)
+    certainty = np.clip(2 * contact - 1, 0, 1) * floor_probability(height) * one_floor
     g, d = ray_world[:, 2], ray_world[:, :2]
 
     diagonal = np.full(T, 1 / DEPTH_SIGMA_M**2) + certainty.sum(1) * g**2 / FLOOR_SIGMA_M**2

@@ -41,6 +41,7 @@ class PlacedTrack:
     contact_points: NDArray[np.floating[Any]]  # (T, 6, 3) sole points and palms
     contact_points_visible: NDArray[np.floating[Any]]  # (T, 6) 0..1
     center: NDArray[np.floating[Any]]  # (T, 3) of the camera
+    uneven_ground: bool = False  # both feet may rest at any height
 
     @property
     def soles(self) -> NDArray[np.floating[Any]]:
@@ -72,7 +73,7 @@ class PlacedTrack:
 
         :param up: (3,) unit vector.
         """
-        contact = resting_probability(self.contact_points, up, self.times, self.center)
+        contact = resting_probability(self.contact_points, up, self.times, self.center, self.uneven_ground)
         contact *= self.contact_points_visible * self.valid[:, None]
         steps = np.diff(self.times)
         if len(steps):
@@ -82,7 +83,12 @@ class PlacedTrack:
 
 
 def place_track(
-    body: Body, track: Track, fitted: FittedTrack, smoothing: bool, path: CameraPath | None = None
+    body: Body,
+    track: Track,
+    fitted: FittedTrack,
+    smoothing: bool,
+    path: CameraPath | None = None,
+    uneven_ground: bool = False,
 ) -> PlacedTrack:
     """Compute once what the world is estimated from and the motion is assembled from.
 
@@ -101,7 +107,17 @@ def place_track(
     visible = np.clip(fitted.joint_confidence[:, parts] / VISIBLE_CONFIDENCE, 0.0, 1.0)
     return to_single_precision(
         PlacedTrack(
-            body_with_contacts, betas, times, valid, rotations, root, joints, contact_points, visible, path.center
+            body_with_contacts,
+            betas,
+            times,
+            valid,
+            rotations,
+            root,
+            joints,
+            contact_points,
+            visible,
+            path.center,
+            uneven_ground,
         )
     )
 

@@ -28,6 +28,7 @@ class Shot:
     source: str  # name of the footage
     smoothing: bool = True  # False: every frame is fitted alone
     ablation: Ablation = NO_ABLATION
+    uneven_ground: bool = False  # True: feet rest at any height
 
     @property
     def is_still(self) -> bool:

@@ -25,6 +25,7 @@ MOMENT_S = 0.1  # length of a clip in which the weight b is halved
 MIN_CONTACT = 1e-3  # added to the contact probability of a frame
 SAME_FLOOR_M = 0.4  # the feet of people on one floor may differ so much in height, as their distances are uncertain
 UP_NOISE_RAD = np.radians(5.0)  # σ_up, error of an up direction estimated from bodies
+FIRST_S = 0.5  # on uneven ground, of the contact that determines the floor
 LEVEL_UP = (0.0, -1.0, 0.0)  # up in the axes of a level camera
 
 
@@ -118,20 +119,20 @@ def up_from_floor(feet_cam: NDArray[np.floating[Any]], up: NDArray[np.floating[A
 
 
 def up_from_scene(
-    up_body: NDArray[np.floating[Any]], feet_cam: NDArray[np.floating[Any]], lines: Lines | None
+    up_body: NDArray[np.floating[Any]], feet_cam: NDArray[np.floating[Any]] | None, lines: Lines | None
 ) -> NDArray[np.floating[Any]]:
     """Correct the up direction of the bodies by the lines of the background or, failing that, by the feet.
 
     Lines that determine only one horizontal direction, such as a fence's, remove the component along it.
 
     :param up_body: (3,) unit vector, camera axes.
-    :param feet_cam: (T, F, 3) points of the soles, camera axes, metres.
+    :param feet_cam: (T, F, 3) points of the soles, camera axes, metres; None: they are not on one floor.
     :return: (3,) unit vector, camera axes.
     """
     estimate = estimate_up_from_lines(lines or Lines.none(), up_body)
     if estimate.up is not None:
         return estimate.up
-    up = up_from_floor(feet_cam, up_body)
+    up = up_body if feet_cam is None else up_from_floor(feet_cam, up_body)
     if estimate.level is not None:
         up = up - (up @ estimate.level) * estimate.level
     return _unit(up)
@@ -179,22 +180,33 @@ def find_world(placed: list[PlacedTrack], lines: Lines | None = None) -> SharedW
     """Estimate the world: z up, the floor at z = 0, the origin below the first position of the most prominent person.
 
     The up direction is estimated from the background's lines, or from all bodies and floors together. Each person's
-    feet are taken relative to their own mean position, so that neither a step nor a wrong distance tilts the world.
+    feet are taken relative to their own mean position, so that neither a step nor a wrong distance tilts the world. On
+    uneven ground, feet do not determine the up direction, and everybody's floor is what they stand on at first.
 
     :param placed: the most prominent person first.
     :param lines: of the background, in the first frame's camera axes.
     """
     all_soles = [person.soles[person.valid] for person in placed]
     up = up_from_bodies(placed)
-    centered = [soles - _lowest(soles, up).mean(axis=0) for soles in all_soles]
-    up = up_from_scene(up, np.concatenate(centered), lines)
+    centered = np.concatenate([soles - _lowest(soles, up).mean(axis=0) for soles in all_soles])
+    up = up_from_scene(up, None if placed[0].uneven_ground else centered, lines)
     contacts = [person.contact(up)[person.valid, : len(SOLES)] for person in placed]
+    if placed[0].uneven_ground:
+        times = (person.times[person.valid] for person in placed)
+        contacts = [_first_contact(*each) for each in zip(contacts, times, strict=True)]
     heights = [floor_height(soles, contact, up) for soles, contact in zip(all_soles, contacts, strict=True)]
     T_world_camera = world_from_level_camera(up, height=-heights[0])
     start = transform_points(T_world_camera, placed[0].joints[placed[0].valid.argmax(), :1])[0]
     T_world_camera[:2, 3] -= start[:2]
     relative = [height - heights[0] for height in heights]
     return SharedWorld(T_world_camera, [h if abs(h) > SAME_FLOOR_M else 0.0 for h in relative])
+
+
+def _first_contact(contact: NDArray[np.floating[Any]], times: NDArray[np.float64]) -> NDArray[np.floating[Any]]:
+    """Return the contact probability (T, F), 0 after somebody has been on the ground for `FIRST_S` altogether."""
+    on_ground_s = np.cumsum(contact.max(axis=1) * np.gradient(times)) if len(times) > 1 else np.zeros(len(times))
+    first: NDArray[np.floating[Any]] = contact * (on_ground_s <= max(FIRST_S, on_ground_s[0]))[:, None]
+    return first
 
 
 def _lowest(soles_cam: NDArray[np.floating[Any]], up: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:

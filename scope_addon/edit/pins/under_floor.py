@@ -18,9 +18,12 @@ def feet_under_floor(motion: Motion, body: Body) -> tuple[float, int]:
     """Return how far a foot is under the floor because of what was measured, metres, and in how many frames.
 
     :param body: that of the motion.
-    :return: of feet that are more than `UNDER_FLOOR_M` under the floor and lower than without pins; or 0 and 0.
+    :return: of feet that are more than `UNDER_FLOOR_M` under the floor and lower than without pins; or 0 and 0, as
+        on uneven ground.
     :raises MotionFileError: the motion's corrections are damaged.
     """
+    if motion.uneven_ground:
+        return 0.0, 0
     kept = Exchange | Interpolation | Upright | Floor | FeetOnFloor
     free = with_corrections(motion, body, tuple(c for c in corrections_of(motion) if isinstance(c, kept)))
     lowest, before = (foot_heights(m, body).min(axis=1) for m in (motion, free))

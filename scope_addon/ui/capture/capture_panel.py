@@ -117,6 +117,7 @@ class SCOPE_PT_person(Tab, bpy.types.Panel):
         elif settings.lens == "FILE":
             draw_file(layout, settings, "calibration_file", text="File")
         layout.prop(settings, "smoothing")
+        layout.prop(settings, "uneven_ground")
         layout.prop(settings, "use_range")
         if settings.use_range:
             column = layout.column(align=True)

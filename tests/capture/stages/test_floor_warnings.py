@@ -34,7 +34,7 @@ def test_another_floor(body, height, where):
     found = floor_warnings("a.mp4", body, [standing(body, from_second(2, height))])
     assert found == [
         f"a.mp4: the person stands up to {where} the floor at 2.0 s, so the clip has more than one floor: capture the "
-        "part that matters, with a start and end time"
+        "part that matters, with a start and end time, or with uneven ground"
     ]
 
 

@@ -128,7 +128,7 @@ def test_a_body_on_hands_and_feet_is_not_rotated():
 
 def test_a_still_image_is_balanced_without_accelerations():
     placed = standing(20.0)
-    one = PlacedTrack(*(getattr(placed, n) if n in ("body", "betas") else getattr(placed, n)[:1]
+    one = PlacedTrack(*(getattr(placed, n) if n in ("body", "betas", "uneven_ground") else getattr(placed, n)[:1]
                         for n in placed.__dataclass_fields__))  # fmt: skip
     turn, _ = balancing_rotations(one, FEET[:1], UP)
     assert turned_deg(turn)[0] < -3.0

@@ -35,6 +35,16 @@ def test_a_right_depth_is_not_changed(step):
     assert np.abs(ground_plane.correct_depth(root, soles, contact, T_world_camera, times)).max() < 0.05
 
 
+def test_feet_above_the_floor_do_not_move_the_body_on_uneven_ground(step):
+    _, omega, root, place, T_world_camera, times = step
+    raised = root + 0.1 * T_world_camera[2, :3]
+    soles = place(omega, raised)[2]
+    contact = standing.resting_probability(soles, T_world_camera[2, :3], times, CAMERA)
+    given = (raised, soles, contact, T_world_camera, times)
+    assert np.abs(ground_plane.correct_depth(*given)).max() > 0.15
+    np.testing.assert_allclose(ground_plane.correct_depth(*given, one_floor=False), 0.0, atol=0.05)
+
+
 def test_the_depth_system_is_solved_as_a_dense_one():
     rng = np.random.default_rng(0)
     off = rng.normal(size=30)

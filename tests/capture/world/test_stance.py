@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 from scope.scope_addon.capture.world.placement import PlacedTrack
-from scope.scope_addon.capture.world.stance import stance_on_floor
+from scope.scope_addon.capture.world.stance import stance_on_ground
 from scope.scope_addon.kinematics.axes import world_from_level_camera
 from scope.scope_addon.kinematics.contact_points import contact_point_positions, with_contact_points
 from scope.solver.loaders.body_file import load_body
@@ -34,7 +34,7 @@ def test_a_wrong_distance_is_corrected_along_the_line_of_sight(error_m: float) -
     height = float((truth.contact_points[0, :4] @ -UP).mean())  # of the camera above the soles
     away = truth.root[0] / np.linalg.norm(truth.root[0])
     placed = stands_at(TRUTH + error_m * away)
-    stance = stance_on_floor(placed, world_from_level_camera(UP, height), balanced=False)
+    stance = stance_on_ground(placed, world_from_level_camera(UP, height), balanced=False)
     left = stance.root_cam - truth.root
     np.testing.assert_allclose(np.cross(left, away), 0.0, atol=1e-6)
     assert np.linalg.norm(left, axis=1).max() <= 0.3 * abs(error_m) + 1e-3
