@@ -61,6 +61,7 @@ _SECTIONS = {
         "View", "StandingPoints",
     ),
     "Fitting": ("fit", "fit_batch", "fit_clip", "fit_clips", "fit_motion", "FrameSolver", "fit_tree", "carry"),
+    "Residuals of your own": ("register_residual", "check_residual"),
     "Options and priors": (
         "Options", "Stage", "Weights", "COLD_STAGES", "WARM_STAGES", "Priors", "default_priors", "JointPrior",
         "load_joint_prior", "Temporal", "with_previous", "MotionPrior",
@@ -90,8 +91,8 @@ def _entry(name: str, value: Any) -> str:
     """Return the heading of one name and, as a block of text, its parameters and docstring."""
     if inspect.isclass(value):
         lines = _class(value)
-    elif inspect.isfunction(value):
-        lines = _function(value)
+    elif inspect.isfunction(inspect.unwrap(value)):
+        lines = _function(inspect.unwrap(value))
     else:
         kind = f"tuple of {len(value)} {type(value[0]).__name__}" if isinstance(value, tuple) else type(value).__name__
         lines = [f"{name.split('.')[-1]}: {kind}"]
