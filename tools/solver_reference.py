@@ -46,6 +46,8 @@ print(fit.status, fit.t_camera_part, fit.state.beta)  # why it stopped, joints i
 
 `K` is the (3, 3) camera matrix, `pixels` (17, 2), `confidence` (17,), `frames` a list of `Measurements`
 and `times` their times in seconds. For several calibrated cameras, a frame is a list of one `View` for each.
+`fit_motion(body, [measurements], [0.0], covariance=True)` gives the covariance of the joints of a single frame. Results
+can be pickled, and their arrays saved with `np.savez`; `State(*arrays)` is where a later fit can start (`init`).
 `solver/examples/` fits 3D joints, 2D keypoints, a marker set, an SMPL+H hand and a clip from three cameras, and refines
 a regression network's output:
 
