@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from .fitting.batch import fit_batch, fit_clips
     from .fitting.clip import carry, fit_clip
     from .fitting.frame_solver import FrameSolver, fit, fit_tree
+    from .fitting.residual_check import check_residual
     from .learned_prior import JointPrior, load_joint_prior
     from .loaders import load_body
     from .measurements import Floor, FootContacts, Keypoints2D, Keypoints3D, Measurements, OrientationField, PosePriors
@@ -75,6 +76,7 @@ __all__ = [
     "View",
     "Weights",
     "carry",
+    "check_residual",
     "default_priors",
     "fit",
     "fit_batch",
@@ -97,6 +99,7 @@ _HOMES = {
     "fitting.batch": "fit_batch fit_clips",
     "fitting.clip": "carry fit_clip",
     "fitting.frame_solver": "FrameSolver fit fit_tree",
+    "fitting.residual_check": "check_residual",
     "learned_prior": "JointPrior load_joint_prior",
     "loaders": "load_body",
     "measurements": "Floor FootContacts Keypoints2D Keypoints3D Measurements OrientationField PosePriors",

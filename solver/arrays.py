@@ -21,13 +21,15 @@ _FLOAT64 = np.dtype(np.float64)
 def as_array(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Array:
     """Return `value` as contiguous float64.
 
-    :param value: an array, or lists of numbers, of `shape`.
+    :param value: an array, or lists of numbers, of `shape`; what numpy's masked arrays mask becomes NaN.
     :param shape: the expected one, for instance (None, 3) for (n, 3): None is any length.
     :param name: what the array is, as a message begins.
     :raises ShapeError: it has another shape, or is no array of numbers.
     """
     if type(value) is not np.ndarray or value.dtype is not _FLOAT64:
         _refuse_unless_numbers(value, "fiub", "numbers", shape, name)
+        if isinstance(value, np.ma.MaskedArray):  # whose masked values numpy's conversion would take for measured ones
+            value = np.where(_masked(value), np.nan, value.data)
     array = np.ascontiguousarray(value, dtype=np.float64)
     if array.shape == shape and array.ndim:
         return array
@@ -39,10 +41,12 @@ def as_array(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Arra
 def as_integers(value: ArrayLike, name: str) -> Array:
     """Return `value` as contiguous int64 (n,).
 
-    :raises ShapeError: it is no list of whole numbers.
+    :raises ShapeError: it is no list of whole numbers, or a masked array that masks one.
     """
     if type(value) is not np.ndarray or value.dtype.kind not in "iu":
         _refuse_unless_numbers(value, "iu", "integers", (None,), name)
+    if isinstance(value, np.ma.MaskedArray) and _masked(value).any():
+        raise ShapeError(f"{name} must all be there, but the masked array masks some; leave these rows out.")
     array = np.asarray(value)
     if array.ndim != 1:
         raise ShapeError(f"{name} must be integers of shape (n,), but got {array.dtype} of shape {array.shape}.")
@@ -75,7 +79,13 @@ def described(value: Any) -> str:
         return f"the text {value[:40]!r}"
     if isinstance(value, np.ndarray):
         return f"an array of {value.dtype} of shape {value.shape}"
-    return f"a {type(value).__name__}"
+    kind = type(value).__name__
+    return f"{'an' if kind[0] in 'aeioAEIO' else 'a'} {kind}"
+
+
+def _masked(value: np.ma.MaskedArray[Any, Any]) -> Array:
+    mask: Array = np.ma.getmaskarray(value)  # type: ignore[no-untyped-call]
+    return mask
 
 
 def _refuse_unless_numbers(value: Any, kinds: str, what: str, shape: tuple[int | None, ...], name: str) -> None:

@@ -56,6 +56,11 @@ class Body:
     gender: str = "neutral"
     file: str = ""  # of the user's, absolute; empty for a built-in body
 
+    def __repr__(self) -> str:
+        """Return name and sizes, not its arrays, which would fill a thousand lines of a notebook."""
+        sizes = f"K={self.K}, P={self.P}, V={len(self.v_template)}, M={len(self.keypoint_names)}"
+        return f"Body({self.name!r}, {sizes})"
+
     @property
     def K(self) -> int:
         """Number of rotational joints (parts without the root)."""

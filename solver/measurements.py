@@ -62,7 +62,11 @@ def _normalize(K: Array, pixels: Array, confidence: Array, out: Array) -> None:
 
 @dataclass
 class Keypoints2D:
-    """Points in the image: indices (n,), pixels (n, 2), confidence (n,)."""
+    """Points in the image: indices (n,), pixels (n, 2) without lens distortion, confidence (n,).
+
+    A row with NaN, or without a positive confidence, is left out, as of 3D keypoints and directions. Cameras have no
+    distortion coefficients: undistort pixels first, for instance with OpenCV's undistortPoints(pixels, K, dist, P=K).
+    """
 
     indices: ArrayLike
     pixels: ArrayLike

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Mapping
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -57,6 +59,15 @@ def check_weight(value: Any, name: str) -> None:
     """
     if not 0.0 <= as_number(value, name) < math.inf:
         raise InvalidValueError(f"{name} must be finite and not negative, but is {value}.")
+
+
+def check_count(value: Any, name: str, least: int = 1) -> None:
+    """Check how many there are of something.
+
+    :raises InvalidValueError: it is no whole number, or less than `least`.
+    """
+    if not isinstance(value, Integral) or value < least:
+        raise InvalidValueError(f"{name} must be a whole number of at least {least}, but is {value!r}.")
 
 
 def check_robust(value: Any, name: str) -> None:
@@ -145,6 +156,16 @@ def check_type(value: Any, wanted: type | tuple[type, ...], name: str) -> None:
         kinds = wanted if isinstance(wanted, tuple) else (wanted,)
         allowed = " or ".join("None" if kind is type(None) else kind.__name__ for kind in kinds)
         raise InvalidValueError(f"{name} must be {allowed}, but is {described(value)}.")
+
+
+def check_list(value: Any, name: str, what: str) -> None:
+    """Check that there is an entry for each of something, whatever the entries are.
+
+    :param what: what each entry is of, for the message: "frame", "clip".
+    :raises InvalidValueError: it is a single entry, or a generator, which can be read only once.
+    """
+    if isinstance(value, (str, bytes, Mapping)) or not (hasattr(value, "__len__") and hasattr(value, "__getitem__")):
+        raise InvalidValueError(f"{name} must be a list with an entry for each {what}, but is {described(value)}.")
 
 
 def warn_of_units(points: Array, name: str) -> None:

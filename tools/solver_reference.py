@@ -46,6 +46,8 @@ print(fit.status, fit.t_camera_part, fit.state.beta)  # why it stopped, joints i
 
 `K` is the (3, 3) camera matrix, `pixels` (17, 2), `confidence` (17,), `frames` a list of `Measurements`
 and `times` their times in seconds. For several calibrated cameras, a frame is a list of one `View` for each.
+`fit_motion(body, [measurements], [0.0], covariance=True)` gives the covariance of the joints of a single frame. Results
+can be pickled, and their arrays saved with `np.savez`; `State(*arrays)` is where a later fit can start (`init`).
 `solver/examples/` fits 3D joints, 2D keypoints, a marker set, an SMPL+H hand and a clip from three cameras, and refines
 a regression network's output:
 
@@ -61,6 +63,7 @@ _SECTIONS = {
         "View", "StandingPoints",
     ),
     "Fitting": ("fit", "fit_batch", "fit_clip", "fit_clips", "fit_motion", "FrameSolver", "fit_tree", "carry"),
+    "Residuals of your own": ("register_residual", "check_residual"),
     "Options and priors": (
         "Options", "Stage", "Weights", "COLD_STAGES", "WARM_STAGES", "Priors", "default_priors", "JointPrior",
         "load_joint_prior", "Temporal", "with_previous", "MotionPrior",
@@ -90,8 +93,8 @@ def _entry(name: str, value: Any) -> str:
     """Return the heading of one name and, as a block of text, its parameters and docstring."""
     if inspect.isclass(value):
         lines = _class(value)
-    elif inspect.isfunction(value):
-        lines = _function(value)
+    elif inspect.isfunction(inspect.unwrap(value)):
+        lines = _function(inspect.unwrap(value))
     else:
         kind = f"tuple of {len(value)} {type(value[0]).__name__}" if isinstance(value, tuple) else type(value).__name__
         lines = [f"{name.split('.')[-1]}: {kind}"]

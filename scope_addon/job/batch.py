@@ -39,7 +39,6 @@ class Batch:
     :param suffixes: suffixes of the result files, such as ``.npz``.
     :param extras: what else to write of each clip.
     :raises InputError: the folder of footage does not exist.
-    :raises OutputError: the output folder cannot be created.
     """
 
     def __init__(
@@ -53,10 +52,6 @@ class Batch:
     ) -> None:
         if not folder.is_dir():
             raise InputError(f"{folder} is not a folder; give the folder with the footage")
-        try:
-            out.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise OutputError(f"cannot create the folder {out}: {error.strerror}; choose another with --out") from error
         self.folder, self.out = folder.resolve(), out.resolve()
         self.report_file = out / REPORT_NAME
         self.settings = CaptureSettings(options, tuple(suffixes), extras)
@@ -89,7 +84,7 @@ class Batch:
         :param runner: captures the clips; None for this machine.
         :return: the report; its ``exit_status`` is 1 if a clip failed, else 3 if a clip showed no person, else 0.
         :raises UsageError: the folder contains no footage.
-        :raises OutputError: the report cannot be written.
+        :raises OutputError: the output folder cannot be created, or the report cannot be written.
         """
         clips = self.clips(recursive)
         if not clips:
@@ -97,6 +92,11 @@ class Batch:
                 f"no footage in {self.folder}: no file ends with one of {' '.join(FOOTAGE_SUFFIXES)}"
                 + ("" if recursive else "; --recursive includes subfolders")
             )
+        out = self.report_file.parent  # as it was given
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(f"cannot create the folder {out}: {error.strerror}; choose another with --out") from error
         previous = {} if again else self._previous_entries()
         entries: dict[str, Entry] = {}
         runner = runner or LocalRunner(self._program, jobs)

@@ -14,7 +14,7 @@ from ..measurements import Measurements
 from ..options import Options, Priors, default_priors
 from ..state import ClipFit, Fit, State
 from ..temporal import Temporal
-from ..validation import check_type
+from ..validation import check_list, check_type
 from .clip import fit_clip
 from .frame_solver import FrameSolver
 
@@ -42,6 +42,7 @@ def fit_batch(
     :raises ShapeError: an array does not fit the body, whichever frame it belongs to, or `init` has another length.
     :raises InvalidValueError: a value that no fit can use, in whichever frame.
     """
+    check_list(measurements, "measurements", "frame")
     for k, m in enumerate(measurements):
         check_type(m, Measurements, f"measurements[{k}]")
     for k, state in enumerate(init or ()):
@@ -82,6 +83,7 @@ def fit_clips(
     :raises ShapeError: an array does not fit the body, or a clip has no frames.
     :raises InvalidValueError: a value that no fit can use, in whichever clip.
     """
+    check_list(clips, "clips", "clip")
     priors = default_priors(body) if priors is None else priors
 
     def one(clip: Sequence[Measurements]) -> ClipFit:

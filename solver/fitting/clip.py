@@ -29,7 +29,7 @@ from ..options import Options, Priors, default_priors
 from ..residuals.registry import SHAPE_PRIOR
 from ..state import ClipFit, Fit, State, Status
 from ..temporal import Temporal, with_previous
-from ..validation import check_type
+from ..validation import check_count, check_list, check_type, check_weight
 from .frame_solver import fit_tree
 from .report import Outcome, cost_by_term, make_fit
 
@@ -73,12 +73,15 @@ def fit_clip(
     :raises ShapeError: when there is no frame, or when an array does not fit the body.
     :raises InvalidValueError: a value that no fit can use.
     """
+    check_list(measurements, "measurements", "frame")
     for k, m in enumerate(measurements):
         check_type(m, Measurements, f"measurements[{k}]")
     for k, state in enumerate(init or ()):
         check_type(state, State, f"init[{k}]")
     if len(measurements) == 0:
         raise ShapeError("A clip needs at least one frame of measurements, but got none.")
+    check_weight(focal_weight, "focal_weight")
+    check_count(shape_frames, "shape_frames")
     if init is not None and len(init) != len(measurements):
         raise ShapeError(f"There must be one initial state a frame, {len(measurements)}, but got {len(init)}.")
     priors = default_priors(body) if priors is None else priors
@@ -98,7 +101,7 @@ def fit_clip(
     ]
     seen = [k for k, frame in enumerate(frames) if frame.count]
     chosen = seen
-    if len(seen) > shape_frames > 0:
+    if len(seen) > shape_frames:
         chosen = [seen[k] for k in np.linspace(0, len(seen) - 1, shape_frames).round().astype(int)]
     joint = _Joint(clip_tree, [frames[k] for k in chosen], priors, options, focal_weight if focal else 0.0)
     joint.optimize()

@@ -22,14 +22,14 @@ from ..measurements import Measurements
 from ..options import Options, Priors, default_priors
 from ..rotations import nearest_rotation
 from ..state import State, Status
-from ..validation import check_finite, check_type, check_weight
+from ..validation import as_number, check_finite, check_list, check_type, check_weight
 from .covariance import joint_covariances
 from .initial import initial_states
 from .levenberg_marquardt import Optimizer
 from .prior import MotionPrior, StandingPoints
 from .problem import ClipProblem, MotionTerms
 from .system import make_poses
-from .views import View, pack_frames
+from .views import View, pack_frames, views_of
 from .windows import Window, combined, overlapping, tiles
 
 _FRAMES_FOR_TWO_THREADS = 16
@@ -98,11 +98,16 @@ def fit_motion(
     :raises ShapeError: there is no frame, or an array does not fit the body or the clip.
     :raises InvalidValueError: a value that no fit can use.
     """
+    check_list(frames, "frames", "frame")
     clock = _checked_times(times, len(frames))
     if init is not None and len(init) != len(frames):
         raise ShapeError(f"There must be one initial state a frame, {len(frames)}, but got {len(init)}.")
-    if not 0.0 <= overlap < window:
+    if not as_number(window, "window") > 0.0:
+        raise InvalidValueError(f"window must be a positive number of seconds, or infinite for one, but is {window}.")
+    if not 0.0 <= as_number(overlap, "overlap") < window:
         raise InvalidValueError(f"The overlap of windows must lie in 0..{window} s, but is {overlap} s.")
+    for f, frame in enumerate(frames):
+        views_of(frame, f"frames[{f}]")
     check_type(motion, MotionPrior, "motion")
     check_type(stands, (StandingPoints, type(None)), "stands")
     check_weight(focal_weight, "focal_weight")

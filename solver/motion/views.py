@@ -14,11 +14,12 @@ import numpy as np
 from numba.extending import register_jitable
 from numpy.typing import ArrayLike
 
-from ..arrays import as_array
+from ..arrays import as_array, described
 from ..compiled.kernel import kernel
 from ..compiled.part import Array
 from ..compiled.tree import Tree
 from ..custom_residuals.external import External
+from ..errors import InvalidValueError
 from ..gauss_newton.terms import Layout, PackedPriors, Terms, fill_terms
 from ..measurements import Measurements
 from ..residuals.registry import RESIDUALS, empty_tables
@@ -111,13 +112,30 @@ def pack_frames(
     of_frame, counts = [0], np.zeros(len(frames), np.int64)
     for f, frame in enumerate(frames):
         name = f"frames[{first + f}]"
-        views = [View(frame)] if isinstance(frame, Measurements) else frame
-        check_type(views, Sequence, name)
-        for k, view in enumerate(views or [View(Measurements())]):
-            check_type(view, View, f"{name}[{k}]")
-            counts[f] += packer.add(view, without if k else priors, name)
+        for k, view in enumerate(views_of(frame, name) or [View(Measurements())]):
+            counts[f] += packer.add(view, without if k else priors)
         of_frame.append(len(packer.starts))
     return packer.packed(of_frame, priors), counts
+
+
+def views_of(frame: Measurements | Sequence[View], name: str) -> Sequence[View]:
+    """Return what cameras measured of a frame, checked: measurements alone are the view of a camera at the origin.
+
+    :param name: of the frame, for messages.
+    :raises ShapeError: a camera's rotation or position has another shape.
+    :raises InvalidValueError: the frame is neither measurements nor views, or a camera's rotation is none.
+    """
+    if isinstance(frame, Measurements):
+        return [View(frame)]
+    if not isinstance(frame, Sequence) or isinstance(frame, str):
+        raise InvalidValueError(f"{name} must be Measurements or a list of View, but is {described(frame)}.")
+    for k, view in enumerate(frame):
+        check_type(view, View, f"{name}[{k}]")
+        check_type(view.measurements, Measurements, f"measurements of {name}[{k}]")
+        R, t = as_array(view.R_camera_world, (3, 3), f"R_camera_world of {name}[{k}]"), view.t_camera_world
+        check_rotations(R[None], f"R_camera_world of {name}[{k}]")
+        check_finite(as_array(t, (3,), f"t_camera_world of {name}[{k}]"), f"t_camera_world of {name}[{k}]")
+    return frame
 
 
 class _Packer:
@@ -134,9 +152,8 @@ class _Packer:
         self._cameras: list[tuple[Array, Array, bool]] = []
         self._size = self._shared = 0
 
-    def add(self, view: View, priors: PackedPriors, name: str) -> int:
-        """Add a view of the frame of that name, and return how many measurements are usable."""
-        camera = _checked_camera(view, name)
+    def add(self, view: View, priors: PackedPriors) -> int:
+        """Add a view, as `views_of` has checked it, and return how many measurements are usable."""
         terms, count, layout = fill_terms(self._tree, view.measurements, priors, self._layout)
         if layout is not self._layout:
             self._shared += len(self._layout.rest)
@@ -149,7 +166,7 @@ class _Packer:
         for table, ints, floats in zip(self._tables, terms.ints, terms.floats, strict=True):
             table.add(ints, floats)
         self._external.append(terms.external)
-        self._cameras.append(camera)
+        self._cameras.append(_camera_of(view))
         self._size += len(terms.flags)
         return count + len(terms.ints[0])
 
@@ -195,14 +212,11 @@ class _Tables:
         return np.concatenate([floats for _, floats in self._parts])
 
 
-def _checked_camera(view: View, name: str) -> tuple[Array, Array, bool]:
+def _camera_of(view: View) -> tuple[Array, Array, bool]:
     """Return R_camera_world, made orthonormal, t_camera_world, and whether the camera's axes are the world's."""
-    R = as_array(view.R_camera_world, (3, 3), f"R_camera_world of {name}")
-    t = as_array(view.t_camera_world, (3,), f"t_camera_world of {name}")
+    R, t = np.asarray(view.R_camera_world, dtype=float), np.asarray(view.t_camera_world, dtype=float)
     if np.array_equal(R, _EYE) and not t.any():
         return _EYE, _NULL, True
-    check_rotations(R[None], f"R_camera_world of {name}")
-    check_finite(t, f"t_camera_world of {name}")
     return nearest_rotation(R), t, False
 
 

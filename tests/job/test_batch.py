@@ -352,6 +352,7 @@ def test_a_folder_without_footage_is_an_error(tmp_path):
     (tmp_path / "empty").mkdir()
     with pytest.raises(UsageError, match="no footage"):
         batch(tmp_path / "empty", tmp_path / "out").run(1)
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(

@@ -181,7 +181,7 @@ def test_the_parser_finds_shapes_and_errors() -> None:
     public = public_functions()
     assert raised(public["solver/rotations:exp"]) == {"ShapeError"}
     assert raised(public["solver/validation:check_weight"]) == {"InvalidValueError"}
-    assert raised(public["scope_addon/job/batch:Batch.__init__"]) == {"InputError", "OutputError"}
+    assert raised(public["scope_addon/job/batch:Batch.run"]) == {"UsageError", "OutputError"}
     assert raised(public["scope_addon/cli:main"]) == set()  # it prints what it catches
     assert raised(public["scope_addon/cluster/remote:download"]) == {
         "UsageError"

@@ -57,6 +57,12 @@ def test_a_whole_file_is_read_and_so_is_one_without_what_is_optional(tmp_path):
     np.testing.assert_array_equal(bare.triangles(), arrays["faces"][:, :3])
 
 
+def test_a_body_is_shown_by_its_name_and_sizes(tmp_path):
+    body = load_body(saved(tmp_path / "small.npz", small_body()))
+    assert repr(body) == f"Body('small', K={N - 1}, P={P}, V={V}, M={M})"
+    assert repr([body]) == f"[{body}]"
+
+
 BROKEN = {
     "a flat tree": ("kintree_table", np.arange(N), r"must have shape \(2, any\), but has \(3,\)"),
     "no tree": ("kintree_table", np.int64(3), r"must have shape \(2, any\), but has \(\)"),

@@ -225,6 +225,35 @@ MEASURED_REFUSED = {
         lambda: fit_batch(BODY, [SEEN], init=[untyped(np.eye(3))]),
         r"init\[0\] must be State or None, but is an array",
     ),
+    "a generator": (
+        lambda: fit_batch(BODY, untyped(m for m in [SEEN])),
+        "measurements must be a list with an entry for each frame, but is a generator",
+    ),
+    "one frame": (
+        lambda: fit_clip(BODY, untyped(SEEN)),
+        "measurements must be a list with an entry for each frame, but is a Measurements",
+    ),
+    "frames of a motion": (
+        lambda: fit_motion(BODY, untyped(SEEN), [0.0]),
+        "frames must be a list with an entry for each frame, but is a Measurements",
+    ),
+    "one clip": (
+        lambda: fit_clips(BODY, untyped(SEEN)),
+        "clips must be a list with an entry for each clip, but is a Measurements",
+    ),
+    "frames for the shape": (
+        lambda: fit_clip(BODY, [SEEN], shape_frames=0),
+        "shape_frames must be a whole number of at least 1, but is 0",
+    ),
+    "focal weight": (
+        lambda: fit_clip(BODY, [SEEN], focal=True, focal_weight=-1.0),
+        "focal_weight must be finite and not negative, but is -1",
+    ),
+    "masked indices": (
+        seen(keypoints3d=Keypoints3D(np.ma.masked_equal(np.arange(M), 0), POINTS, np.ones(M))),
+        "Indices of 3D keypoints must all be there, but the masked array masks some",
+    ),
+    "an article": (seen(keypoints3d=untyped(Options())), "must be Keypoints3D or None, but is an Options"),
     "threads": (lambda: fit_batch(BODY, [SEEN], threads=-2), "threads must be a whole number of at least 0, but is -2"),
     "threads of clips": (lambda: fit_clips(BODY, [[SEEN]], threads=untyped(1.5)), "threads must be a whole number"),
 }
@@ -234,6 +263,17 @@ MEASURED_REFUSED = {
 def test_measurements_that_cannot_be_used_are_refused(make, message):
     with pytest.raises(InputError, match=message):
         make()
+
+
+def test_what_a_masked_array_masks_is_not_measured():
+    wrong = POINTS + [[0.5, 0.5, 0.5]] * (np.arange(M) == 1)[:, None]
+    masked = np.ma.masked_array(wrong, np.repeat(np.arange(M) == 1, 3))
+    kept = np.arange(M) != 1
+    without = Keypoints3D(np.arange(M)[kept], POINTS[kept], np.ones(M - 1))
+    found = fit(BODY, Measurements(keypoints3d=Keypoints3D(np.arange(M), masked, np.ones(M))))
+    expected = fit(BODY, Measurements(keypoints3d=without))
+    assert found.measurements == expected.measurements == M - 1
+    np.testing.assert_allclose(found.t_camera_part, expected.t_camera_part, atol=1e-9)
 
 
 SETTINGS_REFUSED = {

@@ -63,6 +63,7 @@ class Video:
     _source_fps: Fraction | None = field(default=None, repr=False)
     _sequence: PictureSequence | None = field(default=None, repr=False)
     _still: NDArray[np.uint8] | None = field(default=None, repr=False)
+    _bytes: int | None = field(default=None, repr=False)  # of the file when it was opened
     _decoders: list[_Decoder] = field(default_factory=list, repr=False)
 
     @property
@@ -148,7 +149,11 @@ def open_video(path: str | Path, wanted: FootageRange | None = None) -> Video:
         raise VideoError(f"{path} is empty (0 bytes); export or download it again")
     if head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(_LISTS):
         raise VideoError(f"{path} is a playlist or other text, not footage; give a video itself")
-    return _open_still(path, wanted) if is_picture(path) else _open_moving(path, wanted)
+    if is_picture(path):
+        return _open_still(path, wanted)
+    video = _open_moving(path, wanted)
+    video._bytes = status.st_size
+    return video
 
 
 def _open_sequence(path: Path, sequence: PictureSequence, requested: FootageRange) -> Video:
@@ -295,6 +300,15 @@ class _Decoder:
                 f"decoding {video.path.name} stopped after {index} of about {video.frame_count} frames; "
                 "the file may be damaged or incomplete"
             )
+        if time <= video.wanted.end_s and self._has_grown():
+            self._warn(f"{video.path.name} grew while it was read; capture it again once it is written completely")
+
+    def _has_grown(self) -> bool:
+        """Return whether somebody still writes the file, such as a recorder an .mkv or a .ts."""
+        try:
+            return self._video._bytes is not None and self._video.path.stat().st_size > self._video._bytes
+        except OSError:  # removed, or a network folder that is gone: everything was read
+            return False
 
     def _warn(self, text: str) -> None:
         if text not in self._video.warnings:

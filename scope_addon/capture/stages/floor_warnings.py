@@ -12,14 +12,18 @@ from ...kinematics.foot_skin import UNDER_FLOOR_M, foot_heights, lower_floors, s
 from ...motion import Motion
 from .clock import at_times
 
+_ESTIMATED = "somebody is taller or smaller than estimated: give everybody's height"
+_GIVEN = "the heights are given in another order than the people, the most prominent first"
 
-def floor_warnings(name: str, body: Body, motions: list[Motion]) -> list[str]:
+
+def floor_warnings(name: str, body: Body, motions: list[Motion], heights_given: int = 0) -> list[str]:
     """List in sentences where people stand on other floors or on steps, and where feet are under the floor.
 
     There are none on uneven ground, which has no floor.
 
     :param name: the footage's.
     :param body: that of the motions.
+    :param heights_given: of how many people the height was known.
     """
     warnings = []
     for number, motion in enumerate(motions, 1):
@@ -27,22 +31,34 @@ def floor_warnings(name: str, body: Body, motions: list[Motion]) -> list[str]:
             continue
         who = "the person" if len(motions) == 1 else f"person {number}"
         heights = foot_heights(motion, body)
-        about = [*_other_floors(who, heights, motion), *_steps(who, body, motion), *_under_floor(who, heights, motion)]
+        scale = "" if len(motions) == 1 else _GIVEN if heights_given >= len(motions) else _ESTIMATED
+        about = [
+            *_other_floors(who, heights, motion, scale),
+            *_steps(who, body, motion),
+            *_under_floor(who, heights, motion),
+        ]
         warnings += [f"{name}: {text}" for text in about]
     return warnings
 
 
-def _other_floors(who: str, heights: NDArray[np.float64], motion: Motion) -> list[str]:
+def _other_floors(who: str, heights: NDArray[np.float64], motion: Motion, scale: str) -> list[str]:
+    """List the other floors of a person.
+
+    :param scale: what else puts a person off the floor of another from the first frame on; empty for one person. With a
+        size that is wrong by a quarter, a person is a quarter too near or too far, and so above or below the others.
+    """
     texts = []
     for side, find in (("below", lower_floors), ("above", upper_floors)):
         spans = find(heights, motion.foot_contact, motion.timestamps)
         if spans:
             most = max(float(np.abs(heights[slice(*span)].min(axis=1)).max()) for span in spans)
             when = at_times([float(motion.timestamps[first]) for first, _ in spans])
-            texts.append(
-                f"{who} stands up to {most:.1f} m {side} the floor {when}, so the clip has more than one floor: "
-                "capture the part that matters, with a start and end time, or with uneven ground"
-            )
+            whole = "capture the part that matters, with a start and end time, or with uneven ground"
+            if scale and spans[0][0] <= motion.valid.argmax():
+                cause = f", so either {scale}; or the clip has more than one floor: {whole}"
+            else:
+                cause = f", so the clip has more than one floor: {whole}"
+            texts.append(f"{who} stands up to {most:.1f} m {side} the floor {when}{cause}")
     return texts
 
 

@@ -54,7 +54,7 @@ def make_report(
         "cuts_s": [round(t, 3) for t in footage.cuts_s],
         "warnings": footage.warnings
         + capture_warnings(Path(video.path).name, options, footage.cuts_s, motions)
-        + floor_warnings(Path(video.path).name, body, motions),
+        + floor_warnings(Path(video.path).name, body, motions, len(options.heights_m)),
     }
 
 

@@ -268,6 +268,29 @@ def test_a_truncated_video_gives_its_frames_and_a_warning(tmp_path, capfd):
     assert capfd.readouterr().err == ""
 
 
+@pytest.mark.parametrize("end_s", [np.inf, 0.2])
+def test_a_video_that_is_still_being_written_gives_a_warning(tmp_path, end_s):
+    data = write_video(tmp_path / "whole.ts", ramp(40)).read_bytes()
+    path = tmp_path / "a.ts"
+    path.write_bytes(data[: len(data) // 2 // 188 * 188])
+    video = open_video(path, VideoRange(end_s=end_s))
+    with path.open("ab") as file:
+        file.write(data[path.stat().st_size :])
+    assert len(list(video)) > 1
+    grown = [text for text in video.warnings if "a.ts grew while it was read" in text]
+    assert len(grown) == (1 if end_s == np.inf else 0), video.warnings
+
+
+def test_a_video_that_is_removed_while_it_is_read_gives_its_frames(tmp_path):
+    path = write_video(tmp_path / "a.mp4", ramp(20))
+    video = open_video(path)
+    frames = iter(video)
+    next(frames)
+    path.unlink()
+    assert len(list(frames)) == 19
+    assert video.warnings == []
+
+
 @pytest.mark.parametrize(("suffix", "shift_s"), [(".mp4", -0.8), (".mkv", 20.0)])
 def test_a_clip_cut_without_re_encoding_gives_no_warning(tmp_path, suffix, shift_s):
     """An edit list omits the beginning, or timestamps start late: neither is damage."""

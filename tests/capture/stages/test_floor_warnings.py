@@ -38,6 +38,26 @@ def test_another_floor(body, height, where):
     ]
 
 
+@pytest.mark.parametrize(
+    ("given", "cause"), [(0, "give everybody's height"), (1, "give everybody's height"), (2, "in another order")]
+)
+def test_somebody_off_the_floor_of_another_all_the_time_may_have_another_size(body, given, cause):
+    low, other = standing(body, np.zeros(90)), standing(body, np.full(90, 0.5))
+    (found,) = floor_warnings("a.mp4", body, [low, other], given)
+    assert found.startswith("a.mp4: person 2 stands up to 0.5 m above the floor at 0.0 s, so either ")
+    assert cause in found
+    assert found.endswith(
+        "or the clip has more than one floor: capture the part that matters, with a start and end time"
+    )
+
+
+def test_somebody_who_changes_floors_has_no_other_size(body):
+    (found,) = floor_warnings("a.mp4", body, [standing(body, np.zeros(90)), standing(body, from_second(2, -1.5))])
+    assert found.startswith(
+        "a.mp4: person 2 stands up to 1.5 m below the floor at 2.0 s, so the clip has more than one"
+    )
+
+
 @pytest.mark.parametrize(("height", "where"), [(-0.18, "18 cm below"), (0.15, "15 cm above")])
 def test_a_step_that_was_levelled(body, height, where):
     motion = standing(body, np.zeros(90), raw=from_second(1, height))

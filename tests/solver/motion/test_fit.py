@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`fit_motion` against known motions, and what its result must not depend on."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scope.solver import (
+    InputError,
     InvalidValueError,
     Keypoints3D,
     Measurements,
@@ -191,6 +193,8 @@ def test_what_cannot_be_used_is_refused():
         fit_motion(body, frames, times, init=states[:2])
     with pytest.raises(InvalidValueError, match="overlap of windows"):
         fit_motion(body, frames, times, overlap=12.0)
+    with pytest.raises(InvalidValueError, match="window must be a positive number of seconds.* but is 0"):
+        fit_motion(body, frames, times, window=0.0)
     with pytest.raises(InvalidValueError, match="leave `shape` out"):
         fit_motion(body, frames, times, shape=np.zeros(P), focal=True)
     with pytest.raises(InvalidValueError, match="MotionPrior.contact"):
@@ -202,3 +206,23 @@ def test_what_cannot_be_used_is_refused():
     assert fit_motion(body, frames, times, init=states).status is Status.NO_MEASUREMENTS
     with pytest.raises(InvalidValueError, match="rotation"):
         fit_motion(body, [[View(Measurements(), 2.0 * np.eye(3))]] * 3, times, init=states)
+
+
+TURNED = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+FRAMES_REFUSED = {
+    "no frame": (None, "frames[1] must be Measurements or a list of View, but is None"),
+    "a view": (View(Measurements()), "frames[1] must be Measurements or a list of View, but is a View"),
+    "measurements among views": ([Measurements()], "frames[1][0] must be View, but is a Measurements"),
+    "a view of None": ([View(None)], "measurements of frames[1][0] must be Measurements, but is None"),  # type: ignore[arg-type]
+    "scaled": ([View(Measurements()), View(Measurements(), 2.0 * TURNED)], "R_camera_world of frames[1][1] must be"),
+    "mirrored": ([View(Measurements(), np.diag([1.0, 1.0, -1.0]))], "R_camera_world of frames[1][0] must be rotation"),
+    "flat": ([View(Measurements(), TURNED, np.zeros(2))], "t_camera_world of frames[1][0] must have shape (3,)"),
+    "far": ([View(Measurements(), TURNED, [0.0, np.inf, 0.0])], "t_camera_world of frames[1][0] must be finite"),
+}
+
+
+@pytest.mark.parametrize(("frame", "message"), FRAMES_REFUSED.values(), ids=FRAMES_REFUSED)
+def test_without_states_a_frame_that_cannot_be_used_is_told_too(frame, message):
+    body, _, times = walk(np.random.default_rng(0), 3)
+    with pytest.raises(InputError, match=re.escape(message)):
+        fit_motion(body, [Measurements(), frame, Measurements()], times)

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`check_residual`: whether the blocks of a registered residual are those of its cost."""
+
+from typing import Any
+
+import numpy as np
+
+from ..compiled.part import GRADIENT, SHAPE, Array
+from ..compiled.tree import BodyArrays, Tree, make_tree
+from ..custom_residuals.external import raise_failure
+from ..errors import InvalidValueError
+from ..gauss_newton.linearize import linearize, make_blocks
+from ..gauss_newton.recursion import make_workspace
+from ..gauss_newton.terms import make_terms
+from ..measurements import Measurements
+from ..options import Options, Priors, Stage, Weights
+from ..rotations import exp, hat
+from ..state import State
+
+_STEP = 1e-5  # of the differences, radians and metres
+_OTHERS_OFF = {"joint_prior": 0.0, "joint_limits": 0.0, "joint_flow": 0.0, "shape": 0.0}
+
+
+def check_residual(body: BodyArrays, name: str, ints: Any, floats: Any, *, seed: int = 0) -> dict[str, float]:
+    """Compare the derivatives that a registered residual returns with differences of its cost, at a random state.
+
+    A wrong Jacobian makes a fit slow, or stops it away from the minimum, without any error. The differences are
+    relative to the largest derivative: with the right Jacobian they are below 1e-5, unless the residual has a kink.
+
+    :param ints, floats: rows for `name`, as in `Measurements.tables`.
+    :param seed: of the state: the root 3 m in front of the camera, joints rotated by about 50°, the shape as varied as
+        the population's.
+    :return: the largest difference for the root's six unknowns ("root"), the joints' rotations ("joints") and the shape
+        ("shape"), and by how much JᵀJ is too small for them: gᵀ (JᵀJ)⁺ g / 2 cost - 1, with g = Jᵀr ("curvature").
+    :raises ShapeError: the rows do not fit the residual or the body.
+    :raises InvalidValueError: there is no residual of that name, its kernel does not compile, or its cost is 0 or not
+        finite at that state, where derivatives say nothing.
+    """
+    tree = make_tree(body)
+    problem = _Problem(tree, name, ints, floats)
+    state, found = _random_state(tree, seed), np.zeros(problem.size)
+    cost, g, H = problem.linearized(state)
+    if not 0.0 < cost < np.inf:
+        raise InvalidValueError(
+            f"The cost of {name!r} must be positive and finite to be differentiated, but is {cost:g} at the random "
+            f"state of seed {seed}; use other rows or another seed."
+        )
+    for k in range(problem.size):
+        step = _STEP * np.eye(problem.size)[k]
+        ahead, behind = (problem.linearized(problem.moved(state, d))[0] for d in (step, -step))
+        found[k] = (ahead - behind) / (2.0 * _STEP)
+    off = np.abs(g - found) / max(np.abs(found).max(), np.abs(g).max(), 1e-300)
+    joints = 6 + 3 * (len(tree.parents) - 1)
+    explained = float(g @ np.linalg.pinv(H, rcond=1e-10, hermitian=True) @ g) / (2.0 * cost)
+    return {
+        "root": float(off[:6].max()),
+        "joints": float(off[6:joints].max(initial=0.0)),
+        "shape": float(off[joints:].max(initial=0.0)),
+        "curvature": max(0.0, explained - 1.0),
+    }
+
+
+class _Problem:
+    """The cost of some rows as a function of all unknowns: x_0 (6), u_1..u_K (3 each), beta (P)."""
+
+    def __init__(self, tree: Tree, name: str, ints: Any, floats: Any) -> None:
+        self._tree = tree
+        self._terms = make_terms(tree, Measurements(tables={name: (ints, floats)}), Priors())
+        weights = Weights(tables={name: 1.0}, **_OTHERS_OFF)
+        self._weights = Options().stage_table([Stage(weights)])[0][0]
+        self.size = 3 + 3 * len(tree.parents) + tree.shape
+
+    def linearized(self, state: State) -> tuple[float, Array, Array]:
+        """Return the cost, its gradient (n,) and JᵀJ (n, n), of the blocks of all parts."""
+        tree, blocks, pose = self._tree, make_blocks(self._tree), state.pose(self._tree)
+        cost = linearize(tree, self._terms, self._weights, 0.0, pose, blocks, make_workspace(tree).scratch)
+        raise_failure()
+        n, P, end = self.size, tree.shape, SHAPE + tree.shape
+        g, H, x = np.zeros(n), np.zeros((n, n)), np.zeros((len(tree.parents), 6, n))  # x_i = x[i] @ unknowns
+        beta = np.eye(n)[n - P :]
+        for i, parent in enumerate(tree.parents):
+            if i == 0:
+                x[0] = np.eye(6, n)
+            else:
+                u = np.eye(n)[3 + 3 * i : 6 + 3 * i]
+                x[i] = x[parent] + np.vstack([np.eye(3), hat(pose.t[i] - pose.t[0])]) @ u
+                H_u = blocks.H_u[i]
+                g += u.T @ H_u[:, GRADIENT]
+                mixed = u.T @ (H_u[:, :6] @ x[i] + H_u[:, SHAPE:end] @ beta)
+                H += mixed + mixed.T + u.T @ blocks.H_uu[i] @ u
+            A = blocks.A[i]
+            g += x[i].T @ A[:, GRADIENT]
+            mixed = x[i].T @ A[:, SHAPE:end] @ beta
+            H += mixed + mixed.T + x[i].T @ A[:, :6] @ x[i]
+        C = np.triu(blocks.C[:P, :P])
+        g += beta.T @ blocks.c[:P]
+        H += beta.T @ (C + np.triu(C, 1).T) @ beta
+        return float(cost), g, H
+
+    def moved(self, state: State, d: Array) -> State:
+        """Return the state after a step d (n,) of the unknowns."""
+        pose, P = state.pose(self._tree), self._tree.shape
+        R_parent = pose.R[self._tree.parents[1:]]
+        turns = exp(d[6 : len(d) - P].reshape(-1, 3))
+        Omega = np.swapaxes(R_parent, 1, 2) @ turns @ R_parent @ state.Omega
+        R = exp(d[:3]) @ state.R_camera_root
+        return State(R, state.t_camera_root + d[3:6], Omega, state.beta + d[len(d) - P :])
+
+
+def _random_state(tree: Tree, seed: int) -> State:
+    rng, K = np.random.default_rng(seed), len(tree.parents) - 1
+    place = np.array([0.0, 0.0, 3.0]) + 0.2 * rng.standard_normal(3)
+    Omega = exp(0.5 * rng.standard_normal((K, 3)))
+    return State(exp(rng.standard_normal(3)), place, Omega, rng.standard_normal(tree.shape))

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`check_residual` finds wrong derivatives, and finds none in those that are right."""
+
+import numpy as np
+import pytest
+from scope.solver import InvalidValueError, check_residual, load_joint_prior, register_residual
+from scope.solver.examples import own_residual
+from scope.solver.residuals import floor, pose_prior
+from scope.solver.residuals.accumulation import add_to_point
+
+from ..synthetic import random_body
+
+K, P, M = 5, 3, 12
+BODY = random_body(np.random.default_rng(1), K, P, M)
+ROWS = [[2], [4]], [[0.3, 1.0], [-0.2, 2.0]]
+
+
+def kernel(gradient, curvature):
+    """The example's kernel, with its Jᵀr and JᵀJ times a factor each."""
+
+    def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):
+        cost = 0.0
+        for k in range(ints.shape[0]):
+            i, w = ints[k, 0], weight * floats[k, 1]
+            r = pose.t[i, 1] - floats[k, 0]
+            cost += 0.5 * w * r * r
+            W, f = curvature * w, gradient * w * r
+            add_to_point(tree, pose, blocks, tree.keypoints + i, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, W, 0.0, 0.0, 0.0, f, 0.0)
+        return cost
+
+    return accumulate
+
+
+own_residual.register()
+register_residual("wrong_sign", kernel=kernel(-1.0, 1.0), floats=2)
+register_residual("half_gradient", kernel=kernel(0.5, 1.0), floats=2)
+register_residual("half_curvature", kernel=kernel(1.0, 0.5), floats=2)
+register_residual("own_floor_checked", kernel=floor.accumulate, floats=6, indexes="points")
+register_residual("own_pose_checked", kernel=pose_prior.accumulate, floats=14)
+
+
+def tables():
+    """Rows of residuals whose derivatives other tests have found to be right."""
+    rng = np.random.default_rng(2)
+    yield "height", ROWS
+    yield "slow_height", ROWS
+    yield "own_floor_checked", floor.pack([3, 7], np.array([0.6, 0.0, 0.8]), 9.0, [2.0, 1.0], [3.0, 3.0])
+    yield "own_pose_checked", pose_prior.pack([0, 3], np.tile(np.eye(3), (2, 1, 1)), rng.random((2, 3)), [2, 1], [1, 3])
+    prior = load_joint_prior()
+    names = ["pelvis", *prior.names[:K]]
+    yield "joint_flow", prior.tables(names)
+    yield "joint_limits", (np.array([[2]]), np.array([[0.6, 0.0, 0.8, -0.02, 0.02, 0.02, 1.0, 2.0]]))
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("name", "rows"), list(tables()))
+def test_right_derivatives_differ_by_rounding_only(name, rows, seed):
+    found = check_residual(BODY, name, *rows, seed=seed)
+    assert set(found) == {"root", "joints", "shape", "curvature"}
+    assert max(found.values()) < 1e-5, found
+
+
+def test_each_kind_of_mistake_shows():
+    assert check_residual(BODY, "wrong_sign", *ROWS)["root"] == pytest.approx(2.0, abs=1e-6)
+    assert check_residual(BODY, "half_gradient", *ROWS)["root"] == pytest.approx(0.5, abs=1e-6)
+    assert check_residual(BODY, "half_gradient", *ROWS)["joints"] > 0.1
+    found = check_residual(BODY, "half_curvature", *ROWS)
+    assert found.pop("curvature") == pytest.approx(1.0, abs=1e-6)
+    assert max(found.values()) < 1e-8
+
+
+def test_a_residual_without_a_cost_at_the_state_says_nothing():
+    wide = np.array([[2]]), np.array([[1.0, 0.0, 0.0, -9.0, 9.0, 9.0, 1.0, 1.0]])
+    with pytest.raises(InvalidValueError, match=r"cost of 'joint_limits' must be positive .* is 0 .* seed 3"):
+        check_residual(BODY, "joint_limits", *wide, seed=3)
+    with pytest.raises(InvalidValueError, match="no residual named 'nothing'"):
+        check_residual(BODY, "nothing", *ROWS)
