@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -72,15 +73,19 @@ class _Missed:
 class HandTracker:
     """Tracks the hands of the people whom `PeopleTracker` tracks; frames are given in order.
 
-    :param threads: of each network.
+    Each network runs in one thread, and several hands in parallel: in two threads, which mostly wait for each other, a
+    run of these small networks takes twice the processor time.
+
+    :param threads: number of hands that are looked for in parallel.
     :param folder: of the networks; None: the built-in ones.
     :param execution: what the networks run on.
     :raises SetupError: a network is missing.
     """
 
     def __init__(self, threads: int, folder: Path | None = None, execution: Execution | None = None) -> None:
-        self._network = HandNetwork(threads, folder, execution)
-        self._palms = PalmDetector(threads, folder, execution)
+        self._network = HandNetwork(1, folder, execution)
+        self._palms = PalmDetector(1, folder, execution)
+        self._pool = ThreadPoolExecutor(threads, "scope-hands")
         self._hands: dict[Key, _Hand] = {}
         self._missed: dict[Key, list[_Missed]] = {}
         self._time_s = 0.0
@@ -112,7 +117,8 @@ class HandTracker:
             key: self._hands.get(key) or _Hand(None, sight.wrist_px, now, now - PATIENCE_S)
             for key, sight in sights.items()
         }
-        found = {key: self._find(sight, self._hands[key]) for key, sight in sights.items()}
+        # Each changes its own hand and sight alone, so that the results do not depend on the threads' timing.
+        found = dict(zip(sights, self._pool.map(self._find, sights.values(), self._hands.values()), strict=True))
         for (number, side), sight in sights.items():
             if found[number, side] is None:
                 found[number, side] = _of_other_side(sight, sights[number, 1 - side].opposite)
