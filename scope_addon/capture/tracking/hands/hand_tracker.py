@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -45,6 +46,7 @@ MOST_PALMS = 2
 # Frames that are kept of a hand, a third of a second at 30 frames/s: each is a copy of its surroundings.
 MOST_MISSED = 11
 SMALLEST_HAND_PX = 12.0
+HIDDEN_WRIST = 0.3  # confidence of the body's wrist below which its hand is hardly ever found
 LARGER_SCALE = 1.3  # of a region by the body in which a hand is looked for that was found later
 _MARGIN = 0.3  # of a region's side, by which its centre may be outside the image
 
@@ -200,7 +202,7 @@ class HandTracker:
                 followed = better(followed, sight.judge(estimate, least, TENTATIVE, FOLLOWED_WRIST))
                 if followed is not None and followed.is_sure:
                     return followed
-        if not is_search_due(self._time_s, hand.seen_s, hand.searched_s):
+        if not self._is_search_due(sight, hand):
             return followed
         hand.searched_s = self._time_s
         predicted = region_from_body(sight.person.keypoints_px, sight.scale, sight.side)
@@ -208,6 +210,14 @@ class HandTracker:
             return followed
         just_lost = self._time_s - hand.seen_s <= EAGER_S
         return better(self._search(sight, predicted, look_again=just_lost), followed)
+
+    def _is_search_due(self, sight: Sight, hand: _Hand) -> bool:
+        """Return whether a lost hand is to be looked for: at most 30 times per second, a hidden one at `PATIENCE_S`.
+
+        Where it is found again, it is followed back through the frames in between.
+        """
+        seen_s = hand.seen_s if sight.wrist_confidence >= HIDDEN_WRIST else -math.inf
+        return is_search_due(self._time_s, seen_s, hand.searched_s, FRAME_S)
 
     def _search(self, sight: Sight, predicted: Region, look_again: bool) -> Found | None:
         """Find the hand whose palm is nearest to the predicted region, or without a palm, any hand in that region.

@@ -117,14 +117,22 @@ def test_a_hand_is_found_again_and_zeros_mark_the_frames_without_it(follow):
 
 @pytest.mark.parametrize("rate", [12, 30, 60])
 def test_a_missing_hand_is_searched_equally_often_at_any_frame_rate(follow, rate):
-    """Each hand in every frame for a third of a second, then six to eight times per second."""
+    """Each hand for a third of a second in every frame, or 30 times per second, then six to eight times per second."""
     tracker = follow([])
     calls = []
     for k in range(3 * rate):
         tracker.step(IMAGE, [(0, person())], k / rate)
         calls.append(tracker._palms.calls)
-    assert calls[rate // 3] == 2 * 2 * (rate // 3 + 1)  # with a second look each time
+    assert calls[rate // 3] == 2 * 2 * (min(rate, 30) // 3 + 1)  # with a second look each time
     assert 22 <= calls[3 * rate - 1] - calls[rate - 1] <= 32  # in two seconds, both hands
+
+
+def test_a_hand_whose_wrist_is_hidden_is_not_looked_for_in_every_frame(follow):
+    """Six to eight times per second from the start, each hand."""
+    tracker = follow([])
+    for k in range(31):
+        tracker.step(IMAGE, [(0, replace(person(), keypoints_confidence=np.full(33, 0.2)))], k / 30)
+    assert 12 <= tracker._palms.calls <= 18
 
 
 def test_a_hand_is_followed_with_the_wrist_where_it_moves_far_in_a_frame(follow):
