@@ -45,7 +45,9 @@ UNSURE_SCORE = 0.2  # of a palm in a second look
 MOST_PALMS = 2
 # Frames that are kept of a hand, a third of a second at 30 frames/s: each is a copy of its surroundings.
 MOST_MISSED = 11
-SMALLEST_HAND_PX = 12.0
+SMALLEST_HAND_PX = 12.0  # length of a hand that is looked for
+# The same of one whose palm the network reads to within about 20 degrees: 20 pixels from wrist to middle knuckle.
+LARGE_HAND_PX = 52.0
 HIDDEN_WRIST = 0.3  # confidence of the body's wrist below which its hand is hardly ever found
 LARGER_SCALE = 1.3  # of a region by the body in which a hand is looked for that was found later
 _MARGIN = 0.3  # of a region's side, by which its centre may be outside the image
@@ -81,10 +83,18 @@ class HandTracker:
     :param threads: number of hands that are looked for in parallel.
     :param folder: of the networks; None: the built-in ones.
     :param execution: what the networks run on.
+    :param least_px: length of the smallest hands that are looked for, by the body's scale; pixels.
     :raises SetupError: a network is missing.
     """
 
-    def __init__(self, threads: int, folder: Path | None = None, execution: Execution | None = None) -> None:
+    def __init__(
+        self,
+        threads: int,
+        folder: Path | None = None,
+        execution: Execution | None = None,
+        least_px: float = SMALLEST_HAND_PX,
+    ) -> None:
+        self._least_px = least_px
         self._network = HandNetwork(1, folder, execution)
         self._palms = PalmDetector(1, folder, execution)
         self._pool = ThreadPoolExecutor(threads, "scope-hands")
@@ -142,7 +152,7 @@ class HandTracker:
             if hand is not None and hand.is_sure:
                 elsewhere = [m for other, those in (before | self._missed).items() if other != key for m in those]
                 self._look_back(missed, hand, sight, elsewhere)
-            elif sight.hand_px >= SMALLEST_HAND_PX:
+            elif sight.hand_px >= self._least_px:
                 others = [h.estimate for other, h in found.items() if other != key and h is not None]
                 seen = replace(sight.around_wrist(), others=others, opposite=[])
                 self._missed[key] = [*missed, _Missed(now, seen, hand, rows[key[0]][key[1]])][-MOST_MISSED:]
@@ -151,7 +161,7 @@ class HandTracker:
     def _beside(self, sight: Sight, others: Sequence[HandEstimate]) -> Found | None:
         """Look for a hand where another one was found: beside the others, which it may touch."""
         predicted = region_from_body(sight.person.keypoints_px, sight.scale, sight.side)
-        if sight.hand_px < SMALLEST_HAND_PX or not _is_in_image(predicted, sight.image_rgb):
+        if sight.hand_px < self._least_px or not _is_in_image(predicted, sight.image_rgb):
             return None
         return self._search(replace(sight, others=list(others)), predicted, look_again=False)
 
@@ -206,7 +216,7 @@ class HandTracker:
             return followed
         hand.searched_s = self._time_s
         predicted = region_from_body(sight.person.keypoints_px, sight.scale, sight.side)
-        if sight.hand_px < SMALLEST_HAND_PX or not _is_in_image(predicted, sight.image_rgb):
+        if sight.hand_px < self._least_px or not _is_in_image(predicted, sight.image_rgb):
             return followed
         just_lost = self._time_s - hand.seen_s <= EAGER_S
         return better(self._search(sight, predicted, look_again=just_lost), followed)
