@@ -48,7 +48,7 @@ MOST_MISSED = 11
 SMALLEST_HAND_PX = 12.0  # length of a hand that is looked for
 # The same of one whose palm the network reads to within about 20 degrees: 20 pixels from wrist to middle knuckle.
 LARGE_HAND_PX = 52.0
-HIDDEN_WRIST = 0.3  # confidence of the body's wrist below which its hand is hardly ever found
+HIDDEN_WRIST = 0.1  # confidence of the body's wrist below which its hand is hardly ever found
 LARGER_SCALE = 1.3  # of a region by the body in which a hand is looked for that was found later
 _MARGIN = 0.3  # of a region's side, by which its centre may be outside the image
 

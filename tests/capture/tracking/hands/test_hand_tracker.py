@@ -138,7 +138,7 @@ def test_a_hand_whose_wrist_is_hidden_is_not_looked_for_in_every_frame(follow):
     """Six to eight times per second from the start, each hand."""
     tracker = follow([])
     for k in range(31):
-        tracker.step(IMAGE, [(0, replace(person(), keypoints_confidence=np.full(33, 0.2)))], k / 30)
+        tracker.step(IMAGE, [(0, replace(person(), keypoints_confidence=np.full(33, 0.05)))], k / 30)
     assert 12 <= tracker._palms.calls <= 18
 
 
