@@ -18,7 +18,13 @@ from typing import Any, NoReturn, TextIO
 
 from ..solver.errors import ScopeError
 from ..solver.loaders.body_file import ASSETS
-from .command_line.arguments import add_options, body_and_options, non_default_arguments, path_argument
+from .command_line.arguments import (
+    add_options,
+    body_and_options,
+    non_default_arguments,
+    path_argument,
+    with_bare_values,
+)
 from .command_line.blender_folder import remove_blender_folder
 from .command_line.cluster_runner import dask_runner, folder_argument, local_folders
 from .command_line.import_command import add_import
@@ -58,6 +64,7 @@ from .job.clips.task import SHOWN_COMMAND, STOP_WITH_STDIN, Extras
 from .job.parent import stop_with_parent
 from .job.private_folder import lasting_folder
 from .job.unfinished import unfinished_capture
+from .options.capture import OFF
 from .scene.export.output_paths import SUFFIXES
 
 SAMPLE = ASSETS / "sample" / "sample.mp4"
@@ -65,6 +72,11 @@ PROGRAM = (sys.executable, "-m", str(__package__))
 
 
 class _Parser(argparse.ArgumentParser):
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse the arguments, where some flags may come without a value; see `with_bare_values`."""
+        given = sys.argv[1:] if args is None else list(args)
+        return super().parse_known_args(with_bare_values(given), namespace)
+
     def error(self, message: str) -> NoReturn:
         """Raise UsageError instead of printing the whole usage."""
         raise UsageError(f"{message} (see {self.prog} --help)")
@@ -215,7 +227,7 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
     check_outputs(outputs, video, args.overlay, args.report)
     check_blender(outputs)
     check_memory_limit(with_scene=any(path.suffix.lower() not in MOTION_SUFFIXES for path in outputs))
-    rig = checked_rig(args, outputs, args.hands)
+    rig = checked_rig(args, outputs, args.hands != OFF)
 
     body, options = body_and_options(args)
     options = with_window_seconds(options, args)
@@ -273,7 +285,7 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
         raise UsageError(f"--jobs must be at least 1, not {args.jobs}")
     clips = [Path(args.out) / f"clip{suffix}" for suffix in formats]
     check_blender(clips)
-    checked_rig(args, clips, args.hands)
+    checked_rig(args, clips, args.hands != OFF)
     _, options = body_and_options(args)
     check_networks(options)  # an unusable network is reported once, before the first clip
     extras = Extras(args.overlays, args.reports)

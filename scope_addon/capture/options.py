@@ -10,8 +10,8 @@ from typing import Any
 
 from ...solver.body import Body
 from ..errors import UsageError
-from ..options import OPTIONS, Place, options_at
-from ..options.capture import ALL, LARGEST
+from ..options import OPTIONS, Place, option, options_at
+from ..options.capture import ALL, LARGEST, OFF
 from .camera.calibration import read_calibration
 from .camera.intrinsics import choose_camera
 from .fitting.ablation import NO_ABLATION, Ablation
@@ -45,7 +45,7 @@ class CaptureOptions:
     smoothing: bool = _DEFAULT["smoothing"]
     uneven_ground: bool = _DEFAULT["uneven_ground"]  # feet rest at any height, not on one horizontal floor
     threads: int = _DEFAULT["threads"]  # 0: as many as there are cores
-    hands: bool = _DEFAULT["hands"]  # the fingers as well; the body needs finger joints
+    hands: str = _DEFAULT["hands"]  # off, auto, on: the fingers as well; the body needs finger joints
     face: bool = _DEFAULT["face"]  # expressions and gaze as well
     provider: str = _DEFAULT["provider"]  # what the networks run on; see `execution`
     detector: Path | None = _DEFAULT["detector"]  # the user's own networks, ONNX files; see `adapters`
@@ -61,9 +61,9 @@ def capture_options(values: Mapping[str, Any]) -> CaptureOptions:
     :raises UsageError: a time or the frame rate cannot be parsed, or the end does not come after the start.
     """
     fields: dict[str, Any] = {}
-    for option in options_at(Place.CAPTURE | Place.WORKER):
-        value = values[option.name]
-        fields[option.name] = Path(value) if option.value_type is Path and value is not None else value
+    for each in options_at(Place.CAPTURE | Place.WORKER):
+        value = values[each.name]
+        fields[each.name] = Path(value) if each.value_type is Path and value is not None else value
     return CaptureOptions(wanted=parse_range(values["start"], values["end"], values["fps"]), **fields)
 
 
@@ -78,7 +78,9 @@ def check_options(body: Body, options: CaptureOptions) -> None:
     Execution(options.provider)
     if options.keypoints and not options.ablation.lifter:
         raise UsageError("the lifter cannot be left out with a keypoint file: such a network does not estimate depth")
-    if options.hands:
+    if problem := option("hands").type_error(options.hands):
+        raise UsageError(f"hands {problem}")
+    if options.hands != OFF:
         require_fingers(body)
     for height_m in options.heights_m:
         require_stature(body, height_m)
@@ -86,9 +88,9 @@ def check_options(body: Body, options: CaptureOptions) -> None:
         choose_camera(1, 1, focal_mm=options.focal_mm, fov_deg=options.fov_deg, calibration=options.calibration)
     elif options.calibration:
         read_calibration(options.calibration)
-    for option in options_at(Place.CAPTURE):  # ranges not checked above
-        if problem := option.range_error(getattr(options, option.name)):
-            raise UsageError(f"{option.flag} {problem}")
+    for each in options_at(Place.CAPTURE):  # ranges not checked above
+        if problem := each.range_error(getattr(options, each.name)):
+            raise UsageError(f"{each.flag} {problem}")
 
 
 def check_networks(options: CaptureOptions) -> None:

@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...solver.body import Body
 from ..errors import UsageError
-from ..options import Option, Place, options_at
+from ..options import OPTIONS, Option, Place, options_at
 from ..options.body_choice import chosen_body
 
 if TYPE_CHECKING:
@@ -38,6 +38,18 @@ def add_options(parser: argparse.ArgumentParser, place: Place = Place.COMMAND_LI
             parser.add_argument(option.flag, action="store_true", help=option.argument.help or option.help)
         else:
             _add_valued(parser, option)
+
+
+def with_bare_values(argv: Sequence[str]) -> list[str]:
+    """Give the flags that may come without a value theirs: argparse would take what follows, such as the footage."""
+    bare = {option.flag: option for option in OPTIONS if option.argument.bare}
+    out = list(argv)
+    for k, text in enumerate(argv):
+        if text == "--":
+            break
+        if text in bare and (k + 1 == len(argv) or argv[k + 1] not in bare[text].values):
+            out[k] = f"{text}={bare[text].argument.bare}"
+    return out
 
 
 def _add_valued(parser: argparse.ArgumentParser, option: Option) -> None:

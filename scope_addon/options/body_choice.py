@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...solver.loaders.body_file import CHILD_BELOW_M, body_with_children, body_with_hands
+from .capture import OFF
 
 
 def chosen_body(values: Mapping[str, Any]) -> str:
@@ -15,6 +16,6 @@ def chosen_body(values: Mapping[str, Any]) -> str:
     :param values: by the option's name: ``body``, ``heights_m`` and, where fingers can be captured, ``hands``.
     """
     which: str = values["body"]
-    if values.get("hands"):
+    if values.get("hands", OFF) != OFF:
         which = body_with_hands(which)
     return body_with_children(which) if any(height < CHILD_BELOW_M for height in values["heights_m"]) else which

@@ -11,6 +11,7 @@ from typing import Any
 from .record import Argument, Choice, Option, Place, Property
 
 LARGEST, ALL = "largest", "all"  # people
+OFF, AUTO, ON = "off", "auto", "on"  # hands
 
 _EVERYWHERE = Place.COMMAND_LINE | Place.WORKER | Place.CAPTURE | Place.PANEL
 _LIVE = Place.LIVE | Place.LIVE_WORKER
@@ -29,6 +30,11 @@ BODIES = (
     Choice("scope", "Body", "The built-in body with SMPL's 24 joints", 0),
     Choice("scope_h", "Body with Hands", "The built-in body with SMPL+H's 52 joints, fingers included", 1),
     Choice("file", "From File", "Your own SMPL, SMPL+H, SMPL-X or STAR file", 2),
+)
+HANDS = (  # the numbers of off and on are those that .blend files stored when hands were a checkbox
+    Choice(OFF, "Off", "Leave the fingers at rest", 0),
+    Choice(ON, "On", "Capture hands of all sizes", 1),
+    Choice(AUTO, "Automatic", "Capture hands that are large enough in the image to be read", 2),
 )
 LENSES = (
     Choice("auto", "Automatic", "Read from the file's metadata if present, estimated otherwise", 0),
@@ -166,12 +172,16 @@ CAPTURE_OPTIONS = (
     ),
     Option(
         "hands",
-        bool,
-        False,
+        str,
+        OFF,
         _EVERYWHERE,
         "capture the fingers as well, on the body with hands; takes longer",
+        choices=HANDS,
         argument=Argument(
-            help="capture the fingers as well, on scope_h (or scope_child_h) unless --body names another body"
+            metavar=f"{OFF}|{AUTO}|{ON}",
+            help="capture the fingers as well, on scope_h (or scope_child_h) unless --body names another body; auto:"
+            " only of hands that are large enough in the image; --hands alone means on",
+            bare=ON,
         ),
     ),
     Option(

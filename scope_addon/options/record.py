@@ -48,6 +48,7 @@ class Argument(NamedTuple):
     :param parse: converts the argument's text to the option's value; its ValueError says what the argument must be.
     :param default_text: how the help describes the default; by default its value.
     :param inherited: whether a batch passes the argument on to the process of each clip.
+    :param bare: the value of the flag alone, where none of the choices follows it; empty: one has to.
     """
 
     flag: str = ""
@@ -56,6 +57,7 @@ class Argument(NamedTuple):
     parse: Callable[[str], Any] | None = None
     default_text: str | None = None
     inherited: bool = True
+    bare: str = ""
 
 
 class Property(NamedTuple):

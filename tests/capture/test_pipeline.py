@@ -229,7 +229,7 @@ def test_feet_outside_the_image_are_not_locked(shared, body, tmp_path):
 
 def test_a_warning_names_the_person_without_hands(shared):
     clip, body = shared / "data" / "clips" / "two_people_portrait.mp4", load_body("scope_h")
-    options = CaptureOptions(quality="fast", people=2, hands=True, wanted=VideoRange(0.0, 0.5, None))
+    options = CaptureOptions(quality="fast", people=2, hands="on", wanted=VideoRange(0.0, 0.5, None))
     report = capture(clip, body, options).report
     without = [n for n, person in enumerate(report["per_person"], 1)
                if not person["left_hand_frames"] + person["right_hand_frames"]]  # fmt: skip

@@ -136,7 +136,7 @@ def test_an_invalid_request_is_an_error(text):
         ({"people": 1.5}, "people must be int or str, not 1.5"),
         ({"threads": True}, "threads must be int, not True"),
         ({"threads": None}, "threads must be int, not None"),
-        ({"hands": 1}, "hands must be bool, not 1"),
+        ({"hands": 1}, "hands must be str, not 1"),
         ({"heights_m": 1.8}, "heights_m must be a list, not 1.8"),
         ({"heights_m": [1.8, "tall"]}, "heights_m must be float or int, not 'tall'"),
         ({"calibration": 3}, "calibration must be str, not 3"),
@@ -154,7 +154,7 @@ def test_keys_differ_if_the_result_may_differ(tmp_path):
     assert request.key("1") == JobRequest(str(clip), threads=3, provider="cuda").key("1")
     assert request.key("1") != request.key("2")
     assert request.key("1") != JobRequest(str(clip), quality="fast").key("1")
-    assert request.key("1") != JobRequest(str(clip), hands=True).key("1")
+    assert request.key("1") != JobRequest(str(clip), hands="on").key("1")
     assert request.key("1") != JobRequest(str(clip), heights_m=(1.8,)).key("1")
     key, status = request.key("1"), clip.stat()
     clip.write_bytes(b"x" * 99 + b"y")

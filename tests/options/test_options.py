@@ -18,6 +18,7 @@ from scope.scope_addon.command_line.arguments import body_and_options, non_defau
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.job.request import JobRequest
 from scope.scope_addon.options import OPTIONS, Argument, Option, Place, option, options_at
+from scope.scope_addon.options.capture import AUTO, OFF, ON
 from scope.scope_addon.retarget.rig_source import ROOTS
 from scope.solver.loaders.body_file import load_body
 
@@ -87,6 +88,7 @@ def test_the_typed_fields_of_the_pipeline_are_the_declared_options():
 def test_the_choices_are_those_of_the_code_behind_them():
     assert set(option("quality").values) == set(LANDMARK_NETWORK_OF_QUALITY)
     assert set(option("provider").values) == set(CHOICES)
+    assert set(option("hands").values) == {OFF, AUTO, ON}
     assert option("retarget_root").values == ROOTS
 
 
@@ -134,13 +136,36 @@ def test_a_request_gives_the_same_options_as_the_command_line(tmp_path):
         people="all",
         start="1",
         heights_m=[1.75],
-        hands=True,
+        hands="on",
         smoothing=False,
         detector=str(tmp_path / "a.onnx"),
         calibration=str(tmp_path / "lens.json"),
     )
     travelled = JobRequest.from_json(request.to_json())
     assert capture_options(travelled.values) == capture_options(option_values(parsed(*argv)))
+
+
+@pytest.mark.parametrize(
+    ("argv", "hands", "video"),
+    [
+        ([], "off", None),
+        (["--hands"], "on", None),
+        (["--hands", "walk.mp4"], "on", "walk.mp4"),
+        (["--hands", "--face", "walk.mp4"], "on", "walk.mp4"),
+        (["walk.mp4", "--hands", "auto"], "auto", "walk.mp4"),
+        (["--hands", "off", "walk.mp4"], "off", "walk.mp4"),
+        (["--hands=auto", "walk.mp4"], "auto", "walk.mp4"),
+        (["--hands", "--", "auto"], "on", "auto"),
+    ],
+)
+def test_the_flag_of_hands_may_come_without_a_value(argv, hands, video):
+    args = parsed(*argv)
+    assert (args.hands, args.video and str(args.video)) == (hands, video)
+
+
+def test_hands_that_are_none_of_the_choices_are_an_error(body):
+    with pytest.raises(UsageError, match="hands must be one of off, on, auto, not 'yes'"):
+        check_options(body, CaptureOptions(hands="yes"))
 
 
 def test_a_batch_passes_on_only_arguments_that_were_given():

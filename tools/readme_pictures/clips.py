@@ -54,7 +54,7 @@ def captured(video: Path, everybody: bool = False) -> list[Motion]:
 @cache
 def captured_in_total(video: Path) -> Motion:
     """Capture the most prominent person of a clip, with fingers and face."""
-    return capture(video, body_with_fingers(), CaptureOptions(hands=True, face=True)).motions[0]
+    return capture(video, body_with_fingers(), CaptureOptions(hands="on", face=True)).motions[0]
 
 
 def talk() -> Path:

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import os
 
-from ...options.capture import LARGEST
+from ...options.capture import AUTO, LARGEST, OFF
 from ..options import CaptureOptions, most_people
 from ..perception.execution import Execution
 from ..perception.kept.kept_estimates import KeptEstimates
 from ..tracking.face.face_tracker import FaceTracker
-from ..tracking.hands.hand_tracker import HandTracker
+from ..tracking.hands.hand_tracker import LARGE_HAND_PX, SMALLEST_HAND_PX, HandTracker
 from ..tracking.tracker import PeopleTracker
 from .frame_observer import Trackers
 
@@ -39,6 +39,7 @@ def open_trackers(
         execution=execution,
         kept=kept,
     )
-    hands = HandTracker(threads, execution=execution) if options.hands else None
+    least_px = LARGE_HAND_PX if options.hands == AUTO else SMALLEST_HAND_PX
+    hands = None if options.hands == OFF else HandTracker(threads, execution=execution, least_px=least_px)
     # The face's small layers take twice the processor time in two threads, which mostly wait for each other.
     return Trackers(people, hands, FaceTracker(1, execution=execution) if options.face else None)

@@ -12,6 +12,7 @@ from ....solver.body import Body
 from ....solver.names import BODY_JOINTS
 from ...counts import counted
 from ...motion import Motion
+from ...options.capture import ON
 from ..media.video import Video
 from ..options import CaptureOptions
 from .clock import at_times
@@ -77,7 +78,7 @@ def capture_warnings(name: str, options: CaptureOptions, cuts_s: list[float], mo
             warnings.append(f"{name}: {who} was not seen in {missing} of {frames}; these are filled in")
         if _legs_confidence(motion) < MIN_LEG_CONFIDENCE:
             warnings.append(f"{name}: the legs of {who} were not seen, so their motion is a guess")
-        if options.hands and not any(hand_frames(motion).values()):
+        if options.hands == ON and not any(hand_frames(motion).values()):
             warnings.append(
                 f"{name}: no hands of {who} were found; come closer, or show the palms to the camera more often"
             )

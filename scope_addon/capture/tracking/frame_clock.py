@@ -6,18 +6,20 @@ from __future__ import annotations
 import math
 
 FRAME_S = 1 / 30  # from one frame to the next where their times are unknown
-EAGER_S = 10 * FRAME_S  # for which a lost hand or face is looked for in every frame
+EAGER_S = 10 * FRAME_S  # for which a lost hand or face is looked for in every frame, or nearly so
 PATIENCE_S = 4 * FRAME_S  # between two attempts afterwards
 _TOLERANCE_S = 0.005  # of a frame's time
 
 
-def is_search_due(time_s: float, seen_s: float, searched_s: float) -> bool:
+def is_search_due(time_s: float, seen_s: float, searched_s: float, eager_step_s: float = 0.0) -> bool:
     """Return whether a lost hand or face is to be looked for in the frame of this time.
 
     :param seen_s: when it was last seen; if never, when it was first looked for.
     :param searched_s: when it was last looked for.
+    :param eager_step_s: least time between two attempts for the first `EAGER_S`.
     """
-    return time_s - seen_s <= EAGER_S + _TOLERANCE_S or time_s - searched_s >= PATIENCE_S - _TOLERANCE_S
+    interval_s = eager_step_s if time_s - seen_s <= EAGER_S + _TOLERANCE_S else PATIENCE_S
+    return time_s - searched_s >= interval_s - _TOLERANCE_S
 
 
 class FrameClock:

@@ -8,8 +8,8 @@ from scope.scope_addon.job.progress.stage_times import kind_of, load_stage_times
 
 
 def test_times_of_a_frame_are_kept_for_each_kind(tmp_path):
-    best, fast = (kind_of({"quality": quality, "hands": False, "start": 3}) for quality in ("best", "fast"))
-    assert best == kind_of({"quality": "best", "hands": False, "start": 7})
+    best, fast = (kind_of({"quality": quality, "hands": "off", "start": 3}) for quality in ("best", "fast"))
+    assert best == kind_of({"quality": "best", "hands": "off", "start": 7})
     save_stage_times(tmp_path, best, {"solving": 3.0, "writing": 0.5}, 100)
     save_stage_times(tmp_path, fast, {"solving": 1.0}, 100)
     assert load_stage_times(tmp_path, best) == {"solving": 0.03, "writing": 0.005}

@@ -122,8 +122,8 @@ def test_the_height_of_a_child_requests_the_body_of_all_ages(fake_worker, footag
 
 
 def test_hands_request_the_body_with_fingers(fake_worker, footage):
-    fake_worker("assert request['hands'] and request['body'] == 'scope_h'\nsend('error', message='so it was')")
-    bpy.context.scene.scope.footage, bpy.context.scene.scope.hands = str(footage), True
+    fake_worker("assert request['hands'] == 'on' and request['body'] == 'scope_h'\nsend('error', message='so it was')")
+    bpy.context.scene.scope.footage, bpy.context.scene.scope.hands = str(footage), "ON"
     with pytest.raises(RuntimeError, match="So it was"):
         bpy.ops.scope.capture()
 
@@ -134,7 +134,7 @@ def test_changed_options_need_another_capture(fake_worker, footage):
     scene.scope.footage = str(footage)
     bpy.ops.scope.capture()
     fake_worker("send('error', message='asked again')")
-    others = {"quality": "FAST", "lens": "FOV", "smoothing": False, "body": "SCOPE_H", "people": "ALL", "hands": True}
+    others = {"quality": "FAST", "lens": "FOV", "smoothing": False, "body": "SCOPE_H", "people": "ALL", "hands": "ON"}
     others |= {"height_cm": 180.0}
     for name, value in others.items():
         before = getattr(scene.scope, name)

@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -43,7 +45,10 @@ UNSURE_SCORE = 0.2  # of a palm in a second look
 MOST_PALMS = 2
 # Frames that are kept of a hand, a third of a second at 30 frames/s: each is a copy of its surroundings.
 MOST_MISSED = 11
-SMALLEST_HAND_PX = 12.0
+SMALLEST_HAND_PX = 12.0  # length of a hand that is looked for
+# The same of one whose palm the network reads to within about 20 degrees: 20 pixels from wrist to middle knuckle.
+LARGE_HAND_PX = 52.0
+HIDDEN_WRIST = 0.1  # confidence of the body's wrist below which its hand is hardly ever found
 LARGER_SCALE = 1.3  # of a region by the body in which a hand is looked for that was found later
 _MARGIN = 0.3  # of a region's side, by which its centre may be outside the image
 
@@ -72,15 +77,27 @@ class _Missed:
 class HandTracker:
     """Tracks the hands of the people whom `PeopleTracker` tracks; frames are given in order.
 
-    :param threads: of each network.
+    Each network runs in one thread, and several hands in parallel: in two threads, which mostly wait for each other, a
+    run of these small networks takes twice the processor time.
+
+    :param threads: number of hands that are looked for in parallel.
     :param folder: of the networks; None: the built-in ones.
     :param execution: what the networks run on.
+    :param least_px: length of the smallest hands that are looked for, by the body's scale; pixels.
     :raises SetupError: a network is missing.
     """
 
-    def __init__(self, threads: int, folder: Path | None = None, execution: Execution | None = None) -> None:
-        self._network = HandNetwork(threads, folder, execution)
-        self._palms = PalmDetector(threads, folder, execution)
+    def __init__(
+        self,
+        threads: int,
+        folder: Path | None = None,
+        execution: Execution | None = None,
+        least_px: float = SMALLEST_HAND_PX,
+    ) -> None:
+        self._least_px = least_px
+        self._network = HandNetwork(1, folder, execution)
+        self._palms = PalmDetector(1, folder, execution)
+        self._pool = ThreadPoolExecutor(threads, "scope-hands")
         self._hands: dict[Key, _Hand] = {}
         self._missed: dict[Key, list[_Missed]] = {}
         self._time_s = 0.0
@@ -112,7 +129,8 @@ class HandTracker:
             key: self._hands.get(key) or _Hand(None, sight.wrist_px, now, now - PATIENCE_S)
             for key, sight in sights.items()
         }
-        found = {key: self._find(sight, self._hands[key]) for key, sight in sights.items()}
+        # Each changes its own hand and sight alone, so that the results do not depend on the threads' timing.
+        found = dict(zip(sights, self._pool.map(self._find, sights.values(), self._hands.values()), strict=True))
         for (number, side), sight in sights.items():
             if found[number, side] is None:
                 found[number, side] = _of_other_side(sight, sights[number, 1 - side].opposite)
@@ -134,7 +152,7 @@ class HandTracker:
             if hand is not None and hand.is_sure:
                 elsewhere = [m for other, those in (before | self._missed).items() if other != key for m in those]
                 self._look_back(missed, hand, sight, elsewhere)
-            elif sight.hand_px >= SMALLEST_HAND_PX:
+            elif sight.hand_px >= self._least_px:
                 others = [h.estimate for other, h in found.items() if other != key and h is not None]
                 seen = replace(sight.around_wrist(), others=others, opposite=[])
                 self._missed[key] = [*missed, _Missed(now, seen, hand, rows[key[0]][key[1]])][-MOST_MISSED:]
@@ -143,7 +161,7 @@ class HandTracker:
     def _beside(self, sight: Sight, others: Sequence[HandEstimate]) -> Found | None:
         """Look for a hand where another one was found: beside the others, which it may touch."""
         predicted = region_from_body(sight.person.keypoints_px, sight.scale, sight.side)
-        if sight.hand_px < SMALLEST_HAND_PX or not _is_in_image(predicted, sight.image_rgb):
+        if sight.hand_px < self._least_px or not _is_in_image(predicted, sight.image_rgb):
             return None
         return self._search(replace(sight, others=list(others)), predicted, look_again=False)
 
@@ -194,14 +212,22 @@ class HandTracker:
                 followed = better(followed, sight.judge(estimate, least, TENTATIVE, FOLLOWED_WRIST))
                 if followed is not None and followed.is_sure:
                     return followed
-        if not is_search_due(self._time_s, hand.seen_s, hand.searched_s):
+        if not self._is_search_due(sight, hand):
             return followed
         hand.searched_s = self._time_s
         predicted = region_from_body(sight.person.keypoints_px, sight.scale, sight.side)
-        if sight.hand_px < SMALLEST_HAND_PX or not _is_in_image(predicted, sight.image_rgb):
+        if sight.hand_px < self._least_px or not _is_in_image(predicted, sight.image_rgb):
             return followed
         just_lost = self._time_s - hand.seen_s <= EAGER_S
         return better(self._search(sight, predicted, look_again=just_lost), followed)
+
+    def _is_search_due(self, sight: Sight, hand: _Hand) -> bool:
+        """Return whether a lost hand is to be looked for: at most 30 times per second, a hidden one at `PATIENCE_S`.
+
+        Where it is found again, it is followed back through the frames in between.
+        """
+        seen_s = hand.seen_s if sight.wrist_confidence >= HIDDEN_WRIST else -math.inf
+        return is_search_due(self._time_s, seen_s, hand.searched_s, FRAME_S)
 
     def _search(self, sight: Sight, predicted: Region, look_again: bool) -> Found | None:
         """Find the hand whose palm is nearest to the predicted region, or without a palm, any hand in that region.

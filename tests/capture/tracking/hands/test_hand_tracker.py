@@ -77,10 +77,10 @@ class FakePalms:
 def follow(monkeypatch):
     """``follow(hands)``: a tracker whose networks see these hands, as long as they are in the list."""
 
-    def make(hands):
+    def make(hands, **options):
         monkeypatch.setattr(hand_tracker, "HandNetwork", lambda *_: FakeHands(hands))
         monkeypatch.setattr(hand_tracker, "PalmDetector", lambda *_: FakePalms(hands))
-        return HandTracker(1)
+        return HandTracker(1, **options)
 
     return make
 
@@ -117,14 +117,29 @@ def test_a_hand_is_found_again_and_zeros_mark_the_frames_without_it(follow):
 
 @pytest.mark.parametrize("rate", [12, 30, 60])
 def test_a_missing_hand_is_searched_equally_often_at_any_frame_rate(follow, rate):
-    """Each hand in every frame for a third of a second, then six to eight times per second."""
+    """Each hand for a third of a second in every frame, or 30 times per second, then six to eight times per second."""
     tracker = follow([])
     calls = []
     for k in range(3 * rate):
         tracker.step(IMAGE, [(0, person())], k / rate)
         calls.append(tracker._palms.calls)
-    assert calls[rate // 3] == 2 * 2 * (rate // 3 + 1)  # with a second look each time
+    assert calls[rate // 3] == 2 * 2 * (min(rate, 30) // 3 + 1)  # with a second look each time
     assert 22 <= calls[3 * rate - 1] - calls[rate - 1] <= 32  # in two seconds, both hands
+
+
+def test_hands_below_the_least_size_are_not_looked_for(follow):
+    for least_px, expected in ((0.9 * LENGTH, [True, False]), (1.1 * LENGTH, [False, False])):
+        tracker = follow([hand_at((300, 500))], least_px=least_px)
+        assert list(seen(tracker, person())) == expected
+    assert tracker._network.calls == tracker._palms.calls == 0
+
+
+def test_a_hand_whose_wrist_is_hidden_is_not_looked_for_in_every_frame(follow):
+    """Six to eight times per second from the start, each hand."""
+    tracker = follow([])
+    for k in range(31):
+        tracker.step(IMAGE, [(0, replace(person(), keypoints_confidence=np.full(33, 0.05)))], k / 30)
+    assert 12 <= tracker._palms.calls <= 18
 
 
 def test_a_hand_is_followed_with_the_wrist_where_it_moves_far_in_a_frame(follow):
@@ -377,7 +392,7 @@ def test_a_capture_with_hands_from_file_to_motion(shared):
     """Fingers are near the keypoints in the image, and all arrays of the motion are consistent."""
     body = load_body("scope_h")
     wanted = VideoRange(1.4, 2.0, None)
-    options = CaptureOptions(quality="fast", hands=True, threads=1, smoothing=False, wanted=wanted)
+    options = CaptureOptions(quality="fast", hands="on", threads=1, smoothing=False, wanted=wanted)
     result = capture(shared / "data/clips/gesture_square.mp4", body, options)
     m = result.motions[0]
     assert m.body_model == "scope_h"
@@ -393,3 +408,20 @@ def test_a_capture_with_hands_from_file_to_motion(shared):
     assert np.median(off) < 3.5  # pixels; a palm measures 13 of them
     finger = body.joint_names.index("left_index2")
     assert np.array_equal(m.joint_confidence[:, finger] > 0, m.keypoints2d[:, 33, 2] > 0)
+
+
+def test_auto_captures_large_hands_and_leaves_the_fingers_of_small_ones_at_rest(shared):
+    """Hands of 37 pixels from wrist to middle knuckle in the first clip, of 13 in the second."""
+    body = load_body("scope_h")
+    options = CaptureOptions(quality="fast", hands="auto", threads=1, smoothing=False)
+    clips = {"squats_5fps": VideoRange(0.0, 1.0, None), "gesture_square": VideoRange(1.4, 1.6, None)}
+    large, small = (
+        capture(shared / f"data/clips/{name}.mp4", body, replace(options, wanted=wanted))
+        for name, wanted in clips.items()
+    )
+    assert large.report["per_person"][0]["right_hand_frames"] == len(large.motions[0])
+    assert small.report["per_person"][0]["right_hand_frames"] == 0
+    assert not any("hands" in warning for warning in small.report["warnings"])
+    fingers = [body.joint_names.index(f"right_{name}{k}") for name in ("index", "middle") for k in (1, 2, 3)]
+    rotations = small.motions[0].poses.reshape(len(small.motions[0]), -1, 3)[:, fingers]
+    np.testing.assert_allclose(rotations, 0.0, atol=1e-6)
