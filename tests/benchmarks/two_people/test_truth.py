@@ -66,7 +66,7 @@ def test_regions_hold_everybody_also_where_joints_are_not_known() -> None:
 
 def test_mirrored_regions_show_mirrored_pixels() -> None:
     image = np.random.default_rng(1).integers(0, 255, (300, 201, 3), np.uint8)
-    image = cv2.GaussianBlur(image, (0, 0), 5.0)
+    image = np.asarray(cv2.GaussianBlur(image, (0, 0), 5.0), np.uint8)
     region = Region((80.0, 140.0), 120.0, 0.3)
     flipped = np.ascontiguousarray(image[:, ::-1])
     other = mirror(region, 201).cut(flipped, 64)[:, ::-1]
