@@ -91,8 +91,9 @@ def make_truth(videos: dict[str, Path]) -> dict[str, Any]:
     lines: list[list[object]] = []
     for network, of_network in people.items():
         for person, found in of_network.items():
-            error = found.found.error_px.reshape(len(CAMERAS), -1, KEYPOINT_COUNT)[..., _KEYPOINTS]
-            good = found.found.good.reshape(error.shape)
+            shape = len(CAMERAS), -1, KEYPOINT_COUNT
+            error = found.found.error_px.reshape(shape)[..., _KEYPOINTS]
+            good = found.found.good.reshape(shape)[..., _KEYPOINTS]
             known = np.isfinite(found.joints[:, _KEYPOINTS, 0])
             px = [float(np.median(e[g])) for e, g in zip(error, good, strict=True)]
             lines.append([f"{person}, {network}", float(known.mean()), float(good.mean()), *px])
