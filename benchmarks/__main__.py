@@ -30,6 +30,7 @@ ELSEWHERE = {  # imported where they are wanted: some need packages that others 
     "faces": (".perception.face_conditions", "faces_and_conditions"),
     "blender": (".blender", "blender"),
     "cluster": (".cluster", "cluster"),
+    "two_people": (".two_people.accuracy", "two_people"),
     "live": (".live.live", "live"),
 }
 LIVE_PARTS = ("rate", "offline", "simulated", "world", "hour")

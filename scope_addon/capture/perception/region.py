@@ -78,6 +78,11 @@ class Region:
         larger, smaller = max(self.side_px, other.side_px), min(self.side_px, other.side_px)
         return apart <= distance * larger and larger <= 2 * smaller
 
+    def difference(self, other: Region) -> float:
+        """Return the distance of the centres in sides of the larger square plus |log| of the ratio of the sides."""
+        smaller, larger = sorted((max(self.side_px, 1e-9), max(other.side_px, 1e-9)))
+        return math.dist(self.center_px, other.center_px) / larger + math.log(larger / smaller)
+
     def _image_from_pixel(self, size: int) -> NDArray[np.float64]:
         """Calculate the (2, 3) affine map from pixel indices of a ``size`` crop to image coordinates."""
         A = self.R_image_crop * (self.side_px / size)

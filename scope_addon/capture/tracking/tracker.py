@@ -49,6 +49,7 @@ FALLBACK_S = 15 * FRAME_S  # for which the largest network replaces a smaller on
 HALF_SWAPPED = 2.0  # `swap_ratio` below which a network may be about to confuse the sides
 APPEARANCE_S = 4 * FRAME_S  # between two samples of the appearance
 _MIN_REDETECTION_AGE = 6  # frames for which somebody was tracked
+_JUST_LOST_FRAMES = 2  # within which a detected body at the prediction continues the tracklet
 _SAME_TARGET, _LOST_TARGET, _REPLACED_TARGET = 0.12, 0.5, 0.35  # distances of regions in sides, see `Region.resembles`
 
 
@@ -226,10 +227,7 @@ class PeopleTracker:
                 return
             estimate = redetect_rotated(self._networks.landmarks, image_rgb, lost, self._live)
             if estimate is not None:
-                lost.update(estimate, looks_swapped(lost.estimate, estimate), self._clock.time_s, self._clock.step_s)
-                lost.frames_lost = 0
-                self._lost.remove(lost)
-                self._live.append(lost)
+                self._resume(lost, estimate)
 
     def _search(self, image_rgb: NDArray[np.uint8]) -> None:
         """Start a tracklet for everybody who is detected and not tracked yet; small people only if nobody else is."""
@@ -270,8 +268,13 @@ class PeopleTracker:
         return sorted(detections, key=rank, reverse=True)
 
     def _may_be_new(self, region: Region) -> bool:
-        """Return whether nobody is tracked in the region, and its size matters."""
-        if any(region.resembles(f.estimate.next_region, _SAME_TARGET) for f in self._live):
+        """Return whether nobody is tracked in the region, and its size matters.
+
+        Somebody who is lost in front of or behind another person may be in nearly the same region as that person.
+        """
+        lost = min((region.difference(f.predicted_region) for f in self._lost), default=math.inf)
+        tracked = (f.estimate.next_region for f in self._live)
+        if any(region.resembles(other, _SAME_TARGET) and region.difference(other) <= lost for other in tracked):
             return False
         largest = max((f.estimate.region.side_px for f in self._live), default=0.0)
         return not self._largest_only or region.side_px >= RIVAL_SIDE * largest
@@ -294,8 +297,20 @@ class PeopleTracker:
         largest = max((f.estimate.region.side_px for f in self._live), default=0.0)
         if self._largest_only and estimate.region.side_px < RIVAL_SIDE * largest:
             return
+        just_lost = (f for f in self._lost if f.frames_lost <= _JUST_LOST_FRAMES and not f.is_occluded)
+        nearest = min(just_lost, key=lambda f: f.innovation(estimate), default=None)
+        if nearest is not None and nearest.innovation(estimate) <= MAX_INNOVATION:
+            self._resume(nearest, estimate)
+            return
         self._lost = [f for f in self._lost if not estimate.region.resembles(f.predicted_region, _REPLACED_TARGET)]
         self._live.append(self._start(estimate))
+
+    def _resume(self, lost: TrackedTarget, estimate: PoseEstimate) -> None:
+        """Continue the tracklet of a lost person who was found again."""
+        lost.update(estimate, looks_swapped(lost.estimate, estimate), self._clock.time_s, self._clock.step_s)
+        lost.frames_lost = 0
+        self._lost.remove(lost)
+        self._live.append(lost)
 
     def _start(self, estimate: PoseEstimate) -> TrackedTarget:
         self._tracklets += 1

@@ -47,7 +47,8 @@ def test_somebody_off_the_floor_of_another_all_the_time_may_have_another_size(bo
     assert found.startswith("a.mp4: person 2 stands up to 0.5 m above the floor at 0.0 s, so either ")
     assert cause in found
     assert found.endswith(
-        "or the clip has more than one floor: capture the part that matters, with a start and end time"
+        "or the clip has more than one floor: capture the part that matters, with a start and end time, or with uneven "
+        "ground"
     )
 
 

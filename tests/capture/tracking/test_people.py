@@ -89,6 +89,15 @@ def test_a_single_frame_is_not_enough_next_to_a_person_who_was_tracked(follow: C
     assert identities(track, [stands, flickers]) == {0}
 
 
+def test_a_person_who_is_lost_in_front_of_another_one_is_found_again(follow: Callable[..., list[Track]]) -> None:
+    """Their regions have nearly the same centre, but not the same size: that the one behind is tracked is no reason."""
+    behind = Person(lambda t: (500, 205), BLUE, size_px=80)
+    front = Person(lambda t: (max(660 - 3.0 * t, 534), 200), RED, size_px=120, hidden=range(60, 63))
+    tracks = follow([behind, front], 120, wanted=2)
+    assert [identities(track, [behind, front]) for track in tracks] == [{1}, {0}]
+    assert tracks[0].seen[64:].all()
+
+
 def test_a_newcomer_who_occludes_a_person_does_not_take_the_identity(follow: Callable[..., list[Track]]) -> None:
     """The occluded target drifts onto the newcomer; that it was tracked for longer must not decide."""
     stands = Person(lambda t: (500, 200), RED, hidden=range(46, 56))

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The truth of two people: synthetic joints that four cameras see are found again, also with a wrong keypoint."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scope.benchmarks.two_people.accuracy import are_apart, region_around
+from scope.benchmarks.two_people.footage import Camera
+from scope.benchmarks.two_people.truth import mirror, pixels, regions_of, solve
+from scope.scope_addon.capture.perception.region import Region
+from scope.solver.rotations import exp
+
+DIST = np.array([-0.05, 0.14, 0.0006, 0.0007, 0.0])
+
+
+def _cameras() -> dict[str, Camera]:
+    """Four cameras 4 m from the origin that look at it, with a lens that distorts."""
+    found = {}
+    for k in range(4):
+        T = np.eye(4)
+        T[:3, :3], T[2, 3] = exp(np.array([0.0, 0.3 + k * np.pi / 2, 0.0])), 4.0
+        K = np.array([[1660.0 + 10 * k, 0, 540.0], [0, 1660.0, 960.0], [0, 0, 1]])
+        found[f"cam{k + 1}"] = Camera(f"cam{k + 1}", K, DIST, T, (1088, 1920), np.array([0.0, -1.0, 0.0]), 0, 0.0)
+    return found
+
+
+def _joints() -> NDArray[np.float64]:
+    """(3, 33, 3) metres: three frames of a person who stands at the origin."""
+    joints = np.random.default_rng(0).uniform([-0.3, -0.8, -0.3], [0.3, 0.8, 0.3], (3, 33, 3))
+    joints[:, [11, 12], 1], joints[:, [23, 24], 1] = -0.5, 0.0
+    return joints
+
+
+def test_joints_are_found_again_through_distorting_lenses() -> None:
+    cameras, joints = _cameras(), _joints()
+    seen = np.stack([pixels(joints.reshape(-1, 3), camera).reshape(3, 33, 2) for camera in cameras.values()])
+    keypoints = np.concatenate([seen, np.ones((4, 3, 33, 1))], -1)
+    keypoints[1, 0, 7, :2] += 400.0  # on another person
+    found = solve(keypoints, cameras, adjusts=False)
+    np.testing.assert_allclose(found.joints, joints, atol=5e-4)
+    assert not found.found.good.reshape(4, 3, 33)[1, 0, 7]
+    assert found.found.good.sum() == 4 * 3 * 33 - 1
+
+
+def test_projection_agrees_with_opencv_and_keeps_what_is_not_known() -> None:
+    camera, points = _cameras()["cam2"], _joints()[0]
+    rotation, shift = cv2.Rodrigues(camera.T_camera_world[:3, :3])[0], camera.T_camera_world[:3, 3]
+    expected = cv2.projectPoints(points, rotation, shift, camera.K, camera.dist)[0].reshape(-1, 2)
+    points[3] = np.nan
+    got = pixels(points, camera)
+    assert np.isnan(got[3]).all()
+    np.testing.assert_allclose(np.delete(got, 3, 0), np.delete(expected, 3, 0), atol=1e-6)
+
+
+def test_regions_hold_everybody_also_where_joints_are_not_known() -> None:
+    camera, joints = _cameras()["cam1"], _joints()
+    joints[1, 24] = np.nan
+    for region, points in zip(regions_of(joints, camera), joints, strict=True):
+        inside = region.crop_from_image(pixels(points, camera))
+        inside = inside[np.isfinite(inside).all(1)]
+        assert ((inside > 0) & (inside < 1)).all()
+
+
+def test_mirrored_regions_show_mirrored_pixels() -> None:
+    image = np.random.default_rng(1).integers(0, 255, (300, 201, 3), np.uint8)
+    image = np.asarray(cv2.GaussianBlur(image, (0, 0), 5.0), np.uint8)
+    region = Region((80.0, 140.0), 120.0, 0.3)
+    flipped = np.ascontiguousarray(image[:, ::-1])
+    other = mirror(region, 201).cut(flipped, 64)[:, ::-1]
+    np.testing.assert_allclose(other.astype(float), region.cut(image, 64).astype(float), atol=2.0)
+    assert mirror(mirror(region, 201), 201) == region
+
+
+@pytest.mark.parametrize(("shift", "apart"), [(0.0, False), (90.0, False), (110.0, True)])
+def test_people_are_apart_where_their_boxes_are(shift: float, apart: bool) -> None:
+    points = np.random.default_rng(2).uniform(0, 100, (12, 2))
+    points[:2] = [[0, 0], [100, 100]]
+    points[5] = np.nan
+    assert are_apart(points, points + [shift, 0]) == apart
+    assert are_apart(points, points - [0, shift]) == apart
+
+
+def test_a_region_around_limbs_is_upright_with_the_trunk() -> None:
+    points = np.array([[-20, -50], [20, -50], [-30, -20], [30, -20], [-30, 0], [30, 0], [-10, 0], [10, 0], [-10, 40],
+                       [10, 40], [-10, 80], [10, 80]], float)  # fmt: skip
+    region = region_around(points + 200)
+    assert region.center_px == (200.0, 200.0)
+    assert region.rotation == pytest.approx(0.0)
+    assert region.side_px > 2 * 80
