@@ -161,12 +161,18 @@ def run_capture(video: Path, target: Path, say: Callable[[str], None]) -> Outcom
     Of clips without ground truth everybody is captured, each into a file of their own: see `motion_files`.
     """
     people = () if truth_of(video) else ("--people", "all")
-    command = Command(video.name, "capture", (str(video), "-o", str(target), *people, "--json", "--quiet"))
+    files = (_from_root(video), "-o", _from_root(target))
+    command = Command(video.name, "capture", (*files, *people, "--json", "--quiet"))
     for path in motion_files(target.parent, target.stem):
         path.unlink()
     say(f"running {command.text}")
     done = timed(command, ["-m", SCRIPTS["capture"], "capture", *command.arguments])
     return replace(done, printed="", figures=json.loads(done.printed) if done.status == 0 else {})
+
+
+def _from_root(path: Path) -> str:
+    """Return a path of the checkout or beside it as seen from the root folder, where commands run; others as given."""
+    return Path(os.path.relpath(path, ROOT)).as_posix() if path.is_relative_to(ROOT.parent) else str(path)
 
 
 def timed(command: Command, arguments: Sequence[str]) -> Outcome:

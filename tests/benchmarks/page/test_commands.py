@@ -79,6 +79,13 @@ def test_everybody_is_captured_where_no_truth_says_who_it_is_about(tmp_path, mon
         assert ("--people" in outcome.command.arguments) == everybody
 
 
+def test_commands_name_files_of_the_checkout_from_its_root(monkeypatch):
+    monkeypatch.setattr(commands, "timed", lambda command, arguments: Outcome(command, "", "", {}, 1.0, 3))
+    data = ROOT.parent / "shared" / "data"
+    outcome = run_capture(data / "no such clip.mp4", ROOT / "build" / "report" / "no.npz", lambda text: None)
+    assert outcome.command.arguments[:3] == ("../shared/data/no such clip.mp4", "-o", "build/report/no.npz")
+
+
 def test_motion_files_are_those_of_everybody_in_their_order(tmp_path):
     for name in ("bb.person1.npz", "b.personal.npz", "c.npz", *(f"b.person{n}.npz" for n in range(12, 0, -1))):
         (tmp_path / name).touch()
