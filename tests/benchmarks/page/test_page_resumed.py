@@ -117,6 +117,7 @@ def test_the_page_says_what_each_command_costs():
     assert "./scripts/gate</th><td>1:01</td><td>2:02</td><td>3.1</td>" in text
     assert "./scripts/bench solver</th><td>60:00</td><td>–</td><td>–</td>" in text
     assert "all</th><td>61:01</td><td>2:02</td>" in text
+    assert "all</th><td>60:00</td><td>–</td>" in module.costs([solver])[0]
 
 
 def test_without_an_earlier_run_there_is_nothing_to_go_on_with(done):
