@@ -41,20 +41,23 @@ def printed_parts(text: str, details: re.Pattern[str] | None = None) -> list[Mar
 
     In the first column, the keys of the evaluation are replaced by its headings. Lines about pictures are left out.
 
-    :param details: tables whose first heading it matches are folded under that heading.
+    :param details: tables whose first heading it matches come last, folded under that heading.
     """
     parts: list[Markup] = []
+    folded: dict[str, list[Markup]] = {}
     for block in re.split(r"\n\s*\n", _PICTURE.sub("", text).strip()):
         for is_table, group in groupby(block.splitlines(), lambda line: line.startswith("|")):
             lines = list(group)
             if is_table and len(lines) > 1 and _RULE.fullmatch(lines[1]):
                 cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in (lines[0], *lines[2:])]
                 rows = [[with_headings(row[0]), *row[1:]] for row in cells[1:]]
-                table = page.table(cells[0], rows, numbers=True)
-                parts.append(page.folded(cells[0][0], table) if details and details.match(cells[0][0]) else table)
+                is_detail = details is not None and details.match(cells[0][0])
+                (folded.setdefault(cells[0][0], []) if is_detail else parts).append(
+                    page.table(cells[0], rows, numbers=True)
+                )
             elif text := " ".join(lines).strip():
                 parts.append(Markup(f"<p>{escape(text)}</p>\n"))
-    return parts
+    return [*parts, *(page.folded(heading, *tables) for heading, tables in folded.items())]
 
 
 def with_headings(name: str) -> str:
