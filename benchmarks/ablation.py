@@ -132,6 +132,8 @@ def measure_clip(
 ) -> dict[str, People]:
     """Return the figures of every person of a clip for every row; None for people who were not found.
 
+    A figure that the clip does not have is NaN.
+
     :param truth: of a camera or a render, or of a scene; None: IoU alone.
     """
     scene = _of_scene(path.stem)
@@ -154,7 +156,9 @@ def measure_clip(
         else:
             figures = {"iou": mask_iou(body, motions[0], observed.tracks[0].masks, observed.shot.image_size)}
             if truth is not None:
-                figures |= {key: float(evaluate_motion(motions[0], truth)[key]) for key in SHOWN}
+                errors = evaluate_motion(motions[0], truth)
+                # Feet that never stand do not slide.
+                figures |= {key: np.nan if errors[key] is None else float(errors[key]) for key in SHOWN}
             found[name] = [figures]
     return found
 
@@ -202,12 +206,14 @@ def _of_scene(name: str) -> bool:
 
 def _mean(clips: Mapping[str, Any], row: str, names: Any) -> dict[str, float]:
     people = [figures for name in names if name in clips for figures in clips[name][row] if figures is not None]
-    return {key: float(np.mean([each[key] for each in people])) for key in (people[0] if people else ())}
+    known = {key: [each[key] for each in people if not np.isnan(each[key])] for key in (people[0] if people else ())}
+    return {key: float(np.mean(values)) if values else np.nan for key, values in known.items()}
 
 
 def _median_iou(clips: Mapping[str, Any], row: str, names: Any) -> str:
-    known = [each["iou"] for name in names if name in clips for each in clips[name][row] if each and "iou" in each]
-    return f"{np.nanmedian(known):.3f}" if known else "–"
+    people = [each for name in names if name in clips for each in clips[name][row] if each]
+    known = [each["iou"] for each in people if not np.isnan(each.get("iou", np.nan))]
+    return f"{np.median(known):.3f}" if known else "–"
 
 
 def _more(clips: Mapping[str, Any], row: str, names: Sequence[str]) -> str:

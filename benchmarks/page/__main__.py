@@ -133,11 +133,35 @@ def report_page(folder: Path, done: Run, curves: Curves) -> str:
         page.section("The capture above", *over_time([motion]), figures_table([motion], body)),
         *(capture_section(folder, *each, body, why.get(each[0], "")) for each in done.captured),
         *(outcome_section(each, curves) for each in done.measured),
-        page.section(
-            "Commands", page.command_line("\n".join(each.command.text for each in done.everything)), note=note
-        ),
+        page.section("Commands, and what running them again costs", *costs(done.everything), note=note),
     ]
     return page.document("Scope on this machine", content, viewer_data([motion], body, rows, [page.person_color(0)]))
+
+
+def costs(outcomes: Sequence[Outcome]) -> list[page.Markup]:
+    """Return the table of what each command cost, with the sum, and how to read it."""
+    rows = [
+        [each.command.text, _minutes(each.seconds), _minutes(each.processor_seconds), _load_text(each.load)]
+        for each in outcomes
+    ]
+    known = [each.processor_seconds for each in outcomes if each.processor_seconds is not None]
+    rows.append(["all", _minutes(sum(each.seconds for each in outcomes)), _minutes(sum(known) if known else None), ""])
+    head = ("command", "elapsed, min:s", "processor time, min:s", "load, mean")
+    note = (
+        "Processor time is that of all threads and of all processes that a command started; on a busy machine, elapsed "
+        "times are longer than on an idle one, processor time hardly. The load is the mean number of processes that "
+        "ran or waited for a core, the command's own included. Clips that were rendered before are used again; "
+        "rendering them is not included."
+    )
+    return [page.table(head, rows, numbers=True), page.paragraph(note)]
+
+
+def _minutes(seconds: float | None) -> str:
+    return "–" if seconds is None else f"{int(seconds) // 60}:{int(seconds) % 60:02d}"
+
+
+def _load_text(load: float | None) -> str:
+    return "–" if load is None else f"{load:.1f}"
 
 
 def left_out(done: Run) -> list[Command]:

@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shlex
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ WITHOUT_TRUTH = (  # clips of people
     *("run_moving_camera", "gesture_square", "squats_5fps", "sit_stand_close", "two_people_portrait"),
     "walk_side_static",
 )
+LOAD_EVERY_S = 10.0
 SCRIPTS = {"bench": "scope.benchmarks", "gate": "scope.benchmarks.gate", "capture": "scope.scope_addon"}
 
 
@@ -42,7 +44,12 @@ class Command:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a command printed, its figures, how long it took and its exit status."""
+    """What a command printed, its figures, how long it took and its exit status.
+
+    ``processor_seconds`` are those of the command and all that it started, in all threads. ``load`` is the mean number
+    of processes that ran or waited for a core meanwhile, the command's own included. Both are None where the system
+    does not tell, and in runs recorded before they were measured.
+    """
 
     command: Command
     printed: str
@@ -50,6 +57,8 @@ class Outcome:
     figures: dict[str, Any]
     seconds: float
     status: int
+    processor_seconds: float | None = None
+    load: float | None = None
 
 
 LONG = (  # what takes hours together, and is left out of a quick run
@@ -142,11 +151,8 @@ def run(command: Command, folder: Path, say: Callable[[str], None]) -> Outcome:
     path = folder / f"{'-'.join((command.script, *command.arguments)).replace('--', '')}.json"
     path.unlink(missing_ok=True)
     say(f"running {command.text}")
-    arguments = [sys.executable, "-m", SCRIPTS[command.script], *command.arguments, "--json", str(path)]
-    since = time.monotonic()
-    done = subprocess.run(arguments, capture_output=True, text=True, cwd=ROOT, check=False)
-    figures = json.loads(path.read_text("utf-8")) if path.is_file() else {}
-    return Outcome(command, done.stdout, done.stderr, figures, time.monotonic() - since, done.returncode)
+    done = timed(command, ["-m", SCRIPTS[command.script], *command.arguments, "--json", str(path)])
+    return replace(done, figures=json.loads(path.read_text("utf-8")) if path.is_file() else {})
 
 
 def run_capture(video: Path, target: Path, say: Callable[[str], None]) -> Outcome:
@@ -155,12 +161,48 @@ def run_capture(video: Path, target: Path, say: Callable[[str], None]) -> Outcom
     Of clips without ground truth everybody is captured, each into a file of their own: see `motion_files`.
     """
     people = () if truth_of(video) else ("--people", "all")
-    command = Command(video.name, "capture", (str(video), "-o", str(target), *people, "--json", "--quiet"))
+    files = (_from_root(video), "-o", _from_root(target))
+    command = Command(video.name, "capture", (*files, *people, "--json", "--quiet"))
     for path in motion_files(target.parent, target.stem):
         path.unlink()
     say(f"running {command.text}")
-    since = time.monotonic()
-    arguments = [sys.executable, "-m", SCRIPTS["capture"], "capture", *command.arguments]
-    done = subprocess.run(arguments, capture_output=True, text=True, cwd=ROOT, check=False)
-    figures = json.loads(done.stdout) if done.returncode == 0 else {}
-    return Outcome(command, "", done.stderr, figures, time.monotonic() - since, done.returncode)
+    done = timed(command, ["-m", SCRIPTS["capture"], "capture", *command.arguments])
+    return replace(done, printed="", figures=json.loads(done.printed) if done.status == 0 else {})
+
+
+def _from_root(path: Path) -> str:
+    """Return a path of the checkout or beside it as seen from the root folder, where commands run; others as given."""
+    return Path(os.path.relpath(path, ROOT)).as_posix() if path.is_relative_to(ROOT.parent) else str(path)
+
+
+def timed(command: Command, arguments: Sequence[str]) -> Outcome:
+    """Run Python with arguments, from the root folder, as a command; return its outcome, without figures."""
+    since, before = time.monotonic(), _processor_seconds()
+    loads: list[float] = []
+    with subprocess.Popen(
+        [sys.executable, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT
+    ) as process:
+        try:
+            while True:
+                try:
+                    printed, said = process.communicate(timeout=LOAD_EVERY_S)
+                    break
+                except subprocess.TimeoutExpired:
+                    loads += _load()
+        except BaseException:  # such as Ctrl-C
+            process.kill()
+            raise
+    loads += _load()
+    spent, load = _processor_seconds() - before, sum(loads) / len(loads) if loads else None
+    return Outcome(command, printed, said, {}, time.monotonic() - since, process.returncode, spent or None, load)
+
+
+def _processor_seconds() -> float:
+    """Return the processor time of all processes that this one has waited for, and of theirs; 0 on Windows."""
+    times = os.times()
+    return times.children_user + times.children_system
+
+
+def _load() -> list[float]:
+    """Return the load average over a minute, the shortest that there is, as one number; none on Windows."""
+    return [os.getloadavg()[0]] if hasattr(os, "getloadavg") else []

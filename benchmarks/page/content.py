@@ -11,11 +11,13 @@ from itertools import groupby
 import cv2
 import numpy as np
 
+from ...scope_addon.capture.options import CaptureOptions
 from ...scope_addon.report import page
 from ...scope_addon.report.page import Markup
 from ...scope_addon.report.plots import Axis, Curve, line_plot
 from ..frames import CACHE
 from ..perception.accuracy import SHOWN
+from ..perception.renders import KNOWN
 from .commands import Outcome
 from .curves import Curves
 from .failures import captioned
@@ -26,26 +28,36 @@ PAPER = (
     "The curves of the solver's paper (figures 5 to 7) are not drawn beside these: they are pictures, of which no data "
     "were found, and were not digitized. Whoever has digitized them can give them as a table with --curves."
 )
+DETAILS = {  # benchmarks of many tables: which of them are folded, by their first heading
+    "renders": re.compile(rf"(?!{CaptureOptions().quality}, {KNOWN[0]})\w+, "),
+    "scenes": re.compile(r"\w+, (?!default preset: )"),
+}
 _PICTURE = re.compile(r"^\S+\.jpg: .*\n?", re.MULTILINE)  # that a benchmark has written and says so
 _RULE = re.compile(r"\|(\s*:?-+:?\s*\|)+")
 
 
-def printed_parts(text: str) -> list[Markup]:
+def printed_parts(text: str, details: re.Pattern[str] | None = None) -> list[Markup]:
     """Return Markdown tables as tables and everything else as paragraphs, in their order.
 
     In the first column, the keys of the evaluation are replaced by its headings. Lines about pictures are left out.
+
+    :param details: tables whose first heading it matches come last, folded under that heading.
     """
     parts: list[Markup] = []
+    folded: dict[str, list[Markup]] = {}
     for block in re.split(r"\n\s*\n", _PICTURE.sub("", text).strip()):
         for is_table, group in groupby(block.splitlines(), lambda line: line.startswith("|")):
             lines = list(group)
             if is_table and len(lines) > 1 and _RULE.fullmatch(lines[1]):
                 cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in (lines[0], *lines[2:])]
                 rows = [[with_headings(row[0]), *row[1:]] for row in cells[1:]]
-                parts.append(page.table(cells[0], rows, numbers=True))
+                is_detail = details is not None and details.match(cells[0][0])
+                (folded.setdefault(cells[0][0], []) if is_detail else parts).append(
+                    page.table(cells[0], rows, numbers=True)
+                )
             elif text := " ".join(lines).strip():
                 parts.append(Markup(f"<p>{escape(text)}</p>\n"))
-    return parts
+    return [*parts, *(page.folded(heading, *tables) for heading, tables in folded.items())]
 
 
 def with_headings(name: str) -> str:
@@ -159,6 +171,6 @@ def outcome_section(outcome: Outcome, curves: Curves | None = None) -> Markup:
         page.command_line(outcome.command.text),
         *said,
         *plots(outcome, curves or {}),
-        *printed_parts(outcome.printed),
+        *printed_parts(outcome.printed, DETAILS.get(next(iter(outcome.command.arguments), ""))),
         note=f"It took {outcome.seconds:.0f} s{ended}.",
     )

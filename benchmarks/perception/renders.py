@@ -58,7 +58,7 @@ def renders(quick: bool) -> dict[str, Any]:
     sample = ASSETS / "sample" / "sample.mp4"
     clips["sample"] = sample, sample.with_name("sample_truth.npz")
     figures: dict[str, Any] = {}
-    for quality in (CaptureOptions().quality,) if quick else PRESETS:
+    for quality in (CaptureOptions().quality,) if quick else PRESETS[::-1]:  # best first
         figures[quality] = {}
         for known in KNOWN:
             found = {name: evaluate_render(body, *files, quality, known) for name, files in clips.items()}
@@ -69,8 +69,21 @@ def renders(quick: bool) -> dict[str, Any]:
             flips = {fit: total(row["flips"][fit] for row in shots if "flips" in row) for fit in FITS}
             figures[quality][known]["mean"]["flips"] = flips
             print(flips_table(f"{quality}, {known}", flips), end="\n\n", flush=True)
+    print(presets_table(figures), end="\n\n", flush=True)
     print(intervals_table(figures), end="\n\n", flush=True)
     return figures
+
+
+def presets_table(figures: dict[str, Any]) -> str:
+    """Return the errors of every clip with every preset, nothing given, the clip with the least first.
+
+    :param figures: by preset, then by what is given, then by clip.
+    """
+    by_preset = {quality: by_known[KNOWN[0]] for quality, by_known in figures.items()}
+    first = next(iter(by_preset.values()))
+    names = sorted((name for name in first if name != "mean"), key=lambda name: first[name].get("mpjpe_root", math.inf))
+    rows = [[name, *(_pair(clips.get(name, {})) for clips in by_preset.values())] for name in (*names, "mean")]
+    return table((f"MPJPE-root / PA-MPJPE mm, {KNOWN[0]}", *by_preset), rows)
 
 
 def intervals_table(figures: dict[str, Any]) -> str:
@@ -95,6 +108,11 @@ def intervals_table(figures: dict[str, Any]) -> str:
 def _of_clips(clips: dict[str, Any], key: str) -> dict[str, float]:
     """Return a figure of every clip but the sample, in which somebody was found."""
     return {name: row[key] for name, row in clips.items() if name not in ("sample", "mean") and key in row}
+
+
+def _pair(row: dict[str, Any]) -> str:
+    known = [row.get(key) for key in ("mpjpe_root", "pa_mpjpe")]
+    return "not found" if None in known else " / ".join(f"{value:.1f}" for value in known)
 
 
 def _shown(estimate: Estimate) -> str:

@@ -100,7 +100,7 @@ def _tables(split: str, by_variant: dict[str, list[Result]]) -> dict[str, Any]:
     flips = {}
     for name, results in by_variant.items():
         flips[name] = {fit: total(r.flips[fit] for r in results if r.flips) for fit in FITS}
-        print(flips_table(f"{split}, {name}", flips[name]), end="\n\n", flush=True)
+        print(flips_table(f"{split}, {name}: depth flips", flips[name]), end="\n\n", flush=True)
     people = {name: [_figures(r) for r in results] for name, results in by_variant.items()}
     figures: dict[str, Any] = {"groups": found, "variants": variants, "more_than_default": more, "flips": flips}
     figures["people"] = people
@@ -287,6 +287,8 @@ def _figures(result: Result) -> dict[str, Any]:
 
 
 def _shown(estimate: Estimate) -> str:
+    if not estimate.people:
+        return "–"
     interval = f" ({estimate.low:.1f} to {estimate.high:.1f})" if estimate.people > 1 else ""
     return f"{estimate.mean:.1f}{interval}"
 

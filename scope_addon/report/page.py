@@ -88,6 +88,11 @@ def table(
     return Markup(f'<div class="wide"><table{kind}><thead>{lines[0]}</thead><tbody>{below}</tbody></table></div>')
 
 
+def folded(title: str, *content: Markup) -> Markup:
+    """Return content that is hidden until its title is clicked."""
+    return Markup(f"<details><summary>{escape(title)}</summary>{''.join(content)}</details>\n")
+
+
 def plot_figure(
     title: str, svg: str, legend: Mapping[str, str] | None = None, areas: Mapping[str, str] | None = None
 ) -> Markup:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -38,6 +39,22 @@ def test_a_table_has_means_of_people_and_medians_of_iou(monkeypatch: pytest.Monk
     cells = [cell.strip() for cell in shown[-1].strip("|").split("|")]
     expected = ["row", "61.5 / 40.0", "7", "0.25", "80.0 / 50.0", "100.0 / 40.0", "", "0.815", "0.700"]
     assert cells == expected
+
+
+def test_feet_that_never_stand_count_in_no_mean(monkeypatch: pytest.MonkeyPatch, body: Body, tmp_path: Path) -> None:
+    """The tool has no sliding for a clip in which nobody stands; the means are of the other clips."""
+    motion = made_motion(body, np.zeros((1, body.K + 1, 3)), np.zeros((1, 3)))
+    track = SimpleNamespace(masks=())
+    observed = SimpleNamespace(solve=lambda **_: [motion], tracks=[track], shot=SimpleNamespace(image_size=(640, 480)))
+    figures = dict.fromkeys(SHOWN, 50.0) | {"foot_slide_cm": None}
+    monkeypatch.setattr(ablation, "observe_clip", lambda *_: observed)
+    monkeypatch.setattr(ablation, "evaluate_motion", lambda *_: figures)
+    rolls = ablation.measure_clip(body, tmp_path / "cam1.mp4", tmp_path / "truth_cam1.npz", {"row": {}})
+    assert rolls["row"][0] is not None
+    assert np.isnan(rolls["row"][0]["foot_slide_cm"])
+    walks: dict[str, ablation.People] = {"row": [rolls["row"][0] | {"foot_slide_cm": 0.5, "mpjpe_root": 70.0}]}
+    shown = ablation.ablation_table({"cam1": rolls, "cam2": walks}, {"row": {}}).splitlines()[-1]
+    assert [cell.strip() for cell in shown.strip("|").split("|")][1:4] == ["60.0 / 50.0", "50", "0.50"]
 
 
 def test_what_was_not_measured_is_a_dash() -> None:

@@ -4,15 +4,15 @@
 from __future__ import annotations
 
 import json
+import os
 import shlex
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scope.benchmarks.__main__ import ELSEWHERE
 from scope.benchmarks.page import commands
-from scope.benchmarks.page.commands import SCRIPTS, Command, Outcome, motion_files, run, run_capture, worst_clips
+from scope.benchmarks.page.commands import SCRIPTS, Command, Outcome, motion_files, run, run_capture, timed, worst_clips
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -36,12 +36,12 @@ def test_figures_are_those_of_this_run_alone(tmp_path, monkeypatch):
     (tmp_path / "a.npz").write_text("old")
     done = {"status": 1, "json": None}
 
-    def fake(arguments, **_):
+    def fake(command, arguments):
         if done["json"]:
             Path(arguments[arguments.index("--json") + 1]).write_text(json.dumps(done["json"]))
-        return subprocess.CompletedProcess(arguments, done["status"], "printed", "said")
+        return Outcome(command, "printed", "said", {}, 1.0, done["status"])
 
-    monkeypatch.setattr(commands.subprocess, "run", fake)
+    monkeypatch.setattr(commands, "timed", fake)
     failed = run(Command("Gate", "gate", ()), tmp_path, lambda text: None)
     assert (failed.figures, failed.status, failed.printed, failed.said) == ({}, 1, "printed", "said")
     done |= {"status": 0, "json": {"new": 2}}
@@ -55,17 +55,35 @@ def test_figures_are_those_of_this_run_alone(tmp_path, monkeypatch):
     assert not (tmp_path / "a.npz").exists()
 
 
-def test_everybody_is_captured_where_no_truth_says_who_it_is_about(tmp_path, monkeypatch):
-    def fake(arguments, **_):
-        return subprocess.CompletedProcess(arguments, 3, "", "")
+def test_a_command_costs_the_processor_time_of_the_processes_that_it_starts_too(monkeypatch):
+    """The inner process computes for half a second of processor time; the outer one sleeps for a while, then ends."""
+    monkeypatch.setattr(commands, "LOAD_EVERY_S", 0.1)
+    spin = "import time\nwhile time.process_time() < 0.5: pass"
+    code = f"import subprocess, sys, time; subprocess.run([sys.executable, '-c', {spin!r}]); time.sleep(1); "
+    code += "print('a'); print('b', file=sys.stderr); sys.exit(3)"
+    outcome = timed(Command("Spin", "bench", ()), ["-c", code])
+    assert (outcome.printed, outcome.said, outcome.status, outcome.figures) == ("a\n", "b\n", 3, {})
+    assert outcome.seconds > 1.5
+    if hasattr(os, "getloadavg"):  # not on Windows
+        assert 0.5 <= outcome.processor_seconds < outcome.seconds
+        assert outcome.load >= 0
 
-    monkeypatch.setattr(commands.subprocess, "run", fake)
+
+def test_everybody_is_captured_where_no_truth_says_who_it_is_about(tmp_path, monkeypatch):
+    monkeypatch.setattr(commands, "timed", lambda command, arguments: Outcome(command, "", "", {}, 1.0, 3))
     for name in ("truth_cam1.npz", "roll_truth.npz"):
         np.savez(tmp_path / name, joints=np.zeros(3))
     np.savez(tmp_path / "test_00_truth.npz", limbs=np.zeros(3))  # of several people
     for name, everybody in (("cam1", False), ("roll", False), ("walk", True), ("test_00", True)):
         outcome = run_capture(tmp_path / f"{name}.mp4", tmp_path / f"{name}.npz", lambda text: None)
         assert ("--people" in outcome.command.arguments) == everybody
+
+
+def test_commands_name_files_of_the_checkout_from_its_root(monkeypatch):
+    monkeypatch.setattr(commands, "timed", lambda command, arguments: Outcome(command, "", "", {}, 1.0, 3))
+    data = ROOT.parent / "shared" / "data"
+    outcome = run_capture(data / "no such clip.mp4", ROOT / "build" / "report" / "no.npz", lambda text: None)
+    assert outcome.command.arguments[:3] == ("../shared/data/no such clip.mp4", "-o", "build/report/no.npz")
 
 
 def test_motion_files_are_those_of_everybody_in_their_order(tmp_path):

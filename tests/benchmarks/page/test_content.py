@@ -28,6 +28,30 @@ def test_tables_are_found_among_other_text():
     assert cells(table) == [["clip", "mm"], ["a &amp; b", "12.3"], ["c", ""]]
 
 
+@pytest.mark.parametrize(
+    ("what", "shown", "folded"),
+    [
+        (
+            "renders",
+            ["best, nothing given", "MPJPE-root / PA-MPJPE mm, nothing given", "preset"],
+            ["best, focal length given", "balanced, nothing given", "fast, height given"],
+        ),
+        (
+            "scenes",
+            ["test: people", "test: MPJPE-root, more than the default, mm", "new, default preset: performers"],
+            ["test, preset fast: depth flips", "new, default preset, statures given: performers"],
+        ),
+        ("solver", ["one iteration, K=23 P=10 N=120, us"], []),
+    ],
+)
+def test_of_many_tables_those_of_details_are_folded(what, shown, folded):
+    heads = [*folded[:2], *shown, *folded[1:]]  # the second of the folded has two tables
+    printed = "\n\n".join(report.table((head, "mm"), [("a", 1.0)]) for head in heads)
+    section = outcome_section(Outcome(Command("", "bench", (what,)), printed, "", {}, 1.0, 0))
+    assert re.findall(r"<summary>([^<]*)</summary><div", section) == folded
+    assert [row[0] for row in cells(section)[::2]] == [*shown, *folded[:2], *folded[1:]]
+
+
 def test_experiments_are_plotted_where_their_values_are():
     rows = [
         {"K": K, "N": N, "sparse": 10.0, "dense": 10.0 * factor}

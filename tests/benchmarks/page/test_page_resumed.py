@@ -108,6 +108,18 @@ def test_all_that_an_unfinished_run_lacks_is_named():
     assert module.left_out(Run([], everything, "", {}, quick=False)) == []
 
 
+def test_the_page_says_what_each_command_costs():
+    gate, solver = (
+        Outcome(Command("", "gate", ()), "", "", {}, 61.5, 0, 122.9, 3.14),
+        Outcome(Command("", "bench", ("solver",)), "", "", {}, 3600.0, 0),
+    )
+    text = "".join(module.costs([gate, solver]))
+    assert "./scripts/gate</th><td>1:01</td><td>2:02</td><td>3.1</td>" in text
+    assert "./scripts/bench solver</th><td>60:00</td><td>–</td><td>–</td>" in text
+    assert "all</th><td>61:01</td><td>2:02</td>" in text
+    assert "all</th><td>60:00</td><td>–</td>" in module.costs([solver])[0]
+
+
 def test_without_an_earlier_run_there_is_nothing_to_go_on_with(done):
     with pytest.raises(InputError, match="holds no run"):
         module.measure(False, resume=True)

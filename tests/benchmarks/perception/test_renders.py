@@ -17,7 +17,7 @@ from scope.benchmarks.perception.held_out import (
     held_out_takes,
     standing_feet,
 )
-from scope.benchmarks.perception.renders import against_world, intervals_table, mean_of
+from scope.benchmarks.perception.renders import against_world, intervals_table, mean_of, presets_table
 from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
 from scope.solver.loaders.body_file import ASSETS
 from scope.solver.rotations import log
@@ -135,3 +135,18 @@ def test_intervals_are_over_clips_and_differences_between_the_same_clips():
     assert [cell.strip() for cell in ours.strip("|").split("|")][1:3] == ["3", "50.0 (40.0 to 60.0)"]
     assert ours.rstrip("| ").endswith("(20.0 to 30.0)")
     assert "more than the default" in head
+
+
+def test_clips_are_listed_with_every_preset_the_best_captured_first():
+    walk = {"mpjpe_root": 40.0, "pa_mpjpe": 30.0}
+    best = {"roll": {"coverage": 0.0}, "walk": walk, "sample": {"mpjpe_root": 35.0, "pa_mpjpe": 20.0}, "mean": walk}
+    fast = best | {"roll": {"mpjpe_root": 90.0, "pa_mpjpe": 70.06}}
+    figures = {"best": {"nothing given": best}, "fast": {"nothing given": fast}}
+    head, _, *lines = presets_table(figures).splitlines()
+    assert [[cell.strip() for cell in line.strip("|").split("|")] for line in (head, *lines)] == [
+        ["MPJPE-root / PA-MPJPE mm, nothing given", "best", "fast"],
+        ["sample", "35.0 / 20.0", "35.0 / 20.0"],
+        ["walk", "40.0 / 30.0", "40.0 / 30.0"],
+        ["roll", "not found", "90.0 / 70.1"],
+        ["mean", "40.0 / 30.0", "40.0 / 30.0"],
+    ]

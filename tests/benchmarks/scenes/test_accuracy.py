@@ -128,6 +128,16 @@ def test_groups_are_of_frames_and_of_people(body, truth, monkeypatch):
     assert "travelling camera" not in rows
 
 
+def test_a_group_of_which_nobody_was_found_has_dashes_in_the_tables(body, truth, monkeypatch, capsys):
+    evaluated = evaluate(body, truth, [motion(body, truth["limbs_cam"][0])], monkeypatch)
+    accuracy._tables("test", {"default preset": evaluated})
+    lines = capsys.readouterr().out.splitlines()
+    cells = {line.split("|")[1].strip(): [cell.strip() for cell in line.split("|")[2:-1]] for line in lines if line}
+    assert cells["stature below 1.5 m"] == ["1", "–", "–", "0 %", "–"]
+    assert cells["1.5 to 1.75 m"][:2] == ["1", "0.0"]
+    assert "nan" not in "\n".join(lines)
+
+
 def test_variants_are_compared_where_both_found_the_person(body, truth, monkeypatch):
     right, wrong = truth["limbs_cam"][0], truth["limbs_cam"][0].copy()
     wrong[:, LIMB_JOINTS.index("left_wrist"), 2] += 0.12
