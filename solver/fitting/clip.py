@@ -80,7 +80,7 @@ def fit_clip(
     if len(measurements) == 0:
         raise ShapeError("A clip needs at least one frame of measurements, but got none.")
     if init is not None and len(init) != len(measurements):
-        raise ShapeError(f"There must be one initial state a frame, {len(measurements)}, but got {len(init)}.")
+        raise ShapeError(f"There must be one initial state per frame, {len(measurements)}, but got {len(init)}.")
     priors = default_priors(body) if priors is None else priors
     check_type(priors, Priors, "priors")
     check_type(options, Options, "options")

@@ -100,7 +100,7 @@ def fit_motion(
     """
     clock = _checked_times(times, len(frames))
     if init is not None and len(init) != len(frames):
-        raise ShapeError(f"There must be one initial state a frame, {len(frames)}, but got {len(init)}.")
+        raise ShapeError(f"There must be one initial state per frame, {len(frames)}, but got {len(init)}.")
     if not 0.0 <= overlap < window:
         raise InvalidValueError(f"The overlap of windows must lie in 0..{window} s, but is {overlap} s.")
     check_type(motion, MotionPrior, "motion")
