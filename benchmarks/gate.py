@@ -37,7 +37,7 @@ from .solver.timing import take_turns  # noqa: E402
 
 RECORD = Path(__file__).with_name("gate.json")
 ACCURACY = ("mpjpe_root", "pa_mpjpe", "foot_slide_cm", "jitter_rel", "flipped")
-LEAST_NOISE = {"mpjpe_root": 1.0, "pa_mpjpe": 1.0, "foot_slide_cm": 0.2, "jitter_rel": 2.0, "flipped": 0.02}
+MIN_NOISE = {"mpjpe_root": 1.0, "pa_mpjpe": 1.0, "foot_slide_cm": 0.2, "jitter_rel": 2.0, "flipped": 0.02}
 MACHINES, MACHINES_OF_NETWORKS = 0.35, 0.6  # by which a ratio of times may differ between machines, of its value
 TRIES = 3
 JPEG_QUALITIES = (80, 88, 96)  # of the copies
@@ -160,7 +160,7 @@ def accuracy_and_noise(body: Body, videos: dict[str, tuple[Path, Path]], folder:
             _encode(video, copies[name][0], quality)
         found.append(accuracy(body, copies))
     return {
-        name: _figure(value, [each[name] for each in found], LEAST_NOISE[name.split()[-1]])
+        name: _figure(value, [each[name] for each in found], MIN_NOISE[name.split()[-1]])
         for name, value in found[0].items()
     }
 

@@ -13,14 +13,14 @@ from types import FrameType
 from .command_line.address_space import address_space_limit
 from .command_line.signals import stopping_signals
 
-_LEAST = 300_000_000  # bytes of address space; with less, numpy may load in part, and hang or fail later
+_MIN_BYTES = 300_000_000  # bytes of address space; with less, numpy may load in part, and hang or fail later
 
 
 def main() -> None:
     """Load the command line and run it."""
     for number in stopping_signals():
         signal.signal(number, _stop)
-    if _memory_is_limited_to(_LEAST):
+    if _memory_is_limited_to(_MIN_BYTES):
         _stop_without_memory()
     try:
         from .cli import run

@@ -22,12 +22,12 @@ from ...tools.train_lifter.split import is_held_out
 
 SEED = 7
 SIZE = (640, 480)
-SECONDS, LEAST_SECONDS = 1.5, 0.7
+SECONDS, MIN_SECONDS = 1.5, 0.7
 SUNK_M = 0.12  # under the recorded floor: the fit left a hand there, which the performer's model lacks
-MOST_BETA = 2.5  # of a standard normal distribution
+MAX_BETA = 2.5  # of a standard normal distribution
 FOCAL_PX = (470.0, 1000.0)  # 0.73 to 1.56 of the width: a phone's main camera to twice its focal length
 HEIGHT_M, DISTANCE_M, TILT_DEG = (0.8, 2.0), (3.0, 6.5), (0.0, 15.0)  # of the camera; it looks down
-LEAST_FILL = 0.45  # longer side of the person's box over the image height, median of the frames
+MIN_FILL = 0.45  # longer side of the person's box over the image height, median of the frames
 MARGIN_PX = 12.0  # around the person in all frames
 FARTHEST_M = 1.7  # bench and wall are behind it
 NEAREST_M = 1.2  # to the camera
@@ -80,7 +80,7 @@ def draw_shot(body: Body, take: Take, seed: int = SEED) -> Shot:
     """
     rng = np.random.default_rng([seed, take.number])
     frames = draw_section(rng, body, take, SECONDS)
-    betas = np.clip(rng.standard_normal(body.P), -MOST_BETA, MOST_BETA)
+    betas = np.clip(rng.standard_normal(body.P), -MAX_BETA, MAX_BETA)
     states, pelvis = states_and_pelvis(body, take, frames, betas)
     stands = np.zeros((len(frames), 2), bool)
     trans = pelvis - body.rest_joints(betas)[0]
@@ -120,7 +120,7 @@ def draw_section(rng: np.random.Generator, body: Body, take: Take, seconds: floa
     states = exp(take.poses.reshape(len(take.poses), -1, 3).astype(float))
     points = body.keypoints(*body.forward_kinematics(states, take.trans, take.betas), take.betas)
     unsound = np.concatenate([[0], np.cumsum(~take.valid | (points[..., 1].min(axis=1) < -SUNK_M))])
-    least, most = (round(length * take.fps) for length in (LEAST_SECONDS, seconds))
+    least, most = (round(length * take.fps) for length in (MIN_SECONDS, seconds))
     for count in range(min(most, len(take.valid)), least - 1, -1):
         starts = np.flatnonzero(unsound[count:] == unsound[: len(unsound) - count])
         if len(starts):
@@ -182,4 +182,4 @@ def _well_inside(shot: Shot, skin: NDArray[np.float64]) -> bool:
     if uv.min() < MARGIN_PX or (uv.max((0, 1)) > np.subtract(shot.size, 1 + MARGIN_PX)).any():
         return False
     longer_side = np.ptp(uv, axis=1).max(axis=1)
-    return bool(np.median(longer_side) >= LEAST_FILL * shot.size[1])
+    return bool(np.median(longer_side) >= MIN_FILL * shot.size[1])

@@ -25,14 +25,14 @@ SCENES, SCENES_OF_NEW_PERFORMERS = 60, 24
 NEW_SEED = 12  # of scenes of new performers
 FPS, SECONDS = 15.0, 1.2
 STRIDE = 2  # frames of a recording between two of the clip
-MOST_BETA, BETA_SPREAD = 4.0, 1.5  # wider than the default body's population
+MAX_BETA, BETA_SPREAD = 4.0, 1.5  # wider than the default body's population
 CHILD_SCALE, HEAD_GROWTH = (0.62, 0.85), 0.6  # a child of 0.62 has a head 1 + 0.6 * 0.38 times as large, relatively
 LOOSE_M, HAIR_M = (0.008, 0.03), (0.0, 0.05)
 FOCAL = (0.7, 1.7)  # over the longer side of the picture
 HEIGHT_M, DISTANCE_M = (0.5, 2.3), (2.2, 8.0)
 SHAKE_DEG, PAN_LAG = 0.3, 0.8  # of a held camera; the share of the person's way that it follows
-MARGIN, LEAST_TALL = 0.01, 0.6  # of the picture's height; of its shorter side, what the person's stature appears as
-MOST_HIDDEN = 0.5  # of the first person's limb joints, in all frames together, behind the block
+MARGIN, MIN_TALL = 0.01, 0.6  # of the picture's height; of its shorter side, what the person's stature appears as
+MAX_HIDDEN = 0.5  # of the first person's limb joints, in all frames together, behind the block
 NEAREST_M, APART_M = 0.9, 0.35  # skin to camera; people from each other and from the block
 EVERY_VERTEX, EVERY_FRAME = 40, 4  # that a camera is tested with
 TRIES, TRIES_EACH, CAMERAS_EACH = 400, 20, 20  # of all recordings, of each, and of each drawn person
@@ -93,7 +93,7 @@ def draw_person(
         return None
     if frames is not None and len(section) < frames:
         return None
-    betas = np.clip(BETA_SPREAD * rng.standard_normal(body.P), -MOST_BETA, MOST_BETA)
+    betas = np.clip(BETA_SPREAD * rng.standard_normal(body.P), -MAX_BETA, MAX_BETA)
     scale = float(rng.uniform(*CHILD_SCALE)) if is_child else 1.0
     states, pelvis = states_and_pelvis(body, take, section, betas)
     R_heading = exp(np.array([0.0, 0.0, rng.uniform(0, 2 * np.pi)]))
@@ -153,7 +153,7 @@ def _film(
         return None
     rest = (kind.size, FPS, kind.camera, kind.surroundings, block, int(rng.integers(1 << 31)))
     scene = Scene(number, split, people, intrinsics, poses, *rest)
-    if block is not None and scene.hidden(first, body).mean() > MOST_HIDDEN:
+    if block is not None and scene.hidden(first, body).mean() > MAX_HIDDEN:
         return None
     return scene if _well_inside(body, scene) else None
 
@@ -198,7 +198,7 @@ def _well_inside(body: Body, scene: Scene) -> bool:
             if pixels.min() < margin or (pixels.max((0, 1)) > np.array(scene.size) - 1 - margin).any():
                 return False
             depth = np.median(camera[..., 2])
-            if scene.intrinsics[0, 0] * person.stature_m(body) / depth < LEAST_TALL * min(width, height):
+            if scene.intrinsics[0, 0] * person.stature_m(body) / depth < MIN_TALL * min(width, height):
                 return False
     return True
 

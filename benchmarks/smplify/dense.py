@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 STEP = 1e-6  # of the forward differences
-DAMPING, LEAST, MOST = 1e-3, 1e-9, 1e9  # relative to the diagonal of JᵀJ
+DAMPING, MIN_DAMPING, MAX_DAMPING = 1e-3, 1e-9, 1e9  # relative to the diagonal of JᵀJ
 Vector = NDArray[np.float64]
 Residuals = Callable[[Vector], Vector]  # (B, n) -> (B, m): B points at a time
 
@@ -50,9 +50,9 @@ def minimize(residuals: Residuals, x: Vector, free: NDArray[np.bool_], limit: in
             if lower < cost:
                 break
             damping *= 10
-            if damping > MOST:
+            if damping > MAX_DAMPING:
                 return Minimum(x, cost, iteration)
-        decrease, x, r, cost, damping = (cost - lower) / cost, trial, r_trial, lower, max(damping / 10, LEAST)
+        decrease, x, r, cost, damping = (cost - lower) / cost, trial, r_trial, lower, max(damping / 10, MIN_DAMPING)
         if decrease < tolerance:
             return Minimum(x, cost, iteration + 1)
     return Minimum(x, cost, limit)

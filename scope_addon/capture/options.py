@@ -22,7 +22,7 @@ from .perception.adapters.detectors.box_detector import BoxDetector
 from .perception.adapters.keypoints.keypoint_network import KeypointNetwork
 from .perception.execution import Execution
 from .perception.sessions import landmark_network_name
-from .tracking.tracker import MOST_PEOPLE
+from .tracking.tracker import MAX_PEOPLE
 
 WINDOW_S = 120.0
 _DEFAULT = {option.name: option.default for option in OPTIONS}
@@ -107,12 +107,12 @@ def check_networks(options: CaptureOptions) -> None:
 def most_people(people: int | str) -> int:
     """Return the maximum number of people to capture.
 
-    :raises UsageError: neither a number from 1 to `MOST_PEOPLE` nor one of the words.
+    :raises UsageError: neither a number from 1 to `MAX_PEOPLE` nor one of the words.
     """
     if people == LARGEST:
         return 1
     if people == ALL:
-        return MOST_PEOPLE
-    if isinstance(people, str) or not 1 <= people <= MOST_PEOPLE:
-        raise UsageError(f"people must be {LARGEST}, {ALL} or 1 to {MOST_PEOPLE}, but is {people!r}")
+        return MAX_PEOPLE
+    if isinstance(people, str) or not 1 <= people <= MAX_PEOPLE:
+        raise UsageError(f"people must be {LARGEST}, {ALL} or 1 to {MAX_PEOPLE}, but is {people!r}")
     return people

@@ -11,7 +11,7 @@ from typing import Any
 
 from ..job.clips.task import COUNT, ClipTask, Entry
 
-MOST_WINDOWS = 5  # in a task: what a lost worker costs
+MAX_WINDOWS = 5  # in a task: what a lost worker costs
 TASKS_PER_WORKER = 2  # at least, so that a faster worker gets more of them
 
 
@@ -81,7 +81,7 @@ class Divisions:
 
 def window_ranges(windows: int, workers: int) -> list[str]:
     """Return ranges ``FIRST:END`` of successive windows, each of which becomes a task."""
-    size = max(1, min(MOST_WINDOWS, math.ceil(windows / (TASKS_PER_WORKER * max(workers, 1)))))
+    size = max(1, min(MAX_WINDOWS, math.ceil(windows / (TASKS_PER_WORKER * max(workers, 1)))))
     return [f"{first}:{min(first + size, windows)}" for first in range(0, windows, size)]
 
 

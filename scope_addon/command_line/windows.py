@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..capture.stages.clock import Progress
 
 WINDOW_SECONDS = "--window-seconds"
-_LEAST_S = 0.1
+_MIN_S = 0.1
 
 
 def add_window_arguments(capture: argparse.ArgumentParser) -> None:
@@ -41,8 +41,8 @@ def with_window_seconds(options: CaptureOptions, args: argparse.Namespace) -> Ca
     """
     if args.window_seconds is None:
         return options
-    if not _LEAST_S <= args.window_seconds < math.inf:
-        raise UsageError(f"{WINDOW_SECONDS} must be at least {_LEAST_S:g}, but is {args.window_seconds:g}")
+    if not _MIN_S <= args.window_seconds < math.inf:
+        raise UsageError(f"{WINDOW_SECONDS} must be at least {_MIN_S:g}, but is {args.window_seconds:g}")
     return replace(options, window_s=args.window_seconds)
 
 

@@ -32,7 +32,7 @@ from ..capture.tracking.left_right import (
     readings_of,
 )
 
-_MOST_FRAMES = 120  # that are kept for an answer
+_MAX_FRAMES = 120  # that are kept for an answer
 
 
 @dataclass
@@ -94,7 +94,7 @@ class CausalLeftRight:
         for frame in self._frames:
             total = (totals[-1][:, None] + frame.steps).min(axis=0) + frame.costs
             totals.append(total - total.min())
-        while len(self._frames) > 1 and (self._frames[0].reference is None or len(self._frames) > _MOST_FRAMES):
+        while len(self._frames) > 1 and (self._frames[0].reference is None or len(self._frames) > _MAX_FRAMES):
             self._frames.popleft()
             totals.pop(0)
             self._before = totals[0]

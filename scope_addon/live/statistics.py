@@ -8,7 +8,7 @@ from collections import deque
 import numpy as np
 
 RECENT_S = 2.0  # over which the rate is shown
-MOST_LATENCIES = 100_000  # the last hour at 28 poses/s
+MAX_LATENCIES = 100_000  # the last hour at 28 poses/s
 
 
 class Statistics:
@@ -16,7 +16,7 @@ class Statistics:
 
     def __init__(self) -> None:
         self._given: deque[float] = deque()
-        self._latencies: deque[float] = deque(maxlen=MOST_LATENCIES)
+        self._latencies: deque[float] = deque(maxlen=MAX_LATENCIES)
         self.poses = 0
         self._first_s = self._last_s = 0.0
 

@@ -44,7 +44,7 @@ LENSES = (
 )
 
 
-_MOST_PEOPLE = 100  # whose heights can be given
+_MAX_PEOPLE = 100  # whose heights can be given
 
 
 def _parse_people(text: str) -> int | str:
@@ -58,8 +58,8 @@ def _parse_people(text: str) -> int | str:
 def _parse_heights(text: str) -> tuple[float, ...]:
     """Convert a list in centimetres, one number for each person, to metres."""
     numbers = text.split(",")
-    if len(numbers) > _MOST_PEOPLE:
-        raise ValueError(f"must give at most {_MOST_PEOPLE} heights, not {len(numbers)}")
+    if len(numbers) > _MAX_PEOPLE:
+        raise ValueError(f"must give at most {_MAX_PEOPLE} heights, not {len(numbers)}")
     try:
         return tuple(float(number) / 100 for number in numbers)
     except ValueError as error:

@@ -8,7 +8,7 @@ from pathlib import Path
 from .capture import QUALITIES
 from .record import Argument, Option, Place, Property
 
-MOST_PEOPLE = 4
+MAX_PEOPLE = 4
 
 LIVE_OPTIONS = (
     Option(
@@ -28,7 +28,7 @@ LIVE_OPTIONS = (
         Place.LIVE | Place.LIVE_WORKER | Place.LIVE_PANEL,
         "maximum number of people to follow; each one takes time",
         minimum=1,
-        maximum=MOST_PEOPLE,
+        maximum=MAX_PEOPLE,
         argument=Argument("--people", "N"),
         blender=Property("people", "People"),
     ),

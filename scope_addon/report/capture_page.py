@@ -40,7 +40,7 @@ _SHORT = {
     "floor": "under the floor",
     "warned": "warning",
 }
-_MOST_SPANS = 60  # that the page lists
+_MAX_SPANS = 60  # that the page lists
 _GAP_S = 0.25  # between spans that are listed as one
 _AT_TIME = re.compile(r"at (\d+\.\d) s")  # in warnings
 
@@ -218,10 +218,10 @@ def review_table(motions: Sequence[Motion], spans: Sequence[Sequence[Span]]) -> 
                 rows[-1].append(_name(n, motions))
     if not rows:
         return Markup("")
-    more = len(rows) - _MOST_SPANS
+    more = len(rows) - _MAX_SPANS
     head = ("Time", "Frames", "To review", *(("Person",) if len(motions) > 1 else ()))
     said = f'<p class="note">and {more} more</p>' if more > 0 else ""
-    return Markup(page.table(head, rows[:_MOST_SPANS], markup_columns=(0,)) + said)
+    return Markup(page.table(head, rows[:_MAX_SPANS], markup_columns=(0,)) + said)
 
 
 def figures_table(motions: Sequence[Motion], body: Body) -> Markup:

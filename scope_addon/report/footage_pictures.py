@@ -19,7 +19,7 @@ from ..errors import OutputError
 from ..motion import Motion
 
 PICTURES, LONGEST_SIDE = 40, 800
-MOST_BYTES = 5_000_000  # of all pictures of a page
+MAX_BYTES = 5_000_000  # of all pictures of a page
 _QUALITY = 74  # of WebP
 
 Progress = Callable[[int, int], None]
@@ -48,7 +48,7 @@ def overlay_pictures(
     wanted: FootageRange | None = None,
     progress: Progress | None = None,
 ) -> list[Picture]:
-    """Return at most `PICTURES` frames of the overlay, in chronological order, of at most `MOST_BYTES` together.
+    """Return at most `PICTURES` frames of the overlay, in chronological order, of at most `MAX_BYTES` together.
 
     :param rows: (n,) rows of the motions that the page shows.
     :param wanted: the range of the footage that was captured.
@@ -64,7 +64,7 @@ def overlay_pictures(
         pictures.append(small_picture(row_of[index], image))
         if progress is not None:
             progress(len(pictures), len(chosen))
-    return bounded(pictures, MOST_BYTES)
+    return bounded(pictures, MAX_BYTES)
 
 
 def spread_rows(count: int, most: int) -> NDArray[np.int64]:

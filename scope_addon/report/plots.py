@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 WIDTH, HEIGHT = 1000.0, 100.0
 _AREA_PX, _TOP_PX, _AXIS_PX = 120, 10, 24  # heights of the plot area, of the space above it, and of the axis below it
 _ROW_PX = 22  # of a band
-_MOST_POINTS = 1200  # of a curve; of more, the smallest and the largest of each interval are drawn
+_MAX_POINTS = 1200  # of a curve; of more, the smallest and the largest of each interval are drawn
 
 Array = NDArray[np.float64]
 
@@ -158,9 +158,9 @@ def area_path(x: Array, values: Array, x_axis: Axis, bottom: float, height: floa
 def thinned(x: Array, y: Array) -> tuple[Array, Array]:
     """Return fewer points of a long curve, x (n,) and y (n,): the smallest and the largest y of each interval."""
     count = len(x)
-    if count <= _MOST_POINTS:
+    if count <= _MAX_POINTS:
         return x, y
-    edges = np.linspace(0, count, _MOST_POINTS // 2 + 1).astype(int)
+    edges = np.linspace(0, count, _MAX_POINTS // 2 + 1).astype(int)
     kept = []
     for first, end in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
         part = y[first:end]

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ...solver.body import Body
 from ..motion import Motion
 
-MOST_BYTES = 4_500_000  # of all people over time; of longer clips, every n-th frame is shown
+MAX_BYTES = 4_500_000  # of all people over time; of longer clips, every n-th frame is shown
 _QUATERNION = 32767
 
 
@@ -29,7 +29,7 @@ def shown_rows(motions: Sequence[Motion]) -> NDArray[np.int64]:
     frames = len(motions[0])
     of_camera, of_root = 12 * 4 + 8, 3 * 4 + 1
     size = frames * (of_camera + sum(8 * motion.joint_count + of_root for motion in motions))
-    return np.arange(0, frames, max(1, -(-size // MOST_BYTES)))
+    return np.arange(0, frames, max(1, -(-size // MAX_BYTES)))
 
 
 def viewer_data(

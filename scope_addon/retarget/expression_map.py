@@ -25,7 +25,7 @@ LARGEST_ANGLE = 180.0  # degrees
 MOVED = ("left", "up", "forward")  # channels of a control: shares of a length of the face
 TURNED = ("pitch", "yaw", "roll")  # degrees about left, up and forward: down, to the left, with the left side up
 _KIND = "expression map"
-_LEAST_ARKIT = 5  # keys with ARKit's names from which others, such as visemes, are left alone
+_MIN_ARKIT = 5  # keys with ARKit's names from which others, such as visemes, are left alone
 _BOTH_BLINK = {"eyeBlinkLeft": 0.5, "eyeBlinkRight": 0.5}
 _SMILE = {"mouthSmileLeft": 0.5, "mouthSmileRight": 0.5}
 _STRETCH = {"mouthStretchLeft": 0.5, "mouthStretchRight": 0.5}
@@ -120,7 +120,7 @@ def guess_expression_map(keys: Iterable[str]) -> ExpressionMap:
     """Guess the map from the names of shape keys: ARKit's, else Oculus' visemes, else VRM's and VRoid's expressions."""
     names = {key: _plain(key) for key in keys}
     arkit = {key: {_ARKIT[name]: 1.0} for key, name in names.items() if name in _ARKIT}
-    if len(arkit) >= _LEAST_ARKIT:
+    if len(arkit) >= _MIN_ARKIT:
         return ExpressionMap(arkit)
     found = {}
     for key, name in names.items():

@@ -18,7 +18,7 @@ _HEADER_BYTES = 27
 _SCALAR_BYTES = {"C": 1, "B": 1, "Y": 2, "I": 4, "F": 4, "D": 8, "L": 8}
 _ELEMENT_BYTES = {"b": 1, "c": 1, "i": 4, "f": 4, "d": 8, "l": 8}
 _LARGEST_UNPACKED = 1 << 30  # bytes of all arrays together
-_MOST_NODES, _DEEPEST = 5_000_000, 64
+_MAX_NODES, _DEEPEST = 5_000_000, 64
 _STEP = 1 << 20
 
 
@@ -54,7 +54,7 @@ class _Checker:
             raise ValueError("its nodes are nested too deeply")
         while at < end:
             self._nodes += 1
-            if self._nodes > _MOST_NODES:
+            if self._nodes > _MAX_NODES:
                 raise ValueError("it has too many nodes")
             node_end, count, size, name = self._node.unpack_from(self._data, at)
             if node_end == 0:

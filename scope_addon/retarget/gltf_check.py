@@ -20,7 +20,7 @@ from ...solver.loaders.regular_file import check_regular
 _COMPONENT_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 _COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 _LARGEST_JSON, _LARGEST_FILE = 200_000_000, 2 << 30
-_MOST_ELEMENTS = 50_000_000  # of an accessor without data, whose elements are all zero
+_MAX_ELEMENTS = 50_000_000  # of an accessor without data, whose elements are all zero
 _DAMAGED = (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError, RecursionError, struct.error)
 
 
@@ -105,7 +105,7 @@ def _check_accessor(accessor: dict[str, Any], views: list[dict[str, Any]]) -> No
     if "bufferView" in accessor:
         _check_within(views[accessor["bufferView"]], accessor.get("byteOffset", 0), count, item_bytes)
     else:
-        _require(count <= _MOST_ELEMENTS)
+        _require(count <= _MAX_ELEMENTS)
     if "sparse" in accessor:
         sparse = accessor["sparse"]
         index, values, changed = sparse["indices"], sparse["values"], _natural(sparse["count"])

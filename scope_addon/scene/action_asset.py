@@ -18,7 +18,7 @@ from .skeleton_picture import skeleton_picture
 TAGS = ("mocap", "scope")
 CATALOGS_FILE = "blender_assets.cats.txt"
 _SIZE = 256  # pixels of Blender's large previews
-_MOST_BONES = 200
+_MAX_BONES = 200
 _THICKNESS, _THIN, _THICK = 0.12, 0.012, 0.07  # of a bone without a ring: share of its length, and limits in metres
 _RING_TO_LIMB = 0.7  # a ring lies around the surface; a thinner capsule shows the limbs apart
 
@@ -60,7 +60,7 @@ def set_preview(action: bpy.types.Action, armature: bpy.types.Object, frame: flo
     try:
         posed = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
         bones = [bone for bone in posed.pose.bones if bone.bone.use_deform] or list(posed.pose.bones)
-        bones = bones[:_MOST_BONES]
+        bones = bones[:_MAX_BONES]
         if not bones:
             return
         place = np.array(posed.matrix_world, float)

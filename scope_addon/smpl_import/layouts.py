@@ -24,8 +24,8 @@ from ...solver.rotations import log
 from ..errors import MotionFileError
 from ..kinematics.frame_blocks import by_blocks
 
-MOST_FRAMES = 500_000  # more than two hours at 60 frames per second
-_MOST_BETAS = 400
+MAX_FRAMES = 500_000  # more than two hours at 60 frames per second
+_MAX_BETAS = 400
 _LARGEST_RATE = 10_000.0
 _ORTHONORMAL = 0.01  # largest deviation of RᵀR from the identity
 _FARTHEST_M = 1e5  # from the origin; a number beyond that is not in metres
@@ -156,9 +156,9 @@ def _axis_angles(array: NDArray[Any], name: str, path: Path) -> NDArray[np.float
     """Return axis-angle vectors (T, J, 3) of an array of them, or of rotation matrices (T, J, 3, 3)."""
     if array.ndim == 0 or len(array) == 0:
         raise MotionFileError(f"{path}: {name} has no frames; choose another file")
-    if len(array) > MOST_FRAMES:
+    if len(array) > MAX_FRAMES:
         raise MotionFileError(
-            f"{path}: {name} has {len(array)} frames, but at most {MOST_FRAMES} can be imported; cut it"
+            f"{path}: {name} has {len(array)} frames, but at most {MAX_FRAMES} can be imported; cut it"
         )
     values = _numbers(array, name, path)
     if values.ndim >= 3 and values.shape[-2:] == (3, 3) and (values.ndim == 4 or values.shape[1:] == (3, 3)):
@@ -196,7 +196,7 @@ def _betas(arrays: Mapping[str, NDArray[Any]], count: int, path: Path) -> NDArra
     if key is None:
         return np.zeros(0)
     values = np.atleast_1d(_numbers(np.atleast_1d(arrays[key]), key, path))
-    if values.ndim > 2 or values.shape[-1] > _MOST_BETAS or (values.ndim == 2 and len(values) not in (1, count)):
+    if values.ndim > 2 or values.shape[-1] > _MAX_BETAS or (values.ndim == 2 and len(values) not in (1, count)):
         raise MotionFileError(f"{path}: {key} has shape {values.shape}, but must have (10,) or ({count}, 10), or 16")
     return values if values.ndim == 1 else values.mean(axis=0)
 

@@ -24,7 +24,7 @@ from ..compiled.tree import Tree
 from ..errors import InvalidValueError
 from . import numeric
 
-MOST = 16  # external residuals; each has a column of the weights
+MAX_EXTERNAL = 16  # external residuals; each has a column of the weights
 INDEXES = ("points", "parts", "joints")
 
 _I, _F = types.int64, types.float64

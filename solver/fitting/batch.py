@@ -48,7 +48,7 @@ def fit_batch(
     for k, state in enumerate(init or ()):
         check_type(state, (State, type(None)), f"init[{k}]")
     if init is not None and len(init) != len(measurements):
-        raise ShapeError(f"There must be one initial state a frame, {len(measurements)}, but got {len(init)}.")
+        raise ShapeError(f"There must be one initial state per frame, {len(measurements)}, but got {len(init)}.")
     starts = [None] * len(measurements) if init is None else list(init)
     tree = make_tree(body)
     priors = default_priors(body) if priors is None else priors

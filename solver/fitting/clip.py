@@ -20,7 +20,7 @@ from ..compiled.tree import BodyArrays, Tree, make_tree, with_fixed_shape
 from ..custom_residuals.external import raise_failure
 from ..errors import ShapeError
 from ..gauss_newton.linearize import linearize, make_blocks, make_pose
-from ..gauss_newton.optimizer import DAMPING_LEAST, make_settings
+from ..gauss_newton.optimizer import MIN_DAMPING, make_settings
 from ..gauss_newton.recursion import Workspace, eliminate, make_workspace, retract, solve_globals, substitute
 from ..gauss_newton.several_frames import SeveralFrames, SharedPriors
 from ..gauss_newton.terms import Terms, fill_terms, pack_priors, usable
@@ -83,7 +83,7 @@ def fit_clip(
     check_weight(focal_weight, "focal_weight")
     check_count(shape_frames, "shape_frames")
     if init is not None and len(init) != len(measurements):
-        raise ShapeError(f"There must be one initial state a frame, {len(measurements)}, but got {len(init)}.")
+        raise ShapeError(f"There must be one initial state per frame, {len(measurements)}, but got {len(init)}.")
     priors = default_priors(body) if priors is None else priors
     check_type(priors, Priors, "priors")
     check_type(options, Options, "options")
@@ -273,7 +273,7 @@ class _Joint(SeveralFrames):
         last, triggs = self.stages[-1], self.settings.triggs
         for f in self.frames:
             f.cost = linearize(self.tree, f.terms, last, triggs, f.pose, f.blocks, f.work.scratch)
-            eliminate(self.tree, f.pose, f.blocks, DAMPING_LEAST, self.settings.root_scale, f.work)
+            eliminate(self.tree, f.pose, f.blocks, MIN_DAMPING, self.settings.root_scale, f.work)
             shares = self._shares(f) if self.report else {}
             outcome = Outcome(self.status, float(f.cost), self.iterations, self.rejected, shares)
             information = f.work.C[: self.P, : self.P].copy()
@@ -297,7 +297,7 @@ class _Joint(SeveralFrames):
         if not self.frames:
             prior: NDArray[np.float64] = self.shape_weights[-1] * self.shared.shape_information
             return prior
-        C, _, _ = self._reduced(len(self.stages) - 1, DAMPING_LEAST)
+        C, _, _ = self._reduced(len(self.stages) - 1, MIN_DAMPING)
         return shape_information(C[: self.tree.globals, : self.tree.globals], P)
 
 

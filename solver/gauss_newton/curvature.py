@@ -20,8 +20,8 @@ from ..compiled.kernel import kernel
 from ..compiled.part import GRADIENT, Array, Blocks, Pose
 from ..compiled.tree import Tree
 
-LEAST_SHARE = 0.2  # of JᵀJ that H + t S keeps
-LEAST_COSINE = 0.1  # between d and w: below, dᵀw is uncertain and the update would be large
+MIN_SHARE = 0.2  # of JᵀJ that H + t S keeps
+MIN_COSINE = 0.1  # between d and w: below, dᵀw is uncertain and the update would be large
 SHORTEST_STEP = 1e-7  # radians: below, the difference of two gradients is mostly rounding
 
 
@@ -80,7 +80,7 @@ def allowed_share(H, S) -> float:  # type: ignore[no-untyped-def]
     """Return t: how much of S may be added to H."""
     h00, h01, h02, h11, h12, h22 = upper(H)
     s00, s01, s02, s11, s12, s22 = upper(S)
-    k, t = 1.0 - LEAST_SHARE, 1.0
+    k, t = 1.0 - MIN_SHARE, 1.0
     for _ in range(4):
         if _positive(
             k * h00 + t * s00, k * h01 + t * s01, k * h02 + t * s02,
@@ -139,7 +139,7 @@ def update(
         d1 = Q[0, 1] * x + Q[1, 1] * y + Q[2, 1] * z - g[1] - m01 * w0 - m11 * w1 - m12 * w2
         d2 = Q[0, 2] * x + Q[1, 2] * y + Q[2, 2] * z - g[2] - m02 * w0 - m12 * w1 - m22 * w2
         along = d0 * w0 + d1 * w1 + d2 * w2
-        if along * along > LEAST_COSINE * LEAST_COSINE * length * (d0 * d0 + d1 * d1 + d2 * d2):
+        if along * along > MIN_COSINE * MIN_COSINE * length * (d0 * d0 + d1 * d1 + d2 * d2):
             k = 1.0 / along
             _store(
                 S,

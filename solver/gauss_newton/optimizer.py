@@ -23,9 +23,9 @@ from .curvature import Curvature, apply_correction, reset, set_current, update
 from .linearize import linearize
 from .recursion import Workspace, eliminate, retract, step
 
-DAMPING_LEAST, DAMPING_MOST = 1e-9, 1e12
+MIN_DAMPING, MAX_DAMPING = 1e-9, 1e12
 FIRST_GROWTH = 2.0  # of the damping after the first rejected step; it doubles with every further one in a row
-LEAST_DECREASE = 1e-13  # a predicted decrease below this share of the cost is rounding
+MIN_DECREASE = 1e-13  # a predicted decrease below this share of the cost is rounding
 RUNNING = -1  # not a `Status`: the stage goes on
 CONVERGED, MAX_ITERATIONS, STALLED, NO_MEASUREMENTS, NON_FINITE = range(5)  # values of `Status`
 
@@ -73,10 +73,10 @@ def judge_trial(
     if trial_cost < cost:  # False for NaN
         decrease = cost - trial_cost
         gain = 2.0 * decrease / predicted - 1.0
-        damping = min(max(damping * max(1.0 / 9.0, 1.0 - gain**3), DAMPING_LEAST), DAMPING_MOST)
+        damping = min(max(damping * max(1.0 / 9.0, 1.0 - gain**3), MIN_DAMPING), MAX_DAMPING)
         return True, damping, FIRST_GROWTH, CONVERGED if decrease <= tolerance * cost else RUNNING
     damping *= growth
-    return False, damping, 2.0 * growth, STALLED if damping > DAMPING_MOST else RUNNING
+    return False, damping, 2.0 * growth, STALLED if damping > MAX_DAMPING else RUNNING
 
 
 _judge_trial = kernel(judge_trial)  # for `optimize`; several_frames.py, whose loop is not compiled, calls it as it is
@@ -104,7 +104,7 @@ def _run_stage(tree, terms, s, settings, memory, start):  # type: ignore[no-unty
         if settings.curvature:
             apply_correction(tree, pose, blocks, curvature, 1.0)
         predicted = step(tree, pose, blocks, damping, settings.root_scale, work)
-        if predicted <= LEAST_DECREASE * cost:
+        if predicted <= MIN_DECREASE * cost:
             status = CONVERGED
             break
         iterations += 1
@@ -153,5 +153,5 @@ def optimize(tree, terms, measured, settings, memory):  # type: ignore[no-untype
         cost = linearize(
             tree, terms, settings.stages[-1], settings.triggs, memory.poses[0], memory.blocks[0], work.scratch
         )
-    eliminate(tree, memory.poses[at], memory.blocks[at], DAMPING_LEAST, settings.root_scale, work)
+    eliminate(tree, memory.poses[at], memory.blocks[at], MIN_DAMPING, settings.root_scale, work)
     return cost, status, iterations, rejected, at

@@ -10,8 +10,8 @@ from ..compiled.part import Array
 from .optimizer import (
     CONVERGED,
     FIRST_GROWTH,
-    LEAST_DECREASE,
     MAX_ITERATIONS,
+    MIN_DECREASE,
     NON_FINITE,
     RUNNING,
     Settings,
@@ -67,7 +67,7 @@ class SeveralFrames(ABC):
             return NON_FINITE
         for _ in range(settings.limits[s]):
             predicted = self._step(s, damping)
-            if predicted <= LEAST_DECREASE * self.cost:
+            if predicted <= MIN_DECREASE * self.cost:
                 status = CONVERGED
                 break
             self.iterations += 1

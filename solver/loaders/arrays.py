@@ -15,7 +15,7 @@ from ..errors import ModelFileError
 
 # What a file's array must hold, and its shape; None is any extent.
 Form = tuple[str, tuple[int | None, ...]]
-_LEAST_EXTENT_M, _LARGEST_EXTENT_M = 0.01, 50.0  # of a template along each axis
+_MIN_EXTENT_M, _MAX_EXTENT_M = 0.01, 50.0  # of a template along each axis
 _KINDS = {"numbers": "iuf", "whole numbers": "iu", "text": "U"}
 
 REQUIRED: dict[str, Form] = {
@@ -126,7 +126,7 @@ def check_extent(v_template: NDArray[np.float64], path: Path) -> None:
     :raises ModelFileError: it measures less or more along an axis than any body, or has no vertices.
     """
     extent = np.ptp(v_template, axis=0) if len(v_template) else np.zeros(3)
-    if not (extent.min() >= _LEAST_EXTENT_M and extent.max() <= _LARGEST_EXTENT_M):
+    if not (extent.min() >= _MIN_EXTENT_M and extent.max() <= _MAX_EXTENT_M):
         size = " × ".join(f"{side:.3g}" for side in extent)
         raise ModelFileError(
             f"{path}: v_template measures {size} m, which no body does; choose a file whose unit is the metre"

@@ -31,7 +31,7 @@ from .skeletons import recognise_skeleton
 
 MAX_BETAS = 16  # as AMASS; SMPL-X and STAR files carry 300, most of them below a millimetre
 SMPLX_SHAPE, SMPLX_EXPRESSION = 300, 100  # how a full SMPL-X file divides shapedirs; older ones have 10 and 10
-MOST_VERTICES, MOST_JOINTS, MOST_WEIGHTS = 200_000, 500, 20_000_000  # SMPL-X: 10475, 55, 576125
+MAX_VERTICES, MAX_JOINTS, MAX_WEIGHTS = 200_000, 500, 20_000_000  # SMPL-X: 10475, 55, 576125
 STAR_CORRECTIVES = 93  # 23 quaternions and one shape coefficient; SMPL has 207
 
 _NUMERIC = ("v_template", "shapedirs", "J_regressor", "kintree_table", "weights", "f")
@@ -112,7 +112,7 @@ def _check_tables(arrays: dict[str, NDArray[Any]], path: Path) -> None:
         raise ModelFileError(
             f"{path}: {vertices} vertices and {n} joints do not match any supported body; choose another file"
         )
-    if vertices > MOST_VERTICES or n > MOST_JOINTS or vertices * n > MOST_WEIGHTS:
+    if vertices > MAX_VERTICES or n > MAX_JOINTS or vertices * n > MAX_WEIGHTS:
         raise ModelFileError(f"{path}: {vertices} vertices and {n} joints are too many for a body; choose another")
     forms: dict[str, Form] = {
         "weights": ("numbers", (vertices, n)),

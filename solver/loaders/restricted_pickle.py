@@ -24,7 +24,7 @@ from .pickled_values import Discarded, Global, stand_in
 from .regular_file import in_one_line
 
 LARGEST_FILE = 1 << 30  # bytes; the largest official SMPL-X pickle has half of it
-MOST_OPCODES = 200_000  # official files need a few thousand
+MAX_OPCODES = 200_000  # official files need a few thousand
 
 _UNREADABLE: tuple[type[Exception], ...] = (pickle.UnpicklingError, EOFError, AttributeError, ValueError, TypeError)
 _UNREADABLE += (LookupError, OverflowError, struct.error, MemoryError)
@@ -134,8 +134,8 @@ class _Handlers(dict[int, Callable[[Any], object]]):
 
     def __getitem__(self, opcode: int) -> Callable[[Any], object]:
         self._count += 1
-        if self._count > MOST_OPCODES:
-            raise ModelFileError(f"it has more than {MOST_OPCODES} pickle instructions, too many for such a file")
+        if self._count > MAX_OPCODES:
+            raise ModelFileError(f"it has more than {MAX_OPCODES} pickle instructions, too many for such a file")
         return super().__getitem__(opcode)
 
     def __missing__(self, opcode: int) -> Callable[[Any], object]:

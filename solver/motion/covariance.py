@@ -21,7 +21,7 @@ from ..compiled.part import Array, Pose
 from ..compiled.rows import add1, clear
 from ..compiled.tree import Tree
 from ..gauss_newton.gram import subtract_gram_rows
-from ..gauss_newton.optimizer import DAMPING_LEAST
+from ..gauss_newton.optimizer import MIN_DAMPING
 from .band import Factor, eliminate_clip, far_width, run_both
 from .system import GLOBALS, ClipSystem
 
@@ -56,7 +56,7 @@ def joint_covariances(
     :param system: linearized at `poses`; `factor` is overwritten.
     :param pool: a thread of it takes the second half.
     """
-    eliminate_clip(system, DAMPING_LEAST, root_scale, factor, pool)
+    eliminate_clip(system, MIN_DAMPING, root_scale, factor, pool)
     T, n, _ = system.N.shape
     G, parts, W = tree.globals, len(tree.parents), len(factor.c)
     C = np.triu(factor.C[:G, :G])

@@ -101,7 +101,7 @@ def fit_motion(
     check_list(frames, "frames", "frame")
     clock = _checked_times(times, len(frames))
     if init is not None and len(init) != len(frames):
-        raise ShapeError(f"There must be one initial state a frame, {len(frames)}, but got {len(init)}.")
+        raise ShapeError(f"There must be one initial state per frame, {len(frames)}, but got {len(init)}.")
     if not as_number(window, "window") > 0.0:
         raise InvalidValueError(f"window must be a positive number of seconds, or infinite for one, but is {window}.")
     if not 0.0 <= as_number(overlap, "overlap") < window:

@@ -13,7 +13,7 @@ from ..options import Options, Priors
 from ..state import State
 from .views import View
 
-_LEAST_CONDITION = 1e-4  # of a point's rays: smallest over largest eigenvalue, below which they are too nearly parallel
+_MIN_CONDITION = 1e-4  # of a point's rays: smallest over largest eigenvalue, below which they are too nearly parallel
 
 
 def initial_states(
@@ -60,7 +60,7 @@ def triangulated(views: Sequence[View], points: int) -> Measurements:
                 row = np.broadcast_to(R[axis], (usable.sum(), 3))
                 _add_rows(A, b, indices[usable], row, q[usable, axis] - t[axis], q[usable, 3])
         values = np.linalg.eigvalsh(A)
-        fixed = values[:, 0] > _LEAST_CONDITION * np.maximum(values[:, 2], 1e-12)
+        fixed = values[:, 0] > _MIN_CONDITION * np.maximum(values[:, 2], 1e-12)
         p = np.full((points, 3), np.nan)
         p[fixed] = np.linalg.solve(A[fixed], b[fixed][..., None])[..., 0]
     index = np.flatnonzero(fixed)

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..compiled.kernel import kernel
 from ..compiled.part import Array, Pose
-from ..gauss_newton.optimizer import DAMPING_LEAST
+from ..gauss_newton.optimizer import MIN_DAMPING
 from ..gauss_newton.recursion import move
 from ..gauss_newton.several_frames import SeveralFrames
 from .band import eliminate_clip, make_factor, solve_clip
@@ -69,7 +69,7 @@ class Optimizer(SeveralFrames):
     def information(self) -> Array:
         """Return the information (G, G) of the global columns with all poses eliminated, priors included."""
         G, root_scale = self.problem.tree.globals, self.settings.root_scale
-        eliminate_clip(self.system, DAMPING_LEAST, root_scale, self.factor, self.pool)
+        eliminate_clip(self.system, MIN_DAMPING, root_scale, self.factor, self.pool)
         C = np.triu(self.factor.C[:G, :G])
         information: Array = C + np.triu(C, 1).T
         return information

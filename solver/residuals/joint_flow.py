@@ -49,7 +49,7 @@ FLOATS = WIDTH * (SIZE + 2)  # their parameters, then w and h, each as WIDTH val
 INDEXES = "parts"
 _W = SIZE
 NEAREST = 1e-4  # radians to pi
-_LEAST_TRACE = 4.0 * math.sin(0.5 * NEAREST) ** 2  # of 1 + tr MᵀOmega = 4 cos^2(angle / 2)
+_MIN_TRACE = 4.0 * math.sin(0.5 * NEAREST) ** 2  # of 1 + tr MᵀOmega = 4 cos^2(angle / 2)
 _FARTHEST = math.sin(0.5 * NEAREST) ** -2.5  # of (1 + w^2) / w^(5/2)
 
 # A state of the formulas: x (3), dx/de (9) by rows, |det dx/dmu| without constants, gradient of its logarithm by e (3).
@@ -194,7 +194,7 @@ def _keep_off_half_turns(floats, k, state):  # type: ignore[no-untyped-def]
                 for i in range(3):
                     R[r, c] += M[i, r] * state[(3 * i + c) * WIDTH + lane]
             trace += R[r, r]
-        if 1.0 + trace > _LEAST_TRACE:
+        if 1.0 + trace > _MIN_TRACE:
             continue
         x, y, z = log3(R[0, 0], R[0, 1], R[0, 2], R[1, 0], R[1, 1], R[1, 2], R[2, 0], R[2, 1], R[2, 2])
         scale = (math.pi - NEAREST) / math.sqrt(x * x + y * y + z * z)
@@ -269,7 +269,7 @@ def transform(parameters: Array, Omega: Array) -> tuple[Array, Array, Array, Arr
     p = np.asarray(parameters, float)
     M = p[MEAN : MEAN + 9].reshape(3, 3)
     local = M.T @ np.asarray(Omega, float)
-    near = 1.0 + np.trace(local, axis1=-2, axis2=-1) < _LEAST_TRACE
+    near = 1.0 + np.trace(local, axis1=-2, axis2=-1) < _MIN_TRACE
     if near.any():
         phi = log(local)
         kept = exp(phi * ((np.pi - NEAREST) / np.maximum(np.linalg.norm(phi, axis=-1, keepdims=True), 1.0)))

@@ -24,7 +24,7 @@ import numpy as np
 
 from ..compiled.kernel import inlined_kernel
 from ..compiled.part import Array
-from ..custom_residuals.external import INDEXES, MOST, Registered, external_residuals
+from ..custom_residuals.external import INDEXES, MAX_EXTERNAL, Registered, external_residuals
 from ..errors import InvalidValueError
 from . import floor, foot_contact, joint_flow, joint_limits, joint_prior, pose_prior
 from .image import outline
@@ -42,7 +42,7 @@ RESIDUALS = {
 # Columns of a stage's weights: the measurements, the shape prior, then RESIDUALS in order, then external ones.
 KEYPOINT2D, KEYPOINT3D, ORIENTATION_FIELD, SHAPE_PRIOR, FIRST_TABLE = range(5)
 FIRST_EXTERNAL = FIRST_TABLE + len(RESIDUALS)
-COLUMNS = FIRST_EXTERNAL + MOST
+COLUMNS = FIRST_EXTERNAL + MAX_EXTERNAL
 
 
 @inlined_kernel
@@ -132,8 +132,8 @@ def register_residual(
     allowed = INDEXES if function is None else INDEXES[1:]
     if indexes not in allowed:
         raise InvalidValueError(f"indexes of {name!r} must be one of {', '.join(allowed)}, but is {indexes!r}.")
-    if name not in external and len(external) == MOST:
-        raise InvalidValueError(f"There is room for {MOST} residuals from outside: {', '.join(external)}.")
+    if name not in external and len(external) == MAX_EXTERNAL:
+        raise InvalidValueError(f"There is room for {MAX_EXTERNAL} residuals from outside: {', '.join(external)}.")
     slot = external[name].slot if name in external else len(external)
     external[name] = Registered(name, slot, int(ints), int(floats), indexes, kernel, function)
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scope.scope_addon.cli import PROGRAM, SAMPLE, main
-from scope.scope_addon.cluster.division import MOST_WINDOWS, Divisions, window_ranges
+from scope.scope_addon.cluster.division import MAX_WINDOWS, Divisions, window_ranges
 from scope.scope_addon.job.clips.task import CaptureSettings, ClipTask
 
 from ..job.processes import runs, wait_for
@@ -76,7 +76,7 @@ def result(folder: Path, name: str) -> str:
 def test_windows_become_tasks_of_at_most_some_windows() -> None:
     assert window_ranges(3, 1) == ["0:2", "2:3"]
     assert window_ranges(30, 4) == ["0:4", "4:8", "8:12", "12:16", "16:20", "20:24", "24:28", "28:30"]
-    assert all(int(e) - int(b) <= MOST_WINDOWS for b, e in (r.split(":") for r in window_ranges(1000, 2)))
+    assert all(int(e) - int(b) <= MAX_WINDOWS for b, e in (r.split(":") for r in window_ranges(1000, 2)))
 
 
 def test_the_last_part_of_a_clip_is_followed_by_its_capture(tmp_path: Path) -> None:

@@ -39,9 +39,9 @@ def test_a_file_that_contradicts_itself_is_refused(tmp_path, properties, says):
 def test_nodes_without_end_are_refused(tmp_path, monkeypatch):
     """They would be read for hours, or until nothing is left of the stack."""
     path = fbx(tmp_path / "rig.fbx")  # two nodes, and the end of each list of them
-    monkeypatch.setattr(fbx_check, "_MOST_NODES", 4)
+    monkeypatch.setattr(fbx_check, "_MAX_NODES", 4)
     check_fbx(path)
-    monkeypatch.setattr(fbx_check, "_MOST_NODES", 3)
+    monkeypatch.setattr(fbx_check, "_MAX_NODES", 3)
     with pytest.raises(InputError, match="it has too many nodes"):
         check_fbx(path)
     monkeypatch.setattr(fbx_check, "_DEEPEST", 0)

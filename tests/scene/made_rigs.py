@@ -19,7 +19,7 @@ FRAMES = range(1, 60, 6)
 FBX = Matrix.LocRotScale((0.4, -0.3, 0), Matrix.Rotation(math.radians(90), 3, "X").to_quaternion(), (0.01,) * 3)
 ARMS = [(f"{s}_{a}", f"{s}_{b}") for s in ("left", "right") for a, b in (("shoulder", "elbow"), ("elbow", "wrist"))]
 LEGS = [(f"{s}_{a}", f"{s}_{b}") for s in ("left", "right") for a, b in (("hip", "knee"), ("knee", "ankle"))]
-MOST_KEPT = 8  # captures, of 5 MB each
+MAX_KEPT = 8  # captures, of 5 MB each
 # By what tells their motions apart: the file, and the scene's first, last and current frame.
 _kept: dict[str, tuple[str, tuple[int, int, int]]] = {}
 
@@ -82,7 +82,7 @@ def captured(motion, body=BODY):
         path = os.path.join(os.environ["BLENDER_USER_RESOURCES"], f"captured-{os.getpid()}-{key}.blend")
         bpy.data.libraries.write(path, {result.collection})
         _kept[key] = path, (scene.frame_start, scene.frame_end, scene.frame_current)
-        if len(_kept) > MOST_KEPT:
+        if len(_kept) > MAX_KEPT:
             os.remove(_kept.pop(next(iter(_kept)))[0])
     return result.people[0].armature
 

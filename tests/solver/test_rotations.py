@@ -115,3 +115,35 @@ def test_the_shortest_turn_takes_one_direction_to_the_other_about_what_is_across
     np.testing.assert_allclose(R[1], np.eye(3), atol=1e-12)
     np.testing.assert_allclose(rotations.shortest_turn(a[7], b[7]), R[7], atol=1e-12)
     np.testing.assert_allclose(rotations.shortest_turn(*np.reshape([a, b], (2, 5, 10, 3))), R.reshape(5, 10, 3, 3))
+
+
+def test_small_angles_have_all_their_digits():
+    """At 0.03 rad, where the kernel's logarithm is a series, its fourth term is 3e-11 of the angle."""
+    vectors = 0.03 * AXES
+    rotation_matrices = np.array([exp_by_doubling(v) for v in vectors])
+    for found in (rotations.log(rotation_matrices), [rotations.log3(*r.ravel()) for r in rotation_matrices]):
+        np.testing.assert_allclose(found, vectors, rtol=0.0, atol=0.03 * 1e-12)
+
+
+def test_nearly_orthonormal_matrices_become_the_nearest_rotations():
+    """The nearest rotation is the polar factor, here by singular values; a step's error is that of before, squared."""
+    rng = np.random.default_rng(6)
+    matrices = rotations.exp(rng.uniform(-3.0, 3.0, (40, 3))) + 1e-8 * rng.standard_normal((40, 3, 3))
+    U, _, Vt = np.linalg.svd(matrices)
+    assert rotations.orthonormalize(matrices)
+    np.testing.assert_allclose(matrices, U @ Vt, atol=4e-15)
+
+
+@pytest.mark.parametrize("column", range(3))
+def test_what_is_no_rotation_is_not_made_orthonormal(column):
+    """A longer axis, two axes that are not at right angles, and a reflection, which is orthonormal as well."""
+    turn = rotations.exp([0.9, -0.7, 1.3])
+    longer, slanted, mirrored = turn.copy(), turn.copy(), turn.copy()
+    longer[:, column] *= 1.0 + 1e-6
+    slanted[:, column] += 1e-6 * turn[:, column - 1]
+    mirrored[:, column] *= -1.0
+    for matrix in (longer, slanted, mirrored, np.full((3, 3), np.nan)):
+        both = np.array([turn, matrix])
+        assert not rotations.orthonormalize(both)
+        np.testing.assert_array_equal(both[1], matrix)
+    assert rotations.orthonormalize(turn[None].copy())

@@ -21,7 +21,7 @@ from onnx import NodeProto, helper, numpy_helper
 
 from .graph import Graph
 
-MOST_DOUBLED = 8  # channels; of more, twice as many take longer than the products
+MAX_DOUBLED = 8  # channels; of more, twice as many take longer than the products
 
 
 def replace_prelu(graph: Graph) -> None:
@@ -71,7 +71,7 @@ class _Nodes:
         one, prelu, depthwise, last = chain
         count = len(self._weights(one))
         groups = [_attributes(each)["group"] for each in (depthwise, last)]
-        if count > MOST_DOUBLED or groups != [count, 1] or len(self._weights(depthwise)) != count:
+        if count > MAX_DOUBLED or groups != [count, 1] or len(self._weights(depthwise)) != count:
             return None
         return one, prelu, depthwise, last
 

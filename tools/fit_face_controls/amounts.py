@@ -21,7 +21,7 @@ Amounts = dict[Channel, float]
 MIRRORED = ("left", "yaw", "roll")  # channels whose sign changes
 EYES = {"eyeLookDown": ("pitch", 11.4), "eyeLookUp": ("pitch", -9.8), "eyeLookIn": ("yaw", -15.0)}
 EYES["eyeLookOut"] = ("yaw", 15.0)  # degrees, of the left eye, as the shapes turn the eyeballs
-_LEAST = {True: 0.015, False: 0.4}  # moves, and turns in degrees, that are written
+_MIN_AMOUNT = {True: 0.015, False: 0.4}  # moves, and turns in degrees, that are written
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ def write_map(path: Path, fitted: dict[str, Amounts], by_hand: dict[str, Amounts
             found = mirror(found)
         for (bone, channel), value in found.items():
             value = round(value, 2 if channel in MOVED else 1)
-            if abs(value) > _LEAST[channel in MOVED]:
+            if abs(value) > _MIN_AMOUNT[channel in MOVED]:
                 controls[bone][channel][expression] = value
     blocks = []
     for bone in sorted(controls):

@@ -35,7 +35,7 @@ _CONTROLS: tuple[str, ...] = (
     "cheek.B.{}.001",
 )
 _CONTROLS += ("cheek.T.{}.001", "nose.{}.001", *(f"brow.T.{{}}.00{k}" for k in (1, 2, 3)))
-_LEAST = {"lid": 0.04, "lips": 0.02, "lip.T": 0.02, "lip.B": 0.02, "brow": 0.02}
+_MIN_AMOUNTS = {"lid": 0.04, "lips": 0.02, "lip.T": 0.02, "lip.B": 0.02, "brow": 0.02}
 _LID_WEIGHT = 0.3
 _BLINK: dict[bool, Amounts] = {  # by whether the face is the upgraded one: the lids meet
     False: {("lid.T.L.002", "up"): -0.9, ("lid.T.L.002", "forward"): -0.4},
@@ -130,7 +130,7 @@ def by_hand(face: RigifyFace) -> dict[str, Amounts]:
 def fit_rigify(shapes: FaceShapes, face: RigifyFace) -> dict[str, Amounts]:
     """Return the amounts of the expressions in the middle and on the left, and print which share of each is shown."""
     moving = np.array([way in MOVED for _, way in face.channels])
-    least = [next((v for name, v in _LEAST.items() if bone.startswith(name)), 0.025) for bone, _ in face.channels]
+    least = [next((v for name, v in _MIN_AMOUNTS.items() if bone.startswith(name)), 0.025) for bone, _ in face.channels]
     for k, (bone, _) in enumerate(face.channels):
         if bone.endswith(".001") and bone.startswith(("lip.T", "lip.B")):
             least[k] = 0.025

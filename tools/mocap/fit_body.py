@@ -38,9 +38,9 @@ FOLLOWING_JOINT_WEIGHT = 0.5
 FLOOR_QUANTILE = 0.05  # of the frames, ordered by the height of the lowest point of the feet
 SOLES = ("heel", "foot_index")
 # Largest plausible angle of a joint, degrees; beyond, the recording is broken (as a reversed left foot in 01_12).
-MOST_DEGREES = {"ankle": 75.0, "foot": 70.0, "wrist": 85.0, "hand": 60.0, "head": 60.0, "neck": 75.0, "collar": 50.0}
-MOST_DEGREES |= {"hip": 140.0, "knee": 155.0, "elbow": 160.0, "shoulder": 175.0}
-MOST_DEGREES_PER_SECOND = 1700.0  # of a joint; kicks and flips reach 1400
+MAX_DEGREES = {"ankle": 75.0, "foot": 70.0, "wrist": 85.0, "hand": 60.0, "head": 60.0, "neck": 75.0, "collar": 50.0}
+MAX_DEGREES |= {"hip": 140.0, "knee": 155.0, "elbow": 160.0, "shoulder": 175.0}
+MAX_DEGREES_PER_SECOND = 1700.0  # of a joint; kicks and flips reach 1400
 
 
 @dataclass
@@ -157,10 +157,10 @@ def _fitted(body: Body, betas: NDArray[np.float64], take: Take, fitter: _Fitter)
 
 def plausible(body: Body, Omega: NDArray[np.float64], fps: float) -> NDArray[np.bool_]:
     """Return (T,) bool: whether all joint states (T, K+1, 3, 3) are within their ranges and speed limit."""
-    most = np.array([MOST_DEGREES.get(name.rpartition("_")[2], 180.0) for name in body.joint_names])
+    most = np.array([MAX_DEGREES.get(name.rpartition("_")[2], 180.0) for name in body.joint_names])
     inside = (np.degrees(np.linalg.norm(log(Omega[:, 1:]), axis=-1)) <= most[1:]).all(axis=1)
     turns = log(np.swapaxes(Omega[:-1, 1:], -1, -2) @ Omega[1:, 1:])
-    slow = (np.degrees(np.linalg.norm(turns, axis=-1)) * fps <= MOST_DEGREES_PER_SECOND).all(axis=1)
+    slow = (np.degrees(np.linalg.norm(turns, axis=-1)) * fps <= MAX_DEGREES_PER_SECOND).all(axis=1)
     return inside & np.append(True, slow) & np.append(slow, True)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.rotations import exp
-from .retarget import HEAD_PITCH, MOST_HEAD_PITCH
+from .retarget import HEAD_PITCH, MAX_HEAD_PITCH
 from .take import Take
 
 Points = NDArray[np.float64]
@@ -127,7 +127,7 @@ def _carried(chest: Points, up: Points) -> Points:
 def _looking_ahead(skull: Points) -> Points:
     """Return head rotations (T, 3, 3) with a constant pitch of the bone from neck to head, which leans, taken out."""
     pitch = float(np.median(np.arctan2(skull[:, 1, 2], np.abs(skull[:, 1, 1]))))  # of the forward axis, upwards
-    return skull @ exp(np.array([np.clip(HEAD_PITCH + pitch, -2 * MOST_HEAD_PITCH, 2 * MOST_HEAD_PITCH), 0.0, 0.0]))
+    return skull @ exp(np.array([np.clip(HEAD_PITCH + pitch, -2 * MAX_HEAD_PITCH, 2 * MAX_HEAD_PITCH), 0.0, 0.0]))
 
 
 def _unit(v: Points) -> Points:

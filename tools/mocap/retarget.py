@@ -24,7 +24,7 @@ SIDES = ("left", "right")
 CMU_SPLAY = np.radians(20.0)  # of CMU's thighs at zero pose
 CMU_ELBOW_ROLL = np.radians(30.0)  # of CMU's elbow axis about the outstretched arm at zero pose, up at the front
 HEAD_PITCH = np.radians(5.0)  # median forward pitch to which heads are set: people look slightly down
-MOST_HEAD_PITCH = np.radians(25.0)
+MAX_HEAD_PITCH = np.radians(25.0)
 STANCE_SPEED = 0.12  # m/s: a foot slower than this stands
 LENGTHS = (  # joint, joint, source joint, source joint, standard deviation in metres
     *((f"{s}_{a}", f"{s}_{b}", f"{s}_{a}", f"{s}_{b}", 0.01)
@@ -118,7 +118,7 @@ def correspond(body: Body, betas: NDArray[np.float64], takes: list[Take]) -> Cor
     if cmu:
         head = np.concatenate([segment_rotations(t, found.parts["head"]) for t in takes])
         pitch = float(np.median(np.arctan2(_forward_lean(head), head[:, 1, 1])))
-        found.C["head"] = exp([np.clip(HEAD_PITCH - pitch, -MOST_HEAD_PITCH, MOST_HEAD_PITCH), 0.0, 0.0])
+        found.C["head"] = exp([np.clip(HEAD_PITCH - pitch, -MAX_HEAD_PITCH, MAX_HEAD_PITCH), 0.0, 0.0])
     found.offset = {joint: np.zeros(3) for joint in found.points}
     return found
 

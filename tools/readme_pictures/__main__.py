@@ -29,8 +29,8 @@ PICTURES = {
 }
 WITHOUT_DATA = (*ANIMATIONS, "real_faces")
 BY_BENCHMARKS = ("smplify", "scenes")  # drawn by `./scripts/bench` with these names, and copied from build/bench
-MOST_BYTES = 60_000
-LARGEST_BYTES = dict.fromkeys((*PICTURES, *BY_BENCHMARKS), MOST_BYTES) | {"real_faces": 120_000}
+MAX_BYTES = 60_000
+LARGEST_BYTES = dict.fromkeys((*PICTURES, *BY_BENCHMARKS), MAX_BYTES) | {"real_faces": 120_000}
 
 
 def main() -> int:
@@ -56,7 +56,7 @@ def main() -> int:
     return 0
 
 
-def write_jpeg(path: Path, picture: NDArray[np.uint8], most_bytes: int = MOST_BYTES) -> None:
+def write_jpeg(path: Path, picture: NDArray[np.uint8], most_bytes: int = MAX_BYTES) -> None:
     """Write a JPEG, as good as its size allows."""
     bgr = cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)
     for quality in range(90, 30, -4):

@@ -20,7 +20,7 @@ from ..pinned_wheel import DOWNLOADS
 PARTS = ("cheek", "chin", "eyebrows", "eyes", "forehead", "head", "mouth", "nose")
 MOVES_HEAD = re.compile(r"head/head-(trans|angle)")  # where the head is, which is the pose's
 ACTIVE = 0.35  # share of the pairs of targets that shape a person
-MOST = 0.6  # weight of a target
+MAX_WEIGHT = 0.6  # weight of a target
 
 
 def identity_targets(downloads: Path = DOWNLOADS) -> NDArray[np.float64]:
@@ -45,5 +45,5 @@ def identity_targets(downloads: Path = DOWNLOADS) -> NDArray[np.float64]:
 
 def draw_identity(targets: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
     """Return the displacements (V, 3) of one person's face, metres."""
-    weights = rng.uniform(0.0, MOST, len(targets)) * (rng.uniform(size=len(targets)) < ACTIVE)
+    weights = rng.uniform(0.0, MAX_WEIGHT, len(targets)) * (rng.uniform(size=len(targets)) < ACTIVE)
     return np.einsum("g,gvx->vx", weights, targets)

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-LEAST_PRESENCE, LEAST_SPREAD, MOST_DISAGREEMENT = 0.9, 0.38, 0.2  # otherwise the tracker would reject the detection
+MIN_PRESENCE, MIN_SPREAD, MAX_DISAGREEMENT = 0.9, 0.38, 0.2  # otherwise the tracker would reject the detection
 
 
 def load_pairs(path: Path) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
     """Return points, rays, confidences and world landmarks of the pairs that a tracker would accept."""
     with np.load(path) as data:
-        good = (data["presence"] >= LEAST_PRESENCE) & (data["spread"] >= LEAST_SPREAD)
-        good &= data["disagreement"] <= MOST_DISAGREEMENT
+        good = (data["presence"] >= MIN_PRESENCE) & (data["spread"] >= MIN_SPREAD)
+        good &= data["disagreement"] <= MAX_DISAGREEMENT
         return data["points"][good], data["rays"][good], data["confidence"][good], data["world"][good]

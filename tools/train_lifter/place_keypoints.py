@@ -23,7 +23,7 @@ from ...solver.rotations import exp
 from .detector_noise import MIRROR_PARTNER
 
 CLIPS = ("walk_side_static", "run_moving_camera", "squats_5fps", "gesture_square", "two_people_portrait")
-LEAST_FRAMES = 20  # of a person who is included
+MIN_FRAMES = 20  # of a person who is included
 REGULARIZATION = 0.3
 FARTHEST_M = 0.12  # larger errors are outliers
 REFLECTION = np.diag([-1.0, 1.0, 1.0])
@@ -64,7 +64,7 @@ def main() -> None:
     everybody = []
     for clip in CLIPS:
         found = capture(folder / f"{clip}.mp4", body, CaptureOptions(people="all", ablation=ablation))
-        everybody += [normal_equations(body, m) for m in found.motions if m.valid.sum() >= LEAST_FRAMES]
+        everybody += [normal_equations(body, m) for m in found.motions if m.valid.sum() >= MIN_FRAMES]
     columns = [offsets(*each) for each in everybody]
     columns.append(offsets(*(np.sum(each, axis=0) for each in zip(*everybody, strict=True))))
     for k, name in enumerate(KEYPOINT_NAMES):

@@ -42,7 +42,7 @@ NOVELTY_INNOVATION = 0.05  # what being new counts as, see MAX_INNOVATION
 MEMORY_S = 60 * FRAME_S  # for which a lost person is looked for, and preferred to a more prominent one
 RIVAL_SIDE = 0.5  # a person with a smaller share of the largest side will not become the most prominent one
 REPLACING_SIDE = 1.5  # a person this much larger takes the place of the smallest one, when all places are taken
-MOST_PEOPLE = 12
+MAX_PEOPLE = 12
 REFERENCE_S = 30 * FRAME_S  # between two calls of the reference network
 REFERENCE_SWAPPED_S = 8 * FRAME_S  # the same where left and right seem to be swapped
 FALLBACK_S = 15 * FRAME_S  # for which the largest network replaces a smaller one that lost the person, or swapped sides
@@ -85,7 +85,7 @@ class PeopleTracker:
         self._reference = ReferenceEstimator(networks.reference) if networks.reference else None
         self._people = people
         self._largest_only = people is None
-        self._max_live = 2 if people is None else min(people + 1, MOST_PEOPLE)
+        self._max_live = 2 if people is None else min(people + 1, MAX_PEOPLE)
         self.reset()
 
     def restarted(self, regions: Sequence[Region] = ()) -> PeopleTracker:

@@ -21,7 +21,7 @@ REACH_S = 0.4  # over which a correction fades out on both sides
 FEET = ("left", "right")
 _HIGHEST_M = 1e3
 _LAST_FRAME = 1 << 53
-_MOST_INTERPOLATIONS = 1000
+_MAX_INTERPOLATIONS = 1000
 
 
 @dataclass(frozen=True)
@@ -294,9 +294,9 @@ def from_arrays(arrays: Mapping[str, NDArray[Any]]) -> tuple[Correction, ...]:
     spans = column("contact_spans", 2), column("exchange_spans", 2)
     floors = column("floor_frames"), column("floor_heights")
     interpolated, snaps = column("interpolated_spans", 2), (column("snap_level"), column("snap_lift"))
-    if len(interpolated) > _MOST_INTERPOLATIONS:
+    if len(interpolated) > _MAX_INTERPOLATIONS:
         raise MotionFileError(
-            f"the motion has {len(interpolated)} interpolated spans, but may have at most {_MOST_INTERPOLATIONS}"
+            f"the motion has {len(interpolated)} interpolated spans, but may have at most {_MAX_INTERPOLATIONS}"
         )
     if any(len(flags) and flags.dtype != np.bool_ for flags in snaps):
         raise MotionFileError("the motion's corrections are damaged: snap_level and snap_lift are not true or false")

@@ -24,7 +24,7 @@ from ...live.sources.system_cameras import camera_names, camera_with_modes
 
 NAMES, DEVICES = Path("/sys/class/video4linux"), Path("/dev")
 LONGEST_NAME = 60  # characters
-_MOST_CAMERAS, _MOST_FORMATS, _MOST_SIZES = 64, 16, 64
+_MAX_CAMERAS, _MAX_FORMATS, _MAX_SIZES = 64, 16, 64
 # Of linux/videodev2.h: the requests, the structures' layouts, and the two constants that are needed.
 _QUERYCAP, _ENUM_FMT, _ENUM_FRAMESIZES = 0x80685600, 0xC0405602, 0xC02C564A
 _CAPABILITY, _FORMAT, _SIZE = "16s32s32sIII12x", "III32sI16x", "III6I8x"
@@ -56,14 +56,14 @@ def list_cameras(names: Path = NAMES, devices: Path = DEVICES, ioctl: Ioctl | No
     if ioctl is None:
         if not sys.platform.startswith("linux"):
             return [
-                Camera(number, _shown(name)) for number, name in enumerate(camera_names(sys.platform)[:_MOST_CAMERAS])
+                Camera(number, _shown(name)) for number, name in enumerate(camera_names(sys.platform)[:_MAX_CAMERAS])
             ]
         import fcntl
 
         ioctl = fcntl.ioctl
     with suppress(OSError):
         numbers = sorted(int(m[1]) for entry in os.listdir(names) if (m := re.fullmatch(r"video(\d{1,3})", entry)))
-        entries = ((n, f"video{n}") for n in numbers[:_MOST_CAMERAS])
+        entries = ((n, f"video{n}") for n in numbers[:_MAX_CAMERAS])
         found = (_camera(n, names / entry / "name", devices / entry, ioctl) for n, entry in entries)
         return [camera for camera in found if camera is not None]
     return []
@@ -82,7 +82,7 @@ def camera_with_formats(source: str) -> Camera:
                 return camera
         raise VideoError(f"camera {number} does not exist; connect a camera, or choose a stream or a file")
     name, modes = camera_with_modes(number, sys.platform)
-    return Camera(number, _shown(name), tuple(_shown(text) for text in described(modes)[:_MOST_FORMATS]))
+    return Camera(number, _shown(name), tuple(_shown(text) for text in described(modes)[:_MAX_FORMATS]))
 
 
 def camera_source(text: str) -> str | None:
@@ -118,7 +118,7 @@ def _camera(number: int, name: Path, device: Path, ioctl: Ioctl) -> Camera | Non
 
 def _formats(node: int, ioctl: Ioctl) -> Iterator[str]:
     """Yield each pixel format of a camera with its largest size."""
-    for index in range(_MOST_FORMATS):
+    for index in range(_MAX_FORMATS):
         answer = bytearray(struct.pack(_FORMAT, index, _CAPTURE, 0, b"", 0))
         try:
             ioctl(node, _ENUM_FMT, answer)
@@ -131,7 +131,7 @@ def _formats(node: int, ioctl: Ioctl) -> Iterator[str]:
 
 def _sizes(node: int, code: int, ioctl: Ioctl) -> Iterator[tuple[int, int]]:
     """Yield the sizes of a pixel format; the largest one of a continuous range."""
-    for index in range(_MOST_SIZES):
+    for index in range(_MAX_SIZES):
         answer = bytearray(struct.pack(_SIZE, index, code, 0, *[0] * 6))
         try:
             ioctl(node, _ENUM_FRAMESIZES, answer)

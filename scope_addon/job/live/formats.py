@@ -19,7 +19,7 @@ from .cameras import LONGEST_NAME, Camera, camera_number, camera_source
 from .formats_request import FormatsRequest
 
 ANSWER_S = 20.0  # for an answer, and for the user's to the system's question
-_MOST = 64  # formats
+_MAX_FORMATS = 64  # formats
 _INTERVAL_S = 0.02
 
 
@@ -28,7 +28,7 @@ def _is_shown(value: object) -> bool:
 
 
 def _are_formats(value: object) -> bool:
-    return isinstance(value, list) and len(value) <= _MOST and all(_is_shown(text) for text in value)
+    return isinstance(value, list) and len(value) <= _MAX_FORMATS and all(_is_shown(text) for text in value)
 
 
 _FIELDS: Fields = {

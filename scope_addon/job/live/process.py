@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...options.live import MOST_PEOPLE
+from ...options.live import MAX_PEOPLE
 from ..messages import CAPTURE_FIELDS, LONGEST_LINE, Fields, is_number, is_text, unreadable
 from ..process import START_SCRIPT, WorkerProcess
 from .commands import RECORD, STOP
@@ -96,7 +96,7 @@ class LiveProcess(WorkerProcess):
         return [pose for pose in found if pose is not None]
 
     def _keep(self, line: bytes) -> None:
-        if (person := _POSE.match(line)) is not None and int(person[1]) < MOST_PEOPLE:
+        if (person := _POSE.match(line)) is not None and int(person[1]) < MAX_PEOPLE:
             self._newest[int(person[1])] = line
         else:
             super()._keep(line)

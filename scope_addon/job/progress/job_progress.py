@@ -29,7 +29,7 @@ _FINDING = "finding the person"  # the stage whose speed those after it are esti
 _SHAPE = "finding the shape"  # the first stage for each person; of several people it says how many
 _MEASURED_S, _MEASURED_STEPS = 4.0, 12  # of a stage, before its speed is believed
 _STEADY = 1.5  # largest ratio between the speeds of the last two thirds of that time
-_MOST_MARKS = 512
+_MAX_MARKS = 512
 
 
 class JobProgress:
@@ -69,7 +69,7 @@ class JobProgress:
         if total > 0:
             self._reached[stage] = (min(1.0, done / total), self._spent(stage))
         self._marks.append((now, done))
-        if len(self._marks) > _MOST_MARKS:
+        if len(self._marks) > _MAX_MARKS:
             del self._marks[1:-1:2]
         self.fraction = max(self.fraction, self._fraction_at_stage())
 

@@ -18,7 +18,7 @@ _SETTINGS = (
     "provider",
     "threads",
 )  # on which the time of a frame depends
-_MOST_KINDS = 50
+_MAX_KINDS = 50
 _LONGEST_S = 86_400.0  # that a stage may take for a frame
 
 
@@ -49,7 +49,7 @@ def save_stage_times(folder: Path, kind: str, seconds: Mapping[str, float], fram
     kinds = {name: times for name, times in _read(folder).items() if name != kind and _are_times(times)}
     kinds[kind] = {stage: duration / frames for stage, duration in seconds.items()}
     with suppress(ScopeError, OSError):
-        save_map(folder / _FILE, _WHAT, kinds=dict(list(kinds.items())[-_MOST_KINDS:]))
+        save_map(folder / _FILE, _WHAT, kinds=dict(list(kinds.items())[-_MAX_KINDS:]))
 
 
 def _read(folder: Path) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from ..pose import LivePose
 from .pose_values import values
 
 VERSION = 1
-MOST_CLIENTS = 16
+MAX_CLIENTS = 16
 _QUEUED_LINES = 2  # per client and person; older ones are dropped
 _SEND_BUFFER_BYTES = 32768  # some eight poses: what the system queues for a slow client is delay as well
 _SEND_TIMEOUT_S = 10.0  # after which a client that reads nothing is disconnected
@@ -95,7 +95,7 @@ class JsonServer:
                 return
             with self._lock:
                 self._clients = [client for client in self._clients if not client.is_gone]
-                if self._is_over or len(self._clients) >= MOST_CLIENTS:
+                if self._is_over or len(self._clients) >= MAX_CLIENTS:
                     connection.close()
                     continue
                 self._clients.append(_Client(connection, self._header, _QUEUED_LINES * self._people))

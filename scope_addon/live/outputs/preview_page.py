@@ -33,7 +33,7 @@ from ..sources import Picture
 LONGER_SIDE = 960  # pixels of what is shown
 INTERVAL_S = 0.05  # between two pictures
 _KEPT_S = 0.5  # for which pictures wait for their poses; a pose that is older has none
-_MOST_KEPT = 12  # pictures; at 720p, 33 MB
+_MAX_KEPT = 12  # pictures; at 720p, 33 MB
 _QUALITY = 80  # of the JPEG pictures
 _CLOSING_S = 0.4  # for which the end waits for browsers
 _POLLING_INTERVAL_S = 0.1  # in which the server sees that it is to end
@@ -55,7 +55,7 @@ class PreviewPage:
     def __init__(self, body: Body) -> None:
         self._bones = [(k, int(p), _color(body.joint_names[k])) for k, p in enumerate(body.parents) if p >= 0]
         self._session: LiveSession | None = None
-        self._pictures: deque[Picture] = deque(maxlen=_MOST_KEPT)
+        self._pictures: deque[Picture] = deque(maxlen=_MAX_KEPT)
         self._poses: dict[int, LivePose] = {}  # the newest of each person
         self._viewers, self._is_over = 0, threading.Event()
         self._changed = threading.Condition()

@@ -12,7 +12,7 @@ import re
 from dataclasses import dataclass
 
 LONGEST_LOG = 1 << 18  # characters, beyond which nothing is read
-MOST_MODES = 256
+MAX_MODES = 256
 _SIDES, _HIGHEST_FPS = range(16, 16385), 1000.0
 _FPS = 30.0  # of the mode to ask for, as near as the camera has it
 _NUMBER = r"([0-9.einf+]{1,20})"  # drivers that leave an interval out give infinite rates
@@ -53,7 +53,7 @@ def parse_modes(log: str, device_format: str) -> list[Mode]:
     found: dict[Mode, None] = {}
     for line in log[:LONGEST_LOG].splitlines():
         mode = _dshow_mode(line) if device_format == "dshow" else _avfoundation_mode(line)
-        if mode is not None and len(found) < MOST_MODES:
+        if mode is not None and len(found) < MAX_MODES:
             found[mode] = None
     return list(found)
 

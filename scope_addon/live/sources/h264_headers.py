@@ -17,7 +17,7 @@ from itertools import islice
 
 _SLICE, _IDR_SLICE, _PARAMETERS = 1, 5, 7  # nal_unit_type
 _BUILT_ON = 0x60  # nal_ref_idc in the first byte, not zero where other pictures build on this one
-_MOST_UNITS = 64  # of a packet that are looked at; one has some parameters and slices
+_MAX_UNITS = 64  # of a packet that are looked at; one has some parameters and slices
 _HEAD_BYTES = 64  # of a slice, more than what comes before its frame_num
 _RECENT, _MANY = 16, 8  # pictures, and gaps among them from which these are no losses
 _PARAMETER_BYTES = 1024  # of a sequence parameter set, which may have scaling lists
@@ -46,7 +46,7 @@ class FrameNumbers:
 
     def has_gap(self, data: bytes) -> bool:
         """Note a packet, and return whether pictures are missing before that of the packet."""
-        for unit in islice(self._units(data), _MOST_UNITS):
+        for unit in islice(self._units(data), _MAX_UNITS):
             kind = unit[0] & 31
             if kind == _PARAMETERS:
                 self._read_parameters(unit)
@@ -56,7 +56,7 @@ class FrameNumbers:
 
     def has_picture(self, data: bytes) -> bool:
         """Return whether a packet contains a picture, or part of one, rather than parameters alone."""
-        return any(unit[0] & 31 in (_SLICE, _IDR_SLICE) for unit in islice(self._units(data), _MOST_UNITS))
+        return any(unit[0] & 31 in (_SLICE, _IDR_SLICE) for unit in islice(self._units(data), _MAX_UNITS))
 
     def _is_gap(self, unit: bytes, *, begins: bool) -> bool:
         assert self._bits is not None

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 SLOWEST_S = 1 / 28  # between frames: n is not raised beyond it without need, so that no slow source becomes slower
-MORE_TIME, MOST_TIME = 1.25, 1.35  # between even frames beyond that, over uneven ones: to begin with n, and to keep it
+MORE_TIME, MAX_TIME = 1.25, 1.35  # between even frames beyond that, over uneven ones: to begin with n, and to keep it
 RECENT_S, FEWEST = 1.0, 8  # over which it is seen that frames take too long, and the least number of them
 IN_TIME_S = 4.0  # the same, that they would be processed in time with a lower n
 LATE_SHARE, RARE_SHARE = 0.15, 0.08  # of the frames in these times, that take too long
@@ -90,7 +90,7 @@ class Pace:
         assert self.every is not None
         if self._interval_s > SLOWER * self._chosen_for_s:
             return False
-        return len(self._recent(IN_TIME_S)) < FEWEST or self._costs_little(self.every, MOST_TIME, IN_TIME_S)
+        return len(self._recent(IN_TIME_S)) < FEWEST or self._costs_little(self.every, MAX_TIME, IN_TIME_S)
 
     def _costs_little(self, every: int, more_time: float, recent_s: float) -> bool:
         """Return whether every n-th frame takes hardly more time than whichever frames could be processed."""

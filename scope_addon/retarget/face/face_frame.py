@@ -18,7 +18,7 @@ from ....solver.errors import InputError
 _EYES = (("ORG-eye.L", "ORG-eye.R"), ("eye.L", "eye.R"))
 _MOUTH = (("lips.L", "lips.R"), ("lip_end.L.001", "lip_end.R.001"), ("levator05.L", "levator05.R"))
 _LIDS = (("lid.T.L.002", "lid.B.L.002"),)
-_LEAST_LENGTH = 1e-9
+_MIN_LENGTH = 1e-9
 # What a control's name begins with, and the length in which it is moved; all others by the width of the mouth.
 _BY_LIDS = ("lid",)
 _BY_EYES = ("brow", "nose", "cheek.T", "oculi", "levator06")
@@ -85,6 +85,6 @@ def _pair(
 
 def _direction(along: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
     length = float(np.linalg.norm(along))
-    if not length > _LEAST_LENGTH:
+    if not length > _MIN_LENGTH:
         raise InputError("the bones of the rig's eyes and mouth are in one place; place them in Edit Mode")
     return along / length, length

@@ -28,7 +28,7 @@ from ..character.animation import quaternion_from_matrix, quaternion_product
 from .datablocks import NewDatablocks, found, remove
 
 _Q_MODEL_WORLD = quaternion_from_matrix(R_WORLD_MODEL.T)
-_LEAST_CHANGE = 0.01  # of a shape coefficient that changes the mesh: less than half a millimetre
+_MIN_CHANGE = 0.01  # of a shape coefficient that changes the mesh: less than half a millimetre
 
 
 class LiveBody:
@@ -68,7 +68,7 @@ class LiveBody:
             rig, mesh = self._create(betas)
             created = True
         keys = mesh.data.shape_keys
-        changed = np.abs(betas - self._betas).max(initial=0.0) > _LEAST_CHANGE
+        changed = np.abs(betas - self._betas).max(initial=0.0) > _MIN_CHANGE
         if changed and keys is not None and len(keys.key_blocks) == len(betas) + 1:
             self._betas = betas
             keys.key_blocks.foreach_set("value", np.array([0.0, *betas], np.float32))  # after Basis

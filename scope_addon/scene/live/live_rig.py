@@ -28,7 +28,7 @@ from ..rigs.rig_retarget import RetargetOptions, usable_map
 from .datablocks import found
 
 # The proportions are compared again for such a change of a shape coefficient, but not at every pose while these settle.
-_LEAST_CHANGE, _LEAST_PAUSE_S = 0.05, 0.25
+_MIN_CHANGE, _MIN_PAUSE_S = 0.05, 0.25
 
 
 class LiveRig:
@@ -127,9 +127,9 @@ class LiveRig:
     def _transfer_of(self, betas: NDArray[np.floating[Any]]) -> Transfer:
         """Return the transfer for a shape, or for a slightly older one."""
         now_s = time.monotonic()
-        is_due = np.abs(betas - self._betas).max(initial=0.0) > _LEAST_CHANGE and now_s > self._due_s
+        is_due = np.abs(betas - self._betas).max(initial=0.0) > _MIN_CHANGE and now_s > self._due_s
         if self._transfer is None or is_due:
-            self._betas, self._due_s = np.array(betas, float), now_s + _LEAST_PAUSE_S
+            self._betas, self._due_s = np.array(betas, float), now_s + _MIN_PAUSE_S
             self._transfer = Transfer(self._body, self._betas, self._skeleton, self._map, feet=self._options.feet)
         return self._transfer
 

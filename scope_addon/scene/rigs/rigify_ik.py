@@ -21,7 +21,7 @@ from .rig_action import BoneKeys
 # Limb, middle bone, end and, of legs, toe.
 _LIMBS = (("thigh", "shin", "foot", "toe"), ("upper_arm", "forearm", "hand", ""))
 # Sine of the bend below which a limb counts as straight: noise would determine the roll of its base.
-_LEAST_BEND = 0.01
+_MIN_BEND = 0.01
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ def _hinge(rig: bpy.types.Object, limb: _Limb, bases: dict[str, list[Matrix]]) -
     for bend in (middle + spread, middle - spread):
         has = L @ (0.0, np.cos(bend), np.sin(bend))
         across = has[[0, 2]] / max(float(np.hypot(has[0], has[2])), 1e-9)
-        x, z = wanted[[0, 2]] + _LEAST_BEND * across  # a straight limb leaves the roll undetermined
+        x, z = wanted[[0, 2]] + _MIN_BEND * across  # a straight limb leaves the roll undetermined
         roll = np.arctan2(x, z) - np.arctan2(across[0], across[1])
         found.append((float(np.angle(np.exp(1j * roll))), float(np.angle(np.exp(1j * bend)))))
     roll, bend = min(found, key=lambda pair: abs(pair[0]))

@@ -16,7 +16,7 @@ from ..captured_person import captured_armature
 from .frame_fit import fit_frame, unfit_frame
 from .viewports import viewport_at, viewports
 
-_LEAST_SIDE = 0.3  # of the viewport's width
+_MIN_SIDE = 0.3  # of the viewport's width
 _DRAWN_AFTER_S = 0.2
 _SIDE_TILT = math.radians(5.0)
 _SIDE_HEIGHT_M = 2.6  # vertical extent of the side view
@@ -124,7 +124,7 @@ def open_side_view(context: bpy.types.Context, area: bpy.types.Area) -> None:
     before = {each.as_pointer() for each in screen.areas}
     # What the sidebar and the toolbar leave is shared equally.
     covered = sum(region.width for region in area.regions if region.type in ("TOOLS", "UI") and region.width > 1)
-    factor = max(_LEAST_SIDE, (1.0 - covered / max(1, area.width)) / 2.0)
+    factor = max(_MIN_SIDE, (1.0 - covered / max(1, area.width)) / 2.0)
     width = factor * area.width
     with _in(window, area):
         bpy.ops.screen.area_split(direction="VERTICAL", factor=factor)

@@ -16,7 +16,7 @@ PICTURES = {
     "preferences": ("11_preferences", (830, 36, 1518, 572)),
 }
 _SCALE = 0.6  # of wide pictures
-_MOST_BYTES = 60_000
+_MAX_BYTES = 60_000
 ROOT = Path(__file__).resolve().parents[3]
 
 made = []
@@ -29,7 +29,7 @@ for name, (screenshot, (left, top, right, bottom)) in PICTURES.items():
         picture = cv2.resize(picture, None, fx=_SCALE, fy=_SCALE, interpolation=cv2.INTER_AREA)
     for quality in range(85, 20, -5):
         jpeg = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
-        if len(jpeg) <= _MOST_BYTES:
+        if len(jpeg) <= _MAX_BYTES:
             break
     (ROOT / "assets" / "guide" / f"{name}.jpg").write_bytes(jpeg)
     made.append(name)

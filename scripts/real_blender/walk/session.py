@@ -29,7 +29,7 @@ from walk.file_steps import Step
 SEED, COUNT = int(ARGUMENTS[2]), int(ARGUMENTS[3])
 PAUSE_S = 0.02
 OPENED_PAUSE_S = 0.5  # Blender crashes when a script chooses a tab before the new file's window is drawn
-MOST_OBJECTS = 60  # above which a step begins a new file
+MAX_OBJECTS = 60  # above which a step begins a new file
 
 
 def everything() -> State:
@@ -91,7 +91,7 @@ class Walk:
         if self.taken == 0:
             self.steps.prepare()
         self.taken += 1
-        crowded = len(bpy.data.objects) > MOST_OBJECTS
+        crowded = len(bpy.data.objects) > MAX_OBJECTS
         step = self.steps.new_file() if crowded else self.steps.choose()
         self.last = f"{self.taken} {step.text}"
         self.log.write(f"{time.monotonic() - self.began:.1f} s: {self.last}")

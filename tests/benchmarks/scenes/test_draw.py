@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scope.benchmarks.perception.held_out import Take
-from scope.benchmarks.scenes.draw import APART_M, FPS, MOST_HIDDEN, STRIDE, draw_person, draw_scene, look_at
+from scope.benchmarks.scenes.draw import APART_M, FPS, MAX_HIDDEN, STRIDE, draw_person, draw_scene, look_at
 from scope.benchmarks.scenes.scene import DEVELOPMENT, NEW_PERFORMERS, STATIC, TEST
 
 NUMBERS = (1, 3, 4, 6)
@@ -99,7 +99,7 @@ def test_a_block_hides_some_joints_of_the_first_person_but_not_most(body, scenes
     blocked = [scene for scene in scenes if scene.block is not None]
     assert blocked
     for scene in blocked:
-        assert scene.hidden(scene.people[0], body).mean() <= MOST_HIDDEN
+        assert scene.hidden(scene.people[0], body).mean() <= MAX_HIDDEN
 
 
 def test_people_keep_apart(body, scenes):

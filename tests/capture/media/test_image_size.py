@@ -21,7 +21,7 @@ from scope.scope_addon.errors import NO_PERSON, VideoError
 
 from .made_video import patch_track_header, write_video
 
-MOST_DETECTOR_RUNS = 600  # of one image; of 16:9 there are 48
+MAX_DETECTOR_RUNS = 600  # of one image; of 16:9 there are 48
 READ = """
 import resource, sys
 resource.setrlimit(resource.RLIMIT_AS, (3 << 30, 3 << 30))
@@ -198,4 +198,4 @@ def test_runs_of_the_detector_are_bounded(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setattr(PersonDetector, "_detect_in", detect_in)
     cv2.imwrite(str(tmp_path / "long.png"), np.zeros((500, 25, 3), np.uint8))
     assert main(["capture", str(tmp_path / "long.png"), "-o", str(tmp_path / "a.npz")]) == NO_PERSON
-    assert 200 < len(corners) <= MOST_DETECTOR_RUNS
+    assert 200 < len(corners) <= MAX_DETECTOR_RUNS

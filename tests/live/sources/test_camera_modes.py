@@ -6,7 +6,7 @@ from __future__ import annotations
 import pytest
 from scope.scope_addon.live.sources.camera_modes import (
     LONGEST_LOG,
-    MOST_MODES,
+    MAX_MODES,
     Mode,
     described,
     nearest_mode,
@@ -96,7 +96,7 @@ def test_what_is_no_mode_is_left_out(line, kind):
 
 def test_an_endless_log_is_read_to_a_bound():
     many = "".join(f"  {16 + k}x16@[1.000000 30.000000]fps\n" for k in range(9000))
-    assert len(parse_modes(many, "avfoundation")) == MOST_MODES
+    assert len(parse_modes(many, "avfoundation")) == MAX_MODES
     assert parse_modes("x" * LONGEST_LOG + AVFOUNDATION, "avfoundation") == []
 
 

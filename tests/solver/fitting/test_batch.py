@@ -36,7 +36,7 @@ def test_initial_states_are_used_where_they_are_given():
     warm = fit_batch(BODY, batch, init=[first.state, None, first.state], threads=2)
     for found, m, init in zip(warm, batch, [first.state, None, first.state], strict=True):
         np.testing.assert_array_equal(found.t_camera_part, fit(BODY, m, init=init).t_camera_part)
-    with pytest.raises(ShapeError, match="one initial state a frame, 3"):
+    with pytest.raises(ShapeError, match="one initial state per frame, 3"):
         fit_batch(BODY, batch, init=[None])
 
 

@@ -244,5 +244,5 @@ def test_a_clip_is_deterministic_and_refuses_nonsense():
     np.testing.assert_array_equal(a.beta, b.beta)
     with pytest.raises(ShapeError, match="at least one frame"):
         fit_clip(body, [])
-    with pytest.raises(ShapeError, match="one initial state a frame"):
+    with pytest.raises(ShapeError, match="one initial state per frame"):
         fit_clip(body, measurements, init=[a.frames[0].state])

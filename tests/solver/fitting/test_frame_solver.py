@@ -75,6 +75,18 @@ def test_recovers_pose_and_shape_without_noise(seed):
     assert found.status in (Status.CONVERGED, Status.STALLED)
 
 
+def test_a_fit_that_begins_at_its_minimum_has_converged_though_its_tolerance_is_zero():
+    """What is left to gain is rounding: without a limit to that, steps would be damped until the fit stalls."""
+    body, state = scene(3)
+    m = measured(body, state, noise=1.0)
+    options = Options(stages=[Stage(FREE, 0.0, 200)])
+    minimum = fit(body, m, options=options, priors=Priors())
+    again = fit(body, m, init=minimum.state, options=options, priors=Priors())
+    assert again.status == Status.CONVERGED
+    assert again.iterations <= 2
+    assert again.cost == pytest.approx(minimum.cost, rel=1e-12)
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_cold_start_finds_the_person_with_the_default_schedule(seed):
     body, state = scene(seed)

@@ -29,7 +29,7 @@ from scope.solver.gauss_newton.curvature import (
     update,
 )
 from scope.solver.gauss_newton.linearize import linearize, make_blocks, make_pose
-from scope.solver.gauss_newton.optimizer import DAMPING_LEAST
+from scope.solver.gauss_newton.optimizer import MIN_DAMPING
 from scope.solver.gauss_newton.recursion import eliminate, make_workspace
 from scope.solver.gauss_newton.terms import make_terms
 from scope.solver.learned_prior import load_joint_prior
@@ -170,7 +170,7 @@ def test_without_it_the_minimum_is_the_same(body, seed):
 def test_without_it_every_step_is_a_dense_gauss_newton_step():
     """Three steps from the definitions, by complex-step Jacobians, hardly damped; with it, the third is another."""
     _, arrays, state, _, _, _, raw, sigmas, scales, priors, weights, measurements = problem(1, 7, 4, 30)
-    options = Options([Stage(weights, 0.0, 3)], damping=DAMPING_LEAST)
+    options = Options([Stage(weights, 0.0, 3)], damping=MIN_DAMPING)
     start = State(*state)
     for _ in range(3):
         J, r, _ = dense_system(arrays, state, raw, sigmas, scales, priors, weights)
@@ -207,6 +207,6 @@ def test_the_information_on_the_shape_is_gauss_newtons(body):
     table, _, _ = Options().stage_table([Stage()])
     pose, blocks, work = found.state.pose(tree), make_blocks(tree), make_workspace(tree)
     linearize(tree, make_terms(tree, m, priors), table[0], 0.0, pose, blocks, work.scratch)
-    eliminate(tree, pose, blocks, DAMPING_LEAST, 1.0 / 0.3, work)
+    eliminate(tree, pose, blocks, MIN_DAMPING, 1.0 / 0.3, work)
     expected = work.C[:10, :10] - table[0, 0, SHAPE_PRIOR] * np.eye(10)
     np.testing.assert_allclose(found.beta_information, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())

@@ -3,8 +3,8 @@
 
 import numpy as np
 import pytest
-from scope.solver import Status
-from scope.solver.gauss_newton.optimizer import judge_trial
+from scope.solver import Options, Stage, Status
+from scope.solver.gauss_newton.optimizer import judge_trial, make_settings
 
 RUNNING = judge_trial(10.0, 5.0, 5.0, 1.0, 2.0, 0.0)[3]
 
@@ -33,3 +33,8 @@ def test_a_small_decrease_ends_in_convergence_and_damping_without_end_in_a_stall
         if status == RUNNING:
             _, damping, growth, status = judge_trial(10.0, 11.0, 5.0, damping, growth, 1e-3)
     assert status == Status.STALLED.value
+
+
+def test_the_pelvis_moves_by_the_root_length_as_readily_as_a_joint_turns_by_a_radian():
+    settings = make_settings(Options(root_length=0.25), [Stage()])
+    assert settings.root_scale * 0.25 == 1.0  # radians

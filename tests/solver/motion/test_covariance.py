@@ -4,7 +4,7 @@
 from dataclasses import replace
 
 import numpy as np
-from scope.solver.gauss_newton.optimizer import DAMPING_LEAST
+from scope.solver.gauss_newton.optimizer import MIN_DAMPING
 from scope.solver.motion.band import make_factor
 from scope.solver.motion.covariance import joint_covariances
 
@@ -22,7 +22,7 @@ def test_covariance_is_that_of_the_dense_inverse():
     found, from_root, shared = joint_covariances(problem.tree, system, poses, 1.0, make_factor(system))
     _, _, _, H = dense_step(clip)
     n, T = 6 + 3 * K, len(clip.times)
-    S = np.linalg.inv(H + DAMPING_LEAST * np.diag(np.r_[np.ones(T * n), np.zeros(P + 1)]))
+    S = np.linalg.inv(H + MIN_DAMPING * np.diag(np.r_[np.ones(T * n), np.zeros(P + 1)]))
     np.testing.assert_allclose(shared, S[T * n :, T * n :], rtol=1e-6, atol=1e-9 * np.abs(shared).max())
     for f, s in enumerate(clip.starts):
         state = (s.R_camera_root, s.t_camera_root, s.Omega, s.beta)

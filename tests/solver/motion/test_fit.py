@@ -189,7 +189,7 @@ def test_what_cannot_be_used_is_refused():
         fit_motion(body, frames, times[::-1])
     with pytest.raises(ShapeError, match="at least one frame"):
         fit_motion(body, [], [])
-    with pytest.raises(ShapeError, match="one initial state a frame"):
+    with pytest.raises(ShapeError, match="one initial state per frame"):
         fit_motion(body, frames, times, init=states[:2])
     with pytest.raises(InvalidValueError, match="overlap of windows"):
         fit_motion(body, frames, times, overlap=12.0)

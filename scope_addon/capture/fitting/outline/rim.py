@@ -30,7 +30,7 @@ BESIDE_PX = 3.0  # of the mask: how far beside the rim the silhouette must have 
 NEAR_M = 0.2  # from the camera's plane; what is nearer is not compared
 REACH = 20  # pixels of the mask searched to either side
 AGREEMENT_COS = 0.8  # of the angle between the two normals
-MOST_BLENDING_M = 0.02  # skin that blending moves further is not rigid
+MAX_BLENDING_M = 0.02  # skin that blending moves further is not rigid
 BORDER_PX = 3.0  # of the image, within which contours are its edge
 _WIDTHS_M = {"head": 0.03, "neck": 0.03, "spine": 0.04, "pelvis": 0.04, "collar": 0.04, "hip": 0.03}
 _WIDTH_M = 0.02  # of limbs: how far clothes and hair reach beyond the body
@@ -74,7 +74,7 @@ class OutlineMeasurer:
         local = body.v_template[v] - body.J_template[self.part]
         delta = np.einsum("nji,nj->ni", R[self.part], points - t[self.part]) - local
         facing = (normals * points).sum(axis=1) / np.linalg.norm(points, axis=1)
-        near = (np.abs(facing) < RIM_COS) & (points[:, 2] > NEAR_M) & (np.linalg.norm(delta, axis=1) < MOST_BLENDING_M)
+        near = (np.abs(facing) < RIM_COS) & (points[:, 2] > NEAR_M) & (np.linalg.norm(delta, axis=1) < MAX_BLENDING_M)
         rows = np.flatnonzero(near)
         at = self._crop(mask.region, points[rows])
         ahead = self._crop(mask.region, points[rows] + 0.01 * normals[rows]) - at

@@ -21,7 +21,7 @@ from ..prepared_track import PreparedTrack
 from ..weights import ROBUST, cold_stages, warm_stages
 from .rim import OutlineMeasurer
 
-FEWEST, MOST = 4, 32  # masks; fewer, such as that of a still image, can mislead, and more add little
+MIN_MASKS, MAX_MASKS = 4, 32  # fewer, such as that of a still image, can mislead, and more add little
 ROUNDS = 3
 THREADS = 2
 # A rim point's inverse variance: 0.0018 in normalized coordinates, 7 mm at 4 m. The outline says more of the shape than
@@ -36,9 +36,9 @@ def usable_masks(prepared: PreparedTrack) -> list[tuple[int, PersonMask]]:
     if prepared.camera is None:
         return []
     seen = [(row, mask) for row, mask in prepared.track.masks if prepared.track.seen[row]]
-    if len(seen) < FEWEST:
+    if len(seen) < MIN_MASKS:
         return []
-    chosen = np.unique(np.linspace(0, len(seen) - 1, min(MOST, len(seen))).round().astype(int))
+    chosen = np.unique(np.linspace(0, len(seen) - 1, min(MAX_MASKS, len(seen))).round().astype(int))
     return [seen[k] for k in chosen]
 
 

@@ -15,7 +15,7 @@ _FOREHEAD = ((151, 108, 69), (151, 337, 299))
 _HALF = 0.5  # side of the square around an eye, over twice the distance of its corners
 _SPOT = 0.1  # of a place on the cheek, likewise
 _DARK = 8.0  # brightness below which skin says nothing
-_LEAST_PX = 6.0  # distance of an eye's corners below which the square is mostly shadow and hair
+_MIN_PX = 6.0  # distance of an eye's corners below which the square is mostly shadow and hair
 
 
 def eye_light(image_rgb: NDArray[np.uint8], landmarks: NDArray[np.float64]) -> float:
@@ -34,7 +34,7 @@ def eye_light(image_rgb: NDArray[np.uint8], landmarks: NDArray[np.float64]) -> f
     for (first, second), *places in zip(_EYES, _CHEEKS, _FOREHEAD, strict=True):
         (ax, ay), (bx, by) = landmarks[[first, second], :2].tolist()
         width = math.hypot(ax - bx, ay - by)
-        if width < _LEAST_PX:
+        if width < _MIN_PX:
             continue
         eye = _brightness(image_rgb, (ax + bx) / 2, (ay + by) / 2, _HALF * width)
         half = _SPOT * width

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from ...media.video import Video
 
 WARM_UP_S = 1.5
-MOST_WINDOWS = 10_000
+MAX_WINDOWS = 10_000
 _TOLERANCE_S = 1e-6  # of a frame's time, as in decoding
 
 
@@ -46,7 +46,7 @@ def plan_windows(video: Video, window_s: float) -> list[Window]:
     The last window has whatever is left, also of footage that is longer than its container says.
     """
     start_s, length_s = video.wanted.start_s, video.expected_frames / float(video.fps)
-    count = max(1, min(int(length_s / window_s + 1e-9), MOST_WINDOWS))
+    count = max(1, min(int(length_s / window_s + 1e-9), MAX_WINDOWS))
     begins = [start_s + k * window_s for k in range(count)]
     ends = [*begins[1:], math.inf]
     warm_up_s = min(WARM_UP_S, window_s / 2)

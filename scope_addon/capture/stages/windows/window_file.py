@@ -30,7 +30,7 @@ from .plan import Window
 from .window_record import WindowRecord, known_reference
 
 MASK_SIDE = 256
-MOST_TEXT = 100_000
+MAX_TEXT = 100_000
 # Name: type and shape. The first length of several arrays is the same where the letter is: frames (N), tracklets (M),
 # their rows (R), references (Q), masks (K), regions (S), edge frames (E), edges (L).
 _ARRAYS: dict[str, tuple[type[Any], str, tuple[int, ...]]] = {
@@ -189,7 +189,7 @@ def _check(arrays: Arrays) -> None:
     _require(bool(np.isin(arrays["masks"][:, 0], numbers).all()), "masks")
     sides = (arrays["sides"], arrays["mask_regions"][:, 2], arrays["anchor_regions"][:, 3])
     _require(all(bool((side > 0).all()) for side in sides), "sides")
-    _require(lengths["T"] <= MOST_TEXT, "text")
+    _require(lengths["T"] <= MAX_TEXT, "text")
 
 
 def _sums_to(counts: NDArray[np.int64], total: int) -> bool:

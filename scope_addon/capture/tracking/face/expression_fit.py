@@ -31,10 +31,10 @@ from ...perception.face.face_record import landmarks_of, parts, with_expression
 from .face_alignment import aligned, view_terms
 
 FILE = Path(__file__).resolve().parents[4] / "assets" / "face" / "response.npz"
-LEAST_S, LEAST_FRAMES = 2.0, 10  # of a face, from which a person's face at rest is known
+MIN_S, MIN_FRAMES = 2.0, 10  # of a face, from which a person's face at rest is known
 SURE = 0.3  # confidence of frames that tell the person's face
 SPARSITY = 3.0  # λ
-SURE_PX, MOST_NOISE = 64.0, 8.0  # size of a face below which errors grow, with the area's inverse; most growth of λ
+SURE_PX, MAX_NOISE = 64.0, 8.0  # size of a face below which errors grow, with the area's inverse; most growth of λ
 LARGEST_GAZE = 2.0  # w_max of the units that turn the eyes: eyes turn farther than the body's keys at 1
 _TIME_TOLERANCE_S = 0.005  # of their sum
 _ROUNDS, _SWEEPS = 4, 30
@@ -90,7 +90,7 @@ def fitted(rows: NDArray[np.floating[Any]], times: NDArray[np.float64]) -> NDArr
     response = load_response()
     confidence, size, *_ = parts(rows[seen])
     faces = aligned(landmarks_of(rows[seen], response.landmarks).astype(float), response.reference, response.shares)
-    noise = np.clip((SURE_PX / np.maximum(size, 1.0)) ** 2, 1.0, MOST_NOISE)
+    noise = np.clip((SURE_PX / np.maximum(size, 1.0)) ** 2, 1.0, MAX_NOISE)
     sure = confidence >= min(SURE, float(np.median(confidence)))
     units = fit_units(response, faces.points.reshape(len(seen), -1), faces.turns, noise, sure)
     out = rows.copy()
@@ -106,7 +106,7 @@ def is_known(rows: NDArray[np.floating[Any]], times: NDArray[np.float64]) -> boo
     """
     seen = rows[:, 0] > 0
     seconds = float(np.diff(times, prepend=times[:1])[seen].sum())
-    return int(seen.sum()) >= LEAST_FRAMES and seconds >= LEAST_S - _TIME_TOLERANCE_S
+    return int(seen.sum()) >= MIN_FRAMES and seconds >= MIN_S - _TIME_TOLERANCE_S
 
 
 def fit_units(
@@ -134,10 +134,10 @@ def fit_units(
         v = views[sure]
         turned = np.linalg.solve(v.T @ v + ridge, v.T @ (rest - constant))
         own = x - constant - views @ turned
-        target = own @ response.projection.T - SPARSITY * np.clip(noise, ratio, MOST_NOISE)[:, None]
+        target = own @ response.projection.T - SPARSITY * np.clip(noise, ratio, MAX_NOISE)[:, None]
         for a in range(0, len(x), _BLOCK):
             _descend(w[a : a + _BLOCK], normal, target[a : a + _BLOCK], response.largest)
-        ratio = min(max(error_size(response, own[sure] - w[sure] @ E) / float(response.noise), ratio), MOST_NOISE)
+        ratio = min(max(error_size(response, own[sure] - w[sure] @ E) / float(response.noise), ratio), MAX_NOISE)
     return w
 
 

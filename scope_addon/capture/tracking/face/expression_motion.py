@@ -15,7 +15,7 @@ from ...perception.face.face_record import CONTOURS, eye_light_of, parts
 
 CALM_HZ = 2.0  # cut-off frequency at rest
 NOISE = 0.05  # deviation of a weight from the calm motion that counts as noise, of a large face
-MOST_NOISE = 8.0  # times as much for a small one, by the inverse of its area
+MAX_NOISE = 8.0  # times as much for a small one, by the inverse of its area
 GAZE_NOISE = 0.06
 SURE_PX = 64.0  # size of a face from which it is large
 RELEASE_S = 0.5  # in which an expression goes to rest after the face was last seen, and comes back before it is again
@@ -23,8 +23,8 @@ CLOSED = 0.5  # weight of a blink above which the iris is not seen
 DARK_GLASSES = 0.4  # light around the eyes below which they are not seen; small ones in thick frames have 0.45
 GLASSES_S = 1.0  # time over which the median of that is taken: a hand or a shadow that passes is none
 SURE_OF_MOUTH = 0.5  # times the confidence of a face whose eyes are not seen
-LEAST_S = 2.0  # of a face, from which it is known how the network sees its open eyes
-MOST_OPEN = 0.65  # weight of a blink that may be an open eye
+MIN_S = 2.0  # of a face, from which it is known how the network sees its open eyes
+MAX_OPEN = 0.65  # weight of a blink that may be an open eye
 _EYES = [k for k, name in enumerate(EXPRESSIONS) if name.startswith("eye")]
 _BLINKS = [EXPRESSIONS.index(f"eyeBlink{side}") for side in ("Left", "Right")]
 _FORWARD = np.array([0.0, 0.0, 1.0])
@@ -48,7 +48,7 @@ def expression_motion(
     weights = released(weights, seen, times, np.zeros(len(EXPRESSIONS)))
     weights[:, _EYES], sure = eyes, np.where(eyes_seen, confidence, SURE_OF_MOUTH * confidence)
     if smoothing and len(rows) > 2:
-        noise = np.where(seen, np.clip((SURE_PX / np.maximum(size, 1.0)) ** 2, 1.0, MOST_NOISE), 1.0)
+        noise = np.where(seen, np.clip((SURE_PX / np.maximum(size, 1.0)) ** 2, 1.0, MAX_NOISE), 1.0)
         weights = np.clip(calmed(weights, times, NOISE * noise[:, None]), 0.0, 1.0)
         sure = np.where(seen, np.clip(gaussian_smooth(sure, times, CALM_HZ), 0.0, 1.0), 0.0)
     gaze = np.empty_like(directions)
@@ -91,18 +91,18 @@ def with_open_eyes(
     """Take from the blinks what the network sees in this person's open eyes, as narrow ones, or those behind glasses.
 
     With the median m of a blink's weight over the clip, in most of which eyes are open: w' = max(0, (w − m) / (1 − m)).
-    Weights of faces that are seen for less than `LEAST_S` stay, and those of eyes that are closed for half of the clip.
+    Weights of faces that are seen for less than `MIN_S` stay, and those of eyes that are closed for half of the clip.
 
     :param weights: (T, 52).
     :param seen: (T,) where the face was seen.
     :param times: (T,) seconds.
     """
-    if len(times) < 2 or seen.sum() * float(np.median(np.diff(times))) < LEAST_S:
+    if len(times) < 2 or seen.sum() * float(np.median(np.diff(times))) < MIN_S:
         return weights
     out = weights.copy()
     for blink in _BLINKS:
         rest = float(np.median(weights[seen, blink]))
-        if rest < MOST_OPEN:
+        if rest < MAX_OPEN:
             out[:, blink] = np.maximum(0.0, (weights[:, blink] - rest) / (1.0 - rest))
     return out
 

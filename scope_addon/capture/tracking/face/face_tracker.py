@@ -28,7 +28,7 @@ MIN_SIZE, MAX_SIZE = 0.5, 1.6  # side of the face's region over that of the pred
 SMALLEST_REGION_PX = 24.0
 # Least cosine of the angle to the camera, by the body, of a head on which a lost face is looked for. Of heads that look
 # farther away, the network imagines the half that nobody sees, or a face at the back.
-LEAST_FACING = 0.1
+MIN_FACING = 0.1
 FIRST_PRESENCE = 0.001  # in the region by the body, below which it is not looked for by the landmarks there
 
 
@@ -111,7 +111,7 @@ class FaceTracker:
                 return estimate
         elif not is_search_due(time_s, face.seen_s, face.searched_s):
             return None
-        if facing(person.world_landmarks) < LEAST_FACING:
+        if facing(person.world_landmarks) < MIN_FACING:
             return None
         face.searched_s = time_s
         first = self._network.estimate(image_rgb, predicted)

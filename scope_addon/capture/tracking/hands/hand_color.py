@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 _KNUCKLES, _MIDDLES = [5, 9, 13, 17], [6, 10, 14, 18]  # keypoints of a hand: bases and middle joints of the fingers
 _ALONG = (1 / 3, 2 / 3)  # places on the palm, from the wrist to the knuckles
 _DARK = 8.0  # added to colours, which say little below it
-MOST_SHADE = 0.7  # change of a channel's logarithm that light can make from one frame to another
-MOST_TINT = 0.08  # change of a channel's share of all three
+MAX_SHADE = 0.7  # change of a channel's logarithm that light can make from one frame to another
+MAX_TINT = 0.08  # change of a channel's share of all three
 
 
 def palm_color(image_rgb: NDArray[np.uint8], keypoints_px: NDArray[np.float64]) -> NDArray[np.float64] | None:
@@ -40,4 +40,4 @@ def is_like(color: NDArray[np.float64] | None, before: NDArray[np.float64] | Non
     a, b = color + _DARK, before + _DARK
     shade = float(np.abs(np.log(a / b)).max())
     tint = float(np.abs(a / a.sum() - b / b.sum()).max())
-    return shade <= MOST_SHADE or tint <= MOST_TINT
+    return shade <= MAX_SHADE or tint <= MAX_TINT

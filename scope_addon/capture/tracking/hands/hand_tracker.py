@@ -42,9 +42,9 @@ FIRST_PRESENCE = 0.1  # in a rough region, from which the better one of the land
 SEARCH_SCALE = 2.3  # side of the square in which a palm is searched, in sides of the predicted region
 CLOSER_SCALE, SMALLER_SCALE = 1.5, 0.7  # of the square and the region of a second look, likewise
 UNSURE_SCORE = 0.2  # of a palm in a second look
-MOST_PALMS = 2
+MAX_PALMS = 2
 # Frames that are kept of a hand, a third of a second at 30 frames/s: each is a copy of its surroundings.
-MOST_MISSED = 11
+MAX_MISSED = 11
 SMALLEST_HAND_PX = 12.0  # length of a hand that is looked for
 # The same of one whose palm the network reads to within about 20 degrees: 20 pixels from wrist to middle knuckle.
 LARGE_HAND_PX = 52.0
@@ -155,7 +155,7 @@ class HandTracker:
             elif sight.hand_px >= self._least_px:
                 others = [h.estimate for other, h in found.items() if other != key and h is not None]
                 seen = replace(sight.around_wrist(), others=others, opposite=[])
-                self._missed[key] = [*missed, _Missed(now, seen, hand, rows[key[0]][key[1]])][-MOST_MISSED:]
+                self._missed[key] = [*missed, _Missed(now, seen, hand, rows[key[0]][key[1]])][-MAX_MISSED:]
         return [(n, replace(o, hands=rows[n])) for n, o in observations]
 
     def _beside(self, sight: Sight, others: Sequence[HandEstimate]) -> Found | None:
@@ -251,7 +251,7 @@ class HandTracker:
             self._palms.detect(sight.image_rgb, square, threshold),
             key=lambda palm: float(np.hypot(*np.subtract(palm.region.center_px, predicted.center_px))),
         )
-        return [palm.region for palm in palms[:MOST_PALMS]]
+        return [palm.region for palm in palms[:MAX_PALMS]]
 
     def _first_sure(
         self,

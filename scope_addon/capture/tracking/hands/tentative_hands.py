@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 SUPPORT_S = 0.35  # to the nearest frame in which the network is sure of the hand
 LONGEST_STEP_S = 0.12  # between two frames of which one supports the other
-MOST_CHANGE = 0.45  # of the keypoints about their wrist, mean over them, in sizes of the hand
-MOST_GROWTH = 1.6  # of its size from one frame to the other
+MAX_CHANGE = 0.45  # of the keypoints about their wrist, mean over them, in sizes of the hand
+MAX_GROWTH = 1.6  # of its size from one frame to the other
 _TOLERANCE_S = 0.005
 _CONFIDENCE = 2  # column
 
@@ -62,4 +62,4 @@ def _continues(before: NDArray[np.floating[Any]], after: NDArray[np.floating[Any
     a, b = (hand[:, :2] - hand[0, :2] for hand in (before, after))
     sizes = [max(float(np.ptp(points, axis=0).max()), 1e-6) for points in (a, b)]
     change = float(np.linalg.norm(a - b, axis=1).mean())
-    return max(sizes) <= MOST_GROWTH * min(sizes) and change <= MOST_CHANGE * max(sizes)
+    return max(sizes) <= MAX_GROWTH * min(sizes) and change <= MAX_CHANGE * max(sizes)

@@ -13,8 +13,8 @@ from ...perception.landmark_network import LandmarkNetwork
 from ...perception.observation import Observation, PersonMask
 
 MASKS = 16  # for a clip, about; 8 give the same shape on real clips
-LEAST_STRIDE = 6  # frames between two masks in short clips
-LEAST_PRESENCE = 0.5  # in a region without a person, the network invents one
+MIN_STRIDE = 6  # frames between two masks in short clips
+MIN_PRESENCE = 0.5  # in a region without a person, the network invents one
 
 
 class MaskSchedule:
@@ -29,7 +29,7 @@ class MaskSchedule:
     """
 
     def __init__(self, network: LandmarkNetwork | None, frames: int) -> None:
-        self._network, self._stride = network, max(LEAST_STRIDE, frames // MASKS)
+        self._network, self._stride = network, max(MIN_STRIDE, frames // MASKS)
         self._frames, self._masks = 0, 0
 
     @property
@@ -55,7 +55,7 @@ class MaskSchedule:
 
     @staticmethod
     def _with_mask(network: LandmarkNetwork, image_rgb: NDArray[np.uint8], observation: Observation) -> Observation:
-        if observation.presence < LEAST_PRESENCE:
+        if observation.presence < MIN_PRESENCE:
             return replace(observation, mask=None)
         if observation.mask is not None:
             return observation

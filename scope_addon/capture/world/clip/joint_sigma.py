@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 ALONG, ACROSS = 15.5, 11.5
 _RATE_HZ, _EXPONENT = 60.0, 0.3
-_LEAST_HZ = 10.0  # acceleration hardly couples frames that are further apart
+_MIN_HZ = 10.0  # acceleration hardly couples frames that are further apart
 
 
 def joint_sigma(
@@ -42,8 +42,8 @@ def joint_sigma(
     sight = joints / np.linalg.norm(joints, axis=-1, keepdims=True)
     along = np.einsum("tki,tkij,tkj->tk", sight, covariance, sight)
     across = 0.5 * (np.trace(covariance, axis1=-2, axis2=-1) - along)
-    rate = 1.0 / float(np.median(np.diff(times))) if len(times) > 1 else _LEAST_HZ
-    inflation = (max(rate, _LEAST_HZ) / _RATE_HZ) ** _EXPONENT
+    rate = 1.0 / float(np.median(np.diff(times))) if len(times) > 1 else _MIN_HZ
+    inflation = (max(rate, _MIN_HZ) / _RATE_HZ) ** _EXPONENT
     variance = np.maximum(np.stack([along, across], axis=-1), 0.0)
     sigma: NDArray[np.float64] = inflation * np.sqrt(variance) * [ALONG, ACROSS]
     return sigma

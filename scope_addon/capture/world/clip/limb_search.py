@@ -21,9 +21,9 @@ from ....kinematics.mirrored_limbs import LIMBS, bone_depths, mirrored_limb, run
 from .clip_window import ClipWindow
 
 SHALLOW_M, DEEP_M = 0.03, 0.1  # a bone is mirrored while it is deeper, if it gets so deep
-_LEAST_CHANGE_M = 0.1  # by which a limb that has a minimum of its own differs
-_MOST_COST, _MOST_COST_OF_ONE = 5.0, 30.0  # that the mirrored limb may add to frames alone, in the mean and to one
-_LEAST_GAIN = 10.0  # of cost, over the frames that are fitted together
+_MIN_CHANGE_M = 0.1  # by which a limb that has a minimum of its own differs
+_MAX_COST, _MAX_COST_OF_ONE = 5.0, 30.0  # that the mirrored limb may add to frames alone, in the mean and to one
+_MIN_GAIN = 10.0  # of cost, over the frames that are fitted together
 _LONGEST_S = 2.0  # of a bone on one side; longer trials cost much, and none has found a better pose
 _SAMPLES = 5  # further frames of a run that are tried alone
 _MARGIN = 8  # frames before and after
@@ -99,9 +99,9 @@ def _may_be_better(
         now, then = window.fit_alone(row, states[row]), window.fit_alone(row, other[row])
         change: NDArray[Any] = np.linalg.norm(then.t_camera_part[ends] - now.t_camera_part[ends], axis=1)
         added.append(float(then.cost - now.cost))
-        if added[0] > _MOST_COST or not (len(added) > 1 or change.max() > _LEAST_CHANGE_M):
+        if added[0] > _MAX_COST or not (len(added) > 1 or change.max() > _MIN_CHANGE_M):
             return False
-    return float(np.mean(added)) < _MOST_COST and max(added) < _MOST_COST_OF_ONE
+    return float(np.mean(added)) < _MAX_COST and max(added) < _MAX_COST_OF_ONE
 
 
 def _better(window: ClipWindow, motion: _Motion, rows: slice, other: list[State], prior: MotionPrior) -> _Motion:
@@ -109,7 +109,7 @@ def _better(window: ClipWindow, motion: _Motion, rows: slice, other: list[State]
     around = slice(max(rows.start - _MARGIN, 0), min(rows.stop + _MARGIN, len(other)))
     now = window.fit(around, motion.states[around], prior, steps=_STEPS)
     then = window.fit(around, other[around], prior, steps=_STEPS)
-    if not now.cost - then.cost > _LEAST_GAIN:
+    if not now.cost - then.cost > _MIN_GAIN:
         return motion
     states, R, joints = list(motion.states), motion.R.copy(), motion.joints.copy()
     states[around], R[around], joints[around] = then.states, then.R_world_part, then.t_world_part

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ....kinematics.runs import runs
 
-LEAST_PROBABILITY = 0.5
+MIN_PROBABILITY = 0.5
 SPREAD_M = 0.02
 
 
@@ -28,7 +28,7 @@ def resting_places(
     """
     places, probability = np.zeros(points.shape), np.zeros(resting.shape)
     for c in range(resting.shape[1]):
-        for first, end in runs(resting[:, c] > LEAST_PROBABILITY):
+        for first, end in runs(resting[:, c] > MIN_PROBABILITY):
             rest, p = points[first:end, c], resting[first:end, c]
             place = p @ rest / p.sum()
             if np.linalg.norm(rest - place, axis=1).max() < SPREAD_M:

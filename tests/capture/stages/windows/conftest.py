@@ -12,6 +12,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from scope.scope_addon.capture.fitting import focal_length
 from scope.scope_addon.capture.media.frame import Frame
 from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.options import CaptureOptions
@@ -33,7 +34,7 @@ SMALL = Person(lambda t: (150 + 0.5 * t, 130), RED, size_px=45)
 LARGE = Person(lambda t: (430, 130) if 20 <= t < 75 else None, BLUE, size_px=115)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("clip")
     for t, image in enumerate(pictures([SMALL, LARGE], FRAMES, (600, 260))):
@@ -50,6 +51,8 @@ def windows_of(monkeypatch: pytest.MonkeyPatch, folder: Path) -> Callable[..., l
     people = [SMALL, LARGE]
     monkeypatch.setattr(tracking_networks, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people, "heavy" in name))
     monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_: FakeDetector(people))
+    # These pictures have hardly any edges; to search them for a focal length takes a quarter of the time.
+    monkeypatch.setattr(focal_length, "focal_from_edges", lambda *_: None)
 
     def observed(
         options: CaptureOptions, parts: Path | None = None, unfinished: Path | None = None, stop_at: float = np.inf
@@ -69,7 +72,7 @@ def windows_of(monkeypatch: pytest.MonkeyPatch, folder: Path) -> Callable[..., l
     return observed
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def found() -> dict[int | str, list[Track]]:
     """What `undisturbed` has found, by the people who were asked for."""
     return {}

@@ -23,19 +23,25 @@ def places(track: Track) -> np.ndarray:
 
 @pytest.mark.parametrize("people", ["largest", 1, 2])
 def test_windows_of_several_processes_are_the_clip_in_one_piece(
-    windows_of: Callable[..., list[Track]], folder: Path, tmp_path: Path, people: int | str
+    windows_of: Callable[..., list[Track]],
+    undisturbed: Callable[..., list[Track]],
+    folder: Path,
+    tmp_path: Path,
+    people: int | str,
 ) -> None:
     given = options(people)
     assert count_windows(folder, given) == 3
     frames = [observe_windows(folder, given, numbers, tmp_path)[1] for numbers in (range(2, 3), range(2))]
     assert frames == [90, 120]
-    assert_same(windows_of(given, tmp_path), windows_of(given))
+    assert_same(windows_of(given, tmp_path), undisturbed(people))
 
 
 def test_the_same_person_is_followed_across_a_seam_where_somebody_larger_stands(
-    windows_of: Callable[..., list[Track]], monkeypatch: pytest.MonkeyPatch
+    windows_of: Callable[..., list[Track]],
+    undisturbed: Callable[..., list[Track]],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    (track,) = windows_of(options())
+    (track,) = undisturbed()
     truth = np.array([SMALL.center_px(t) for t in range(FRAMES)])
     assert track.seen.all()
     assert track.acquired.sum() == 1
@@ -46,17 +52,21 @@ def test_the_same_person_is_followed_across_a_seam_where_somebody_larger_stands(
 
 
 def test_windows_that_are_missing_or_damaged_are_observed_by_the_process_that_joins(
-    windows_of: Callable[..., list[Track]], folder: Path, tmp_path: Path
+    windows_of: Callable[..., list[Track]], undisturbed: Callable[..., list[Track]], folder: Path, tmp_path: Path
 ) -> None:
     given = options()
     files, _ = observe_windows(folder, given, range(3), tmp_path)
     files[0].unlink()
     files[2].write_bytes(files[2].read_bytes()[:-100])
-    assert_same(windows_of(given, tmp_path), windows_of(given))
+    assert_same(windows_of(given, tmp_path), undisturbed())
 
 
 def test_a_window_that_was_decoded_to_other_images_is_observed_again(
-    windows_of: Callable[..., list[Track]], folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    windows_of: Callable[..., list[Track]],
+    undisturbed: Callable[..., list[Track]],
+    folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """As of a file that does not mark its keyframes well: a decoder that begins in its middle gives a grey image."""
     sought = Video.frames_from
@@ -67,7 +77,7 @@ def test_a_window_that_was_decoded_to_other_images_is_observed_again(
             lost[0, 0] = frame.image_rgb[0, 0]
             yield Frame(frame.index + 5, frame.timestamp_s, lost) if k < 8 else frame
 
-    whole = windows_of(options())
+    whole = undisturbed()
     with monkeypatch.context() as patch:
         patch.setattr(Video, "frames_from", damaged)
         observe_windows(folder, options(), range(1, 2), tmp_path)
@@ -75,7 +85,11 @@ def test_a_window_that_was_decoded_to_other_images_is_observed_again(
 
 
 def test_indices_that_a_decoder_counts_from_elsewhere_are_those_of_the_clip(
-    windows_of: Callable[..., list[Track]], folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    windows_of: Callable[..., list[Track]],
+    undisturbed: Callable[..., list[Track]],
+    folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """As where the frame rate varies, and the index of a frame can only be estimated from its time."""
     sought = Video.frames_from
@@ -83,7 +97,7 @@ def test_indices_that_a_decoder_counts_from_elsewhere_are_those_of_the_clip(
     def shifted(video: Video, start_s: float) -> Iterator[Frame]:
         return (Frame(frame.index + 5, frame.timestamp_s, frame.image_rgb) for frame in sought(video, start_s))
 
-    whole = windows_of(options())
+    whole = undisturbed()
     with monkeypatch.context() as patch:
         patch.setattr(Video, "frames_from", shifted)
         observe_windows(folder, options(), range(1, 3), tmp_path)

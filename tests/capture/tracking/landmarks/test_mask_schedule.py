@@ -10,7 +10,7 @@ import pytest
 from scope.scope_addon.capture.perception.landmark_network import LandmarkNetwork
 from scope.scope_addon.capture.perception.observation import Observation, PersonMask
 from scope.scope_addon.capture.perception.region import Region
-from scope.scope_addon.capture.tracking.landmarks.mask_schedule import LEAST_STRIDE, MASKS, MaskSchedule
+from scope.scope_addon.capture.tracking.landmarks.mask_schedule import MASKS, MIN_STRIDE, MaskSchedule
 from scope.scope_addon.capture.tracking.track import Tracklet, make_track, single_frame_track
 
 IMAGE = np.zeros((48, 64, 3), np.uint8)
@@ -42,7 +42,7 @@ def masked(schedule: MaskSchedule, frames: int) -> list[int]:
 
 
 def test_a_short_clip_has_a_mask_in_its_first_frame_and_then_every_few() -> None:
-    assert masked(schedule(40), 40) == list(range(0, 40, LEAST_STRIDE))
+    assert masked(schedule(40), 40) == list(range(0, 40, MIN_STRIDE))
 
 
 @pytest.mark.parametrize("expected", [3000, 0])
@@ -89,10 +89,10 @@ def test_a_track_keeps_masks_with_their_rows() -> None:
     for row in range(20):
         tracklet.add(row, masks.add(IMAGE, [(0, seen())])[0][1])
     track = make_track(range(20), [row / 30 for row in range(20)], [tracklet])
-    expected = [(row, 1.0 + number) for number, row in enumerate(range(0, 20, LEAST_STRIDE))]
+    expected = [(row, 1.0 + number) for number, row in enumerate(range(0, 20, MIN_STRIDE))]
     assert [(row, float(mask.probability[0, 0])) for row, mask in track.masks] == expected
     assert track.masks[0][1].image_size == (64, 48)
-    tracklet.truncate(LEAST_STRIDE)
+    tracklet.truncate(MIN_STRIDE)
     assert [row for row, _ in tracklet.masks] == [0]
     observation = masks.add(IMAGE, [(0, seen())])[0][1]
     assert single_frame_track(observation).masks == ()

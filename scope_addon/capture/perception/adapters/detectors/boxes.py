@@ -17,7 +17,7 @@ from ...non_maximum_suppression import overlap_clusters
 
 _BORDER = 114  # the grey level that the YOLO family is trained with
 OVERLAP_THRESHOLD = 0.5
-MOST_BOXES = 5000  # the best ones are compared with each other; a broken network may output millions
+MAX_BOXES = 5000  # the best ones are compared with each other; a broken network may output millions
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,6 @@ def suppress(boxes: Boxes, threshold: float) -> Boxes:
     """
     size = boxes.corners[:, 2:] - boxes.corners[:, :2]
     chosen = np.flatnonzero((boxes.scores >= threshold) & (size > 0).all(axis=1))
-    order = chosen[np.argsort(-boxes.scores[chosen], kind="stable")][:MOST_BOXES]
+    order = chosen[np.argsort(-boxes.scores[chosen], kind="stable")][:MAX_BOXES]
     kept = order[[cluster[0] for cluster in overlap_clusters(boxes.corners[order], OVERLAP_THRESHOLD)]]
     return Boxes(boxes.corners[kept], boxes.scores[kept])

@@ -23,7 +23,7 @@ from ..graph import IMAGENET, Graph, finite
 TYPE = "heatmap"
 NORMALIZATION = IMAGENET
 _BLUR = 11  # cells; suits the Gaussians of 2 to 3 cells that these networks are trained with
-_LEAST_HEAT = 1e-10
+_MIN_HEAT = 1e-10
 
 
 def matches(graph: Graph) -> bool:
@@ -82,7 +82,7 @@ def _by_taylor(heat: NDArray[np.float64], x: int, y: int) -> tuple[float, float]
     part = heat[top : y + reach + 1, left : x + reach + 1]
     # zero padding: there is no heat beyond the heatmap
     blurred = cv2.GaussianBlur(part, (_BLUR, _BLUR), 0, borderType=cv2.BORDER_CONSTANT)
-    h = np.log(np.maximum(blurred, _LEAST_HEAT))
+    h = np.log(np.maximum(blurred, _MIN_HEAT))
     x0, y0 = x - left, y - top
     gradient = np.array([h[y0, x0 + 1] - h[y0, x0 - 1], h[y0 + 1, x0] - h[y0 - 1, x0]]) / 2
     xx = (h[y0, x0 + 2] - 2 * h[y0, x0] + h[y0, x0 - 2]) / 4

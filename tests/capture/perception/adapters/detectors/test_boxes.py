@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scope.scope_addon.capture.perception.adapters.detectors.boxes import MOST_BOXES, Boxes, letterbox, suppress
+from scope.scope_addon.capture.perception.adapters.detectors.boxes import MAX_BOXES, Boxes, letterbox, suppress
 
 from .person_in_picture import HEIGHT, WIDTH
 
@@ -25,5 +25,5 @@ def test_of_millions_of_boxes_only_the_best_are_compared() -> None:
     """All of a million, which lie apart, would take hours."""
     corners = np.stack([np.arange(1e6), np.zeros(10**6), np.arange(1e6) + 0.5, np.ones(10**6)], axis=1)
     kept = suppress(Boxes(corners, np.linspace(0.5, 1.0, 1_000_000)), 0.4)
-    assert len(kept.scores) == MOST_BOXES
-    np.testing.assert_array_equal(kept.corners[:, 0], np.arange(10**6 - MOST_BOXES, 10**6)[::-1])
+    assert len(kept.scores) == MAX_BOXES
+    np.testing.assert_array_equal(kept.corners[:, 0], np.arange(10**6 - MAX_BOXES, 10**6)[::-1])
