@@ -68,6 +68,7 @@ class PreparedTrack:
     hands: NDArray[np.floating[Any]] | None = None  # (T, 2, 21, 6) as in the track, undistorted; None: not looked for
     head: NDArray[np.floating[Any]] | None = None  # (T, 4) direction across it, certainty; None: no face looked for
     camera: Camera | None = None  # of the masks; None where the track has none
+    is_stature_given: bool = False  # by the user
     stance: Stance | None = None  # in each frame's camera; the body's last keypoints are then its contact points
 
     def measure(self, k: int, root_cam: NDArray[np.floating[Any]] | None = None) -> Measurements:
@@ -116,6 +117,10 @@ class PreparedTrack:
         hands = None if self.hand_measurer is None else HandMeasurer(body, K)
         return replace(self, body=body, measurer=Measurer(body, K), hand_measurer=hands, stance=stance)
 
+    def with_height(self, height_m: float, sigma_m: float) -> PreparedTrack:
+        """Return the track of an adult of that stature with that standard deviation, both in metres."""
+        return replace(self, priors=with_stature(self.priors, self.body, height_m, sigma_m))
+
     def priors_with_shape(self, betas: NDArray[np.floating[Any]]) -> Priors:
         """Return the priors for a known shape (P,)."""
         return replace(self.priors, shape_mean=betas, shape_information=np.eye(self.body.P) * SHAPE_CERTAINTY)
@@ -140,7 +145,10 @@ def prepare_track(
         priors = with_stature(priors, body, height_m)
     else:
         priors = (with_unknown_stature if ablation.stature else with_population)(priors, body)
-    prepared = PreparedTrack(body, track, measurer, pixels, lifted, priors, ablation.weights(WEIGHTS), camera=camera)
+    weights, is_given = ablation.weights(WEIGHTS), height_m is not None
+    prepared = PreparedTrack(
+        body, track, measurer, pixels, lifted, priors, weights, camera=camera, is_stature_given=is_given
+    )
     if track.face is not None:
         across, ears = across_head(track.face, camera), lifted.points[:, EARS[1]] - lifted.points[:, EARS[0]]
         prepared = replace(prepared, head=np.column_stack([across, certainty(track.face, across, ears)]))

@@ -23,17 +23,19 @@ FIXED = 1e6  # information of a coefficient that does not vary
 _ROUNDS = 3
 
 
-def with_stature(priors: Priors, body: Body, height_m: float) -> Priors:
+def with_stature(priors: Priors, body: Body, height_m: float, sigma_m: float = SIGMA_M) -> Priors:
     """Return the priors for a person of known stature: the most probable shapes of this height.
 
     This is the population's N(0, Λ₀⁻¹) of β, conditioned on the height h(β) of the rest pose's highest vertex above its
     lowest: Λ = Λ₀ + g gᵀ/σ² and mean Λ₀⁻¹g (H − h₀) / (σ² + gᵀΛ₀⁻¹g), with h(β) = h₀ + g·β as long as these two
     vertices stay the same. Λ₀ = I, but growth is fixed at 0 from `CHILD_BELOW_M` on.
+
+    :param sigma_m: σ in Λ; the mean has this height in any case.
     """
     _, h0, g = _shape_of(body, height_m)
     population = _population(body, is_child=height_m < CHILD_BELOW_M)
     mean = g / population * (height_m - h0) / (SIGMA_M**2 + g @ (g / population))
-    return replace(priors, shape_mean=mean, shape_information=np.diag(population) + np.outer(g, g) / SIGMA_M**2)
+    return replace(priors, shape_mean=mean, shape_information=np.diag(population) + np.outer(g, g) / sigma_m**2)
 
 
 def with_unknown_stature(priors: Priors, body: Body) -> Priors:

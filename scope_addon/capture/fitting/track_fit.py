@@ -117,7 +117,7 @@ def _height_sigma(prepared: PreparedTrack, shape: ClipFit) -> float:
     """Return the standard deviation of the stature of a shape of `_fit_shape`, metres."""
     count = len(shape.frames) * (PRIOR_SHARE if usable_masks(prepared) else 1.0)
     information = shape.beta_information / (count * prepared.weights.shape)
-    return stature_sigma(prepared.body, shape.beta, information, prepared.priors.shape_mean is not None)
+    return stature_sigma(prepared.body, shape.beta, information, prepared.is_stature_given)
 
 
 def _spread(indices: NDArray[np.intp], count: int) -> NDArray[np.intp]:

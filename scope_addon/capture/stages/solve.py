@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ....solver.loaders.body_file import CHILD_BELOW_M
 from ...kinematics.single_precision import to_single_precision
 from ...motion import Motion
 from ..fitting.frame_sequence import FittedTrack
@@ -21,11 +22,17 @@ from ..world.camera_travel import camera_travel
 from ..world.clip.clip_fit import fit_clip
 from ..world.placement import PlacedTrack, place_track
 from ..world.raw_motion import RawMotion
+from ..world.relative_sizes import relative_sizes, stander
 from ..world.shot import FittedPerson, Shot
 from ..world.stance import stance_on_ground
 from ..world.world_frame import SharedWorld, find_world
 from .clock import Progress
 from .freed_memory import return_freed_memory
+
+# Of the prior of a stature that follows from the floor, relative: larger for adults (0.05 suits them best), smaller for
+# children, whose proportions are taken for adults' (benchmarks/notebook/clip.md).
+FLOOR_STATURE_SIGMA = 0.02
+MIN_RESIZE = 0.03  # relative change of a size from which on a person is fitted again
 
 
 @dataclass(frozen=True)
@@ -51,6 +58,7 @@ def solve(shot: Shot, tracks: Iterable[Track], progress: Progress, heights_m: Se
     fits = [
         to_single_precision(fit_track(each, progress_of_person(progress, k, count))) for k, each in enumerate(prepared)
     ]
+    prepared, fits = resize_people(shot, prepared, fits, heights_m)
     shot, iterations = replace(shot, path=find_camera_path(shot, prepared[0], fits[0])), fits[0].iterations
     known = [(each.track, each.body) for each in prepared]
     if shot.ablation.stance and not shot.is_still:
@@ -101,6 +109,26 @@ def prepare(shot: Shot, tracks: Iterable[Track], heights_m: Sequence[float]) -> 
 def place(shot: Shot, track: Track, fit: FittedTrack, smoothing: bool = True) -> PlacedTrack:
     """Fill the gaps of a fit, smooth it, and transform it to the first frame's camera axes."""
     return place_track(shot.body, track, fit, smoothing, shot.path, shot.uneven_ground)
+
+
+def resize_people(
+    shot: Shot, prepared: list[PreparedTrack], fits: list[FittedTrack], heights_m: Sequence[float]
+) -> tuple[list[PreparedTrack], list[FittedTrack]]:
+    """Fit those again whose size contradicts that of somebody of known stature on the same floor.
+
+    The camera's travel is not known yet, so with a camera that travels, sizes follow from the clip's first places.
+    """
+    if not heights_m or len(prepared) < 2 or not shot.ablation.stance or shot.uneven_ground:
+        return prepared, fits
+    placed = [place(shot, each.track, fit) for each, fit in zip(prepared, fits, strict=True)]
+    up = find_world(placed, shot.lines).up
+    factors = relative_sizes([stander(each, up, k < len(heights_m)) for k, each in enumerate(placed)])
+    for k, factor in enumerate(factors):
+        if abs(np.log(factor)) > MIN_RESIZE:
+            height_m = factor * placed[k].body.stature(placed[k].betas)
+            prepared[k] = prepared[k].with_height(max(height_m, CHILD_BELOW_M), FLOOR_STATURE_SIGMA * height_m)
+            fits[k] = to_single_precision(fit_track(prepared[k], lambda *_: None))
+    return prepared, fits
 
 
 def find_camera_path(shot: Shot, first: PreparedTrack, fit: FittedTrack) -> CameraPath:

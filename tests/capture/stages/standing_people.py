@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""People who stand, and may step up or down, as exact keypoints and world landmarks of a network."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+from scope.scope_addon.capture.camera.intrinsics import Camera
+from scope.scope_addon.capture.camera.line_segments import Lines
+from scope.scope_addon.capture.fitting.ablation import Ablation
+from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
+from scope.scope_addon.capture.tracking.track import Track
+from scope.scope_addon.capture.world.camera_path import CameraPath
+from scope.scope_addon.capture.world.shot import Shot
+from scope.scope_addon.kinematics.axes import transform_points, world_from_level_camera
+from scope.solver.loaders.body_file import load_body
+from scope.solver.rotations import exp
+
+BODY = load_body("scope")
+BLAZEPOSE = list(BODY.keypoint_set("blazepose").values())
+RATE, STAYS_S, STEPS_S, DEEPER_M = 15.0, 1.5, 0.4, 0.3
+K = np.array([[900.0, 0, 640], [0, 900.0, 360], [0, 0, 1]])
+T_CAMERA_WORLD = np.linalg.inv(world_from_level_camera(np.array([0.0, -1.0, 0.0]), height=1.3))
+
+
+def steps(height_m: float, betas: np.ndarray | None = None, right_m: float = 0.0) -> Track:
+    """Somebody who stands, steps with bent legs onto something that is higher, and stands; 3.5 m from the camera."""
+    betas = np.zeros(BODY.P) if betas is None else betas
+    times = np.arange(round((2 * STAYS_S + STEPS_S) * RATE)) / RATE
+    share = np.clip((times - STAYS_S) / STEPS_S, 0.0, 1.0)
+    bent, pose = np.sin(np.pi * share), np.zeros((len(times), BODY.K + 1, 3))
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        pose[:, BODY.joint_names.index(f"{side}_hip"), 0] = -0.8 * bent
+        pose[:, BODY.joint_names.index(f"{side}_knee"), 0] = 1.4 * bent
+        pose[:, BODY.joint_names.index(f"{side}_shoulder"), 2] = -1.2 * sign
+    rotations = exp(pose)
+    facing = exp(np.array([np.pi / 2, 0.0, 0.0])) @ exp(np.array([0.0, 0.7, 0.0]))  # model y up to world z up
+    R, t = BODY.forward_kinematics(np.concatenate([facing[None], rotations[0, 1:]]), np.zeros(3), betas)
+    standing_m = -BODY.skin(R, t, betas)[:, 2].min()
+    trans = np.stack([right_m + 0.4 * share, 3.5 + DEEPER_M * share, standing_m + height_m * share], axis=1)
+    rotations[:, 0] = T_CAMERA_WORLD[:3, :3] @ facing
+    pelvis = BODY.rest_joints(betas)[0]
+    poses = BODY.forward_kinematics(rotations, transform_points(T_CAMERA_WORLD, trans + pelvis) - pelvis, betas)
+    points = with_keypoint_offsets(BODY).keypoints(*poses, betas)[:, BLAZEPOSE]
+    pixels = points @ K.T
+    return Track(
+        frames=np.arange(len(times)),
+        times=times,
+        seen=np.ones(len(times), bool),
+        keypoints_px=pixels[..., :2] / pixels[..., 2:],
+        confidence=np.full((len(times), 33), 0.9),
+        world_landmarks=points - points[:, [23, 24]].mean(axis=1, keepdims=True),
+        acquired=np.arange(len(times)) == 0,
+    )
+
+
+def seen(track: Track, uneven_ground: bool = False) -> Shot:
+    """What is known of the footage: a static camera without background, whose intrinsics are given."""
+    return Shot(
+        BODY, Camera(K, np.zeros(5), "given"), CameraPath.static(len(track)), Lines.none(), Fraction(int(RATE)),
+        (1280, 720), "made", ablation=Ablation(lifter=False), uneven_ground=uneven_ground,
+    )  # fmt: skip
