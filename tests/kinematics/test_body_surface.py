@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -129,7 +130,7 @@ def test_points_are_where_the_shape_has_them() -> None:
     np.testing.assert_allclose(np.abs((planes.normal[0] * (points - foot)).sum(-1)), nearest, atol=0.02)
 
 
-def shifted(**changes: object) -> BodySurface:
+def shifted(**changes: Any) -> BodySurface:
     body = with_contact_points(with_arm_points(replace(BODY, **changes)), BETAS)
     return BodySurface(body, BETAS)
 

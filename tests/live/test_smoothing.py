@@ -59,6 +59,6 @@ def test_after_a_reset_nothing_of_before_is_left() -> None:
     for t in range(30):
         smooth(exp(1.0 * AXIS)[None], PLACE, t / 30)
     smooth.reset()
-    R, place = smooth(exp(-0.5 * AXIS)[None], 2 * PLACE, 1.0)
+    R, place = smooth(exp(-0.5 * AXIS)[None], 2.0 * PLACE, 1.0)
     assert log(R[0]) @ AXIS == pytest.approx(-0.5, abs=1e-9)
     np.testing.assert_allclose(place, 2 * PLACE)

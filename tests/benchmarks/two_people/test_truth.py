@@ -86,7 +86,7 @@ def test_people_are_apart_where_their_boxes_are(shift: float, apart: bool) -> No
 def test_a_region_around_limbs_is_upright_with_the_trunk() -> None:
     points = np.array([[-20, -50], [20, -50], [-30, -20], [30, -20], [-30, 0], [30, 0], [-10, 0], [10, 0], [-10, 40],
                        [10, 40], [-10, 80], [10, 80]], float)  # fmt: skip
-    region = region_around(points + 200)
+    region = region_around(points + np.full(2, 200.0))
     assert region.center_px == (200.0, 200.0)
     assert region.rotation == pytest.approx(0.0)
     assert region.side_px > 2 * 80

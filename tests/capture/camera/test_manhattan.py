@@ -56,7 +56,7 @@ def test_steps_lead_to_the_directions_of_the_lines() -> None:
     true = exp(rng.normal(size=3))
     normals = np.cross(true[np.arange(60) % 3], rng.normal(size=(60, 3)))
     lines = Lines(normals / np.linalg.norm(normals, axis=1, keepdims=True), rng.uniform(0.1, 0.5, 60))
-    found, supports = true @ exp(np.array([0.02, -0.03, 0.015])).T, np.zeros(3)
+    found, supports = np.asarray(true @ exp(np.array([0.02, -0.03, 0.015])).T, np.float64), np.zeros(3)
     for _ in range(8):
         H, g, supports = line_normal_equations(lines, found, sigma=0.05)
         found = found @ exp(np.linalg.solve(H, g)).T

@@ -260,7 +260,9 @@ def weights_of(body, presence: float, size_px: float) -> tuple[float, float]:
         orientation_field=OrientationField(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 3)), np.zeros(0)),
     )
     added = HandMeasurer(body, np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]])).add(empty, hands)
-    return added.keypoints2d.confidence.sum(), added.orientation_field.confidence.sum()
+    assert added.keypoints2d is not None
+    assert added.orientation_field is not None
+    return float(np.sum(added.keypoints2d.confidence)), float(np.sum(added.orientation_field.confidence))
 
 
 def test_directions_of_a_hand_that_is_hardly_present_count_less_than_its_place(body):

@@ -4,13 +4,12 @@
 from __future__ import annotations
 
 import pytest
-from scope.scope_addon.capture.stages import clock
 from scope.scope_addon.capture.stages.clock import StageClock, at_times
 
 
 def test_stages_add_up_also_when_they_fail(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [100.0]
-    monkeypatch.setattr(clock.time, "perf_counter", lambda: now[0])
+    monkeypatch.setattr("scope.scope_addon.capture.stages.clock.time.perf_counter", lambda: now[0])
     found = StageClock()
     for name, seconds in (("decode", 1.0), ("solver", 2.0), ("decode", 0.5)):
         with found.stage(name):

@@ -34,6 +34,7 @@ def test_a_frame_gets_the_places_and_the_floor_and_keeps_the_rest() -> None:
     np.testing.assert_array_equal(found.floor.indices, POINTS)
     np.testing.assert_array_equal(found.floor.normal, SUPPORT.floor_normal)
     np.testing.assert_array_equal(found.floor.contact, SUPPORT.on_floor)
+    assert found.floor.below is not None
     np.testing.assert_array_equal(found.floor.below, SUPPORT.not_below)
     assert found.floor.offset == SUPPORT.floor_offset
 

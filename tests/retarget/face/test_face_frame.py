@@ -57,7 +57,9 @@ def test_a_face_without_lids_has_none() -> None:
 
 def test_an_eye_turns_about_its_centre() -> None:
     found = bones(NAMES[0])
-    np.testing.assert_array_equal(pivot(found, "eye.R"), EYES[1])
+    at = pivot(found, "eye.R")
+    assert at is not None
+    np.testing.assert_array_equal(at, EYES[1])
     assert pivot(found, "jaw_master") is None
     assert pivot(bones(NAMES[2]), "eye.L") is None  # whose eyes are bones themselves
 

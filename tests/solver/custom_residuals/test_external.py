@@ -83,7 +83,7 @@ def assert_same(a, b, atol):
 
 UP = np.array([0.0, -1.0, 0.0])
 POINT_ROWS = {
-    "own_floor": floor.pack(np.arange(M), UP, -0.1, np.ones(M), np.full(M, 0.5)),
+    "own_floor": floor.pack(np.arange(M), UP, np.full(M, -0.1), np.ones(M), np.full(M, 0.5)),
     "own_contact": foot_contact.pack(np.arange(4), POINTS[:4] + 0.1, np.ones(4)),
 }
 SAME = {

@@ -25,6 +25,12 @@ def seen(world: np.ndarray, camera: int, index: np.ndarray, noise: float = 0.0, 
     return View(Measurements(K, keypoints2d=found), R, t)
 
 
+def points_of(views: list[View]) -> Keypoints3D:
+    found = triangulated(views, POINTS).keypoints3d
+    assert found is not None
+    return found
+
+
 @pytest.fixture
 def world() -> np.ndarray:
     return np.random.default_rng(4).uniform(-1, 1, (POINTS, 3))
@@ -32,17 +38,17 @@ def world() -> np.ndarray:
 
 def test_exact_rays_meet_in_the_points(world: np.ndarray) -> None:
     every = np.arange(POINTS)
-    found = triangulated([seen(world, c, every) for c in range(3)], POINTS).keypoints3d
+    found = points_of([seen(world, c, every) for c in range(3)])
     np.testing.assert_array_equal(found.indices, every)
-    np.testing.assert_allclose(found.points, world, atol=1e-9)
+    np.testing.assert_allclose(np.asarray(found.points), world, atol=1e-9)
 
 
 def test_points_that_one_camera_sees_or_whose_rays_are_parallel_are_left_out(world: np.ndarray) -> None:
     first, second = np.arange(8), np.arange(4, POINTS)
-    found = triangulated([seen(world, 0, first), seen(world, 1, second)], POINTS).keypoints3d
+    found = points_of([seen(world, 0, first), seen(world, 1, second)])
     np.testing.assert_array_equal(found.indices, np.arange(4, 8))
     twice = [seen(world, 0, first), seen(world, 0, first)]  # two cameras in one place
-    assert len(triangulated(twice, POINTS).keypoints3d.indices) == 0
+    assert len(np.asarray(points_of(twice).indices)) == 0
 
 
 def test_nothing_seen_and_nan_count_for_nothing(world: np.ndarray) -> None:
@@ -50,7 +56,7 @@ def test_nothing_seen_and_nan_count_for_nothing(world: np.ndarray) -> None:
     views = [seen(world, 0, every), seen(world, 1, every)]
     views.append(View(Measurements(K, keypoints2d=Keypoints2D(every, np.full((POINTS, 2), np.nan), np.ones(POINTS)))))
     views.append(seen(world + 5.0, 2, every, confidence=0.0))
-    np.testing.assert_allclose(triangulated(views, POINTS).keypoints3d.points, world, atol=1e-9)
+    np.testing.assert_allclose(np.asarray(points_of(views).points), world, atol=1e-9)
 
 
 def pixel_errors(views: list[View], point: np.ndarray, k: int) -> np.ndarray:
@@ -58,14 +64,15 @@ def pixel_errors(views: list[View], point: np.ndarray, k: int) -> np.ndarray:
     errors = []
     for view in views:
         p = np.asarray(view.R_camera_world) @ point + view.t_camera_world
-        errors.append((p / p[2] @ K.T)[:2] - view.measurements.keypoints2d.pixels[k])
+        assert view.measurements.keypoints2d is not None
+        errors.append((p / p[2] @ K.T)[:2] - np.asarray(view.measurements.keypoints2d.pixels)[k])
     return np.concatenate(errors)
 
 
 def test_the_error_in_the_image_is_minimized(world: np.ndarray) -> None:
     """Of cameras at different distances; against Gauss-Newton with numerical derivatives."""
     views = [seen(world, c, np.arange(POINTS), noise=0.5) for c in range(3)]
-    found = triangulated(views, POINTS).keypoints3d.points
+    found = np.asarray(points_of(views).points)
     for k in range(POINTS):
         best = world[k].copy()
         for _ in range(5):
@@ -78,6 +85,6 @@ def test_the_error_in_the_image_is_minimized(world: np.ndarray) -> None:
 def test_3d_keypoints_of_a_camera_are_moved_to_the_world(world: np.ndarray) -> None:
     R, t = CAMERAS[2]
     given = Measurements(keypoints3d=Keypoints3D(np.array([3]), world[[3]] @ R.T + t, np.ones(1)))
-    found = triangulated([View(given, R, t)], POINTS).keypoints3d
+    found = points_of([View(given, R, t)])
     np.testing.assert_array_equal(found.indices, [3])
-    np.testing.assert_allclose(found.points, world[[3]], atol=1e-12)
+    np.testing.assert_allclose(np.asarray(found.points), world[[3]], atol=1e-12)

@@ -28,7 +28,9 @@ FINGERS = [(x, y) for x in (-0.25, -0.12, 0.0, 0.12, 0.24) for y in (-0.5, -0.65
 SHAPE = np.array([(0.0, 0.0), *FINGERS])  # in hand lengths, fingers up
 
 
-def hand(side: int, *, away: float = 0.0, size: float = 1.0, left: float | None = None, presence: float = 0.9):
+def hand(
+    side: int, *, away: float = 0.0, size: float = 1.0, left: float | None = None, presence: float = 0.9
+) -> HandEstimate:
     """Return the hand at a wrist, or some hand lengths beside it, with keypoints that agree with those in space."""
     at = np.array(WRIST_PX[side]) + [away * LENGTH, 0.0]
     world = np.pad(SHAPE * HAND_LENGTH_M, ((0, 0), (0, 1)))

@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception.landmark_network import MARGIN, PoseEstimate
-from scope.scope_addon.capture.perception.region import Region
+from scope.scope_addon.capture.perception.landmark_network import PoseEstimate
+from scope.scope_addon.capture.perception.region import MARGIN, Region
 from scope.scope_addon.capture.tracking.landmarks import plausibility
 
 IMAGE = np.zeros((480, 640, 3), np.uint8)
