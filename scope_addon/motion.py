@@ -2,8 +2,9 @@
 """The motion file: the interface between capture, solver, scene and other tools.
 
 Plain arrays in a compressed .npz, AMASS-style keys, one row per source frame. Frames: world is z up with the floor
-at z = 0; camera is OpenCV's (x right, y down, z forward). ``poses`` holds axis-angle vectors, the root's in the
-world frame and the others relative to their parents; ``trans`` is SMPL's: pelvis = J_0(betas) + trans.
+at z = 0 (on uneven ground, that on which the first person stands at first); camera is OpenCV's (x right, y down, z
+forward). ``poses`` holds axis-angle vectors, the root's in the world frame and the others relative to their parents;
+``trans`` is SMPL's: pelvis = J_0(betas) + trans.
 """
 
 from __future__ import annotations

@@ -43,7 +43,7 @@ def standing_probability(
     center: NDArray[np.floating[Any]] | None = None,
     uneven_ground: bool = False,
 ) -> NDArray[np.floating[Any]]:
-    """Return the (T, F) probability that each sole point rests on the floor: it is slow and the lowest of its frame.
+    """Return the (T, F) probability that each sole point rests on the floor: it is slow and low within its frame.
 
     p = s(4(1 − v/v₀)) s(4(1 − h/(h₀ + |g| d s(4(1 − v̄/v₁))))) with the logistic function s. The height h is relative to
     the frame's lowest sole point, because the floor is not known yet. If the points were seen by a camera, the speed v

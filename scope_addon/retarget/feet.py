@@ -49,6 +49,7 @@ def ankle_goal(
     turn: NDArray[np.float64],
     ankle: NDArray[np.float64],
     floor: float = 0.0,
+    one_floor: bool = True,
 ) -> NDArray[np.float64]:
     """Compute the goals of the rig's ankles, for any number of frames and feet at once.
 
@@ -58,6 +59,7 @@ def ankle_goal(
     :param turn: (..., 3, 3) D, the rotation of both feet from rest.
     :param ankle: (..., 3) the body's, metres.
     :param floor: height of the body's floor, metres.
+    :param one_floor: keep the feet above the floor; False on uneven ground.
     :return: (..., 3) metres.
     """
     yaw = _heading(turn)
@@ -72,7 +74,8 @@ def ankle_goal(
         rolled.append(rig_point[..., 2] - (rig.height + q[..., 2]))
     share = 1.0 / (1.0 + np.exp(np.clip((heights[1] - heights[0]) / _SOFT_M, -50, 50)))  # 1: the ball is in contact
     goal: NDArray[np.float64] = goals[0] + share[..., None] * (goals[1] - goals[0])
-    goal[..., 2] = np.maximum(goal[..., 2], -np.minimum(rolled[0], rolled[1]))
+    if one_floor:
+        goal[..., 2] = np.maximum(goal[..., 2], -np.minimum(rolled[0], rolled[1]))
     return goal
 
 

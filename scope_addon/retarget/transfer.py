@@ -30,28 +30,43 @@ from .skeleton import Pose, Skeleton, head_positions
 
 
 def transfer(
-    clip: Clip, body: Body, betas: NDArray[np.floating[Any]], rig: Skeleton, bone_map: BoneMap, *, feet: bool = True
+    clip: Clip,
+    body: Body,
+    betas: NDArray[np.floating[Any]],
+    rig: Skeleton,
+    bone_map: BoneMap,
+    *,
+    feet: bool = True,
+    one_floor: bool = True,
 ) -> Pose:
     """Compute the rig's motion.
 
     :param betas: (P,) shape coefficients of the body.
     :param feet: place the feet where the body's are, scaled by the ratio of leg lengths; bends the legs a little.
+    :param one_floor: with ``feet``, keep the feet above the floor; False on uneven ground.
     """
-    return Transfer(body, betas, rig, bone_map, feet=feet).pose(clip)
+    return Transfer(body, betas, rig, bone_map, feet=feet, one_floor=one_floor).pose(clip)
 
 
 class Transfer:
     """The transfer from one body to one rig, with everything that does not depend on the motion computed once."""
 
     def __init__(
-        self, body: Body, betas: NDArray[np.floating[Any]], rig: Skeleton, bone_map: BoneMap, *, feet: bool = True
+        self,
+        body: Body,
+        betas: NDArray[np.floating[Any]],
+        rig: Skeleton,
+        bone_map: BoneMap,
+        *,
+        feet: bool = True,
+        one_floor: bool = True,
     ) -> None:
         """Compare both at rest.
 
         :param betas: (P,) shape coefficients of the body.
-        :param feet: as in ``transfer``.
+        :param feet, one_floor: as in ``transfer``.
         """
-        self._body, self._betas, self._rig = body, betas, rig
+        self._body, self._betas, self._rig, self._one_floor = body, betas, rig, one_floor
         index = {part: k for k, part in enumerate(body.joint_names)}
         rest = body.rest_joints(betas) @ R_WORLD_MODEL.T
         row = {part: rig.names.index(bone) for bone, part in bone_map.parts.items() if bone in rig.names}
@@ -82,7 +97,7 @@ class Transfer:
         heads += (self._scale * source_hips + self._lift - heads[:, self._hips].mean(axis=1))[:, None]
         if self._legs is not None:
             motion = RigMotion(turns, self._alignment, world, heads)
-            world, heads = place_feet(rig, self._legs, motion, joints, clip.times)
+            world, heads = place_feet(rig, self._legs, motion, joints, clip.times, self._one_floor)
         return Pose(world, heads, self._facing)
 
     def _turns(self, D: NDArray[np.float64]) -> NDArray[np.float64]:

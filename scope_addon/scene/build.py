@@ -210,6 +210,8 @@ def _build_person(
     rig["scope_body"] = body.name
     rig["scope_body_file"] = body.file
     rig["scope_start"] = options.start_frame
+    if motion.uneven_ground:
+        rig["scope_uneven_ground"] = True
     timing.store_rate(rig, rate)
     rig["scope_betas"] = [float(b) for b in motion.betas]
     if motion.corrections:

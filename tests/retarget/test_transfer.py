@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scope.scope_addon.edit.clip import Clip
 from scope.scope_addon.retarget.transfer import transfer
 from scope.solver.rotations import exp
 
@@ -28,6 +29,17 @@ def test_the_bodys_own_skeleton_moves_as_the_body_whatever_the_axes_of_its_bones
 def test_a_rig_of_another_size_takes_steps_of_its_own_size() -> None:
     pose = transfer(CLIP, BODY, BETAS, body_rig(scale=1.7), same_names(), feet=False)
     np.testing.assert_allclose(pose.heads, 1.7 * JOINTS, atol=1e-9)
+
+
+def test_feet_go_below_the_floor_only_on_uneven_ground() -> None:
+    """A walk one metre down, as at the foot of stairs: hips and ankles of the rig are lower by its own metre."""
+    lower = Clip(CLIP.times, CLIP.rotations, CLIP.root - VERTICAL)
+    rig, ankles = body_rig(scale=1.7), [MAPPED.index(f"{side}_ankle") for side in ("left", "right")]
+    above = transfer(CLIP, BODY, BETAS, rig, same_names()).heads
+    below = transfer(lower, BODY, BETAS, rig, same_names(), one_floor=False).heads
+    np.testing.assert_allclose(below, above - 1.7 * VERTICAL, atol=0.05)
+    held = transfer(lower, BODY, BETAS, rig, same_names()).heads
+    assert held[:, ankles, 2].min() > 0.0
 
 
 @pytest.mark.parametrize("heading", [0.5, 2.0, -3.0])

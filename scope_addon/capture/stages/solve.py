@@ -29,7 +29,7 @@ from ..world.world_frame import SharedWorld, find_world
 from .clock import Progress
 from .freed_memory import return_freed_memory
 
-# Of the prior of a stature that follows from the floor, relative: larger for adults (0.05 suits them best), smaller for
+# Of the prior of a stature that follows from the floor, relative. A compromise: 0.05 suits adults best, less suits
 # children, whose proportions are taken for adults' (benchmarks/notebook/clip.md).
 FLOOR_STATURE_SIGMA = 0.02
 MIN_RESIZE = 0.03  # relative change of a size from which on a person is fitted again
@@ -58,7 +58,7 @@ def solve(shot: Shot, tracks: Iterable[Track], progress: Progress, heights_m: Se
     fits = [
         to_single_precision(fit_track(each, progress_of_person(progress, k, count))) for k, each in enumerate(prepared)
     ]
-    prepared, fits = resize_people(shot, prepared, fits, heights_m)
+    prepared, fits = resize_people(shot, prepared, fits, heights_m, progress)
     shot, iterations = replace(shot, path=find_camera_path(shot, prepared[0], fits[0])), fits[0].iterations
     known = [(each.track, each.body) for each in prepared]
     if shot.ablation.stance and not shot.is_still:
@@ -112,22 +112,29 @@ def place(shot: Shot, track: Track, fit: FittedTrack, smoothing: bool = True) ->
 
 
 def resize_people(
-    shot: Shot, prepared: list[PreparedTrack], fits: list[FittedTrack], heights_m: Sequence[float]
+    shot: Shot,
+    prepared: Sequence[PreparedTrack],
+    fits: Sequence[FittedTrack],
+    heights_m: Sequence[float],
+    progress: Progress,
 ) -> tuple[list[PreparedTrack], list[FittedTrack]]:
     """Fit those again whose size contradicts that of somebody of known stature on the same floor.
 
     The camera's travel is not known yet, so with a camera that travels, sizes follow from the clip's first places.
     """
-    if not heights_m or len(prepared) < 2 or not shot.ablation.stance or shot.uneven_ground:
+    prepared, fits, count = list(prepared), list(fits), len(prepared)
+    if not 0 < len(heights_m) < count or not shot.ablation.stance or shot.uneven_ground:
         return prepared, fits
     placed = [place(shot, each.track, fit) for each, fit in zip(prepared, fits, strict=True)]
     up = find_world(placed, shot.lines).up
-    factors = relative_sizes([stander(each, up, k < len(heights_m)) for k, each in enumerate(placed)])
-    for k, factor in enumerate(factors):
+    people = [stander(each, up, k < len(heights_m)) for k, each in enumerate(placed)]
+    del placed
+    return_freed_memory()
+    for k, factor in enumerate(relative_sizes(people)):
         if abs(np.log(factor)) > MIN_RESIZE:
-            height_m = factor * placed[k].body.stature(placed[k].betas)
+            height_m = factor * people[k].stature_m
             prepared[k] = prepared[k].with_height(max(height_m, CHILD_BELOW_M), FLOOR_STATURE_SIGMA * height_m)
-            fits[k] = to_single_precision(fit_track(prepared[k], lambda *_: None))
+            fits[k] = to_single_precision(fit_track(prepared[k], progress_of_person(progress, k, count)))
     return prepared, fits
 
 
@@ -137,7 +144,8 @@ def find_camera_path(shot: Shot, first: PreparedTrack, fit: FittedTrack) -> Came
         return shot.path
     placed = place(shot, first.track, fit)
     up = find_world([placed], shot.lines).up
-    return replace(shot.path, center=camera_travel(placed.soles, placed.valid, up, placed.times))
+    center = camera_travel(placed.soles, placed.valid, up, placed.times, shot.uneven_ground)
+    return replace(shot.path, center=center)
 
 
 def ground_all(

@@ -34,6 +34,7 @@ def camera_travel(
     valid: NDArray[np.bool_],
     up: NDArray[np.floating[Any]],
     times: NDArray[np.float64],
+    uneven_ground: bool = False,
 ) -> NDArray[np.float64]:
     """Return the (T, 3) displacement of the camera's centre since the first frame, metres; zeros if it is unknown.
 
@@ -41,6 +42,7 @@ def camera_travel(
     :param valid: (T,) frames in which the person was seen.
     :param up: (3,) unit vector.
     :param times: (T,) seconds.
+    :param uneven_ground: soles may carry at any height.
     """
     T = len(times)
     unknown = np.zeros((T, 3))
@@ -51,7 +53,9 @@ def camera_travel(
     lowest = height.argmin(axis=1)
     row = np.arange(T)
     v, h = velocity[row, lowest], height[row, lowest]
-    carries: NDArray[np.bool_] = valid & (np.abs(v @ up) < MAX_VERTICAL_M_S) & (h < np.median(h[valid]) + MAX_HEIGHT_M)
+    carries: NDArray[np.bool_] = valid & (np.abs(v @ up) < MAX_VERTICAL_M_S)
+    if not uneven_ground:
+        carries &= h < np.median(h[valid]) + MAX_HEIGHT_M
     v = v - (v @ up)[:, None] * up
     if carries.sum() < MIN_SAMPLES:
         return unknown

@@ -191,10 +191,10 @@ def find_world(placed: list[PlacedTrack], lines: Lines | None = None) -> SharedW
     centered = np.concatenate([soles - _lowest(soles, up).mean(axis=0) for soles in all_soles])
     up = up_from_scene(up, None if placed[0].uneven_ground else centered, lines)
     contacts = [person.contact(up)[person.valid, : len(SOLES)] for person in placed]
-    if placed[0].uneven_ground:
-        times = (person.times[person.valid] for person in placed)
-        contacts = [_first_contact(*each) for each in zip(contacts, times, strict=True)]
-    heights = [floor_height(soles, contact, up) for soles, contact in zip(all_soles, contacts, strict=True)]
+    heights = []
+    for person, soles, contact in zip(placed, all_soles, contacts, strict=True):
+        rows = _first_contact(contact, person.times[person.valid]) if person.uneven_ground else slice(None)
+        heights.append(floor_height(soles[rows], contact[rows], up))
     T_world_camera = world_from_level_camera(up, height=-heights[0])
     start = transform_points(T_world_camera, placed[0].joints[placed[0].valid.argmax(), :1])[0]
     T_world_camera[:2, 3] -= start[:2]
@@ -202,10 +202,12 @@ def find_world(placed: list[PlacedTrack], lines: Lines | None = None) -> SharedW
     return SharedWorld(T_world_camera, [h if abs(h) > SAME_FLOOR_M else 0.0 for h in relative])
 
 
-def _first_contact(contact: NDArray[np.floating[Any]], times: NDArray[np.float64]) -> NDArray[np.floating[Any]]:
-    """Return the contact probability (T, F), 0 after somebody has been on the ground for `FIRST_S` altogether."""
-    on_ground_s = np.cumsum(contact.max(axis=1) * np.gradient(times)) if len(times) > 1 else np.zeros(len(times))
-    first: NDArray[np.floating[Any]] = contact * (on_ground_s <= max(FIRST_S, on_ground_s[0]))[:, None]
+def _first_contact(contact: NDArray[np.floating[Any]], times: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return the frames (T,) until somebody has been on the ground for `FIRST_S` altogether."""
+    if len(times) < 2:
+        return np.ones(len(times), np.bool_)
+    on_ground_s = contact.max(axis=1) * np.gradient(times)
+    first: NDArray[np.bool_] = np.cumsum(on_ground_s) - on_ground_s < FIRST_S
     return first
 
 

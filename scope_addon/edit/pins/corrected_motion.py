@@ -154,7 +154,8 @@ def _pinned(clip: Clip, motion: Motion, body: Body) -> Clip:
     if not wanted:
         return clip
     # An upright line turns the world about a point on the floor, so the floor's height is nearly the same before it.
-    return resolve(clip, body, motion.betas, wanted, shot, floor=floor_height(corrections))
+    floor = -np.inf if motion.uneven_ground else floor_height(corrections)
+    return resolve(clip, body, motion.betas, wanted, shot, floor=floor)
 
 
 def before_smoothing(motion: Motion, body: Body) -> Motion:

@@ -90,7 +90,7 @@ def resolve(
 
     :param betas: (P,) shape coefficients.
     :param slack: metres by which the body may help a limb to reach a pin.
-    :param floor: its height z, metres.
+    :param floor: its height z, metres; −∞ on uneven ground.
     :return: a new clip; keys that no correction reaches are the same to the bit.
     :raises UsageError: a pin names a joint that the body does not have.
     """
@@ -228,7 +228,7 @@ class _Correction:
         """Return the points of other limbs, which stay where they are while a limb is corrected."""
         refit, own, points = self._refit, self._tracks[index].joints, Points()
         limb = limb_of(own[0])
-        if not limb.endswith("arm"):
+        if not limb.endswith("arm") and np.isfinite(self._floor[key]):
             points.floor = float(self._floor[key])
         free = () if all(joint.endswith("hip") for joint in own) else refit.soles_of(limb)  # a hip moves over its foot
         for k, name in enumerate(refit.sole_names):

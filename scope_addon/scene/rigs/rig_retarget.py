@@ -120,7 +120,8 @@ def retarget(
         with at_rest(rig):
             skeleton, place = probe(rig, bone_map.parts), np.array(rig.matrix_world, float)
             root = skeleton.names.index(bone_map.bone("pelvis") or "")
-            pose = transfer(clip, body, betas, skeleton, bone_map, feet=options.feet)
+            one_floor = not source.get("scope_uneven_ground", False)
+            pose = transfer(clip, body, betas, skeleton, bone_map, feet=options.feet, one_floor=one_floor)
             motion = _placed(source, clip, skeleton, place, pose, root, options)
             turns = basis(skeleton, motion.rotations)
             warnings = blocked_bones(rig, skeleton.names, turns, motion.rotations)

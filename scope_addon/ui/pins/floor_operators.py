@@ -57,6 +57,8 @@ def _others_under_floor(motion: Motion, body: Body) -> str:
     """Return the message about feet that are now under the floor in other frames; empty if there are none."""
     from ...kinematics.foot_skin import UNDER_FLOOR_M, foot_heights
 
+    if motion.uneven_ground:
+        return ""
     lowest = foot_heights(motion, body).min(axis=1)
     under = lowest < -UNDER_FLOOR_M
     if not under.any():

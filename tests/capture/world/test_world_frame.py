@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.world.placement import PlacedTrack
 from scope.scope_addon.capture.world.world_frame import (
+    _first_contact,
     find_world,
+    floor_height,
     up_from_bodies,
     up_from_floor,
     up_from_standing,
@@ -214,3 +216,22 @@ def test_up_is_normal_to_a_floor_on_which_feet_are_spread_wherever_it_lies():
     feet_cam = np.stack([lower, lower + 0.1 * up], axis=1)  # the other foot is in the air
     found = up_from_floor(feet_cam, np.array([0.0, -1.0, 0.0]))
     assert np.arccos(found @ up) == pytest.approx(0.3 * np.arccos(-up[1]), rel=0.15)
+
+
+@pytest.mark.parametrize(("rate", "minutes"), [(30.0, 30.0), (1.0, 1.0)])
+def test_the_floor_of_uneven_ground_is_where_somebody_stands_at_first(rate, minutes):
+    """A slow descent, in a long clip and at one frame a second; the height of the whole clip would be far below."""
+    times = np.arange(round(60 * minutes * rate)) / rate
+    contact = np.full((len(times), 4), 0.9)
+    contact[:2] = 0.0
+    soles = np.zeros((len(times), 4, 3))
+    soles[..., 1] = 1.5 + 0.01 * times[:, None]
+    rows = _first_contact(contact, times)
+    assert rows.any()
+    assert floor_height(soles[rows], contact[rows], np.array([0.0, -1.0, 0.0])) == pytest.approx(-1.5, abs=0.04)
+
+
+def test_without_contact_every_frame_counts():
+    times = np.arange(60) / 30
+    assert _first_contact(np.zeros((60, 4)), times).all()
+    assert _first_contact(np.ones((1, 4)), times[:1]).all()

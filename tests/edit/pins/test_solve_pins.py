@@ -257,3 +257,20 @@ def test_a_leg_that_is_pinned_leaves_its_foot_above_the_floor(on_floor, name, im
     corrected = resolve(on_floor, BODY, BETAS, [pin], SHOT)
     assert missed(corrected, BODY, BETAS, pin, SHOT) < (0.5 if image else 0.002)
     assert depth(corrected) < 0.01
+
+
+def test_no_floor_is_like_one_far_below(on_floor):
+    """As on uneven ground."""
+    at = on_floor.joints(BODY, BETAS)[45, NAMES.index("left_ankle")] + [0.0, 0.12, -0.02]
+    pin = Pin(45, "left_ankle", None, tuple(at))
+    none, low = (resolve(on_floor, BODY, BETAS, [pin], SHOT, floor=floor) for floor in (-np.inf, -10.0))
+    assert missed(none, BODY, BETAS, pin, SHOT) < 0.002
+    np.testing.assert_allclose(none.joints(BODY, BETAS), low.joints(BODY, BETAS), atol=1e-6)
+
+
+def test_a_foot_stands_on_a_kerb_on_uneven_ground():
+    above = np.median(TRUTH.soles(BODY, BETAS)[50:63, :2, 2], axis=0).min() - 0.06
+    kerb = Clip(TRUTH.times, TRUTH.rotations.copy(), TRUTH.root - [0.0, 0.0, above])  # 6 cm high
+    for floor, expected in ((0.0, 0.0), (-np.inf, 0.06)):
+        stands = resolve(kerb, BODY, BETAS, [Contact(50, 62, "left")], SHOT, floor=floor)
+        assert stands.soles(BODY, BETAS)[50:63, :2, 2].min() == pytest.approx(expected, abs=0.003)

@@ -127,7 +127,9 @@ def _meet_pin(armature: bpy.types.Object, body: Body, rate: float, motion: Motio
     whole = clip_with_root_motion(armature, clip, frames)
     shot = shot_of(motion, _start(armature, rate))
     if missed(whole, body, motion.betas, pin, shot) > (_MISSED_M if pin.pixel is None else _MISSED_PX):
-        _write_change(armature, body, clip, frames, (whole, resolve(whole, body, motion.betas, [pin], shot, slack=0.0)))
+        floor = -np.inf if motion.uneven_ground else 0.0
+        met = resolve(whole, body, motion.betas, [pin], shot, slack=0.0, floor=floor)
+        _write_change(armature, body, clip, frames, (whole, met))
 
 
 def heights_of_foot(
