@@ -72,6 +72,10 @@ PROGRAM = (sys.executable, "-m", str(__package__))
 
 
 class _Parser(argparse.ArgumentParser):
+    def __init__(self, **settings: Any) -> None:
+        """Take flags by their full names only: `with_bare_values` knows no others."""
+        super().__init__(**{"allow_abbrev": False, **settings})
+
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Parse the arguments, where some flags may come without a value; see `with_bare_values`."""
         given = sys.argv[1:] if args is None else list(args)

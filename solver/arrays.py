@@ -46,7 +46,7 @@ def as_integers(value: ArrayLike, name: str) -> Array:
     if type(value) is not np.ndarray or value.dtype.kind not in "iu":
         _refuse_unless_numbers(value, "iu", "integers", (None,), name)
     if isinstance(value, np.ma.MaskedArray) and _masked(value).any():
-        raise ShapeError(f"{name} must all be there, but the masked array masks some; leave these rows out.")
+        raise ShapeError(f"{name} must not be masked, but some are; leave these rows out.")
     array = np.asarray(value)
     if array.ndim != 1:
         raise ShapeError(f"{name} must be integers of shape (n,), but got {array.dtype} of shape {array.shape}.")

@@ -66,7 +66,7 @@ def check_count(value: Any, name: str, least: int = 1) -> None:
 
     :raises InvalidValueError: it is no whole number, or less than `least`.
     """
-    if not isinstance(value, Integral) or value < least:
+    if isinstance(value, bool) or not isinstance(value, Integral) or value < least:
         raise InvalidValueError(f"{name} must be a whole number of at least {least}, but is {value!r}.")
 
 
@@ -164,7 +164,8 @@ def check_list(value: Any, name: str, what: str) -> None:
     :param what: what each entry is of, for the message: "frame", "clip".
     :raises InvalidValueError: it is a single entry, or a generator, which can be read only once.
     """
-    if isinstance(value, (str, bytes, Mapping)) or not (hasattr(value, "__len__") and hasattr(value, "__getitem__")):
+    is_single = isinstance(value, (str, bytes, Mapping)) or (isinstance(value, np.ndarray) and value.ndim == 0)
+    if is_single or not (hasattr(value, "__len__") and hasattr(value, "__getitem__")):
         raise InvalidValueError(f"{name} must be a list with an entry for each {what}, but is {described(value)}.")
 
 

@@ -145,7 +145,10 @@ def costs(outcomes: Sequence[Outcome]) -> list[page.Markup]:
         for each in outcomes
     ]
     known = [each.processor_seconds for each in outcomes if each.processor_seconds is not None]
-    rows.append(["all", _minutes(sum(each.seconds for each in outcomes)), _minutes(sum(known) if known else None), ""])
+    spent = (
+        sum(known) if len(known) == len(outcomes) else None
+    )  # a sum of some, beside the elapsed time of all, misleads
+    rows.append(["all", _minutes(sum(each.seconds for each in outcomes)), _minutes(spent), ""])
     head = ("command", "elapsed, min:s", "processor time, min:s", "load, mean")
     note = (
         "Processor time is that of all threads and of all processes that a command started; on a busy machine, elapsed "

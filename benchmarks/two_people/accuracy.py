@@ -174,7 +174,10 @@ def distances(motion: Motion, person: str, true: True2D) -> NDArray[np.float64]:
 
 def owner(motion: Motion, true: True2D) -> str | None:
     """Return which true person a motion is of; None if of neither."""
-    off = {person: float(np.nanmedian(distances(motion, person, true))) for person in true}
+    off = {}
+    for person in true:
+        found = distances(motion, person, true)
+        off[person] = float(np.median(found[np.isfinite(found)])) if np.isfinite(found).any() else np.inf
     nearest = min(off, key=lambda person: off[person])
     return nearest if off[nearest] < _FAR else None
 

@@ -18,6 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ...scope_addon.atomic_write import atomic_path
 from ...scope_addon.capture.media.video import open_video
 from ...tools.pinned_wheel import DOWNLOADS, PinnedWheel
 from ..evaluation.metrics import similarity
@@ -61,7 +62,8 @@ def extract(folder: Path = FOLDER, downloads: Path = DOWNLOADS) -> dict[str, Pat
         folder.mkdir(parents=True, exist_ok=True)
         with zipfile.ZipFile(POSE2SIM.fetch(downloads)) as archive:
             for camera, video in videos.items():
-                with archive.open(_MEMBER.format(camera.replace("cam", "cam0"))) as source, video.open("wb") as target:
+                member = _MEMBER.format(camera.replace("cam", "cam0"))
+                with atomic_path(video) as part, archive.open(member) as source, part.open("wb") as target:
                     shutil.copyfileobj(source, target)
     return videos
 

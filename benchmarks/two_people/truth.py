@@ -22,6 +22,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ...scope_addon.atomic_write import write_npz
 from ...scope_addon.capture.media.video import open_video
 from ...scope_addon.capture.perception.landmark_network import KEYPOINT_COUNT, KEYPOINT_NAMES, LandmarkNetwork
 from ...scope_addon.capture.perception.region import Region, region_from_points
@@ -189,10 +190,11 @@ def _write(
 ) -> None:
     T = camera.T_camera_world
     uv = pixels(joints.reshape(-1, 3), camera).reshape(*joints.shape[:2], 2)
-    np.savez_compressed(
-        path, joints=joints @ T[:3, :3].T + T[:3, 3], names=names, frame_index=frames, intrinsics=camera.K,
-        dist=camera.dist, fps=FPS, size=camera.size, uv=uv, up=camera.up,
-    )  # fmt: skip
+    arrays = {
+        "joints": joints @ T[:3, :3].T + T[:3, 3], "names": names, "frame_index": frames, "intrinsics": camera.K,
+        "dist": camera.dist, "fps": np.asarray(FPS), "size": np.asarray(camera.size), "uv": uv, "up": camera.up,
+    }  # fmt: skip
+    write_npz(path, arrays, compressed=True)
 
 
 def images(video: Path) -> Iterator[NDArray[np.uint8]]:

@@ -16,8 +16,10 @@ from ..measurements import Measurements
 from ..options import Options, Priors, Stage, Weights
 from ..rotations import exp, hat
 from ..state import State
+from ..validation import check_count
 
 _STEP = 1e-5  # of the differences, radians and metres
+_UNEXPLAINED = 1e-6  # of the gradient, outside the range of JᵀJ: more is no rounding
 _OTHERS_OFF = {"joint_prior": 0.0, "joint_limits": 0.0, "joint_flow": 0.0, "shape": 0.0}
 
 
@@ -31,11 +33,14 @@ def check_residual(body: BodyArrays, name: str, ints: Any, floats: Any, *, seed:
     :param seed: of the state: the root 3 m in front of the camera, joints rotated by about 50°, the shape as varied as
         the population's.
     :return: the largest difference for the root's six unknowns ("root"), the joints' rotations ("joints") and the shape
-        ("shape"), and by how much JᵀJ is too small for them: gᵀ (JᵀJ)⁺ g / 2 cost - 1, with g = Jᵀr ("curvature").
+        ("shape"), and by how much JᵀJ is too small for them: gᵀ (JᵀJ)⁺ g / 2 cost - 1, with g = Jᵀr ("curvature");
+        infinite where JᵀJ is missing.
     :raises ShapeError: the rows do not fit the residual or the body.
     :raises InvalidValueError: there is no residual of that name, its kernel does not compile, or its cost is 0 or not
-        finite at that state, where derivatives say nothing.
+        finite at that state, where derivatives say nothing; its Jᵀr or JᵀJ is not finite there; or the seed is no
+        whole number of at least 0.
     """
+    check_count(seed, "seed", 0)
     tree = make_tree(body)
     problem = _Problem(tree, name, ints, floats)
     state, found = _random_state(tree, seed), np.zeros(problem.size)
@@ -45,13 +50,20 @@ def check_residual(body: BodyArrays, name: str, ints: Any, floats: Any, *, seed:
             f"The cost of {name!r} must be positive and finite to be differentiated, but is {cost:g} at the random "
             f"state of seed {seed}; use other rows or another seed."
         )
+    if not (np.isfinite(g).all() and np.isfinite(H).all()):
+        raise InvalidValueError(
+            f"The derivatives Jᵀr and JᵀJ of {name!r} must be finite, but hold NaN or infinity at the random state of "
+            f"seed {seed}."
+        )
     for k in range(problem.size):
         step = _STEP * np.eye(problem.size)[k]
         ahead, behind = (problem.linearized(problem.moved(state, d))[0] for d in (step, -step))
         found[k] = (ahead - behind) / (2.0 * _STEP)
     off = np.abs(g - found) / max(np.abs(found).max(), np.abs(g).max(), 1e-300)
     joints = 6 + 3 * (len(tree.parents) - 1)
-    explained = float(g @ np.linalg.pinv(H, rcond=1e-10, hermitian=True) @ g) / (2.0 * cost)
+    x = np.linalg.pinv(H, rcond=1e-10, hermitian=True) @ g
+    is_missing = np.linalg.norm(g - H @ x) > _UNEXPLAINED * np.linalg.norm(g)  # the pseudoinverse drops that part of g
+    explained = np.inf if is_missing else float(g @ x) / (2.0 * cost)
     return {
         "root": float(off[:6].max()),
         "joints": float(off[6:joints].max(initial=0.0)),

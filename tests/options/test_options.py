@@ -163,6 +163,13 @@ def test_the_flag_of_hands_may_come_without_a_value(argv, hands, video):
     assert (args.hands, args.video and str(args.video)) == (hands, video)
 
 
+@pytest.mark.parametrize("flag", ["--hand", "--qual"])
+def test_flags_are_not_abbreviated(flag):
+    """An abbreviated --hands would take the footage for its value."""
+    with pytest.raises(UsageError, match=f"unrecognized arguments: {flag}"):
+        parsed(flag, "walk.mp4")
+
+
 def test_hands_that_are_none_of_the_choices_are_an_error(body):
     with pytest.raises(UsageError, match="hands must be one of off, on, auto, not 'yes'"):
         check_options(body, CaptureOptions(hands="yes"))

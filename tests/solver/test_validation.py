@@ -241,9 +241,17 @@ MEASURED_REFUSED = {
         lambda: fit_clips(BODY, untyped(SEEN)),
         "clips must be a list with an entry for each clip, but is a Measurements",
     ),
+    "an array without axes": (
+        lambda: fit_batch(BODY, untyped(np.array(SEEN))),
+        r"measurements must be a list with an entry for each frame, but is an array of object of shape \(\)",
+    ),
     "frames for the shape": (
         lambda: fit_clip(BODY, [SEEN], shape_frames=0),
         "shape_frames must be a whole number of at least 1, but is 0",
+    ),
+    "a truth value for the shape": (
+        lambda: fit_clip(BODY, [SEEN], shape_frames=True),
+        "shape_frames must be a whole number of at least 1, but is True",
     ),
     "focal weight": (
         lambda: fit_clip(BODY, [SEEN], focal=True, focal_weight=-1.0),
@@ -251,7 +259,7 @@ MEASURED_REFUSED = {
     ),
     "masked indices": (
         seen(keypoints3d=Keypoints3D(np.ma.masked_equal(np.arange(M), 0), POINTS, np.ones(M))),
-        "Indices of 3D keypoints must all be there, but the masked array masks some",
+        "Indices of 3D keypoints must not be masked, but some are; leave these rows out",
     ),
     "an article": (seen(keypoints3d=untyped(Options())), "must be Keypoints3D or None, but is an Options"),
     "threads": (lambda: fit_batch(BODY, [SEEN], threads=-2), "threads must be a whole number of at least 0, but is -2"),

@@ -27,8 +27,8 @@ def with_stature(priors: Priors, body: Body, height_m: float, sigma_m: float = S
     """Return the priors for a person of known stature: the most probable shapes of this height.
 
     This is the population's N(0, Λ₀⁻¹) of β, conditioned on the height h(β) of the rest pose's highest vertex above its
-    lowest: Λ = Λ₀ + g gᵀ/σ² and mean Λ₀⁻¹g (H − h₀) / (σ² + gᵀΛ₀⁻¹g), with h(β) = h₀ + g·β as long as these two
-    vertices stay the same. Λ₀ = I, but growth is fixed at 0 from `CHILD_BELOW_M` on.
+    lowest: Λ = Λ₀ + g gᵀ/σ² and mean Λ₀⁻¹g (H − h₀) / (σ₀² + gᵀΛ₀⁻¹g), with h(β) = h₀ + g·β as long as these two
+    vertices stay the same, and σ₀ = `SIGMA_M`. Λ₀ = I, but growth is fixed at 0 from `CHILD_BELOW_M` on.
 
     :param sigma_m: σ in Λ; the mean has this height in any case.
     """
@@ -68,7 +68,7 @@ def stature_sigma(body: Body, betas: NDArray[np.floating[Any]], information: NDA
 
     :param betas: (P,) the shape.
     :param information: (P, P) Λ, priors included.
-    :param is_given: the priors are those of `with_stature`.
+    :param is_given: the user gave the stature; one that follows from the floor does not count.
     """
     if body.P == 0:
         return float("nan")

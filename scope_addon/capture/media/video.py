@@ -304,7 +304,7 @@ class _Decoder:
             self._warn(f"{video.path.name} grew while it was read; capture it again once it is written completely")
 
     def _has_grown(self) -> bool:
-        """Return whether somebody still writes the file, such as a recorder an .mkv or a .ts."""
+        """Return whether the file is still being written, as .mkv and .ts files are by recorders."""
         try:
             return self._video._bytes is not None and self._video.path.stat().st_size > self._video._bytes
         except OSError:  # removed, or a network folder that is gone: everything was read

@@ -16,7 +16,7 @@ def is_search_due(time_s: float, seen_s: float, searched_s: float, eager_step_s:
 
     :param seen_s: when it was last seen; if never, when it was first looked for.
     :param searched_s: when it was last looked for.
-    :param eager_step_s: least time between two attempts for the first `EAGER_S`.
+    :param eager_step_s: least time between two attempts during the first `EAGER_S` after it was lost.
     """
     interval_s = eager_step_s if time_s - seen_s <= EAGER_S + _TOLERANCE_S else PATIENCE_S
     return time_s - searched_s >= interval_s - _TOLERANCE_S

@@ -3,13 +3,20 @@
 
 from __future__ import annotations
 
+import shutil
+import zipfile
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
 import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scope.benchmarks.two_people.accuracy import are_apart, region_around
-from scope.benchmarks.two_people.footage import Camera
-from scope.benchmarks.two_people.truth import mirror, pixels, regions_of, solve
+from scope.benchmarks.two_people import accuracy, footage
+from scope.benchmarks.two_people.accuracy import True2D, are_apart, owner, region_around
+from scope.benchmarks.two_people.footage import Camera, extract
+from scope.benchmarks.two_people.truth import TruePerson, mirror, pixels, regions_of, save, solve
 from scope.scope_addon.capture.perception.region import Region
 from scope.solver.rotations import exp
 
@@ -90,3 +97,55 @@ def test_a_region_around_limbs_is_upright_with_the_trunk() -> None:
     assert region.center_px == (200.0, 200.0)
     assert region.rotation == pytest.approx(0.0)
     assert region.side_px > 2 * 80
+
+
+def test_a_person_who_is_never_compared_is_not_the_owner(monkeypatch: pytest.MonkeyPatch) -> None:
+    off = {"man": np.full(3, np.nan), "woman": np.array([0.1, np.nan, 0.2])}
+    monkeypatch.setattr(accuracy, "distances", lambda _, person, true: off[person])
+    motion: Any = SimpleNamespace()
+    true: True2D = dict.fromkeys(off, (np.arange(3), np.zeros((3, 12, 2))))
+    assert owner(motion, true) == "woman"
+    off["woman"][:] = np.nan
+    assert owner(motion, true) is None
+
+
+def test_an_interrupted_extraction_leaves_no_video(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The videos that exist are not extracted again: half a video would stay."""
+    wheel, folder = tmp_path / "a.whl", tmp_path / "videos"
+    with zipfile.ZipFile(wheel, "w") as archive:
+        for k in range(1, 5):
+            archive.writestr(f"Pose2Sim/Demo_MultiPerson/videos/cam0{k}.mp4", f"video {k}")
+    monkeypatch.setattr(footage, "POSE2SIM", SimpleNamespace(fetch=lambda downloads: wheel))
+
+    def interrupted(source: Any, target: Any) -> None:
+        target.write(source.read(3))
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(shutil, "copyfileobj", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            extract(folder, tmp_path)
+    assert list(folder.iterdir()) == []
+    assert [video.read_text("utf-8") for video in extract(folder, tmp_path).values()] == [
+        f"video {k}" for k in range(1, 5)
+    ]
+
+
+def test_an_interrupted_write_leaves_the_truth_as_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cameras, joints = _cameras(), _joints()
+    nothing: Any = None
+    save(tmp_path, "woman", TruePerson(joints, nothing, nothing, cameras))
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    with np.load(tmp_path / "woman_cam1.npz") as truth:
+        assert sorted(truth) == sorted(
+            ["joints", "names", "frame_index", "intrinsics", "dist", "fps", "size", "uv", "up"]
+        )
+        assert (float(truth["fps"]), truth["size"].tolist()) == (60.0, [1088, 1920])
+
+    def interrupted(*_: Any, **__: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(np.lib.format, "write_array", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        save(tmp_path, "woman", TruePerson(joints + 1.0, nothing, nothing, cameras))
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before

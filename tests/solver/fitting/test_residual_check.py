@@ -35,6 +35,9 @@ own_residual.register()
 register_residual("wrong_sign", kernel=kernel(-1.0, 1.0), floats=2)
 register_residual("half_gradient", kernel=kernel(0.5, 1.0), floats=2)
 register_residual("half_curvature", kernel=kernel(1.0, 0.5), floats=2)
+register_residual("no_curvature", kernel=kernel(1.0, 0.0), floats=2)
+register_residual("nan_gradient", kernel=kernel(np.nan, 1.0), floats=2)
+register_residual("nan_curvature", kernel=kernel(1.0, np.nan), floats=2)
 register_residual("own_floor_checked", kernel=floor.accumulate, floats=6, indexes="points")
 register_residual("own_pose_checked", kernel=pose_prior.accumulate, floats=14)
 
@@ -67,6 +70,7 @@ def test_each_kind_of_mistake_shows():
     found = check_residual(BODY, "half_curvature", *ROWS)
     assert found.pop("curvature") == pytest.approx(1.0, abs=1e-6)
     assert max(found.values()) < 1e-8
+    assert check_residual(BODY, "no_curvature", *ROWS)["curvature"] == np.inf
 
 
 def test_a_residual_without_a_cost_at_the_state_says_nothing():
@@ -75,3 +79,15 @@ def test_a_residual_without_a_cost_at_the_state_says_nothing():
         check_residual(BODY, "joint_limits", *wide, seed=3)
     with pytest.raises(InvalidValueError, match="no residual named 'nothing'"):
         check_residual(BODY, "nothing", *ROWS)
+
+
+@pytest.mark.parametrize("name", ["nan_gradient", "nan_curvature"])
+def test_derivatives_that_are_not_finite_are_refused(name):
+    with pytest.raises(InvalidValueError, match=rf"derivatives .* of '{name}' must be finite, .* seed 2"):
+        check_residual(BODY, name, *ROWS, seed=2)
+
+
+@pytest.mark.parametrize("seed", [-1, 0.5, True])
+def test_a_seed_is_a_whole_number_from_0_on(seed):
+    with pytest.raises(InvalidValueError, match="seed must be a whole number of at least 0"):
+        check_residual(BODY, "height", *ROWS, seed=seed)

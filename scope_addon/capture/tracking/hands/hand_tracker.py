@@ -46,7 +46,8 @@ MAX_PALMS = 2
 # Frames that are kept of a hand, a third of a second at 30 frames/s: each is a copy of its surroundings.
 MAX_MISSED = 11
 SMALLEST_HAND_PX = 12.0  # length of a hand that is looked for
-# The same of one whose palm the network reads to within about 20 degrees: 20 pixels from wrist to middle knuckle.
+# Length from which the network reads the palm's direction to within about 20 degrees: 20 pixels from wrist to middle
+# knuckle.
 LARGE_HAND_PX = 52.0
 HIDDEN_WRIST = 0.1  # confidence of the body's wrist below which its hand is hardly ever found
 LARGER_SCALE = 1.3  # of a region by the body in which a hand is looked for that was found later
