@@ -66,6 +66,7 @@ LONG = (  # what takes hours together, and is left out of a quick run
     Command("What each part of the pipeline brings", "bench", ("ablation",)),
     Command("Rendered clips with exact truth", "bench", ("renders",)),
     Command("Rendered scenes of many people", "bench", ("scenes",)),
+    Command("Two people whose truth is triangulated", "bench", ("two_people",)),
     Command("An optimizer in the manner of SMPLify", "bench", ("smplify",)),
     Command("How well captured bodies cover the people", "bench", ("outline",)),
     Command("Expressions and gaze on rendered faces", "bench", ("faces",)),
@@ -163,6 +164,7 @@ def run_capture(video: Path, target: Path, say: Callable[[str], None]) -> Outcom
     people = () if truth_of(video) else ("--people", "all")
     files = (_from_root(video), "-o", _from_root(target))
     command = Command(video.name, "capture", (*files, *people, "--json", "--quiet"))
+    target.parent.mkdir(parents=True, exist_ok=True)
     for path in motion_files(target.parent, target.stem):
         path.unlink()
     say(f"running {command.text}")
