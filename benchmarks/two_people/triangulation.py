@@ -50,17 +50,18 @@ def triangulate(
     :param focal_px: (C,).
     :param views: good ones that a point needs; the others are NaN.
     """
-    weight = np.where(confidence >= GOOD_CONFIDENCE, confidence, 0.0)
+    weight = _weight(confidence)
+    seen = _Views(x, weight, T_camera_world, focal_px)
     best = np.full((x.shape[1], 3), np.nan)
     least = np.full(x.shape[1], np.inf)
     for pair in combinations(range(len(x)), 2):
         X = from_views(x[list(pair)], T_camera_world[list(pair)])
-        cost = _cost(X, x, weight, T_camera_world, focal_px)
+        cost = seen.cost(X)
         better = (weight[list(pair)] > 0).all(0) & (cost < least)
         best[better], least[better] = X[better], cost[better]
     for _ in range(_STEPS):
-        best = _step(best, x, weight, T_camera_world, focal_px)
-    error_px = focal_px[:, None] * np.linalg.norm(project(best, T_camera_world) - x, axis=-1)
+        best = seen.step(best)
+    error_px = seen.error_px(best)
     good = (weight > 0) & (error_px <= GOOD_PX)
     return Triangulated(np.where((good.sum(0) >= views)[:, None], best, np.nan), error_px, good)
 
@@ -80,42 +81,57 @@ def from_views(x: NDArray[np.float64], T_camera_world: NDArray[np.float64]) -> N
 
 def project(X: NDArray[np.float64], T_camera_world: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the normalized image coordinates (C, N, 2) of points (N, 3); far outside for those behind a camera."""
-    p = X @ T_camera_world[:, :3, :3].transpose(0, 2, 1) + T_camera_world[:, None, :3, 3]
+    p = _in_cameras(X, T_camera_world)
     ahead = p[..., 2:] > 1e-6
     return np.asarray(np.where(ahead, p[..., :2] / np.where(ahead, p[..., 2:], 1.0), _BEHIND))
 
 
-def _cost(
-    X: NDArray[np.float64],
-    x: NDArray[np.float64],
-    weight: NDArray[np.float64],
-    T: NDArray[np.float64],
-    focal_px: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    e2 = (focal_px[:, None] * np.linalg.norm(project(X, T) - x, axis=-1)) ** 2
-    return np.asarray(np.nan_to_num(weight * SCALE_PX**2 * e2 / (SCALE_PX**2 + e2), nan=np.inf).sum(0))
+@dataclass(frozen=True)
+class _Views:
+    """What C cameras see of N points, in the notation of `triangulate`; ``weight`` (C, N) is w."""
+
+    x: NDArray[np.float64]
+    weight: NDArray[np.float64]
+    T: NDArray[np.float64]
+    focal_px: NDArray[np.float64]
+
+    def error_px(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the errors e (C, N) of points (N, 3)."""
+        return np.asarray(self.focal_px[:, None] * np.linalg.norm(project(X, self.T) - self.x, axis=-1))
+
+    def cost(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the cost (N,) of each point; infinite for NaN."""
+        e2 = self.error_px(X) ** 2
+        return np.asarray(np.nan_to_num(self.weight * SCALE_PX**2 * e2 / (SCALE_PX**2 + e2), nan=np.inf).sum(0))
+
+    def step(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the points after one Gauss-Newton step."""
+        R = self.T[:, None, :3, :3]
+        q, depth = project(X, self.T), np.maximum(_in_cameras(X, self.T)[..., 2, None, None], 1e-6)
+        r = self.focal_px[:, None, None] * (q - self.x)
+        J = self.focal_px[:, None, None, None] * (R[..., :2, :] - q[..., None] * R[..., 2:, :]) / depth
+        w = self.weight * _robust(r)
+        H = np.einsum("cn,cnij,cnik->njk", w, J, J) + 1e-6 * np.eye(3)
+        g = np.einsum("cn,cnij,cni->nj", w, J, r)
+        known = np.isfinite(X).all(-1) & np.isfinite(H).all((1, 2))
+        moved = X.copy()
+        moved[known] -= np.linalg.solve(H[known], g[known][..., None])[..., 0]
+        return moved
 
 
-def _step(
-    X: NDArray[np.float64],
-    x: NDArray[np.float64],
-    weight: NDArray[np.float64],
-    T: NDArray[np.float64],
-    focal_px: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Return the points after one Gauss-Newton step with the weights w s⁴ / (s² + e²)²."""
-    R = T[:, None, :3, :3]
-    p = X @ T[:, :3, :3].transpose(0, 2, 1) + T[:, None, :3, 3]
-    q, depth = project(X, T), np.maximum(p[..., 2, None, None], 1e-6)
-    r = focal_px[:, None, None] * (q - x)
-    J = focal_px[:, None, None, None] * (R[..., :2, :] - q[..., None] * R[..., 2:, :]) / depth
-    w = weight * (SCALE_PX**2 / (SCALE_PX**2 + (r**2).sum(-1))) ** 2
-    H = np.einsum("cn,cnij,cnik->njk", w, J, J) + 1e-6 * np.eye(3)
-    g = np.einsum("cn,cnij,cni->nj", w, J, r)
-    known = np.isfinite(X).all(-1) & np.isfinite(H).all((1, 2))
-    moved = X.copy()
-    moved[known] -= np.linalg.solve(H[known], g[known][..., None])[..., 0]
-    return moved
+def _in_cameras(X: NDArray[np.float64], T_camera_world: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return points (N, 3), world, in the axes of each camera, (C, N, 3)."""
+    return np.asarray(X @ T_camera_world[:, :3, :3].transpose(0, 2, 1) + T_camera_world[:, None, :3, 3])
+
+
+def _weight(confidence: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return w: the confidences, 0 for those that are too small."""
+    return np.where(confidence >= GOOD_CONFIDENCE, confidence, 0.0)
+
+
+def _robust(r: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the factor s⁴ / (s² + e²)² of ρ on the weights of errors (..., 2), pixels."""
+    return np.asarray((SCALE_PX**2 / (SCALE_PX**2 + (r**2).sum(-1))) ** 2)
 
 
 def adjust_cameras(
@@ -142,16 +158,16 @@ def adjust_cameras(
     """
     C = len(x)
     start, T = T_camera_world, T_camera_world.copy()
-    weight = np.where(confidence >= GOOD_CONFIDENCE, confidence, 0.0)
+    weight = _weight(confidence)
     inverse_variance = np.tile([sigma_rad**-2.0] * 3 + [sigma_m**-2.0] * 3, C) * SCALE_PX**2
     for _ in range(steps):
         X = triangulate(x, confidence, T, focal_px, views=2).points
         known = np.isfinite(X).all(-1) & ((weight > 0).sum(0) >= GOOD_VIEWS)
-        p = X[known] @ T[:, :3, :3].transpose(0, 2, 1) + T[:, None, :3, 3]  # (C, N, 3)
+        p = _in_cameras(X[known], T)
         q, f = p[..., :2] / p[..., 2:], focal_px[:, None, None]
         r = f * (q - x[:, known])
         J_camera = f[..., None] * np.concatenate([np.eye(2) + 0 * q[..., None], -q[..., None]], -1) / p[..., 2:, None]
-        w = weight[:, known] * (SCALE_PX**2 / (SCALE_PX**2 + (r**2).sum(-1))) ** 2
+        w = weight[:, known] * _robust(r)
         J_point = J_camera @ T[:, None, :3, :3]
         J_pose = np.concatenate([J_camera @ -_cross(p), J_camera], -1)  # (C, N, 2, 6): dp = ω × p + t
         H_points = np.einsum("cn,cnij,cnik->njk", w, J_point, J_point) + 1e-6 * np.eye(3)

@@ -34,6 +34,7 @@ SHORTEST_M = 0.8  # S_min
 MIN_CAMERA_M = 0.4  # of a camera nearer to the floor, errors of depth are as large as h_k
 MIN_CONTACT_S = 0.2
 _STEPS = np.arange(-0.8, 0.8, 0.004)  # of log C
+_AS_ESTIMATED, _SMALL, _ELSEWHERE = range(3)  # rows of `_log_densities`
 
 
 @dataclass(frozen=True)
@@ -61,9 +62,10 @@ def relative_sizes(people: Sequence[Stander]) -> NDArray[np.float64]:
     best = int(np.argmax(sum(np.logaddexp.reduce(model, axis=0) for model in models)))
     for k, at, model in zip(usable, heights, models, strict=True):
         kind, log_r = int(np.argmax(model[:, best])), log_c[best] - at
-        share = 1.0 if kind == 1 else STATURE_SIGMA**2 / (STATURE_SIGMA**2 + _noise(people[k]) ** 2)
-        if kind != 2 and not people[k].is_known:
-            factors[k] = np.exp(share * log_r)
+        if kind == _ELSEWHERE or people[k].is_known:
+            continue
+        share = 1.0 if kind == _SMALL else STATURE_SIGMA**2 / (STATURE_SIGMA**2 + _noise(people[k]) ** 2)
+        factors[k] = np.exp(share * log_r)
     return factors
 
 
@@ -77,7 +79,9 @@ def _log_densities(person: Stander, log_r: NDArray[np.float64]) -> NDArray[np.fl
     adult = np.log(ADULTS / (sigma * np.sqrt(2 * np.pi))) - 0.5 * (log_r / sigma) ** 2
     stature = person.stature_m * np.exp(log_r)
     small = np.where((stature >= SHORTEST_M) & (log_r < 0) & (not person.is_known), np.log(SMALL), -np.inf)
-    return np.stack([adult, small, np.full(log_r.shape, np.log(OTHER_FLOOR))])
+    densities = np.empty((3, len(log_r)))
+    densities[_AS_ESTIMATED], densities[_SMALL], densities[_ELSEWHERE] = adult, small, np.log(OTHER_FLOOR)
+    return densities
 
 
 def stander(placed: PlacedTrack, up: NDArray[np.floating[Any]], is_known: bool) -> Stander:
@@ -88,7 +92,9 @@ def stander(placed: PlacedTrack, up: NDArray[np.floating[Any]], is_known: bool) 
     """
     valid, stature_m = placed.valid, placed.body.stature(placed.betas)
     contact = placed.contact(up)[valid, : len(SOLES)]
-    step_s = float(np.median(np.diff(placed.times))) if len(placed.times) > 1 else 0.0
-    if len(placed.times) > 1 and contact.max(axis=1).sum() * step_s < MIN_CONTACT_S:
-        return Stander(float("nan"), stature_m, is_known)
-    return Stander(-floor_height(placed.soles[valid], contact, up), stature_m, is_known)
+    height_m = -floor_height(placed.soles[valid], contact, up)
+    if len(placed.times) > 1:
+        step_s = float(np.median(np.diff(placed.times)))
+        if contact.max(axis=1).sum() * step_s < MIN_CONTACT_S:
+            height_m = float("nan")
+    return Stander(height_m, stature_m, is_known)
