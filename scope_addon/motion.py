@@ -174,11 +174,10 @@ CORRECTION_KEYS = (
 # Not in files of earlier versions; NaN where nothing is known.
 SIGMA_KEYS = ("joint_sigma_m", "joint_sigma_depth_m")
 HEIGHT_SIGMA_KEY = "height_sigma_m"
-UNEVEN_GROUND_KEY = "uneven_ground"  # False in files of earlier versions
 # Only in files of captures that looked for the face: the first are what it expresses, the others where it was seen.
 FACE_KEYS = ("expressions", "expression_names", "expression_confidence", "gaze", "face_points", "face_landmarks")
 _GROUPS = ("corrections", "face")  # fields that are not keys themselves
-OPTIONAL_KEYS = {"source", *SIGMA_KEYS, HEIGHT_SIGMA_KEY, UNEVEN_GROUND_KEY, *CORRECTION_KEYS, *FACE_KEYS}
+OPTIONAL_KEYS = {"source", *SIGMA_KEYS, HEIGHT_SIGMA_KEY, "uneven_ground", *CORRECTION_KEYS, *FACE_KEYS}
 _FACE_SCHEMA: dict[str, tuple[tuple[str | int, ...], type]] = {
     "expressions": (("T", "E"), np.float32),
     "expression_names": (("E",), np.str_),

@@ -94,10 +94,19 @@ def under_floor(motion: Motion, body: Body) -> NDArray[np.bool_]:
 
     :param body: that of the motion.
     """
-    if motion.uneven_ground:
-        return np.zeros(len(motion), np.bool_)
-    under: NDArray[np.bool_] = foot_heights(motion, body).min(axis=1) < -UNDER_FLOOR_M
+    under: NDArray[np.bool_] = depth_under_floor(motion, body) > UNDER_FLOOR_M
     return under
+
+
+def depth_under_floor(motion: Motion, body: Body) -> NDArray[np.float64]:
+    """Return how far the lowest foot of each frame is under the floor, (T,) metres; 0 above it and on uneven ground.
+
+    :param body: that of the motion.
+    """
+    if motion.uneven_ground:
+        return np.zeros(len(motion))
+    depth: NDArray[np.float64] = np.maximum(-foot_heights(motion, body).min(axis=1), 0.0)
+    return depth
 
 
 def lower_floors(

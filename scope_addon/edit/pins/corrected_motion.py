@@ -6,6 +6,7 @@ The motion keeps what was corrected, and of the frames that this changed how the
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -154,8 +155,12 @@ def _pinned(clip: Clip, motion: Motion, body: Body) -> Clip:
     if not wanted:
         return clip
     # An upright line turns the world about a point on the floor, so the floor's height is nearly the same before it.
-    floor = -np.inf if motion.uneven_ground else floor_height(corrections)
-    return resolve(clip, body, motion.betas, wanted, shot, floor=floor)
+    return resolve(clip, body, motion.betas, wanted, shot, floor=floor_of(motion, corrections))
+
+
+def floor_of(motion: Motion, corrections: Iterable[Correction] = ()) -> float:
+    """Return the floor's height z with these corrections, metres; −∞ on uneven ground, which has no floor."""
+    return -np.inf if motion.uneven_ground else floor_height(corrections)
 
 
 def before_smoothing(motion: Motion, body: Body) -> Motion:

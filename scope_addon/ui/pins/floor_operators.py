@@ -55,18 +55,16 @@ class SCOPE_OT_floor_here(CorrectionOperator):
 
 def _others_under_floor(motion: Motion, body: Body) -> str:
     """Return the message about feet that are now under the floor in other frames; empty if there are none."""
-    from ...kinematics.foot_skin import UNDER_FLOOR_M, foot_heights
+    from ...kinematics.foot_skin import UNDER_FLOOR_M, depth_under_floor
 
-    if motion.uneven_ground:
-        return ""
-    lowest = foot_heights(motion, body).min(axis=1)
-    under = lowest < -UNDER_FLOOR_M
+    depth = depth_under_floor(motion, body)
+    under = depth > UNDER_FLOOR_M
     if not under.any():
         return ""
     return rpt_(
         "A foot is up to {depth:.0f} cm under this floor in {count} of {total} frames: press Floor Here in a frame in "
         "which it rests on the floor, or use Snap Feet to Floor",
-        depth=-100 * lowest.min(),
+        depth=100 * depth.max(),
         count=int(under.sum()),
         total=len(motion),
     )

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .....solver.body import Body
 from ....edit.clip import Clip, sample
-from ....edit.pins.corrected_motion import corrections_of, pin_in_world, shot_of, uncorrected
+from ....edit.pins.corrected_motion import corrections_of, floor_of, pin_in_world, shot_of, uncorrected
 from ....edit.pins.corrections import Correction, FeetOnFloor, Pin, feet_on_floor, world_of
 from ....edit.pins.floor_here import foot_height
 from ....edit.pins.moved import moved_clip
@@ -127,8 +127,7 @@ def _meet_pin(armature: bpy.types.Object, body: Body, rate: float, motion: Motio
     whole = clip_with_root_motion(armature, clip, frames)
     shot = shot_of(motion, _start(armature, rate))
     if missed(whole, body, motion.betas, pin, shot) > (_MISSED_M if pin.pixel is None else _MISSED_PX):
-        floor = -np.inf if motion.uneven_ground else 0.0
-        met = resolve(whole, body, motion.betas, [pin], shot, slack=0.0, floor=floor)
+        met = resolve(whole, body, motion.betas, [pin], shot, slack=0.0, floor=floor_of(motion))
         _write_change(armature, body, clip, frames, (whole, met))
 
 
