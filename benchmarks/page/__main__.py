@@ -145,9 +145,8 @@ def costs(outcomes: Sequence[Outcome]) -> list[page.Markup]:
         for each in outcomes
     ]
     known = [each.processor_seconds for each in outcomes if each.processor_seconds is not None]
-    spent = (
-        sum(known) if len(known) == len(outcomes) else None
-    )  # a sum of some, beside the elapsed time of all, misleads
+    # A sum of some, beside the elapsed time of all, would mislead.
+    spent = sum(known) if len(known) == len(outcomes) else None
     rows.append(["all", _minutes(sum(each.seconds for each in outcomes)), _minutes(spent), ""])
     head = ("command", "elapsed, min:s", "processor time, min:s", "load, mean")
     note = (

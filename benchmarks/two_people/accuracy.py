@@ -10,6 +10,7 @@ bounding boxes are apart; area: the body's over the mask's.
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ from ..evaluation.metrics import aligned, similarity
 from ..frames import DATA
 from ..perception.accuracy import CAMERAS, evaluate_motion
 from ..perception.outline import SURE, overlap, silhouette
+from ..perception.perception import PRESETS
 from ..report import table
 from . import truth as truths
 from .footage import FOLDER, extract, load_cameras
@@ -64,7 +66,7 @@ def two_people(quick: bool) -> dict[str, Any]:
     made = all(truth_file(person, camera).is_file() for person in truths.PEOPLE for camera in CAMERAS)
     figures: dict[str, Any] = {} if quick and made else {"truth": make_truth(videos)}
     body, network = load_body("scope"), LandmarkNetwork("pose_landmark_heavy", truths.THREADS)
-    for quality in (CaptureOptions().quality,) if quick else ("best", "balanced", "fast"):
+    for quality in (CaptureOptions().quality,) if quick else PRESETS[::-1]:  # best first
         rows: dict[str, dict[str, Any]] = {}
         for camera in CAMERAS:
             motions = capture(videos[camera], body, CaptureOptions(quality=quality, people=ALL)).motions
@@ -110,7 +112,7 @@ def differences(people: dict[str, dict[str, truths.TruePerson]]) -> dict[str, An
     pairs = {f"{p}: heavy, full": (first[p].joints, second[p].joints) for p in truths.PEOPLE}
     rows = [[name, *_difference(a[:, _KEYPOINTS], b[:, _KEYPOINTS])] for name, (a, b) in pairs.items()]
     with np.load(truth_file("man", CAMERAS[0])) as true, np.load(truth_file("man_triangulated", CAMERAS[0])) as ours:
-        a, b = (data["joints"][:, [data["names"].tolist().index(n) for n in LIMBS]] for data in (true, ours))
+        a, b = (data["joints"][:, columns_of(data, LIMBS)] for data in (true, ours))
         rows.append(["man: his truth, triangulated", *_difference(a, b[true["frame_index"]])])
     return {"differences": rows}
 
@@ -147,13 +149,18 @@ def measure(motions: list[Motion], camera: str, body: Body, network: LandmarkNet
     return rows
 
 
+def columns_of(data: Mapping[str, NDArray[Any]], names: Sequence[str]) -> list[int]:
+    """Return the columns of joints in a file of truth."""
+    all_names = data["names"].tolist()
+    return [all_names.index(name) for name in names]
+
+
 def true_pixels(camera: str) -> True2D:
     """Return the frames, and the pixels of `LIMBS`, of both people."""
     found = {}
     for person in truths.PEOPLE:
         with np.load(truth_file(person, camera)) as data:
-            columns = [data["names"].tolist().index(name) for name in LIMBS]
-            found[person] = data["frame_index"].astype(np.int64), data["uv"][:, columns]
+            found[person] = data["frame_index"].astype(np.int64), data["uv"][:, columns_of(data, LIMBS)]
     return found
 
 
@@ -244,8 +251,8 @@ def distance_ratio(motions: dict[str, Motion], camera: str) -> float:
         at = {int(f): motion.joints_cam[k, 1:3].mean(0) for k, f in enumerate(motion.frames) if motion.valid[k]}
         captured[person] = at
         with np.load(truth_file(person, camera)) as data:
-            columns = [data["names"].tolist().index(name) for name in ("LHip", "RHip")]
-            true[person] = dict(zip(data["frame_index"].tolist(), data["joints"][:, columns].mean(1), strict=True))
+            hips = data["joints"][:, columns_of(data, ("LHip", "RHip"))].mean(1)
+            true[person] = dict(zip(data["frame_index"].tolist(), hips, strict=True))
         frames = set(at) & set(true[person]) if frames is None else frames & set(at) & set(true[person])
     ratios = []
     for frame in sorted(frames or ()):
