@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The probability that a contact point rests on the floor: it is slow, and low within its frame."""
+"""The probability that a contact point rests on the floor: it is slow, low within its frame, and does not fall."""
 
 from __future__ import annotations
 
@@ -15,6 +15,9 @@ CONTACT_SPEED_M_S = 0.35  # v₀, across the line of sight; a swinging foot move
 CONTACT_HEIGHT_M = 0.05  # h₀, above the frame's lowest sole point
 PALM_HEIGHT_M = 0.12  # h_p, above the lowest sole point; larger, since the trunk's depth error lies in between as well
 CONTACT_CUTOFF_HZ = 4.0  # of the positions before their speed is computed, since noise is not motion
+# a₀: at the top of a jump, feet are as slow as on the floor, but they fall at 9.8 m/s². Feet on the floor are
+# accelerated upwards, by landing and taking off, but not downwards.
+FALL_M_S2 = 6.0
 # A foot in the air does not stay still. If one does for about a second, it may be higher than the lowest point because
 # its depth is wrong: it is then displaced up or down along its line of sight.
 STILL_M_S, STILL_CUTOFF_HZ = 0.12, 0.6  # v₁, and of the mean of the speed
@@ -43,13 +46,13 @@ def standing_probability(
     center: NDArray[np.floating[Any]] | None = None,
     uneven_ground: bool = False,
 ) -> NDArray[np.floating[Any]]:
-    """Return the (T, F) probability that each sole point rests on the floor: it is slow and low within its frame.
+    """Return the (T, F) probability that each sole point rests on the floor: it is slow, low, and does not fall.
 
-    p = s(4(1 − v/v₀)) s(4(1 − h/(h₀ + |g| d s(4(1 − v̄/v₁))))) with the logistic function s. The height h is relative to
-    the frame's lowest sole point, because the floor is not known yet. If the points were seen by a camera, the speed v
-    excludes motion in depth, the noisy direction. The more a point stays still, the more it may be higher than the
-    lowest one by what a depth error d explains, with g the upward component of its line of sight and v̄ the root mean
-    square of v over a second.
+    p = s(4(1 − v/v₀)) s(4(1 − h/(h₀ + |g| d s(4(1 − v̄/v₁))))) s(8(1 − a/a₀)) / s(8) with the logistic function s. The
+    height h is relative to the frame's lowest sole point, because the floor is not known yet. If the points were seen
+    by a camera, the speed v and the downward acceleration a ≥ 0 exclude motion in depth, the noisy direction. The more
+    a point stays still, the more it may be higher than the lowest one by what a depth error d explains, with g the
+    upward component of its line of sight and v̄ the root mean square of v over a second.
 
     :param soles: (T, F, 3) metres.
     :param up: (3,) unit vector.
@@ -59,13 +62,15 @@ def standing_probability(
     """
     height = soles @ up
     height = height - height.min(axis=1, keepdims=True)
-    speed = speed_across(soles, times, center)
+    velocity = velocity_across(soles, times, center)
+    speed = np.linalg.norm(velocity, axis=-1)
     allowed = np.full(height.shape, UNEVEN_M if uneven_ground else CONTACT_HEIGHT_M)
     if len(times) > 2 and center is not None:
         upwards = np.abs(line_of_sight(soles - np.expand_dims(center, -2)) @ up)
         mean_speed = np.sqrt(gaussian_smooth(np.square(speed), times, STILL_CUTOFF_HZ))
         allowed += WRONG_DEPTH_M * upwards * logistic(4 * (1 - mean_speed / STILL_M_S))
     p: NDArray[np.floating[Any]] = logistic(4 * (1 - speed / CONTACT_SPEED_M_S)) * logistic(4 * (1 - height / allowed))
+    p *= logistic(8 * (1 - _downward_acceleration(velocity, up, times) / FALL_M_S2)) / logistic(8)
     return p
 
 
@@ -101,20 +106,39 @@ def resting_probability(
 def speed_across(
     points: NDArray[np.floating[Any]], times: NDArray[np.float64], center: NDArray[np.floating[Any]] | None
 ) -> NDArray[np.floating[Any]]:
-    """Return the (T, F) speed in m/s, across the line of sight of a camera; 0 in clips of one or two frames.
+    """Return the (T, F) speed in m/s; see `velocity_across`."""
+    speed: NDArray[np.floating[Any]] = np.linalg.norm(velocity_across(points, times, center), axis=-1)
+    return speed
+
+
+def velocity_across(
+    points: NDArray[np.floating[Any]], times: NDArray[np.float64], center: NDArray[np.floating[Any]] | None
+) -> NDArray[np.floating[Any]]:
+    """Return the (T, F, 3) velocity in m/s, across the line of sight of a camera; 0 in clips of one or two frames.
 
     :param points: (T, F, 3) metres.
     :param times: (T,) seconds.
-    :param center: (T, 3) or (3,) the camera's centre, in the same axes; None: the whole speed.
+    :param center: (T, 3) or (3,) the camera's centre, in the same axes; None: the whole velocity.
     """
     if len(times) <= 2:
-        return np.zeros(points.shape[:2])
+        return np.zeros(points.shape)
     velocity: NDArray[np.floating[Any]] = np.gradient(gaussian_smooth(points, times, CONTACT_CUTOFF_HZ), times, axis=0)
     if center is not None:
         sight = line_of_sight(points - np.expand_dims(center, -2))
         velocity = velocity - sight * (velocity * sight).sum(-1, keepdims=True)
-    speed: NDArray[np.floating[Any]] = np.linalg.norm(velocity, axis=-1)
-    return speed
+    return velocity
+
+
+def _downward_acceleration(
+    velocity: NDArray[np.floating[Any]], up: NDArray[np.floating[Any]], times: NDArray[np.float64]
+) -> NDArray[np.floating[Any]]:
+    """Return the (T, F) downward acceleration, m/s², from velocities (T, F, 3); 0 where it is upward."""
+    if len(times) <= 2:
+        return np.zeros(velocity.shape[:2])
+    down = -np.gradient(velocity @ up, times, axis=0)
+    down[0], down[-1] = down[1], down[-2]  # differences of the two outermost frames alone are mostly noise
+    falling: NDArray[np.floating[Any]] = np.maximum(down, 0.0)
+    return falling
 
 
 def logistic(x: NDArray[np.floating[Any]] | float) -> NDArray[np.floating[Any]]:

@@ -56,6 +56,30 @@ def test_a_foot_at_rest_at_a_wrong_depth_is_in_contact_and_a_raised_one_is_not(s
         np.testing.assert_allclose(elsewhere, standing.standing_probability(far, up, times, CAMERA), atol=1e-9)
 
 
+@pytest.mark.parametrize("rate", [30.0, 60.0])
+@pytest.mark.parametrize("flight_s", [0.35, 0.5])
+def test_feet_do_not_rest_at_the_top_of_a_jump(flight_s, rate):
+    """There they are as slow as on the floor, and both are the lowest."""
+    times = np.arange(0, 2.0, 1 / rate)
+    since = np.clip(times - 0.8, 0.0, flight_s)
+    risen = 0.5 * 9.81 * since * (flight_s - since)
+    soles = np.array([[0.1, 0.0, 3.0], [-0.1, 0.0, 3.0]]) + risen[:, None, None] * [0.0, -1.0, 0.0]
+    p = standing.standing_probability(soles, np.array([0.0, -1.0, 0.0]), times, CAMERA)
+    assert (p[np.abs(times - 0.8 - flight_s / 2) < 0.3 * flight_s] < 0.05).all()
+    stands = (times < 0.7) | (times > 0.9 + flight_s)
+    assert (p[stands] > 0.9).all()
+
+
+def test_an_upward_acceleration_does_not_end_a_contact():
+    """A foot that rolls off the floor, and one that has just landed, are accelerated upwards."""
+    times = np.arange(0, 1.0, 1 / 30)
+    soles = np.zeros((len(times), 2, 3))
+    soles[:, :, 2] = (0.5 * 8.0 * (times - 0.5) ** 2)[:, None]
+    now = np.abs(times - 0.5) < 1e-9
+    assert (standing.standing_probability(soles, np.array([0.0, 0.0, 1.0]), times)[now] > 0.95).all()
+    assert (standing.standing_probability(-soles, np.array([0.0, 0.0, 1.0]), times)[now] < 0.1).all()
+
+
 def test_both_feet_rest_on_stairs_where_the_ground_is_uneven(step):
     _, omega, root, place, T_world_camera, times = step
     up = T_world_camera[2, :3]
