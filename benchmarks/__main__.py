@@ -31,6 +31,7 @@ ELSEWHERE = {  # imported where they are wanted: some need packages that others 
     "blender": (".blender", "blender"),
     "cluster": (".cluster", "cluster"),
     "two_people": (".two_people.accuracy", "two_people"),
+    "climbs": (".climbs.accuracy", "climbs"),
     "live": (".live.live", "live"),
 }
 LIVE_PARTS = ("rate", "offline", "simulated", "world", "hour")

@@ -67,6 +67,7 @@ LONG = (  # what takes hours together, and is left out of a quick run
     Command("Rendered clips with exact truth", "bench", ("renders",)),
     Command("Rendered scenes of many people", "bench", ("scenes",)),
     Command("Two people whose truth is triangulated", "bench", ("two_people",)),
+    Command("Climbs onto boxes, with one floor and with uneven ground", "bench", ("climbs",)),
     Command("An optimizer in the manner of SMPLify", "bench", ("smplify",)),
     Command("How well captured bodies cover the people", "bench", ("outline",)),
     Command("Expressions and gaze on rendered faces", "bench", ("faces",)),
