@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Climbs, always the same: people who end higher than they began, in front of a camera at rest.
 
-They move as two performers of whom nothing was used for training (`tools.mocap.new_performers`). The boxes that they
+They move as a performer of whom nothing was used for training (`tools.mocap.new_performers`). The boxes that they
 climb are not drawn: the capture has to tell from the people that they rise.
 """
 
