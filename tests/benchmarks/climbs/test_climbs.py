@@ -8,10 +8,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scope.benchmarks.climbs import accuracy, draw
+from scope.benchmarks.climbs import accuracy
 from scope.benchmarks.climbs.accuracy import climbs, compare, truth_of, world_mm
 from scope.benchmarks.climbs.draw import draw_climb, rise_m
 from scope.benchmarks.perception.held_out import Take
+from scope.benchmarks.scenes.draw import FPS
 from scope.benchmarks.scenes.people import LIMB_JOINTS
 from scope.benchmarks.scenes.scene import STATIC, Scene, write_truth
 from scope.solver import Body
@@ -26,7 +27,7 @@ def takes(body: Body) -> list[Take]:
     frames = 130
     poses, trans = np.zeros((frames, 3 * (body.K + 1))), np.zeros((frames, 3))
     trans[:, 1] = 1.0 + BOX_M * np.clip((np.arange(frames) - 50) / 30, 0, 1)
-    return [Take(0, "up_0", poses, trans, np.ones(frames, bool), np.zeros(body.P), draw.FPS * 2)]
+    return [Take(0, "up_0", poses, trans, np.ones(frames, bool), np.zeros(body.P), FPS * 2)]
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +43,7 @@ def captured(body: Body, scene: Scene, share: float) -> SimpleNamespace:
     joints = scene.to_camera(replace(person, trans=trans).joints(body))
     poses = log(person.rotations).reshape(T, -1)
     world = {"poses": poses, "trans": trans, "poses_raw": poses, "trans_raw": trans, "betas": person.betas}
-    camera = {"world_from_camera": scene.world_from_camera, "intrinsics": scene.intrinsics, "mocap_framerate": draw.FPS}
+    camera = {"world_from_camera": scene.world_from_camera, "intrinsics": scene.intrinsics, "mocap_framerate": FPS}
     return SimpleNamespace(joints_cam=joints, valid=np.ones(T, bool), frames=np.arange(T), **world, **camera)
 
 
