@@ -146,8 +146,13 @@ def report_page(folder: Path, done: Run, curves: Curves) -> str:
 
 def costs(outcomes: Sequence[Outcome]) -> list[page.Markup]:
     """Return the table of what each command cost, with the sum, and how to read it."""
-    rows = [
-        [each.command.text, minutes_text(each.seconds), minutes_text(each.processor_seconds), load_text(each.load)]
+    rows: list[list[str | page.Markup]] = [
+        [
+            page.command_text(each.command.text),
+            minutes_text(each.seconds),
+            minutes_text(each.processor_seconds),
+            load_text(each.load),
+        ]
         for each in outcomes
     ]
     known = [each.processor_seconds for each in outcomes if each.processor_seconds is not None]
@@ -161,7 +166,7 @@ def costs(outcomes: Sequence[Outcome]) -> list[page.Markup]:
         "ran or waited for a core, the command's own included. Clips that were rendered before are used again; "
         "rendering them is not included."
     )
-    return [page.table(head, rows, numbers=True), page.paragraph(note)]
+    return [page.table(head, rows, markup_columns=(0,), numbers=True), page.paragraph(note)]
 
 
 def left_out(done: Run) -> list[Command]:

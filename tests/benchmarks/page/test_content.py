@@ -127,6 +127,6 @@ def test_clips_are_not_connected_and_their_pictures_are_shown(tmp_path, monkeypa
 def test_a_command_that_failed_says_so():
     outcome = Outcome(Command("Speed", "bench", ("solver", "--quick")), "", "first\nno <clips>", {}, 3.2, 1)
     section = outcome_section(outcome)
-    assert "./scripts/bench solver --quick" in section
+    assert '<code>./scripts/bench solver <span class="option">--quick</span></code>' in section  # in one line
     assert "Elapsed 0:03 min:s, processor time –, mean load –; it ended with status 1." in section
     assert "<p>no &lt;clips&gt;</p>" in section
