@@ -31,6 +31,7 @@ ELSEWHERE = {  # imported where they are wanted: some need packages that others 
     "blender": (".blender", "blender"),
     "cluster": (".cluster", "cluster"),
     "two_people": (".two_people.accuracy", "two_people"),
+    "climbs": (".climbs.accuracy", "climbs"),
     "live": (".live.live", "live"),
 }
 LIVE_PARTS = ("rate", "offline", "simulated", "world", "hour")
@@ -53,15 +54,15 @@ def solver(quick: bool) -> dict[str, Any]:
     figures["clip_dense"] = clip_comparison.against_dense(3 if quick else 20)
     figures["clip_frames"] = clip_comparison.against_frames(1 if quick else 5)
     figures["clip_outlines"] = clip_comparison.with_outlines(3 if quick else 10)
-    for rows in (figures[key] for key in figures if key.startswith("clip")):
-        print(report.rows_table(rows), end="\n\n", flush=True)
+    for key, title in report.CLIP_TABLES.items():
+        print(f"{title}\n\n{report.rows_table(figures[key])}", end="\n\n", flush=True)
     figures |= _real_frames(quick)
     figures["peers"] = {} if quick else peers.run_all()
     print(report.target_lines(figures), end="\n\n")
     if figures["peers"]:
         measured = list(figures["peers"].items())
         print(
-            report.table(("one iteration, K=23 P=10 N=120, us", "measured, or the reason why not"), measured),
+            report.table(("one iteration, K=23 P=10 N=120, µs", "measured, or the reason why not"), measured),
             end="\n\n",
         )
     print(f"Plots are in {OUT}")

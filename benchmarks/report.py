@@ -11,6 +11,21 @@ from .solver.steps import TARGETS, growth, growth_in_joints
 
 FRAME_TARGETS = {"iteration": 30.0, "prior_23_joints": 5.0, "cold_frame_ms": 0.8, "warm_frame_ms": 0.2}
 STARTUP_TARGETS = {"first_call_s": 20.0, "cached_call_s": 0.3}
+NAMES = {  # of the figures in the table of targets
+    "iteration": "whole iteration, all terms",
+    "prior_23_joints": "joint prior of 23 joints",
+    "cold_frame_ms": "one frame to convergence, cold, ms",
+    "warm_frame_ms": "one frame to convergence, warm, ms",
+    "first_call_s": "first call, compiling, s",
+    "cached_call_s": "first call of a later session, s",
+}
+CLIP_TABLES = {  # what the tables of whole clips show, by their keys in the figures
+    "clip": "Linearization and step of a whole clip, K joints: ms per frame, two threads",
+    "clip_gradients": "Elimination over time and conjugate gradients, ms per frame; gap: frames that see nothing",
+    "clip_dense": "A clip's step by elimination and as one dense matrix, ms per step, one thread",
+    "clip_frames": "All frames as one problem, and frames alone with smoothing, ms per frame",
+    "clip_outlines": "Linearization without outlines, with one in one frame in six, and in all, ms per frame",
+}
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
@@ -22,6 +37,13 @@ def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
 def rows_table(rows: Sequence[dict[str, float]]) -> str:
     """Return rows of one kind as a table, their keys as its head."""
     return table(list(rows[0]), [[_exact(x) for x in row.values()] for row in rows])
+
+
+def _step_name(key: str) -> str:
+    """Return the name of a target step, such as "step K=23 P=10 N=52, with the joint prior" for K23_P10_N52_prior."""
+    sizes = key.removesuffix("_prior")
+    name = "step " + " ".join(f"{part[0]}={part[1:]}" for part in sizes.split("_"))
+    return f"{name}, with the joint prior" if key != sizes else name
 
 
 def _cell(x: object) -> str:
@@ -36,11 +58,11 @@ def target_lines(figures: dict[str, Any]) -> str:
     for name, (_, _, _, _, target) in TARGETS.items():
         ratio, called = figures["dense_over_sparse"][name], figures["dense_over_called"][name]
         text = f"dense: {ratio:.1f} x, {called:.1f} x if both are called from Python"
-        rows.append([f"step {name}", figures["gn_step"][name], target, text])
+        rows.append([_step_name(name), figures["gn_step"][name], target, text])
     for name, target in (FRAME_TARGETS | STARTUP_TARGETS).items():
         if figures.get(name) is not None:
-            rows.append([name, figures[name], target, None])
-    return table(("median, one thread, us unless said", "measured", "target", ""), rows)
+            rows.append([NAMES[name], figures[name], target, None])
+    return table(("median, one thread, µs unless stated", "measured", "target", ""), rows)
 
 
 def experiment_lines(number: int, rows: list[dict[str, float]]) -> str:
@@ -57,7 +79,7 @@ def experiment_lines(number: int, rows: list[dict[str, float]]) -> str:
     head = (key, f"{small} sparse", f"{small} dense", f"{large} sparse", f"{large} dense", f"speedup {small}",
             f"speedup {large}", f"{large} / {small} sparse", f"{large} / {small} dense")  # fmt: skip
     counts = " and ".join(str(N) for N in dict.fromkeys(row["N"] for row in rows)) if number == 3 else ""
-    title = f"Experiment {number}{f', N = {counts}' if counts else ''}, us a step"
+    title = f"Experiment {number}{f', N = {counts}' if counts else ''}, µs per step"
     text = f"{title}\n\n" + table(head, lines)
     if number < 3:
         fits = [f"{m} K={K}: N^{growth(rows, K, m):.2f}" for K in (23, 51) for m in ("sparse", "dense")]

@@ -25,7 +25,7 @@ from ...solver.errors import InputError, ScopeError
 from ...solver.loaders.body_file import load_body
 from ..frames import ROOT
 from .commands import LONG, Command, Outcome, clips, commands, motion_files, run, run_capture, truth_of, worst_clips
-from .content import outcome_section
+from .content import load_text, minutes_text, outcome_section
 from .curves import Curves, read_curves
 from .failures import KNOWN, KnownFailure, worst_moments
 from .recorded import FILE, Run, read_run, set_aside, write_run
@@ -77,11 +77,10 @@ def measure(quick: bool, resume: bool = False) -> Run:
     """
     if resume:
         done = read_run(FOLDER)
+        note_revision(done.facts)
     else:
         set_aside(FOLDER)  # the first capture removes the motion of its first clip
         done = Run([], [], now(), facts(other_load()), quick)
-    if resume and revision() != done.facts.get("Revision"):
-        done.facts["Resumed by revision"] = revision()
     for name, video in clips(done.quick):
         if name in [each[0] for each in done.captured]:
             continue
@@ -100,6 +99,13 @@ def measure(quick: bool, resume: bool = False) -> Run:
             done.captured.append((name, video, run_capture(video, FOLDER / f"{name}.npz", say)))
             write_run(FOLDER, done)
     return done
+
+
+def note_revision(facts: dict[str, str]) -> None:
+    """Add the checkout's commit to the facts of a run that goes on, unless an earlier part of it is of this commit."""
+    by = [each for each in facts.get("Resumed by revision", "").split(", ") if each]
+    if revision() not in (facts.get("Revision"), *by):
+        facts["Resumed by revision"] = ", ".join([*by, revision()])
 
 
 def now() -> str:
@@ -133,21 +139,26 @@ def report_page(folder: Path, done: Run, curves: Curves) -> str:
         page.section("The capture above", *over_time([motion]), figures_table([motion], body)),
         *(capture_section(folder, *each, body, why.get(each[0], "")) for each in done.captured),
         *(outcome_section(each, curves) for each in done.measured),
-        page.section("Commands, and what running them again costs", *costs(done.everything), note=note),
+        page.section("Commands and their costs", *costs(done.everything), note=note),
     ]
     return page.document("Scope on this machine", content, viewer_data([motion], body, rows, [page.person_color(0)]))
 
 
 def costs(outcomes: Sequence[Outcome]) -> list[page.Markup]:
     """Return the table of what each command cost, with the sum, and how to read it."""
-    rows = [
-        [each.command.text, _minutes(each.seconds), _minutes(each.processor_seconds), _load_text(each.load)]
+    rows: list[list[str | page.Markup]] = [
+        [
+            page.command_text(each.command.text),
+            minutes_text(each.seconds),
+            minutes_text(each.processor_seconds),
+            load_text(each.load),
+        ]
         for each in outcomes
     ]
     known = [each.processor_seconds for each in outcomes if each.processor_seconds is not None]
     # A sum of some, beside the elapsed time of all, would mislead.
     spent = sum(known) if len(known) == len(outcomes) else None
-    rows.append(["all", _minutes(sum(each.seconds for each in outcomes)), _minutes(spent), ""])
+    rows.append(["all", minutes_text(sum(each.seconds for each in outcomes)), minutes_text(spent), ""])
     head = ("command", "elapsed, min:s", "processor time, min:s", "load, mean")
     note = (
         "Processor time is that of all threads and of all processes that a command started; on a busy machine, elapsed "
@@ -155,15 +166,7 @@ def costs(outcomes: Sequence[Outcome]) -> list[page.Markup]:
         "ran or waited for a core, the command's own included. Clips that were rendered before are used again; "
         "rendering them is not included."
     )
-    return [page.table(head, rows, numbers=True), page.paragraph(note)]
-
-
-def _minutes(seconds: float | None) -> str:
-    return "–" if seconds is None else f"{int(seconds) // 60}:{int(seconds) % 60:02d}"
-
-
-def _load_text(load: float | None) -> str:
-    return "–" if load is None else f"{load:.1f}"
+    return [page.table(head, rows, markup_columns=(0,), numbers=True), page.paragraph(note)]
 
 
 def left_out(done: Run) -> list[Command]:
@@ -217,7 +220,8 @@ def capture_section(folder: Path, name: str, video: Path, outcome: Outcome, body
         "Preset": report["quality"],
         "Camera": report["camera"],
         "Reprojection error": f"{report['reprojection_px']:.1f} px",
-        "Speed": f"{report['fps']['total']:.1f} frames per second, networks on {report['execution']}",
+        "Speed": f"{report['fps']['total']:.1f} frames per second, networks on {report['execution']}, mean load "
+        f"{load_text(outcome.load)}",
     }
     return page.section(
         f"Clip {name}",

@@ -25,6 +25,11 @@ WITHOUT_TRUTH = (  # clips of people
     "walk_side_static",
 )
 LOAD_EVERY_S = 10.0
+SCENES_OF = {  # of each split
+    "development": "the development scenes",
+    "test": "the test scenes",
+    "new_performers": "the scenes of new performers",
+}
 SCRIPTS = {"bench": "scope.benchmarks", "gate": "scope.benchmarks.gate", "capture": "scope.scope_addon"}
 
 
@@ -67,6 +72,7 @@ LONG = (  # what takes hours together, and is left out of a quick run
     Command("Rendered clips with exact truth", "bench", ("renders",)),
     Command("Rendered scenes of many people", "bench", ("scenes",)),
     Command("Two people whose truth is triangulated", "bench", ("two_people",)),
+    Command("Climbs onto boxes, with one floor and with uneven ground", "bench", ("climbs",)),
     Command("An optimizer in the manner of SMPLify", "bench", ("smplify",)),
     Command("How well captured bodies cover the people", "bench", ("outline",)),
     Command("Expressions and gaze on rendered faces", "bench", ("faces",)),
@@ -123,10 +129,10 @@ def worst_clips(measured: Sequence[Outcome]) -> list[tuple[str, Path, str]]:
                 people = [row for row in figures["people"]["default preset"] if np.isfinite(row["mpjpe_root"])]
                 if people:
                     worst = max(people, key=lambda row: row["mpjpe_root"])
-                    why = f"The worst person of the scenes {split}: MPJPE-root is {worst['mpjpe_root']:.1f} mm."
+                    why = f"The worst person of {SCENES_OF[split]}: MPJPE-root is {worst['mpjpe_root']:.1f} mm."
                     found.append((CACHE / "scenes" / f"{worst['clip']}.mp4", why))
                 for row in [row for row in figures["people"]["default preset"] if not row["found"]][:1]:
-                    why = f"A person of the scenes {split} who was not found in any frame."
+                    why = f"A person of {SCENES_OF[split]} who was not found in any frame."
                     found.append((CACHE / "scenes" / f"{row['clip']}.mp4", why))
     reasons: dict[Path, list[str]] = {}
     for path, why in found:

@@ -18,21 +18,25 @@ from ...scope_addon.report.plots import Axis, Curve, line_plot
 from ..frames import CACHE
 from ..perception.accuracy import SHOWN
 from ..perception.renders import KNOWN
+from .about import ABOUT
 from .commands import Outcome
 from .curves import Curves
 from .failures import captioned
 from .paper import convergence_plot, stated_table
 
 BODIES = ((23, "SMPL"), (51, "SMPL+H"))  # number of joints of ours, and whose skeleton has as many
+OF = {"N": "the number of measurements N", "P": "the number of shape coefficients P"}
 PAPER = (
-    "The curves of the solver's paper (figures 5 to 7) are not drawn beside these: they are pictures, of which no data "
-    "were found, and were not digitized. Whoever has digitized them can give them as a table with --curves."
+    "The curves in figures 5 to 7 of the solver's paper are not shown here: they are published as images only, and "
+    "were not digitized. The option --curves plots digitized curves beside these."
 )
 DETAILS = {  # benchmarks of many tables: which of them are folded, by their first heading
     "renders": re.compile(rf"(?!{CaptureOptions().quality}, {KNOWN[0]})\w+, "),
     "scenes": re.compile(r"\w+, (?!default preset: )"),
 }
-_PICTURE = re.compile(r"^\S+\.jpg: .*\n?", re.MULTILINE)  # that a benchmark has written and says so
+# What a benchmark has written to files, as it says.
+_PICTURE = re.compile(r"^(\S+\.jpg: |Plots are in ).*\n?", re.MULTILINE)
+LEFT, RIGHT = 0.06, 0.02  # what a plot's x axis is longer than its curves, over their length
 _RULE = re.compile(r"\|(\s*:?-+:?\s*\|)+")
 
 
@@ -107,13 +111,15 @@ def time_against_accuracy(figures: dict[str, dict[str, dict[str, float]]]) -> Ma
     y = np.concatenate([curve.y for curve in curves])
     x_axis = Axis(float(x.min()) / 1.3, float(x.max()) * 1.3, logarithmic=True, unit="ms")
     y_axis = Axis(0.0, 1.1 * float(y.max()))
-    title = "MPJPE-root in mm by milliseconds a frame (Scope's by the clock), logarithmic; one point for each clip"
+    title = (
+        "MPJPE-root in mm against ms per frame, logarithmic (SMPLify: processor time, Scope: elapsed); a point per clip"
+    )
     svg = line_plot(curves, x_axis, y_axis, label=title, timed=False)
     return page.plot_figure(title, svg, {curve.name: curve.color for curve in curves})
 
 
 def clip_plot(rows: Sequence[dict[str, float]]) -> Markup:
-    """Return the plot of a whole clip as one problem: milliseconds a frame by the number of frames."""
+    """Return the plot of a whole clip as one problem: milliseconds per frame by the number of frames."""
     curves: list[Curve] = []
     for K, _ in BODIES:
         chosen = [row for row in rows if row["K"] == K]
@@ -121,7 +127,7 @@ def clip_plot(rows: Sequence[dict[str, float]]) -> Markup:
         for key, name in (("linearize_ms", "linearize"), ("step_ms", "step")):
             y = np.array([row[key] for row in chosen], float)
             curves.append(Curve(x, y, page.person_color(len(curves)), f"{K} joints, {name}", with_points=True))
-    return plot("A whole clip as one problem: milliseconds a frame by its frames, logarithmic", curves)
+    return plot("A whole clip as one problem: ms per frame against the number of frames; y logarithmic", curves)
 
 
 def experiment_plots(number: str, rows: Sequence[dict[str, float]], digitized: Curves | None = None) -> list[Markup]:
@@ -143,34 +149,48 @@ def experiment_plots(number: str, rows: Sequence[dict[str, float]], digitized: C
             x, y = np.array(points, float).T
             speedups.append(Curve(x, y, page.person_color(2 * n + 1), f"{body}, digitized", with_points=True))
     return [
-        plot(f"{title}: µs of a step by {key}, logarithmic", times),
-        plot(f"{title}: time of a dense step over a sparse one's, by {key}, logarithmic", speedups),
+        plot(f"{title}: µs per step against {OF[key]}; y logarithmic", times),
+        plot(f"{title}: dense over sparse time against {OF[key]}; y logarithmic", speedups),
     ]
 
 
 def plot(title: str, curves: Sequence[Curve]) -> Markup:
-    """Return a plot of curves over common, logarithmic y, with its legend."""
+    """Return a plot of curves over common, logarithmic y, with its legend; the values of y are left of the curves."""
     x = np.concatenate([curve.x for curve in curves])
     y = np.concatenate([curve.y for curve in curves])
-    x_axis = Axis(float(x.min()), float(x.max()) if x.max() > x.min() else float(x.min()) + 1)
+    first, last = float(x.min()), float(x.max()) if x.max() > x.min() else float(x.min()) + 1
+    x_axis = Axis(first - LEFT * (last - first), last + RIGHT * (last - first))
     y_axis = Axis(float(y.min()) / 1.3, float(y.max()) * 1.3, logarithmic=True)
     svg = line_plot(curves, x_axis, y_axis, label=title, timed=False)
     return page.plot_figure(title, svg, {curve.name: curve.color for curve in curves})
 
 
 def outcome_section(outcome: Outcome, curves: Curves | None = None) -> Markup:
-    """Return the section of one command: the command, how long it took, what it printed, and plots.
+    """Return the section of one command: the command, its costs, what it measures, what it printed, and plots.
 
     :param curves: digitized speedups of others, see `read_curves`.
     """
     ended = "" if outcome.status == 0 else f"; it ended with status {outcome.status}"
     last = outcome.said.strip().splitlines()
     said = [Markup(f"<p>{escape(last[-1])}</p>\n")] if last and (outcome.status or not outcome.printed.strip()) else []
+    about = ABOUT.get(next(iter(outcome.command.arguments), outcome.command.script))
+    costs = f"{minutes_text(outcome.seconds)} min:s, processor time {minutes_text(outcome.processor_seconds)}"
     return page.section(
         outcome.command.title,
         page.command_line(outcome.command.text),
+        *([page.paragraph(about)] if about else []),
         *said,
         *plots(outcome, curves or {}),
         *printed_parts(outcome.printed, DETAILS.get(next(iter(outcome.command.arguments), ""))),
-        note=f"It took {outcome.seconds:.0f} s{ended}.",
+        note=f"Elapsed {costs}, mean load {load_text(outcome.load)}{ended}.",
     )
+
+
+def minutes_text(seconds: float | None) -> str:
+    """Return a time as minutes and seconds."""
+    return "–" if seconds is None else f"{int(seconds) // 60}:{int(seconds) % 60:02d}"
+
+
+def load_text(load: float | None) -> str:
+    """Return a load."""
+    return "–" if load is None else f"{load:.1f}"

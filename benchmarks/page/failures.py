@@ -72,8 +72,8 @@ def worst_moments(motion: Motion, truth: Path, body: Body) -> Markup:
         text = f"frame {motion.frames[row]}, {motion.timestamps[row]:.2f} s: {errors[row]:.0f} mm"
         pictures.append((image, text))
     note = (
-        f"The worst moments, with ground truth in red: the mean distance of the limb joints, hips aligned, which is "
-        f"{np.nanmean(errors):.0f} mm over the clip."
+        "The worst moments, ground truth in red. The captions give the mean distance of the limb joints, hips aligned; "
+        f"its mean over the clip is {np.nanmean(errors):.0f} mm."
     )
     return captioned(pictures, note)
 

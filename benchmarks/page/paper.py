@@ -39,10 +39,10 @@ def stated_table(figures: Mapping[str, Any]) -> Markup:
         rows.append(("exponent of a step's time in measurements", f"{LINEAR:g}", f"{by_terms} (23 and 51 joints)"))
         sparse, dense = (f"{growth_in_joints(steps, method):.2f}" for method in ("sparse", "dense"))
         rows.append(("exponent of a step's time in joints", f"{LINEAR:g}", sparse))
-        rows.append(("the same of a dense step", f"{CUBIC:g}", dense))
+        rows.append(("exponent of a dense step's time in joints", f"{CUBIC:g}", dense))
     if not rows:
         return Markup("")
-    return page.table(("what is stated", SOURCE, "here"), rows)
+    return page.table(("quantity", SOURCE, "here"), rows)
 
 
 def convergence_plot(figures: Mapping[str, Any]) -> Markup:

@@ -64,7 +64,7 @@ def draw_scene(body: Body, takes: Sequence[Take], number: int, split: str | None
                 continue
             people.append(_beside(rng, body, first, second))
         for _ in range(CAMERAS_EACH):
-            scene = _film(rng, body, tuple(people), number, split, kind)
+            scene = film(rng, body, tuple(people), number, split, kind)
             if scene is not None:
                 return scene
     raise ValueError(f"no camera was found for scene {number}: the limits are too narrow")
@@ -125,7 +125,7 @@ def _beside(rng: np.random.Generator, body: Body, first: Person, second: Person)
     return _moved(second, 6.0 * toward)
 
 
-def _film(
+def film(
     rng: np.random.Generator, body: Body, people: tuple[Person, ...], number: int, split: str, kind: Kind
 ) -> Scene | None:
     """Draw a camera, and what stands in front of the first person; None if the person is not well in the picture."""

@@ -49,12 +49,17 @@ def render_missing(body: Body, numbers: list[int], threads: int = 0, split: str 
     takes = all_takes(fitted_new_performers() if split == NEW_PERFORMERS else fitted_motions())
     for number in numbers:
         scene = draw_scene(body, takes, number, split)
-
-        def render(path: Path, scratch: Path, scene: Scene = scene) -> None:
-            encode(_pictures(body, scene, scratch, threads), path, scene.size, round(scene.fps), KBIT_PER_S)
-
-        write = partial(write_truth, body=body, scene=scene)
+        write, render = partial(write_truth, body=body, scene=scene), partial(render_scene, body, scene, threads)
         render_if_changed(*video_and_truth(scene.name), COMPARED, write, render)
+
+
+def render_scene(body: Body, scene: Scene, threads: int, path: Path, scratch: Path) -> None:
+    """Render a scene to a path.
+
+    :param threads: of Cycles; 0 for as many as there are cores.
+    :param scratch: a folder for its pictures.
+    """
+    encode(_pictures(body, scene, scratch, threads), path, scene.size, round(scene.fps), KBIT_PER_S)
 
 
 def _pictures(body: Body, scene: Scene, folder: Path, threads: int) -> list[Path]:

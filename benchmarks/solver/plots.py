@@ -64,6 +64,6 @@ def plot_experiment(folder: Path, number: int, rows: list[dict[str, float]], suf
             times[f"{name} {method}"] = x, [row[method] for row in chosen]
         speedups[name] = x, [row["dense"] / row["sparse"] for row in chosen]
     paths = [folder / f"experiment{number}_{what}{suffix}.png" for what in ("times", "speedups")]
-    plot(paths[0], f"Experiment {number}", key, "us a step", times)
+    plot(paths[0], f"Experiment {number}", key, "µs per step", times)
     plot(paths[1], f"Experiment {number}", key, "dense over sparse", speedups)
     return paths

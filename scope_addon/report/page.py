@@ -118,7 +118,13 @@ def list_of(texts: Sequence[str]) -> Markup:
 
 def command_line(command: str) -> Markup:
     """Return a command as a block of code."""
-    return Markup(f"<pre><code>{escape(command)}</code></pre>\n")
+    return Markup(f"<pre><code>{command_text(command)}</code></pre>\n")
+
+
+def command_text(command: str) -> Markup:
+    """Return a command whose lines do not end within an option, such as between the hyphens of ``--json``."""
+    words = [escape(word) for word in command.split(" ")]
+    return Markup(" ".join(f'<span class="option">{word}</span>' if word[:1] == "-" else word for word in words))
 
 
 def seek_button(text: str, time_s: float) -> Markup:

@@ -117,7 +117,7 @@ def test_the_worst_rendered_clips_are_shown_too(tmp_path, monkeypatch):
         ("test_00", "scenes"),
     ]
     assert "132.5 mm" in found[0][2]
-    assert "test: MPJPE-root is 120.0 mm" in found[2][2]
+    assert found[2][2] == "The worst person of the test scenes: MPJPE-root is 120.0 mm."
     assert "not found" in found[3][2]
 
 

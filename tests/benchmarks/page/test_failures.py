@@ -53,7 +53,7 @@ def test_the_worst_moments_are_apart(capture):
 def test_the_page_says_how_far_off_they_are(capture, body):
     shown = worst_moments(*capture, body)
     assert re.findall(r"<figcaption>([^<]*)<", shown) == ["frame 3, 0.60 s: 30 mm", "frame 6, 1.20 s: 10 mm"]
-    assert "which is 9 mm over the clip" in shown  # 60 / 7
+    assert "its mean over the clip is 9 mm" in shown  # 60 / 7
 
 
 def test_known_failures_are_of_clips_that_are_captured():

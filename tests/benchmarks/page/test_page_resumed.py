@@ -52,6 +52,10 @@ def test_what_was_measured_is_not_measured_again(done, tmp_path, monkeypatch, ca
     assert [each[0] for each in run.captured] == ["sample", "b"]
     assert [outcome.command for outcome in run.measured] == COMMANDS
     assert (run.facts["Revision"], run.facts["Resumed by revision"]) == ("abc", "def")
+    for revision in ("def", "abc", "ghi"):
+        monkeypatch.setattr(module, "revision", lambda revision=revision: revision)
+        run = module.measure(False, resume=True)
+    assert run.facts["Resumed by revision"] == "def, ghi"
 
 
 def test_a_run_goes_on_as_quick_or_whole_as_it_began(done, monkeypatch):

@@ -33,8 +33,21 @@ def test_experiments_1_and_2_grow_in_terms(made):
 def test_tables_name_the_bodies_and_compare_them(made):
     rows = steps.experiment(3, 1)
     text = report.experiment_lines(3, rows)
-    assert text.startswith("Experiment 3, N = 72 and 156, us a step")
+    assert text.startswith("Experiment 3, N = 72 and 156, µs per step")
     assert "| P | scope sparse | scope dense | scope_h sparse |" in text
     assert "| 10 | 1 | 10 | 2.22 | 109 | 10 | 49.2 | 2.22 | 10.9 |" in text
     assert steps.growth_in_joints(rows, "sparse") == pytest.approx(1)
     assert steps.growth_in_joints(rows, "dense") == pytest.approx(3)
+
+
+def test_the_table_of_targets_names_what_was_measured_in_words():
+    measured = dict.fromkeys(steps.TARGETS, 10.0)
+    others = dict.fromkeys((*report.FRAME_TARGETS, *report.STARTUP_TARGETS), 0.5)
+    text = report.target_lines(
+        {**dict.fromkeys(("gn_step", "dense_over_sparse", "dense_over_called"), measured), **others}
+    )
+    names = [line.split(" | ")[0].removeprefix("| ") for line in text.splitlines()[2:]]
+    assert names[0] == "step K=23 P=10 N=52, with the joint prior"
+    assert "step K=51 P=10 N=600" in names
+    assert len(names) == len(measured) + len(others)
+    assert not [name for name in names if "_" in name]
