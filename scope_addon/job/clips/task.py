@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import shlex
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -60,7 +61,7 @@ class CaptureSettings(NamedTuple):
         for value in values.values():
             files = [Path(value)] if value else []  # a body, a calibration, a network
             files += [path.with_suffix(".json") for path in files if path.suffix == ".onnx"]  # a network's description
-            _add_files(digest, filter(Path.is_file, files))
+            _add_files(digest, filter(os.path.isfile, files))  # unlike Path's, False for what is too long for a name
         return digest.hexdigest()
 
 
