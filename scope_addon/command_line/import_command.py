@@ -13,7 +13,7 @@ from ..errors import UsageError
 from ..options import Place, options_at
 from ..scene.export.output_paths import SUFFIXES
 from .arguments import add_options, option_values, path_argument
-from .outputs import check_blender, check_outputs, checked_rig, distinct_paths, write_outputs
+from .outputs import check_blender, check_outputs, checked_rig, distinct_paths, stem_of, write_outputs
 from .terminal import print_message
 
 
@@ -44,7 +44,7 @@ def run_import(args: argparse.Namespace) -> dict[str, Any]:
 
     :raises ScopeError: an argument is invalid, the motion cannot be used, or an output failed.
     """
-    outputs = distinct_paths(args.output) or [args.motion.with_suffix(".glb")]
+    outputs = distinct_paths(args.output) or [args.motion.parent / f"{stem_of(args.motion)}.glb"]
     check_outputs(outputs, args.motion)
     check_blender(outputs)
     values = option_values(args, Place.IMPORT)
