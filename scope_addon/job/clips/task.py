@@ -111,7 +111,7 @@ def capture_clip(
     try:
         entry["key"] = task.key or _key(task.basis, footage)
     except OSError as error:
-        return entry | {"status": "failed", "message": f"{footage} cannot be read: {error.strerror}"}
+        return failure(task, f"{footage} cannot be read: {error.strerror}")
     if task.previous and task.previous.get("key") == entry["key"]:
         return task.previous | {"file": task.file, "status": task.previous["status"].replace("done", "skipped")}
     target = out / task.name
@@ -123,15 +123,19 @@ def capture_clip(
             arguments += [SHOWN_COMMAND, shlex.join([*program, *(each for each in shown if each != STOP_WITH_STDIN)])]
         status, stdout, stderr = run(arguments)
     except OSError as error:
-        return entry | {"status": "failed", "message": system_error_message(error)}
+        return entry | failure(task, system_error_message(error))
     entry["seconds"] = round(time.monotonic() - start, 2)
     report = _last_object(stdout)
     if status == 0 and report is not None:
         return entry | _outcome(report, out)
     if status == NO_PERSON:
         return entry | {"status": "no_person", "outputs": [], "message": _error_message(stderr)}
-    message = _error_message(stderr) or f"the process ended with status {status}"
-    return entry | {"status": "failed", "message": message}
+    return entry | failure(task, _error_message(stderr) or f"the process ended with status {status}")
+
+
+def failure(task: ClipTask, message: str) -> Entry:
+    """Return the entry of a clip that could not be captured."""
+    return {"file": task.file, "name": task.name, "status": "failed", "message": message}
 
 
 def _outcome(report: dict[str, Any], out: Path) -> Entry:
