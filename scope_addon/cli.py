@@ -241,7 +241,7 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
     from .report.capture_page import CapturedClip, write_capture_page
 
     with ExitStack() as stack:
-        progress = stack.enter_context(ProgressBar(sys.stderr, show=sys.stderr.isatty() and not args.quiet))
+        progress = stack.enter_context(ProgressBar(sys.stderr, show=not args.quiet))
         if found := window_report(args, video, options, progress):
             return found
         unfinished = stack.enter_context(unfinished_capture(lasting_folder(), video))
@@ -303,7 +303,7 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
         if args.window_seconds is not None:
             given[WINDOW_SECONDS] = f"{args.window_seconds:g}"
         batch = Batch(folder, out, args.program, given, formats, extras)
-        progress = stack.enter_context(ProgressBar(sys.stderr, show=sys.stderr.isatty() and not args.quiet))
+        progress = stack.enter_context(ProgressBar(sys.stderr, show=not args.quiet))
         stack.enter_context(interrupted("finished clips are kept; run the same command again to continue"))
         report = batch.run(
             args.jobs, recursive=args.recursive, again=args.again, progress=progress, say=print_message, runner=runner

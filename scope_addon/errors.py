@@ -20,6 +20,8 @@ Each message says what was wrong, with which file or value, and what to do about
 
 from __future__ import annotations
 
+import errno
+
 from ..solver.errors import InputError, ScopeError
 
 FAILED, BAD_ARGUMENTS, NO_PERSON = 1, 2, 3  # exit statuses
@@ -79,8 +81,13 @@ def internal_error_message(error: Exception) -> str:
 
 def system_error_message(error: OSError | MemoryError) -> str:
     """Describe an error of the operating system, and what to do."""
-    cause = str(error) or "out of memory"
-    return f"the operating system reports an error: {cause}; free disk space or memory and try again"
+    if isinstance(error, PermissionError):
+        advice = "check who may read and write there"
+    elif isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
+        advice = "choose a shorter name"
+    else:
+        advice = "free disk space or memory and try again"
+    return f"the operating system reports an error: {str(error) or 'out of memory'}; {advice}"
 
 
 _WITHOUT_MEMORY = (

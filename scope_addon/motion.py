@@ -12,7 +12,7 @@ from __future__ import annotations
 import io
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,9 @@ from ..solver.loaders.npz import read_npz
 from ..solver.loaders.regular_file import in_one_line
 from .atomic_write import reason, write_npz
 from .errors import MotionFileError, OutputError
+
+if TYPE_CHECKING:
+    from ..solver.body import Body
 
 
 @dataclass
@@ -116,6 +119,21 @@ class Motion:
             if dtype is np.float32 and not np.isfinite(self.face[name]).all():
                 raise MotionFileError(f"{where}: {name} has values that are not finite; capture again")
 
+    def check_body(self, body: Body, where: str = "the motion") -> None:
+        """Check that the motion has frames, and a body's joints and shape coefficients.
+
+        :param where: what the message names as the source of the motion.
+        :raises MotionFileError: it has not.
+        """
+        if self.joint_count != body.K + 1 or self.betas.size != body.P:
+            raise MotionFileError(
+                f"{where} has {self.joint_count} joints and {self.betas.size} shape coefficients (body "
+                f"'{self.body_model}'), but body '{body.name}' has {body.K + 1} and {body.P}; choose the body it was "
+                "captured with"
+            )
+        if len(self) == 0:
+            raise MotionFileError(f"{where} has no frames; capture the video again, or choose another file")
+
     def save(self, path: str | Path) -> None:
         """Write the motion to an .npz file. The write is atomic, so that a failure never leaves a partial file.
 
@@ -173,11 +191,10 @@ CORRECTION_KEYS = (
 )
 # Not in files of earlier versions; NaN where nothing is known.
 SIGMA_KEYS = ("joint_sigma_m", "joint_sigma_depth_m")
-HEIGHT_SIGMA_KEY = "height_sigma_m"
 # Only in files of captures that looked for the face: the first are what it expresses, the others where it was seen.
 FACE_KEYS = ("expressions", "expression_names", "expression_confidence", "gaze", "face_points", "face_landmarks")
 _GROUPS = ("corrections", "face")  # fields that are not keys themselves
-OPTIONAL_KEYS = {"source", *SIGMA_KEYS, HEIGHT_SIGMA_KEY, "uneven_ground", *CORRECTION_KEYS, *FACE_KEYS}
+OPTIONAL_KEYS = {"source", *SIGMA_KEYS, "height_sigma_m", "uneven_ground", *CORRECTION_KEYS, *FACE_KEYS}
 _FACE_SCHEMA: dict[str, tuple[tuple[str | int, ...], type]] = {
     "expressions": (("T", "E"), np.float32),
     "expression_names": (("E",), np.str_),

@@ -178,9 +178,8 @@ def download_wheels(target: Target) -> list[Path]:
 def locked(python: str) -> str:
     """Return the entries of the shipped packages in a Python's lock, with their hashes."""
     text = (ROOT / "scripts" / "requirements" / f"{python}.txt").read_text("utf-8")
-    entries = re.findall(r"^(\S+?)==\S+(?:.*\\\n)*.*$", text, flags=re.M)
-    blocks = re.findall(r"^\S+?==\S+(?:.*\\\n)*.*$", text, flags=re.M)
-    found = {name: block for name, block in zip(entries, blocks, strict=True) if name in PACKAGES}
+    entries = re.finditer(r"^(\S+?)==\S+(?:.*\\\n)*.*$", text, flags=re.M)
+    found = {entry[1]: entry[0] for entry in entries if entry[1] in PACKAGES}
     missing = sorted(set(PACKAGES) - set(found))
     if missing:
         raise SystemExit(f"build: the lock for Python {python} lacks {', '.join(missing)}; run ./scripts/lock")

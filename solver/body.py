@@ -93,6 +93,13 @@ class Body:
         v_bar: Array = self.keypoint_template - self.J_template[self.keypoint_part]
         return v_bar
 
+    @cached_property
+    def strongest_joints(self) -> NDArray[np.integer[Any]]:
+        """(V,) the joint that moves each vertex most."""
+        rows = np.arange(len(self.skin_joints))
+        joints: NDArray[np.integer[Any]] = self.skin_joints[rows, self.skin_weights.argmax(axis=1)]
+        return joints
+
     def _minus_parent(self, rest: Array) -> Array:
         out = rest.copy()
         out[1:] -= rest[self.parents[1:]]

@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import subprocess
 import sys
 
 import cv2
 import numpy as np
 import pytest
-from scope.scope_addon.errors import lacks_memory
+from scope.scope_addon.errors import lacks_memory, system_error_message
 
 from .fuzz.system_calls import AVAILABLE, NO_MEMORY, traced
 
@@ -43,3 +45,17 @@ def test_libraries_that_cannot_be_loaded(tmp_path) -> None:
     failed = [each.stdout for each in said if each.stdout.strip()]
     assert len(failed) > 1
     assert all(text.startswith("True") for text in failed), failed
+
+
+@pytest.mark.parametrize(
+    ("number", "advice"),
+    [
+        (errno.ENOSPC, "free disk space or memory and try again"),
+        (errno.EACCES, "check who may read and write there"),
+        (errno.ENAMETOOLONG, "choose a shorter name"),
+    ],
+)
+def test_the_advice_fits_the_systems_error(number: int, advice: str) -> None:
+    text = system_error_message(OSError(number, os.strerror(number), "walk.npz"))
+    assert "walk.npz" in text
+    assert text.endswith(f"; {advice}")

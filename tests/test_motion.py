@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scope.scope_addon.errors import MotionFileError, OutputError
-from scope.scope_addon.motion import FACE_KEYS, HEIGHT_SIGMA_KEY, SIGMA_KEYS, Motion
+from scope.scope_addon.motion import FACE_KEYS, SIGMA_KEYS, Motion
 
 from .made_motion import made_face
 
@@ -46,7 +46,7 @@ def test_a_saved_motion_loads_the_same(tmp_path):
     back = Motion.load(tmp_path / "a.npz")
     for name, value in vars(motion).items():
         got = getattr(back, name)
-        assert np.array_equal(got, value, equal_nan=name in (*SIGMA_KEYS, HEIGHT_SIGMA_KEY)), name
+        assert np.array_equal(got, value, equal_nan=name in (*SIGMA_KEYS, "height_sigma_m")), name
         assert getattr(got, "dtype", None) == getattr(value, "dtype", None), name
     assert [p.name for p in tmp_path.iterdir()] == ["a.npz"]
 

@@ -22,7 +22,7 @@ from scope.scope_addon.edit.spans import interpolate, swap_sides
 from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
 from scope.scope_addon.retarget.bone_map import BoneMap
 from scope.scope_addon.retarget.skeleton import Skeleton
-from scope.scope_addon.retarget.transfer import transfer
+from scope.scope_addon.retarget.transfer import Transfer
 from scope.solver import fit
 from scope.solver.body import Body
 from scope.solver.motion.fit import fit_motion
@@ -100,7 +100,7 @@ def test_a_transfer_keeps_clip_and_rig(clip):
     names = list(BODY.joint_names)
     parents = np.array(BODY.parents)
     rig = Skeleton(names, parents, parents, heads, heads + [0, 0, 0.1], np.tile(np.eye(3), (len(names), 1, 1)))
-    pose = transfer(clip, BODY, frozen(BETAS.copy()), frozen(rig), BoneMap({name: name for name in names}))
+    pose = Transfer(BODY, frozen(BETAS.copy()), frozen(rig), BoneMap({name: name for name in names})).pose(clip)
     assert len(list(arrays_in(pose))) > 0
 
 

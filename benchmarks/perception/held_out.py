@@ -154,7 +154,7 @@ def _leg_length(body: Body, betas: NDArray[np.floating[Any]]) -> float:
 
 def _skin_of_feet(body: Body) -> NDArray[np.intp]:
     """Return the indices (n,) of the vertices whose largest skinning weight is a foot's."""
-    part = np.take_along_axis(body.skin_joints, body.skin_weights.argmax(axis=1)[:, None], axis=1)[:, 0]
+    part = body.strongest_joints
     feet = [k for k, name in enumerate(body.joint_names) if name.endswith(("_ankle", "_foot"))]
     return np.flatnonzero(np.isin(part, feet))
 

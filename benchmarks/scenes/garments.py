@@ -100,7 +100,7 @@ def _hips(body: Body, betas: Points) -> float:
 
 def _slice(body: Body, betas: Points, height: float) -> NDArray[Any]:
     """Return x and z (n, 2) of the skin at a height, without the arms, metres."""
-    part = np.take_along_axis(body.skin_joints, body.skin_weights.argmax(axis=1)[:, None], axis=1)[:, 0]
+    part = body.strongest_joints
     trunk = np.array([not any(limb in name for limb in LIMBS) for name in body.joint_names])[part]
     skin = body.rest_vertices(betas)
     near: NDArray[Any] = skin[trunk & (np.abs(skin[:, 1] - height) < BAND_M)][:, [0, 2]]

@@ -21,7 +21,7 @@ from ...solver.errors import ScopeError
 from ..errors import ClusterError, internal_error_message, system_error_message
 from ..footage import is_url
 from ..job.batch import ROOT
-from ..job.clips.task import COUNT, DIVIDED, ClipTask, Entry
+from ..job.clips.task import COUNT, DIVIDED, ClipTask, Entry, failure
 from ..job.request import program_version
 from . import worker as worker_side
 from .division import Divisions, described, is_part
@@ -230,7 +230,7 @@ class DaskRunner:
                 return self._give_up(key, f"the results of {task.file} are not what the worker has written")
         except (ScopeError, OSError) as error:
             text = system_error_message(error) if isinstance(error, OSError) else str(error)
-            entry = {"file": task.file, "name": task.name, "status": "failed", "message": text}
+            entry = failure(task, text)
         self._forget(key)
         return self._ended(task, attempt.worker, entry)
 
@@ -250,7 +250,7 @@ class DaskRunner:
             assert folder is not None
             parts = self._divisions.begin(task, entry, folder, self._workers.slots(self._jobs))
         except OSError as error:
-            return self._ended(task, attempt.worker, _failure(task, system_error_message(error)))
+            return self._ended(task, attempt.worker, failure(task, system_error_message(error)))
         self._workers.event(attempt.worker, f"{task.file} is divided into {entry['windows']} windows")
         self._waiting.extendleft(reversed(parts))
         return {}
@@ -286,7 +286,7 @@ class DaskRunner:
         if is_part(attempt.task):
             self._waiting.extendleft(self._divisions.ended(attempt.task, attempt.worker, None))
             return {}
-        return self._ended(attempt.task, attempt.worker, _failure(attempt.task, internal_error_message(error)))
+        return self._ended(attempt.task, attempt.worker, failure(attempt.task, internal_error_message(error)))
 
     def _give_up(self, key: str, why: str, *, blame: bool = True) -> dict[str, Entry]:
         """Let another worker capture the clip, or return its entry if too many were lost.
@@ -310,7 +310,7 @@ class DaskRunner:
             return {}
         message = f"{ATTEMPTS} workers were lost while they captured it; does it need more memory than they have?"
         _, about = self._divisions.close(task)
-        return {task.name: _failure(task, message) | {"worker": attempt.worker} | about}
+        return {task.name: failure(task, message) | {"worker": attempt.worker} | about}
 
     def _forget(self, key: str) -> None:
         """Forget an attempt; what a worker still does for it is in vain."""
@@ -325,7 +325,3 @@ class DaskRunner:
         if futures and self._client.status == "running":
             with suppress(OSError, TimeoutError):  # the scheduler is lost, and forgets them by itself
                 self._client.cancel(futures, force=True)
-
-
-def _failure(task: ClipTask, message: str) -> Entry:
-    return {"file": task.file, "name": task.name, "status": "failed", "message": message}

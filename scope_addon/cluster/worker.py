@@ -23,7 +23,7 @@ from ..footage import is_url
 from ..installed import CAPTURE, check_installed
 from ..job.batch import ROOT
 from ..job.clips.processes import ClipProcesses
-from ..job.clips.task import CaptureSettings, ClipTask, Entry, Extras, capture_clip, file_hash
+from ..job.clips.task import CaptureSettings, ClipTask, Entry, Extras, capture_clip, failure, file_hash
 from ..job.request import program_version
 from . import remote
 from .staging import TOKEN
@@ -89,7 +89,7 @@ def capture_on_worker(task: ClipTask, key: str, program: tuple[str, ...] | None,
                 with remote.store_errors(InputError, task.footage):
                     local = local._replace(footage=str(remote.download(task.footage, Path(scratch))))
         except ScopeError as error:
-            return {"file": task.file, "name": task.name, "status": "failed", "message": str(error)}
+            return failure(task, str(error))
         if is_url(task.out):
             local = local._replace(out=str(Path(scratch, "results")))
         entry = capture_clip(local, program or PROGRAM, run, threads)

@@ -95,6 +95,18 @@ def option_values(args: argparse.Namespace, place: Place = Place.COMMAND_LINE) -
     return {option.name: _value(option, _argument(option, args)) for option in options_at(place)}
 
 
+def values_in_range(args: argparse.Namespace, place: Place) -> dict[str, Any]:
+    """Return the value of each option of a command, by the option's name.
+
+    :raises UsageError: an argument cannot be parsed, or a number is out of its range.
+    """
+    values = option_values(args, place)
+    for option in options_at(place):
+        if problem := option.range_error(values[option.name]):
+            raise UsageError(f"{option.flag} {problem}")
+    return values
+
+
 def non_default_arguments(args: argparse.Namespace) -> dict[str, str | None]:
     """Return the arguments that differ from their defaults, for the process that captures one clip of a batch.
 

@@ -9,11 +9,10 @@ from typing import Any
 
 from ...solver.loaders.skeletons import SKELETONS
 from ..counts import counted
-from ..errors import UsageError
-from ..options import Place, options_at
+from ..options import Place
 from ..scene.export.output_paths import SUFFIXES
-from .arguments import add_options, option_values, path_argument
-from .outputs import check_blender, check_outputs, checked_rig, distinct_paths, write_outputs
+from .arguments import add_options, path_argument, values_in_range
+from .outputs import check_blender, check_outputs, checked_rig, distinct_paths, stem_of, write_outputs
 from .terminal import print_message
 
 
@@ -44,13 +43,10 @@ def run_import(args: argparse.Namespace) -> dict[str, Any]:
 
     :raises ScopeError: an argument is invalid, the motion cannot be used, or an output failed.
     """
-    outputs = distinct_paths(args.output) or [args.motion.with_suffix(".glb")]
+    outputs = distinct_paths(args.output) or [args.motion.parent / f"{stem_of(args.motion)}.glb"]
     check_outputs(outputs, args.motion)
     check_blender(outputs)
-    values = option_values(args, Place.IMPORT)
-    for option in options_at(Place.IMPORT):
-        if problem := option.range_error(values[option.name]):
-            raise UsageError(f"{option.flag} {problem}")
+    values = values_in_range(args, Place.IMPORT)
     # Imported here, so that errors in the arguments are printed immediately.
     from ..smpl_import.convert import import_motion
 

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 from ..counts import counted
 from ..errors import UsageError
 from ..installed import CAPTURE, check_installed, check_live
-from ..options import Place, options_at
+from ..options import Place
 from ..options.body_choice import chosen_body
 from ..scene.export.output_paths import person_paths
-from .arguments import add_options, option_values
+from .arguments import add_options, values_in_range
 from .memory_limit import check_memory_limit
 from .outputs import MOTION_SUFFIXES, check_outputs
 from .terminal import ProgressLine, print_message
@@ -44,7 +44,7 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
     :raises ScopeError: an argument is invalid, the source cannot be read, or an output failed.
     """
     check_live()
-    values = option_values(args, Place.LIVE)
+    values = values_in_range(args, Place.LIVE)
     check_installed(CAPTURE if values["vmc"] is None else (*CAPTURE, "pythonosc"))
     if values["list_formats"]:
         return _list_formats(args.source, quiet=args.json)
@@ -68,7 +68,7 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
         with_camera = [output for output in (recording, page) if output]
         begin = _each([output.begin for output in with_camera])
         receive = _each([each for each in (footage and footage.add, page and page.receive) if each])
-        listeners = Listeners(print_message, lambda state: line(str(state)), begin, receive)
+        listeners = Listeners(print_message, lambda state: line.write(str(state)), begin, receive)
         report = run_live(source, body, options, [*outputs, *with_camera], listeners)
         saved = [footage.save()] if footage else []
         if footage and footage.missing:
@@ -111,11 +111,8 @@ def _paths(values: Mapping[str, Any]) -> list[Path]:
 def _checked(values: Mapping[str, Any]) -> LiveOptions:
     """Check the options as far as possible without opening the source.
 
-    :raises UsageError: a value is out of its range, or contradicts another.
+    :raises UsageError: a value is impossible, or contradicts another.
     """
-    for option in options_at(Place.LIVE):
-        if problem := option.range_error(values[option.name]):
-            raise UsageError(f"{option.flag} {problem}")
     if values["record"] and values["record"].suffix.lower() not in MOTION_SUFFIXES:
         raise UsageError(f"--record writes a motion file: give a name that ends in .npz, not {values['record'].name}")
     if values["keep_footage"] and values["keep_footage"].suffix.lower() != ".mp4":

@@ -37,12 +37,18 @@ def default_outputs(video: Path) -> list[Path]:
 
     :raises UsageError: the current folder is a part of Scope's own.
     """
-    folder = video.parent
+    folder = video.parent if video.name not in ("", "..") else Path(os.path.abspath(video)).parent
     if _is_shipped(folder):
         folder = Path()
         if _is_shipped(folder):
             raise UsageError(f"{folder.resolve()} belongs to Scope and is replaced with it; choose an output with -o")
-    return [folder / f"{video.stem}{suffix}" for suffix in (".npz", ".glb")]
+    return [folder / f"{stem_of(video)}{suffix}" for suffix in (".npz", ".glb")]
+
+
+def stem_of(path: Path) -> str:
+    """Return the name of a file without its suffix, or the whole name of a folder, also of ``.``."""
+    whole = Path(os.path.abspath(path))
+    return whole.name if whole.is_dir() else whole.stem
 
 
 def _is_shipped(folder: Path) -> bool:
@@ -140,7 +146,7 @@ def write_outputs(
         from ..scene.export.export import ExportOptions, export_motions
 
         footage = _footage(video, args)
-        options = replace(NEW_SCENE, name=display_text(video.stem), shape=args.shape_keys)
+        options = replace(NEW_SCENE, name=display_text(stem_of(video)), shape=args.shape_keys)
         if not motions[0].image_size.any():  # imported, and never seen by a camera
             options = replace(options, resolution="keep", active_camera=False, with_camera=False)
         separate = ExportOptions(separate=args.file_per_person, bvh_unit=args.bvh_unit)

@@ -8,7 +8,7 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from typing import TextIO
+from typing import Self, TextIO
 
 from . import signals
 
@@ -37,60 +37,44 @@ def open_standard_streams() -> None:
     sys.stderr = sys.stderr or os.fdopen(2, "w", encoding="utf-8", closefd=False)
 
 
-class ProgressBar:
-    """A one-line progress bar on a terminal; silent elsewhere. Stops work that continues after a signal."""
-
-    def __init__(self, stream: TextIO, *, show: bool) -> None:
-        self.stream, self.show = stream, show
-
-    def __call__(self, stage: str, done: int, total: int) -> None:
-        """Show the progress of a stage: ``done`` of ``total``, which is 0 if unknown.
-
-        :raises KeyboardInterrupt: a signal arrived, but its own KeyboardInterrupt was lost.
-        """
-        if signals.received:
-            raise KeyboardInterrupt
-        if not self.show:
-            return
-        if total:
-            filled = min(30, 30 * done // total)
-            text = f"{stage:<20} [{'#' * filled}{'.' * (30 - filled)}] {done}/{total}"
-        else:
-            text = f"{stage:<20} {done or ''}"
-        self.stream.write(f"{_CLEAR_LINE}{text[:100]}")
-        self.stream.flush()
-
-    def __enter__(self) -> ProgressBar:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self.show:
-            self.stream.write(_CLEAR_LINE)
-
-
 class ProgressLine:
-    """One line of text that is replaced by the next one, on a terminal; silent elsewhere. Stops work after a signal."""
+    """One line on a terminal, each text of which replaces the one before; silent elsewhere. Stops after a signal."""
 
     def __init__(self, stream: TextIO, *, show: bool) -> None:
-        self.stream, self.show = stream, show and stream.isatty()
+        self._stream, self._show = stream, show and stream.isatty()
 
-    def __call__(self, text: str) -> None:
+    def write(self, text: str) -> None:
         """Show a text.
 
         :raises KeyboardInterrupt: a signal arrived, but its own KeyboardInterrupt was lost.
         """
         if signals.received:
             raise KeyboardInterrupt
-        if self.show:
-            self.stream.write(f"{_CLEAR_LINE}{text[:100]}")
-            self.stream.flush()
+        if self._show:
+            self._stream.write(f"{_CLEAR_LINE}{text[:100]}")
+            self._stream.flush()
 
-    def __enter__(self) -> ProgressLine:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self.show:
-            self.stream.write(_CLEAR_LINE)
+        if self._show:
+            self._stream.write(_CLEAR_LINE)
+
+
+class ProgressBar(ProgressLine):
+    """A one-line progress bar on a terminal; silent elsewhere. Stops work that continues after a signal."""
+
+    def __call__(self, stage: str, done: int, total: int) -> None:
+        """Show the progress of a stage: ``done`` of ``total``, which is 0 if unknown.
+
+        :raises KeyboardInterrupt: a signal arrived, but its own KeyboardInterrupt was lost.
+        """
+        if total:
+            filled = min(30, 30 * done // total)
+            self.write(f"{stage:<20} [{'#' * filled}{'.' * (30 - filled)}] {done}/{total}")
+        else:
+            self.write(f"{stage:<20} {done or ''}")
 
 
 @contextmanager

@@ -28,6 +28,14 @@ class Clip:
     def __len__(self) -> int:
         return len(self.times)
 
+    def copy(self) -> Clip:
+        """Return a clip whose rotations and root can be changed without changing this one's."""
+        return Clip(self.times, self.rotations.copy(), self.root.copy())
+
+    def rows(self, which: NDArray[Any] | slice) -> Clip:
+        """Return some of the keys, by their indices, a mask (T,) or a slice."""
+        return Clip(self.times[which], self.rotations[which], self.root[which])
+
     def soles(self, body: Body, betas: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
         """Return the contact points of the feet.
 

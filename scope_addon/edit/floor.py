@@ -39,7 +39,7 @@ def refloor(
     """
     soles = clip.soles(body, betas)
     weight = standing_probability(soles, UP, clip.times)
-    out = Clip(clip.times, clip.rotations.copy(), clip.root.copy())
+    out = clip.copy()
     if level:
         turn, middle = _levelling(soles, weight)
         out.rotations[:, 0] = turn @ out.rotations[:, 0]

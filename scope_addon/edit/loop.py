@@ -54,12 +54,11 @@ def best_cycle(
     if clip.times[span[-1]] - clip.times[span[0]] < shortest or len(span) < 4:
         raise UsageError(f"a cycle of at least {shortest} s does not fit in the chosen frames; choose more of them")
     span = span[:: max(1, len(span) // MAX_SPAN_KEYS)]
-    part = Clip(clip.times[span], clip.rotations[span], clip.root[span])
+    part = clip.rows(span)
     joints = relative_to_trajectory(part, *floor_trajectory(part)).joints(body, betas)
     speed = SPEED_WEIGHT_S * np.gradient(joints, part.times, axis=0)
     features = np.concatenate([joints, speed], axis=-1).reshape(len(span), -1)
-    squares = (features**2).sum(1)
-    apart = np.maximum(squares[:, None] + squares[None] - 2 * features @ features.T, 0.0)
+    apart = _squared_distances(features)
     duration = part.times[None] - part.times[:, None]
     apart[duration < shortest] = np.inf
     if least_movement_m > 0:
@@ -82,12 +81,17 @@ def _moves(joints: NDArray[np.float64], least: float) -> NDArray[np.bool_]:
     :param joints: (N, J, 3) metres.
     :param least: root mean square distance over the joints, metres.
     """
-    flat = joints.reshape(len(joints), -1)
-    squares = (flat**2).sum(1)
-    apart = np.sqrt(np.maximum(squares[:, None] + squares[None] - 2 * flat @ flat.T, 0.0) / joints.shape[1])
+    apart = np.sqrt(_squared_distances(joints.reshape(len(joints), -1)) / joints.shape[1])
     farthest = np.maximum.accumulate(np.triu(apart), axis=1)  # from pose a on, up to pose b
     moves: NDArray[np.bool_] = (farthest >= least) & (apart <= 0.5 * farthest)
     return moves
+
+
+def _squared_distances(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the squared distances (N, N) between points (N, D)."""
+    squares = (points**2).sum(1)
+    apart: NDArray[np.float64] = np.maximum(squares[:, None] + squares[None] - 2 * points @ points.T, 0.0)
+    return apart
 
 
 def close_cycle(clip: Clip, cycle: Cycle, blend: float = 0.2) -> Clip:

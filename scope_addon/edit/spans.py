@@ -38,14 +38,14 @@ def interpolate(clip: Clip, start: float, end: float) -> Clip:
     s = ((clip.times[span] - clip.times[a]) / length)[:, None, None]
     base = clip.rotations[a]
     target = log(np.swapaxes(base, -1, -2) @ clip.rotations[b])
-    before, after = _angular_velocity(clip, a, -1), _angular_velocity(clip, b, +1)
-    v0, v1 = _limited(before * length, target), _limited(after * length, target)
+    before, after = _velocities(clip, a, -1), _velocities(clip, b, +1)
+    v0, v1 = _limited(before[0] * length, target), _limited(after[0] * length, target)
     turn = _hermite(s, np.zeros_like(target), target, v0, v1)
-    out = Clip(clip.times, clip.rotations.copy(), clip.root.copy())
+    out = clip.copy()
     out.rotations[span] = base @ exp(turn)
     step = clip.root[b] - clip.root[a]
-    v0, v1 = _velocity(clip, a, -1) * length, _velocity(clip, b, +1) * length
-    out.root[span] = clip.root[a] + _hermite(s[:, 0], np.zeros(3), step, _limited(v0, step), _limited(v1, step))
+    v0, v1 = _limited(before[1] * length, step), _limited(after[1] * length, step)
+    out.root[span] = clip.root[a] + _hermite(s[:, 0], np.zeros(3), step, v0, v1)
     return out
 
 
@@ -65,7 +65,7 @@ def swap_sides(clip: Clip, body: Body, start: float, end: float, limbs: str = "b
         raise UsageError(f"limbs must be arms, legs or both, not {limbs!r}")
     span = keys_within(clip, start, end)
     names = list(body.joint_names)
-    out = Clip(clip.times, clip.rotations.copy(), clip.root)
+    out = clip.copy()
     for kind in LIMBS if limbs == "both" else (limbs,):
         turn = _HALF_ABOUT_Z if kind == "arms" else np.eye(3)
         for left, name in enumerate(names):
@@ -103,20 +103,14 @@ def _limited(v: NDArray[np.float64], step: NDArray[np.float64]) -> NDArray[np.fl
     return limited
 
 
-def _angular_velocity(clip: Clip, k: int, side: int) -> NDArray[np.float64]:
-    """Return (K+1, 3) radians per second at key k, from the neighbouring key on ``side``; zero where there is none."""
+def _velocities(clip: Clip, k: int, side: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the velocities at key k, from the neighbouring key on ``side``; zeros where there is none.
+
+    :return: of the joints (K+1, 3), radians per second; of the pelvis (3,), metres per second.
+    """
     i, j = (k - 1, k) if side < 0 else (k, k + 1)
     if i < 0 or j >= len(clip):
-        return np.zeros(clip.rotations.shape[1:3])
+        return np.zeros(clip.rotations.shape[1:3]), np.zeros(3)
+    seconds = clip.times[j] - clip.times[i]
     turn = log(np.swapaxes(clip.rotations[i], -1, -2) @ clip.rotations[j])
-    velocity: NDArray[np.float64] = turn / (clip.times[j] - clip.times[i])
-    return velocity
-
-
-def _velocity(clip: Clip, k: int, side: int) -> NDArray[np.float64]:
-    """Return (3,) metres per second of the pelvis at key k, as ``_angular_velocity`` does for the joints."""
-    i, j = (k - 1, k) if side < 0 else (k, k + 1)
-    if i < 0 or j >= len(clip):
-        return np.zeros(3)
-    velocity: NDArray[np.float64] = (clip.root[j] - clip.root[i]) / (clip.times[j] - clip.times[i])
-    return velocity
+    return turn / seconds, (clip.root[j] - clip.root[i]) / seconds

@@ -55,13 +55,13 @@ class Batch:
         self.folder, self.out = folder.resolve(), out.resolve()
         self.report_file = out / REPORT_NAME
         self.settings = CaptureSettings(options, tuple(suffixes), extras)
-        self._program, self._options = list(program), options
+        self._program = list(program)
         self._basis = self.settings.basis(program_version(ROOT))
         self._next_report = 0.0
 
     def clips(self, recursive: bool) -> dict[str, Path]:
         """Return the clips by the name of their results; see `find_clips`."""
-        several = self._options.get("--people") not in (None, "1", "largest")
+        several = self.settings.options.get("--people") not in (None, "1", "largest")
         return find_clips(self.folder, self.out, recursive=recursive, several_people=several)
 
     def run(
@@ -155,7 +155,7 @@ class Batch:
         status = 1 if counts["failed"] else NO_PERSON if counts["no_person"] else 0
         report = {
             "folder": str(self.folder),
-            "options": self._options,
+            "options": self.settings.options,
             "counts": {s: counts[s] for s in STATUSES},
             "files": list(({n: e for n, e in previous.items() if n not in entries} | entries).values()),
             "exit_status": status,

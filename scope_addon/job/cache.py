@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -128,7 +127,7 @@ class Cache:
         import shutil
 
         total = 0
-        for index, (folder, _) in enumerate(_by_time(self.root / "captures")):
+        for index, folder in enumerate(_by_time(self.root / "captures")):
             total += _size(folder)
             if index and total > limit:  # the newest is kept: it has just been captured
                 shutil.rmtree(folder, ignore_errors=True)
@@ -149,7 +148,7 @@ class Cache:
         """Return the folders of code that another version has replaced, or that numba's own cache had made."""
         newest: set[str] = set()
         replaced = []
-        for path, _ in _by_time(self.kernels):
+        for path in _by_time(self.kernels):
             version = _VERSION.fullmatch(path.name)
             if version is None or version[1] in newest:
                 replaced.append(path)
@@ -164,32 +163,27 @@ def _remove_abandoned(jobs: Path) -> None:
 
     from ...solver.processes import is_abandoned
 
-    for folder, _ in _by_time(jobs):
+    for folder in _by_time(jobs):
         with suppress(OSError):  # another process has removed it
             if is_abandoned(folder, folder.name.removeprefix(_JOB)):
                 shutil.rmtree(folder, ignore_errors=True)
 
 
-def _by_time(folder: Path) -> list[tuple[Path, float]]:
-    """Return the content of a folder with modification times, newest first, without concurrently removed entries."""
-    found = []
+def _by_time(folder: Path) -> list[Path]:
+    """Return the content of a folder, what was changed last first, without concurrently removed entries."""
+    times: dict[Path, float] = {}
     with suppress(OSError):
         for path in folder.iterdir():
             with suppress(OSError):
-                found.append((path, path.stat().st_mtime))
-    return sorted(found, key=lambda entry: entry[1], reverse=True)
-
-
-def _files(folder: Path) -> Iterator[Path]:
-    """Yield every file below a folder. A folder that is concurrently removed counts as empty."""
-    for below, _, names in os.walk(folder):
-        for name in names:
-            yield Path(below, name)
+                times[path] = path.stat().st_mtime
+    return sorted(times, key=times.__getitem__, reverse=True)
 
 
 def _size(folder: Path) -> int:
+    """Return the bytes of all files below a folder. One that is concurrently removed counts as empty."""
     total = 0
-    for path in _files(folder):
-        with suppress(OSError):  # removed by another process
-            total += path.stat().st_size
+    for below, _, names in os.walk(folder):
+        for name in names:
+            with suppress(OSError):
+                total += os.stat(os.path.join(below, name)).st_size
     return total

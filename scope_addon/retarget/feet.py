@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.rotations import exp
+from ..edit.root_motion import about_z
 from .skeleton import rotated
 
 _LEVEL = np.array([1.0, 1.0, 0.0])
@@ -134,10 +135,4 @@ def pelvis_drop(
 
 def _heading(turn: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the rotations (..., 3, 3) about the vertical alone, from the sideways axis, which stays horizontal."""
-    angle = np.arctan2(turn[..., 1, 0], turn[..., 0, 0])
-    yaw = np.zeros_like(turn)
-    yaw[..., 0, 0] = yaw[..., 1, 1] = np.cos(angle)
-    yaw[..., 1, 0] = np.sin(angle)
-    yaw[..., 0, 1] = -yaw[..., 1, 0]
-    yaw[..., 2, 2] = 1.0
-    return yaw
+    return about_z(np.arctan2(turn[..., 1, 0], turn[..., 0, 0])).reshape(turn.shape)

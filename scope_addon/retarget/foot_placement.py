@@ -94,13 +94,12 @@ def legs_at_rest(
 
 def _body_feet(body: Body, v: NDArray[np.float64], J: NDArray[np.float64], sides: list[str]) -> list[FootRest]:
     """Measure the feet of the body at rest. The heel is the rear end of what the foot, without its toes, stands on."""
-    strongest = body.skin_joints[np.arange(len(v)), body.skin_weights.argmax(1)]
     low = float(v[:, 2].min())
     feet = []
     for side in sides:
         part = body.joint_names.index(f"{side}_ankle")
         ankle, ball = J[part], J[body.joint_names.index(f"{side}_foot")]
-        sole = v[(strongest == part) & (v[:, 2] < low + _SOLE_M)]
+        sole = v[(body.strongest_joints == part) & (v[:, 2] < low + _SOLE_M)]
         heel = sole[sole[:, 1] > sole[:, 1].max() - _HEEL_M].mean(axis=0) if len(sole) else ankle
         feet.append(FootRest(np.array([*heel[:2], low]) - ankle, ball - ankle, ankle[2] - low))
     return feet

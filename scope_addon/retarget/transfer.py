@@ -29,25 +29,6 @@ from .rest_alignment import heading_alignment, rest_alignment
 from .skeleton import Pose, Skeleton, head_positions
 
 
-def transfer(
-    clip: Clip,
-    body: Body,
-    betas: NDArray[np.floating[Any]],
-    rig: Skeleton,
-    bone_map: BoneMap,
-    *,
-    feet: bool = True,
-    one_floor: bool = True,
-) -> Pose:
-    """Compute the rig's motion.
-
-    :param betas: (P,) shape coefficients of the body.
-    :param feet: place the feet where the body's are, scaled by the ratio of leg lengths; bends the legs a little.
-    :param one_floor: with ``feet``, keep the feet above the floor; False on uneven ground.
-    """
-    return Transfer(body, betas, rig, bone_map, feet=feet, one_floor=one_floor).pose(clip)
-
-
 class Transfer:
     """The transfer from one body to one rig, with everything that does not depend on the motion computed once."""
 
@@ -64,7 +45,8 @@ class Transfer:
         """Compare both at rest.
 
         :param betas: (P,) shape coefficients of the body.
-        :param feet, one_floor: as in ``transfer``.
+        :param feet: place the feet where the body's are, scaled by the ratio of leg lengths; bends the legs a little.
+        :param one_floor: with ``feet``, keep the feet above the floor; False on uneven ground.
         """
         self._body, self._betas, self._rig, self._one_floor = body, betas, rig, one_floor
         index = {part: k for k, part in enumerate(body.joint_names)}

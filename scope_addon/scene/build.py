@@ -259,14 +259,7 @@ def _check(motion: Motion, body: Body) -> None:
 
     :raises MotionFileError: when it has not.
     """
-    if motion.joint_count != body.K + 1 or motion.betas.size != body.P:
-        raise MotionFileError(
-            f"the motion has {motion.joint_count} joints and {motion.betas.size} shape coefficients (body "
-            f"'{motion.body_model}'), but body '{body.name}' has {body.K + 1} and {body.P}; choose the body it was "
-            "captured with"
-        )
-    if len(motion) == 0:
-        raise MotionFileError("the motion has no frames; capture the video again")
+    motion.check_body(body)
     for name in ("poses", "trans", "betas", "intrinsics", "world_from_camera"):
         if not np.isfinite(getattr(motion, name)).all():
             raise MotionFileError(f"the motion's {name} contain NaN or infinity; capture the video again")

@@ -133,7 +133,8 @@ def show_footage(
     background.display_depth = "BACK"
     background.frame_method = "FIT"
     camera.data.show_background_images = True
-    show = _show_picture if path.suffix.lower() in PICTURE_SUFFIXES and not motion.dist.any() else _show_clip
+    undistorted = _show_picture if path.suffix.lower() in PICTURE_SUFFIXES else _show_video
+    show = _show_clip if motion.dist.any() else undistorted
     size, warnings = show(camera.data, background, path, motion, frames)
     if not min(size):
         return [f"Blender cannot decode {path.name}, so the camera shows no footage"]
@@ -168,16 +169,11 @@ def _show_clip(
     motion: Motion,
     frames: NDArray[np.float64],
 ) -> tuple[tuple[int, int], list[str]]:
-    """Show a video, or footage of a distorting lens; return the size in pixels, and warnings."""
+    """Show footage of a distorting lens; return the size in pixels, and warnings."""
     # Always a new clip, because another capture may have another start or lens.
     clip = bpy.data.movieclips.load(str(path))
     clip.frame_start = _start(motion, frames)
     size = tuple(clip.size)
-    if not motion.dist.any():
-        rate = clip.fps
-        bpy.data.movieclips.remove(clip)  # which was never shown
-        _show_video(camera, background, path, motion, frames, rate)
-        return size, []
     background.source = "MOVIE_CLIP"
     background.clip = clip
     clip.display_aspect = pixel_aspect(motion)
@@ -235,23 +231,26 @@ def _drift(motion: Motion, frames: NDArray[np.float64]) -> float:
 def _show_video(
     camera: bpy.types.Camera,
     background: bpy.types.CameraBackgroundImage,
-    footage: Path,
+    path: Path,
     motion: Motion,
     frames: NDArray[np.float64],
-    rate: float,
-) -> None:
+) -> tuple[tuple[int, int], list[str]]:
     """Show a video as an image, whose frame is keyed unless each frame of the scene shows the next one.
 
-    :param rate: frames per second at which Blender counts the video's frames.
+    :return: the size in pixels, and no warnings.
     """
+    clip = bpy.data.movieclips.load(str(path))
+    size, rate = tuple(clip.size), clip.fps  # at which Blender counts the video's frames
+    bpy.data.movieclips.remove(clip)  # which was never shown
     background.source = "IMAGE"
-    background.image = image = bpy.data.images.load(str(footage), check_existing=True)
+    background.image = image = bpy.data.images.load(str(path), check_existing=True)
     image.display_aspect = pixel_aspect(motion)
     if _drift(motion, frames) <= _MAX_OFFSET:
         _show_frames(background.image_user, _start(motion, frames))
-        return
+        return size, []
     scene_frames = np.arange(np.floor(frames[0]), np.ceil(frames[-1]) + 1)
     _key_footage(camera, background, scene_frames, np.round(np.interp(scene_frames, frames, motion.timestamps) * rate))
+    return size, []
 
 
 def _show_picture_sequence(
@@ -306,7 +305,7 @@ def _show_frames(user: bpy.types.ImageUser, start: int) -> None:
 def _set_lens_distortion(
     clip: bpy.types.MovieClip, background: bpy.types.CameraBackgroundImage, motion: Motion
 ) -> None:
-    """Set the clip's lens, and show it undistorted when the lens distorts: Blender's cameras are pinholes.
+    """Set the clip's lens, and show it undistorted: Blender's cameras are pinholes.
 
     :param motion: with OpenCV's distortion in ``dist``.
     """
@@ -322,4 +321,4 @@ def _set_lens_distortion(
     k1, k2, k3, p1, p2 = blender_brown_distortion(motion.dist)
     lens.brown_k1, lens.brown_k2, lens.brown_k3, lens.brown_k4 = k1, k2, k3, 0.0
     lens.brown_p1, lens.brown_p2 = p1, p2
-    background.clip_user.use_render_undistorted = bool(motion.dist.any())
+    background.clip_user.use_render_undistorted = True

@@ -169,8 +169,5 @@ def other_animation(
     moved = {obj.name for person in people for c in person.users_collection for obj in c.objects}
     moved |= {rig.name for rig, _ in rigs}
     others = [obj for obj in scene.objects if obj.name not in moved]
-    return any(len(fcurves(block)) for obj in others for block in (obj, obj.data) if block is not None and _has(block))
-
-
-def _has(block: bpy.types.ID) -> bool:
-    return getattr(block, "animation_data", None) is not None
+    blocks = (block for obj in others for block in (obj, obj.data) if getattr(block, "animation_data", None))
+    return any(map(fcurves, blocks))

@@ -9,7 +9,7 @@ evaluation of the object; nothing evaluates or copies a text, and undo stores it
 
 from __future__ import annotations
 
-from pathlib import Path
+import os
 
 import bpy
 
@@ -57,7 +57,7 @@ def stored_motion(armature: bpy.types.Object) -> Motion:
         if len(content) > _LARGEST_BYTES:
             raise MotionFileError(f"{name} has {len(content) >> 20} MiB, too much for a motion; capture again")
         return Motion.load(name, content)
-    if isinstance(stored, str) and stored and Path(stored).is_file():
+    if isinstance(stored, str) and os.path.isfile(stored):  # False, and no error, for any text that is no name
         return Motion.load(stored)
     raise UsageError(
         f"the captured motion of '{armature.name}' is stored neither in this .blend file nor in the cache; capture the "

@@ -26,7 +26,7 @@ from ..kinematics.contact_points import SOLES
 from ..kinematics.frame_blocks import by_blocks
 from ..kinematics.standing import standing_probability
 from ..motion import REQUIRED_KEYS, SIGMA_KEYS, Motion
-from .layouts import SmplMotion, has_face, read_smpl_motion
+from .layouts import SmplMotion, read_smpl_motion
 
 DEFAULT_RATE = 30.0  # frames per second
 R_WORLD_FILE = {"z": np.eye(3), "y": R_WORLD_MODEL, "camera": R_WORLD_LEVELCAMERA}  # by the axis that points up
@@ -69,14 +69,7 @@ def import_motion(path: Path, body: str = "scope", up: str = "auto", rate: float
 
 
 def _own(motion: Motion, body: Body, path: Path) -> Imported:
-    if motion.joint_count != body.K + 1 or motion.betas.size != body.P:
-        raise MotionFileError(
-            f"{path} is a motion of {motion.joint_count} joints and {motion.betas.size} shape coefficients (body "
-            f"'{motion.body_model}'), but body '{body.name}' has {body.K + 1} and {body.P}; choose the body it was "
-            "captured with"
-        )
-    if len(motion) == 0:
-        raise MotionFileError(f"{path} has no frames; choose another file")
+    motion.check_body(body, str(path))
     for each in fields(motion):
         value = getattr(motion, each.name)
         if (
@@ -145,7 +138,7 @@ def _for_body(source: SmplMotion, body: Body) -> tuple[NDArray[np.float64], str]
             poses[:, names.index(name)] = source.poses[:, i]
     lacks = [
         ("fingers", source.has_fingers and "left_index1" not in names),
-        ("face", has_face(source) and "jaw" not in names),
+        ("face", source.has_face and "jaw" not in names),
     ]
     return poses, " or ".join(what for what, is_lacking in lacks if is_lacking)
 

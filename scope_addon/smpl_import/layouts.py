@@ -8,7 +8,7 @@ is unpickled, and the first thing that is wrong is named.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -69,10 +69,16 @@ class SmplMotion:
     @property
     def has_fingers(self) -> bool:
         """Whether any finger is rotated."""
-        fingers = [
-            i for i, name in enumerate(self.joint_names) if name in (*HAND_JOINTS["left"], *HAND_JOINTS["right"])
-        ]
-        return bool(fingers) and bool(np.abs(self.poses[:, fingers]).max() > 1e-6)
+        return self._rotates((*HAND_JOINTS["left"], *HAND_JOINTS["right"]))
+
+    @property
+    def has_face(self) -> bool:
+        """Whether jaw or eyes are rotated."""
+        return self._rotates(FACE_JOINTS)
+
+    def _rotates(self, joints: Sequence[str]) -> bool:
+        these = [i for i, name in enumerate(self.joint_names) if name in joints]
+        return bool((np.abs(self.poses[:, these]) > 1e-6).any())
 
 
 def read_smpl_motion(path: Path) -> SmplMotion:
@@ -97,7 +103,7 @@ def smpl_motion(arrays: Mapping[str, NDArray[Any]], path: Path) -> SmplMotion:
         position = _numbers(arrays[trans], trans, path)
         if position.shape != (count, 3):
             raise MotionFileError(f"{path}: {trans} must have shape ({count}, 3), as the poses, not {position.shape}")
-        position = position / _scale(arrays, path)
+        position = position / (_positive(arrays, _SCALE, "a positive number", float(np.finfo(float).max), path) or 1.0)
         if np.abs(position).max() > _FARTHEST_M:
             raise MotionFileError(
                 f"{path}: {trans} is {np.abs(position).max():.3g} m from the origin; it must be in metres"
@@ -107,7 +113,7 @@ def smpl_motion(arrays: Mapping[str, NDArray[Any]], path: Path) -> SmplMotion:
         poses=poses,
         trans=position,
         betas=_betas(arrays, count, path),
-        rate=_rate(arrays, path),
+        rate=_positive(arrays, _RATES, "a number of frames per second", _LARGEST_RATE, path),
         gender=read_gender(arrays.get(_GENDER), Path("neutral")),
         body_model=_text(arrays.get(_MODEL)),
         usual_up=usual_up,
@@ -195,36 +201,26 @@ def _betas(arrays: Mapping[str, NDArray[Any]], count: int, path: Path) -> NDArra
     key = _first(arrays, _BETAS)
     if key is None:
         return np.zeros(0)
-    values = np.atleast_1d(_numbers(np.atleast_1d(arrays[key]), key, path))
+    values = _numbers(arrays[key], key, path)
     if values.ndim > 2 or values.shape[-1] > _MAX_BETAS or (values.ndim == 2 and len(values) not in (1, count)):
         raise MotionFileError(f"{path}: {key} has shape {values.shape}, but must have (10,) or ({count}, 10), or 16")
     return values if values.ndim == 1 else values.mean(axis=0)
 
 
-def _rate(arrays: Mapping[str, NDArray[Any]], path: Path) -> float | None:
-    key = _first(arrays, _RATES)
+def _positive(
+    arrays: Mapping[str, NDArray[Any]], names: tuple[str, ...], wanted: str, largest: float, path: Path
+) -> float | None:
+    """Return the first of these numbers that the file has, which must be positive; None if it has none."""
+    key = _first(arrays, names)
     if key is None:
         return None
-    rate = _one_number(arrays[key], key, "a number of frames per second", path)
-    if not 0 < rate <= _LARGEST_RATE:
-        raise MotionFileError(f"{path}: {key} must be a number of frames per second, but is {rate:g}")
-    return rate
-
-
-def _scale(arrays: Mapping[str, NDArray[Any]], path: Path) -> float:
-    key = _first(arrays, _SCALE)
-    if key is None:
-        return 1.0
-    scale = _one_number(arrays[key], key, "a positive number", path)
-    if not (np.isfinite(scale) and scale > 0):
-        raise MotionFileError(f"{path}: {key} must be a positive number, but is {scale:g}")
-    return scale
-
-
-def _one_number(array: NDArray[Any], name: str, wanted: str, path: Path) -> float:
+    array = arrays[key]
     if array.size != 1 or array.dtype.kind not in "fiu":
-        raise MotionFileError(f"{path}: {name} must be {wanted}, but has shape {array.shape} and holds {array.dtype}")
-    return float(array.reshape(-1)[0])
+        raise MotionFileError(f"{path}: {key} must be {wanted}, but has shape {array.shape} and holds {array.dtype}")
+    number = float(array.reshape(-1)[0])
+    if not 0 < number <= largest:
+        raise MotionFileError(f"{path}: {key} must be {wanted}, but is {number:g}")
+    return number
 
 
 def _text(array: NDArray[Any] | None) -> str:
@@ -233,9 +229,3 @@ def _text(array: NDArray[Any] | None) -> str:
 
 def _first(arrays: Mapping[str, NDArray[Any]], names: tuple[str, ...]) -> str | None:
     return next((name for name in names if name in arrays), None)
-
-
-def has_face(motion: SmplMotion) -> bool:
-    """Whether jaw or eyes are rotated."""
-    face = [i for i, name in enumerate(motion.joint_names) if name in FACE_JOINTS]
-    return bool(face) and bool(np.abs(motion.poses[:, face]).max() > 1e-6)

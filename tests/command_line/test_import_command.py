@@ -56,6 +56,7 @@ def test_without_an_output_a_glb_lies_beside_the_motion(amass):
         (["walk.npz", "--expression-map", "face.json"], 2, "--retarget"),
         (["walk.npz", "--retarget", "rig.glb"], 1, "rig.glb"),
         ([""], 2, "MOTION: the path is empty"),
+        (["."], 1, "not a readable motion file"),
     ],
 )
 def test_errors_are_one_sentence_and_write_nothing(amass, monkeypatch, capfd, arguments, status, says):

@@ -33,3 +33,18 @@ def test_a_current_folder_within_scopes_own_is_refused(monkeypatch):
     monkeypatch.chdir(SAMPLE.parent)
     with pytest.raises(UsageError, match="belongs to Scope .* choose an output with -o"):
         default_outputs(Path(SAMPLE.name))
+
+
+def test_results_of_images_in_the_current_folder_are_named_after_it(tmp_path, monkeypatch):
+    (tmp_path / "walk").mkdir()
+    monkeypatch.chdir(tmp_path / "walk")
+    for here in (Path(), Path("../walk/."), Path("below/..")):
+        assert [p.resolve() for p in default_outputs(here)] == [tmp_path / "walk.npz", tmp_path / "walk.glb"]
+
+
+def test_folders_of_images_whose_names_have_dots_have_different_results(tmp_path):
+    first, second = tmp_path / "take.1", tmp_path / "take.2"
+    for folder in (first, second):
+        folder.mkdir()
+    assert default_outputs(first) == [tmp_path / "take.1.npz", tmp_path / "take.1.glb"]
+    assert set(default_outputs(first)).isdisjoint(default_outputs(second))

@@ -35,7 +35,7 @@ def test_elsewhere_nothing_is_shown() -> None:
     stream, file = Terminal(), io.StringIO()
     with ProgressBar(stream, show=False) as bar, ProgressLine(file, show=True) as line:
         bar("Finding", 1, 2)
-        line("text")
+        line.write("text")
     assert stream.getvalue() == file.getvalue() == ""
 
 

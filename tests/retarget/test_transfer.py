@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scope.scope_addon.edit.clip import Clip
-from scope.scope_addon.retarget.transfer import transfer
+from scope.scope_addon.retarget.transfer import Transfer
 from scope.solver.rotations import exp
 
 from ..edit.walking import BETAS, BODY, NAMES, walk
@@ -21,13 +21,13 @@ JOINTS = CLIP.joints(BODY, BETAS)[:, [NAMES.index(name) for name in MAPPED]]
 @pytest.mark.parametrize("feet", [False, True])
 @pytest.mark.parametrize("seed", range(3))
 def test_the_bodys_own_skeleton_moves_as_the_body_whatever_the_axes_of_its_bones(feet: bool, seed: int) -> None:
-    pose = transfer(CLIP, BODY, BETAS, body_rig(seed=seed), same_names(), feet=feet)
+    pose = Transfer(BODY, BETAS, body_rig(seed=seed), same_names(), feet=feet).pose(CLIP)
     np.testing.assert_allclose(pose.heads, JOINTS, atol=2e-3)  # a stretched leg is bent by a hair
     assert pose.facing == pytest.approx(0.0, abs=1e-3)
 
 
 def test_a_rig_of_another_size_takes_steps_of_its_own_size() -> None:
-    pose = transfer(CLIP, BODY, BETAS, body_rig(scale=1.7), same_names(), feet=False)
+    pose = Transfer(BODY, BETAS, body_rig(scale=1.7), same_names(), feet=False).pose(CLIP)
     np.testing.assert_allclose(pose.heads, 1.7 * JOINTS, atol=1e-9)
 
 
@@ -35,24 +35,24 @@ def test_feet_go_below_the_floor_only_on_uneven_ground() -> None:
     """A walk one metre down, as at the foot of stairs: hips and ankles of the rig are lower by its own metre."""
     lower = Clip(CLIP.times, CLIP.rotations, CLIP.root - VERTICAL)
     rig, ankles = body_rig(scale=1.7), [MAPPED.index(f"{side}_ankle") for side in ("left", "right")]
-    above = transfer(CLIP, BODY, BETAS, rig, same_names()).heads
-    below = transfer(lower, BODY, BETAS, rig, same_names(), one_floor=False).heads
+    above = Transfer(BODY, BETAS, rig, same_names()).pose(CLIP).heads
+    below = Transfer(BODY, BETAS, rig, same_names(), one_floor=False).pose(lower).heads
     np.testing.assert_allclose(below, above - 1.7 * VERTICAL, atol=0.05)
-    held = transfer(lower, BODY, BETAS, rig, same_names()).heads
+    held = Transfer(BODY, BETAS, rig, same_names()).pose(lower).heads
     assert held[:, ankles, 2].min() > 0.0
 
 
 @pytest.mark.parametrize("heading", [0.5, 2.0, -3.0])
 def test_a_rig_that_was_built_to_face_elsewhere_faces_where_the_body_does(heading: float) -> None:
-    straight = transfer(CLIP, BODY, BETAS, body_rig(), same_names(), feet=False)
-    turned = transfer(CLIP, BODY, BETAS, body_rig(heading=heading), same_names(), feet=False)
+    straight = Transfer(BODY, BETAS, body_rig(), same_names(), feet=False).pose(CLIP)
+    turned = Transfer(BODY, BETAS, body_rig(heading=heading), same_names(), feet=False).pose(CLIP)
     np.testing.assert_allclose(turned.heads, straight.heads, atol=1e-9)
     assert exp(turned.facing * VERTICAL) == pytest.approx(exp(-heading * VERTICAL), abs=1e-3)
 
 
 @pytest.mark.parametrize("feet", [False, True])
 def test_limbs_of_a_rig_in_an_a_pose_point_where_the_bodys_do(feet: bool) -> None:
-    pose = transfer(CLIP, BODY, BETAS, body_rig(scale=0.6, heading=1.0, arms_down=0.8), same_names(), feet=feet)
+    pose = Transfer(BODY, BETAS, body_rig(scale=0.6, heading=1.0, arms_down=0.8), same_names(), feet=feet).pose(CLIP)
     for first, second in LIMBS:
         off = turn_between(direction(pose.heads, first, second, MAPPED), direction(JOINTS, first, second, MAPPED))
         assert off.max() < np.radians(0.01 if not feet or "shoulder" in first or "elbow" in first else 3.0)
@@ -60,7 +60,7 @@ def test_limbs_of_a_rig_in_an_a_pose_point_where_the_bodys_do(feet: bool) -> Non
 
 def test_no_bone_of_the_rig_changes_its_length() -> None:
     rig = body_rig(scale=1.3, arms_down=0.5)
-    pose = transfer(CLIP, BODY, BETAS, rig, same_names())
+    pose = Transfer(BODY, BETAS, rig, same_names()).pose(CLIP)
     children = np.flatnonzero(rig.carriers >= 0)
     lengths = np.linalg.norm(pose.heads[:, children] - pose.heads[:, rig.carriers[children]], axis=-1)
     at_rest = np.linalg.norm(rig.heads[children] - rig.heads[rig.carriers[children]], axis=-1)

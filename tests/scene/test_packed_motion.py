@@ -185,3 +185,11 @@ def test_an_armature_without_a_motion_is_an_error(people, value):
         armature[MOTION] = value
     with pytest.raises(UsageError, match="capture the footage again"):
         stored_motion(armature)
+
+
+def test_a_text_that_is_no_name_of_a_file_is_no_motion():
+    armature = bpy.data.objects.new("rig", bpy.data.armatures.new("rig"))
+    for text in ("x" * 5000, "a\0b", ""):
+        armature["scope_motion"] = text
+        with pytest.raises(UsageError, match="stored neither in"):
+            stored_motion(armature)

@@ -118,3 +118,12 @@ def test_a_motion_is_told_from_a_body(tmp_path):
         match="walk.npz is a motion file, .* give one of scope, scope_h, scope_child, scope_child_h, or a body's",
     ):
         load_body(saved(tmp_path / "walk.npz", motion))
+
+
+def test_the_joint_that_moves_a_vertex_most_has_its_largest_weight(tmp_path):
+    arrays = small_body()
+    arrays["skin_joints"] = np.tile([0, 1, 2, 0], (V, 1))
+    arrays["skin_weights"] = np.tile([0.2, 0.1, 0.6, 0.1], (V, 1))
+    arrays["skin_weights"][0] = [0.1, 0.7, 0.2, 0.0]
+    np.savez(tmp_path / "small.npz", **arrays)
+    assert load_body(tmp_path / "small.npz").strongest_joints.tolist() == [1] + [2] * (V - 1)

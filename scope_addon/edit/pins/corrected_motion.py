@@ -123,7 +123,7 @@ def with_corrections(motion: Motion, body: Body, corrections: tuple[Correction, 
         if not raw:
             values["joints_cam"] = base.joints_cam.copy()
             T = base.world_from_camera[new]
-            joints = Clip(after.times[new], after.rotations[new], after.root[new]).joints(body, base.betas)
+            joints = after.rows(new).joints(body, base.betas)
             values["joints_cam"][new] = (joints - T[:, None, :3, 3]) @ T[:, :3, :3]
     out = replace(wanted, **values)
     transform = world_of(corrections)

@@ -47,7 +47,7 @@ def interpolated(clip: Clip, spans: Iterable[Interpolation], shot: Shot, *, stri
     :param strict: refuse the others.
     :raises UsageError: one has no key, or none on one side, and ``strict``.
     """
-    out = Clip(clip.times, clip.rotations.copy(), clip.root.copy())
+    out = clip.copy()
     for each in spans:
         span = keys_of_span(clip, each.first, each.last, shot)
         if not len(span) or span[0] == 0 or span[-1] == len(clip) - 1:
@@ -55,8 +55,7 @@ def interpolated(clip: Clip, spans: Iterable[Interpolation], shot: Shot, *, stri
                 out = interpolate(out, shot.time(each.first), shot.time(each.last))
             continue
         around = slice(max(span[0] - 2, 0), span[-1] + 3)  # two keys on each side have the velocities
-        part = Clip(out.times[around], out.rotations[around], out.root[around])
-        part = interpolate(part, out.times[span[0]], out.times[span[-1]])
+        part = interpolate(out.rows(around), out.times[span[0]], out.times[span[-1]])
         out.rotations[around], out.root[around] = part.rotations, part.root
     return out
 

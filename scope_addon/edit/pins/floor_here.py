@@ -12,10 +12,10 @@ from ....solver.body import Body
 from ...errors import UsageError
 from ...kinematics.foot_skin import FootSkin
 from ..clip import Clip, sample
+from ..floor import UP
 
 LOWER = "lower"
 _PARTS = {LOWER: slice(0, 4), "left": slice(0, 2), "right": slice(2, 4)}
-_UP = np.array([0.0, 0.0, 1.0])
 
 
 def foot_height(clip: Clip, body: Body, betas: NDArray[np.floating[Any]], time: float, foot: str) -> float:
@@ -31,5 +31,5 @@ def foot_height(clip: Clip, body: Body, betas: NDArray[np.floating[Any]], time: 
     betas = np.asarray(betas, float)
     at = sample(clip, np.array([time]))
     poses = body.forward_kinematics(at.rotations, at.root - body.rest_joints(betas)[0], betas)
-    heights = FootSkin(body, betas).heights(*poses, _UP)[0]
+    heights = FootSkin(body, betas).heights(*poses, UP)[0]
     return float(heights[_PARTS[foot]].min())

@@ -28,14 +28,13 @@ from ....solver.rotations import exp, log
 from ...kinematics.contact_points import FOOT_PARTS
 from ...kinematics.standing import standing_probability
 from ..clip import Clip, sample
-from ..spans import swap_sides
-from .corrections import Contact, Correction, Exchange, Pin
+from ..floor import UP
+from .corrections import Contact, Pin
 from .fade import faded
 from .pose_refit import FLOOR_M, HELD, PINNED, PINNED_2D, STANDING, Points, PoseRefit, limb_of
 from .rays import pixel_of
 from .reach import SLACK_M, within_reach
 
-_UP = np.array([0.0, 0.0, 1.0])
 _CONTACT_REACH_S = 0.25
 _FLOOR_M = 0.12  # a foot that stands within this height of z = 0 is put on it
 _SWEEPS, _MET_M, _MET_PX = 6, 0.002, 0.5
@@ -81,12 +80,12 @@ def resolve(
     clip: Clip,
     body: Body,
     betas: NDArray[np.floating[Any]],
-    corrections: Iterable[Correction],
+    corrections: Iterable[Contact | Pin],
     shot: Shot,
     slack: float = SLACK_M,
     floor: float = 0.0,
 ) -> Clip:
-    """Correct a motion: exchanged sides first, then feet that stand, then pins.
+    """Correct a motion: feet that stand first, then pins.
 
     :param betas: (P,) shape coefficients.
     :param slack: metres by which the body may help a limb to reach a pin.
@@ -95,9 +94,7 @@ def resolve(
     :raises UsageError: a pin names a joint that the body does not have.
     """
     corrections = tuple(corrections)
-    out = Clip(clip.times, clip.rotations.copy(), clip.root.copy())
-    for exchange in (c for c in corrections if isinstance(c, Exchange)):
-        out = exchanged(out, body, exchange, shot)
+    out = clip.copy()
     refit = PoseRefit(body, betas)
     for contact in (c for c in corrections if isinstance(c, Contact)):
         track = _contact_track(refit, out, contact, shot, floor)
@@ -109,22 +106,13 @@ def resolve(
     return out
 
 
-def exchanged(clip: Clip, body: Body, exchange: Exchange, shot: Shot) -> Clip:
-    """Exchange left and right within a span of source frames; the clip itself if it has no key there."""
-    span = keys_of_span(clip, exchange.first, exchange.last, shot)
-    if not len(span):
-        return clip
-    swapped = swap_sides(clip, body, clip.times[span[0]], clip.times[span[-1]], exchange.limbs)
-    return Clip(clip.times, swapped.rotations, swapped.root.copy())
-
-
 def missed(clip: Clip, body: Body, betas: NDArray[np.floating[Any]], pin: Pin, shot: Shot) -> float:
     """Return how far the joint is from its pin: pixels of a pin in the image, metres of one in space.
 
     :param betas: (P,) shape coefficients.
     """
     at = sample(clip, np.array([shot.time(pin.frame)]))
-    where = at.joints(body, betas)[0, PoseRefit(body, betas).joint(pin.joint)]
+    where = at.joints(body, betas)[0, list(body.joint_names).index(pin.joint)]
     if pin.pixel is not None:
         return float(np.linalg.norm(shot.project(pin.frame, where) - pin.pixel))
     return float(np.linalg.norm(where - pin.position))
@@ -142,10 +130,10 @@ class _Correction:
         R, at, soles = refit.place(clip.rotations[around], clip.root[around])
         lowest = floor + FLOOR_M
         self._floor = np.full(len(clip), lowest)  # what feet may not go below: where they were, if that is lower
-        self._floor[around] = np.minimum(lowest, refit.skin.heights(R, at, _UP).min(axis=1))
+        self._floor[around] = np.minimum(lowest, refit.skin.heights(R, at, UP).min(axis=1))
         self._limited: set[int] = set()  # tracks whose pins are where the limb can reach them
         self._standing = np.zeros((len(clip), soles.shape[1]))
-        self._standing[around] = standing_probability(soles, _UP, times[around])
+        self._standing[around] = standing_probability(soles, UP, times[around])
 
     def run(self) -> None:
         """Treat every joint from the trunk outwards, then each limb as a whole until all are where they should be."""
@@ -161,7 +149,7 @@ class _Correction:
     def _treat(self, index: int, joints: list[str]) -> None:
         """Correct joints of a limb by the keys at which any of them is pinned."""
         track, span, clip = self._tracks[index], self._spans[index], self._clip
-        before = Clip(clip.times[span], clip.rotations[span].copy(), clip.root[span].copy())
+        before = clip.rows(span)  # a copy, as of every selection by indices
         _, at, soles = self._refit.place(before.rotations, before.root)
         self._limit(index, at)
         held = [self._held(index, int(key), at[k], soles[k]) for k, key in enumerate(span)]
@@ -171,7 +159,7 @@ class _Correction:
         rotations = before.rotations @ exp(faded(before.times, known, turn, reach))
         root = before.root + faded(before.times, known, shift, reach)
         R, at, soles = self._refit.place(rotations, root)
-        rise = self._rise(track, span, self._refit.skin.heights(R, at, _UP))
+        rise = self._rise(track, span, self._refit.skin.heights(R, at, UP))
         pinned = {track.keys[h]: h for h in hard}
         for k, key in enumerate(span):
             points, camera = _copied(held[k]), None
@@ -252,7 +240,7 @@ class _Correction:
         """
         own = [k for k, part in enumerate(FOOT_PARTS) if limb_of(part) == limb_of(track.joints[0])]
         lowest = heights[:, own].min(axis=1, initial=np.inf)
-        rise: NDArray[np.float64] = np.maximum(self._floor[span] - lowest, 0.0)[:, None] * _UP
+        rise: NDArray[np.float64] = np.maximum(self._floor[span] - lowest, 0.0)[:, None] * UP
         return rise
 
     def _share(self, index: int, key: int) -> float:

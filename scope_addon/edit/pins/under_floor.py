@@ -9,7 +9,7 @@ from ....solver.body import Body
 from ...kinematics.foot_skin import UNDER_FLOOR_M, foot_heights
 from ...motion import Motion
 from .corrected_motion import corrections_of, with_corrections
-from .corrections import Exchange, FeetOnFloor, Floor, Interpolation, Upright
+from .corrections import Contact, Pin
 
 _NOTICED_M = 0.002
 
@@ -24,8 +24,7 @@ def feet_under_floor(motion: Motion, body: Body) -> tuple[float, int]:
     """
     if motion.uneven_ground:
         return 0.0, 0
-    kept = Exchange | Interpolation | Upright | Floor | FeetOnFloor
-    free = with_corrections(motion, body, tuple(c for c in corrections_of(motion) if isinstance(c, kept)))
+    free = with_corrections(motion, body, tuple(c for c in corrections_of(motion) if not isinstance(c, Contact | Pin)))
     lowest, before = (foot_heights(m, body).min(axis=1) for m in (motion, free))
     under = (lowest < -UNDER_FLOOR_M) & (lowest < before - _NOTICED_M)
     return (-float(lowest[under].min()), int(np.count_nonzero(under))) if under.any() else (0.0, 0)

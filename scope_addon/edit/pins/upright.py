@@ -19,9 +19,9 @@ from ...errors import UsageError
 from ...kinematics.standing import standing_probability
 from ...motion import Motion
 from ..clip import clip_from_motion
+from ..floor import UP
 from .corrected_motion import shot_of
 
-_UP = np.array([0.0, 0.0, 1.0])
 _LARGEST = np.radians(40.0)
 _SHORTEST_PX, _SHORTEST_M = 10.0, 0.1
 _SIDE = np.radians(30.0)  # from level, up to which a view is one from a side
@@ -57,7 +57,7 @@ def upright_transform_in_view(
     :raises UsageError: the view is none from a side, or the line is too short or too far from upright.
     """
     direction = np.asarray(direction, float)
-    if not abs(direction @ _UP) < np.sin(_SIDE) * np.linalg.norm(direction):
+    if not abs(direction @ UP) < np.sin(_SIDE) * np.linalg.norm(direction):
         raise UsageError("the line needs a view from a side, such as Blender's front or right view")
     along = np.subtract(line[1], line[0])
     across = np.cross(direction / np.linalg.norm(direction), along)
@@ -73,21 +73,21 @@ def _transform(motion: Motion, body: Body, normal: NDArray[np.float64]) -> NDArr
     :raises UsageError: the plane is farther from upright than any tilt of a camera explains.
     """
     normal = normal / np.linalg.norm(normal)
-    u = _UP - (_UP @ normal) * normal
-    angle = np.arcsin(np.clip(abs(_UP @ normal), 0.0, 1.0))
+    u = UP - (UP @ normal) * normal
+    angle = np.arcsin(np.clip(abs(UP @ normal), 0.0, 1.0))
     if angle > _LARGEST:
         raise UsageError(
             f"the line is {np.degrees(angle):.0f} degrees from upright; draw it along something upright, such as a "
             "door or a wall's edge"
         )
-    turn = shortest_turn(u / np.linalg.norm(u), _UP)
+    turn = shortest_turn(u / np.linalg.norm(u), UP)
     clip = clip_from_motion(body, motion, raw=False)
     soles = clip.soles(body, motion.betas)
-    standing = standing_probability(soles, _UP, clip.times) > 0.5
+    standing = standing_probability(soles, UP, clip.times) > 0.5
     points = soles[standing] if standing.any() else soles.reshape(-1, 3)
     pivot = points.mean(axis=0) * [1.0, 1.0, 0.0]
     moved = (points - pivot) @ turn.T + pivot
     out = np.eye(4)
     out[:3, :3] = turn
-    out[:3, 3] = pivot - turn @ pivot + _UP * (np.median(points[:, 2]) - np.median(moved[:, 2]))
+    out[:3, 3] = pivot - turn @ pivot + UP * (np.median(points[:, 2]) - np.median(moved[:, 2]))
     return out

@@ -49,8 +49,12 @@ def _stem(folder: Path, path: Path) -> str:
     return path.relative_to(folder).with_suffix("").as_posix().casefold()
 
 
-def _footage_below(folder: Path, out: Path, recursive: bool) -> list[Path]:
-    """Return the videos, pictures and picture sequences in a folder."""
+def _footage_below(folder: Path, out: Path, recursive: bool, above: tuple[Path, ...] = ()) -> list[Path]:
+    """Return the videos, pictures and picture sequences in a folder.
+
+    :param above: the folders that lead to it, to which links are not followed: that would never end.
+    """
+    above = (*above, folder.resolve())
     found: list[Path] = []
     for path in folder.iterdir():
         suffix = path.suffix.lower()
@@ -59,8 +63,8 @@ def _footage_below(folder: Path, out: Path, recursive: bool) -> list[Path]:
         if path.is_dir():
             if _is_sequence_folder(path):
                 found.append(path)
-            elif recursive:
-                found += _footage_below(path, out, recursive)
+            elif recursive and path.resolve() not in above:
+                found += _footage_below(path, out, recursive, above)
         # Pipes are skipped, because opening one would block; a broken link is kept, to be reported as a failed clip.
         elif suffix in FOOTAGE_SUFFIXES and (path.is_file() or not path.exists()):
             found.append(path)

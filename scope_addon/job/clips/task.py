@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import shlex
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -60,7 +61,7 @@ class CaptureSettings(NamedTuple):
         for value in values.values():
             files = [Path(value)] if value else []  # a body, a calibration, a network
             files += [path.with_suffix(".json") for path in files if path.suffix == ".onnx"]  # a network's description
-            _add_files(digest, filter(Path.is_file, files))
+            _add_files(digest, filter(os.path.isfile, files))  # unlike Path's, False for what is too long for a name
         return digest.hexdigest()
 
 
@@ -110,7 +111,7 @@ def capture_clip(
     try:
         entry["key"] = task.key or _key(task.basis, footage)
     except OSError as error:
-        return entry | {"status": "failed", "message": f"{footage} cannot be read: {error.strerror}"}
+        return failure(task, f"{footage} cannot be read: {error.strerror}")
     if task.previous and task.previous.get("key") == entry["key"]:
         return task.previous | {"file": task.file, "status": task.previous["status"].replace("done", "skipped")}
     target = out / task.name
@@ -122,15 +123,19 @@ def capture_clip(
             arguments += [SHOWN_COMMAND, shlex.join([*program, *(each for each in shown if each != STOP_WITH_STDIN)])]
         status, stdout, stderr = run(arguments)
     except OSError as error:
-        return entry | {"status": "failed", "message": system_error_message(error)}
+        return entry | failure(task, system_error_message(error))
     entry["seconds"] = round(time.monotonic() - start, 2)
     report = _last_object(stdout)
     if status == 0 and report is not None:
         return entry | _outcome(report, out)
     if status == NO_PERSON:
         return entry | {"status": "no_person", "outputs": [], "message": _error_message(stderr)}
-    message = _error_message(stderr) or f"the process ended with status {status}"
-    return entry | {"status": "failed", "message": message}
+    return entry | failure(task, _error_message(stderr) or f"the process ended with status {status}")
+
+
+def failure(task: ClipTask, message: str) -> Entry:
+    """Return the entry of a clip that could not be captured."""
+    return {"file": task.file, "name": task.name, "status": "failed", "message": message}
 
 
 def _outcome(report: dict[str, Any], out: Path) -> Entry:

@@ -12,20 +12,12 @@ from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
-from .actions import has_slots
+from .actions import has_slots, read_whole_keys, write_whole_keys
 from .fcurve_modifiers import read_modifiers, write_modifiers
 
 _SETTINGS = ("use_frame_range", "use_cyclic", "frame_start", "frame_end")
 _CURVE = ("extrapolation", "color_mode", "color", "select", "mute", "lock", "hide", "auto_smoothing")
-# Properties of a key, by the number of their values and type.
-_KEY = (
-    *((name, 2, np.float32) for name in ("co", "handle_left", "handle_right")),
-    *((name, 1, np.float32) for name in ("amplitude", "back", "period")),
-    *((name, 1, np.int32) for name in ("interpolation", "easing", "type", "handle_left_type", "handle_right_type")),
-    *((f"select_{part}", 1, np.bool_) for part in ("control_point", "left_handle", "right_handle")),
-)
 _Curves = dict[tuple[str, int], bpy.types.FCurve]
 
 
@@ -88,22 +80,6 @@ def _restore_curves(owner: Any, wanted: Any) -> None:
 
 
 def _restore_keys(curve: bpy.types.FCurve, source: bpy.types.FCurve) -> None:
-    wanted = _keys(source)
-    present = _keys(curve)
-    if all(np.array_equal(present[name], wanted[name]) for name in wanted):
-        return
-    points = curve.keyframe_points
-    points.clear()
-    points.add(len(source.keyframe_points))
-    for name, values in wanted.items():
-        points.foreach_set(name, values)
-    curve.update()
-
-
-def _keys(curve: bpy.types.FCurve) -> dict[str, NDArray[Any]]:
-    """Return the values of each key property, flat."""
-    points = curve.keyframe_points
-    found = {name: np.empty(count * len(points), kind) for name, count, kind in _KEY}
-    for name, values in found.items():
-        points.foreach_get(name, values)
-    return found
+    wanted, present = read_whole_keys(source), read_whole_keys(curve)
+    if not all(np.array_equal(present[name], wanted[name]) for name in wanted):
+        write_whole_keys(curve, wanted)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import bpy
 import numpy as np
@@ -20,6 +21,14 @@ from .fcurve_modifiers import read_modifiers, write_modifiers
 
 # Values of Blender's keyframe interpolation enum, which foreach_set takes as integers.
 INTERPOLATION = {"CONSTANT": 0, "LINEAR": 1, "BEZIER": 2}
+_POINTS = ("co", "handle_left", "handle_right")
+# Properties of a key, by the number of their values and type.
+_KEY = (
+    *((name, 2, np.float32) for name in _POINTS),
+    *((name, 1, np.float32) for name in ("amplitude", "back", "period")),
+    *((name, 1, np.int32) for name in ("interpolation", "easing", "type", "handle_left_type", "handle_right_type")),
+    *((f"select_{part}", 1, np.bool_) for part in ("control_point", "left_handle", "right_handle")),
+)
 
 
 def has_slots() -> bool:
@@ -195,8 +204,46 @@ def change_keys(curve: bpy.types.FCurve, frames: NDArray[np.float64], values: ND
     present = np.abs(coordinates[at, 0] - wanted) < 2e-3
     coordinates[at[present], 1] = values[present]
     keys.foreach_set("co", coordinates.ravel())
-    for frame, value in zip(wanted[~present], values[~present], strict=True):
-        keys.insert(float(frame), float(value), options={"FAST"}).interpolation = "LINEAR"
+    if not present.all():
+        _insert_keys(curve, np.stack([wanted, values], axis=1)[~present].astype(np.float32))
+    curve.update()
+
+
+def _insert_keys(curve: bpy.types.FCurve, new: NDArray[np.float32]) -> None:
+    """Insert keys (N, 2), frame and value, in linear time: Blender moves all later ones for each key that it inserts.
+
+    It inserts the first, which the others resemble; all between keys that are smooth, whose handles it changes.
+    """
+    is_smooth = read_whole_keys(curve)["interpolation"].max() >= INTERPOLATION["BEZIER"]
+    by_blender, others = np.split(new, [len(new) if is_smooth else 1])
+    for key in by_blender.tolist():
+        curve.keyframe_points.insert(*key, options={"FAST"}).interpolation = "LINEAR"
+    if not len(others):
+        return
+    whole = read_whole_keys(curve)
+    frames = whole["co"][:, 0]
+    first, places = int(np.searchsorted(frames, new[0, 0])), np.searchsorted(frames, others[:, 0])
+    for name, rows in whole.items():
+        whole[name] = np.insert(rows, places, others if name in _POINTS else rows[first], axis=0)
+    write_whole_keys(curve, whole)
+
+
+def read_whole_keys(curve: bpy.types.FCurve) -> dict[str, NDArray[Any]]:
+    """Return every property of a curve's keys by its name, (T, n)."""
+    keys = curve.keyframe_points
+    found = {name: np.empty((len(keys), count), kind) for name, count, kind in _KEY}
+    for name, rows in found.items():
+        keys.foreach_get(name, rows.ravel())
+    return found
+
+
+def write_whole_keys(curve: bpy.types.FCurve, whole: dict[str, NDArray[Any]]) -> None:
+    """Replace the keys of a curve by those with these properties, in the order of their frames, (T, n) each."""
+    keys = curve.keyframe_points
+    keys.clear()
+    keys.add(len(whole["co"]))
+    for name, rows in whole.items():
+        keys.foreach_set(name, rows.ravel())
     curve.update()
 
 

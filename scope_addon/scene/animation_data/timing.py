@@ -79,6 +79,12 @@ def key_frames(timestamps: NDArray[np.float64], rate: float, start_frame: float 
     return np.where(np.abs(frames - whole) < 1e-3, whole, frames)
 
 
+def whole_frames_of(frames: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the whole frames (N,) within the span of keys (T,); the nearest if all keys lie between two of them."""
+    whole = np.arange(math.ceil(frames[0] - 1e-4), math.floor(frames[-1] + 1e-4) + 1, dtype=float)
+    return whole if len(whole) else np.round(frames[:1])
+
+
 def store_rate(armature: bpy.types.Object, rate: float) -> None:
     """Store the frame rate for which an armature's keys were written, frames per second."""
     armature[_RATE] = rate

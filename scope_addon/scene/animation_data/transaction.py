@@ -14,6 +14,7 @@ from contextlib import contextmanager
 import bpy
 
 from .action_content import restore_content
+from .removal import NewDatablocks
 
 # Kinds of datablock that the work may create; shape keys go with their mesh.
 _KINDS = (
@@ -37,7 +38,7 @@ def all_or_nothing(
     unique = list(dict.fromkeys(objects))
     animated = [_SavedAnimation(owner) for owner in (*unique, *keys)]
     values = [(block, block.value) for key in keys for block in key.key_blocks]
-    before = {kind: {block.session_uid for block in getattr(bpy.data, kind)} for kind in _KINDS}
+    new = NewDatablocks(_KINDS)
     settings = _SavedScene(scene)
     transforms = [_SavedTransform(obj) for obj in unique]
     try:
@@ -50,8 +51,7 @@ def all_or_nothing(
             saved.restore()
         for block, value in values:
             block.value = value
-        new = [b for kind in _KINDS for b in getattr(bpy.data, kind) if b.session_uid not in before[kind]]
-        bpy.data.batch_remove(new)
+        new.remove()
         settings.restore()
         raise
     for saved in animated:

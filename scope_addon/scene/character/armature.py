@@ -42,7 +42,6 @@ def rest_pose(body: Body, betas: NDArray[np.floating[Any]]) -> RestPose:
 
 def _bone_tails(body: Body, joints: NDArray[np.float64], vertices: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the tails (K+1, 3) for display: at a child joint, or at the end of the surface that the bone moves."""
-    owner = np.take_along_axis(body.skin_joints, body.skin_weights.argmax(axis=1)[:, None], axis=1)[:, 0]
     tails = joints.copy()
     for i, parent in enumerate(body.parents):
         incoming = joints[i] - joints[parent] if parent >= 0 else _UP
@@ -57,7 +56,7 @@ def _bone_tails(body: Body, joints: NDArray[np.float64], vertices: NDArray[np.fl
             ahead[lengths <= SHORTEST_BONE] = -2.0
             tails[i] = joints[children[ahead.argmax()]]
             continue
-        surface = vertices[owner == i] - joints[i]
+        surface = vertices[body.strongest_joints == i] - joints[i]
         reach = float((surface @ incoming).max()) if len(surface) else 0.0
         tails[i] = joints[i] + incoming * max(reach, SHORTEST_BONE)
     return tails

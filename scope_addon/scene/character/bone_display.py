@@ -62,11 +62,10 @@ def surface_radii(
     :param vertices: (V, 3) metres, the rest mesh of the fitted shape, world frame.
     :return: (K+1,) metres.
     """
-    owner = np.take_along_axis(body.skin_joints, body.skin_weights.argmax(axis=1)[:, None], axis=1)[:, 0]
     lengths = np.linalg.norm(rest.tails - rest.joints, axis=1)
     radii = np.empty(len(rest.joints))
     for i, length in enumerate(lengths):
-        local = (vertices[owner == i] - rest.joints[i]) @ M[i]
+        local = (vertices[body.strongest_joints == i] - rest.joints[i]) @ M[i]
         middle = local[np.abs(local[:, 1] - 0.5 * length) <= 0.25 * length] if len(local) else local
         reach = np.linalg.norm((middle if len(middle) else local)[:, [0, 2]], axis=1)
         radii[i] = max(float(np.quantile(reach, 0.9)) if len(reach) else 0.3 * length, _MIN_RADIUS)

@@ -56,10 +56,11 @@ def store_corrections(
     from ...edit.pins.corrected_motion import corrections_of
     from ...edit.pins.corrections import Pin
 
-    entries = [_entry(armature, motion, c, rate) for c in corrections_of(motion)]
-    for entry, correction in zip(entries, corrections_of(motion), strict=True):
+    entries = []
+    for correction in corrections_of(motion):
+        entries.append(_entry(armature, motion, correction, rate))
         if isinstance(correction, Pin):
-            entry["missed"] = _missed(motion, correction, (places or {}).get(correction))
+            entries[-1]["missed"] = _missed(motion, correction, (places or {}).get(correction))
     armature[_LIST] = json.dumps(entries)
 
 

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import math
-
 import bpy
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +13,7 @@ from ...kinematics.axes import R_WORLD_MODEL
 from ...kinematics.face.expressions import expressions_of, mouth_faces_of
 from ...motion import Motion
 from ..animation_data.actions import Channels, fcurves, read_keys, shape_key_path
+from ..animation_data.timing import whole_frames_of
 from .body_mesh import colour_faces
 
 MOUTH_COLOR = (0.06, 0.01, 0.01)  # linear
@@ -36,14 +35,11 @@ def add_expression_keys(mesh: bpy.types.Object, body: Body) -> bool:
         return False
     if mesh.data.shape_keys is None:
         mesh.shape_key_add(name="Basis", from_mix=False)
-    rest = np.empty((len(mesh.data.vertices), 3), np.float32)
-    mesh.data.shape_keys.key_blocks[0].data.foreach_get("co", rest.ravel())
+    rest = _places(mesh.data.shape_keys.key_blocks[0])
     for expression in expressions:
         moved = rest.copy()
         moved[expression.vertices] += (expression.offsets @ R_WORLD_MODEL.T).astype(np.float32)
-        key = mesh.shape_key_add(name=expression.name, from_mix=False)
-        key.data.foreach_set("co", moved.ravel())
-        key.value = 0.0
+        _add_key(mesh, expression.name, moved, 0.0)
     colour_faces(mesh, mouth_faces_of(body), "mouth", MOUTH_COLOR)
     return True
 
@@ -62,16 +58,14 @@ def key_expressions(
     :param whole_frames: key whole frames only, by linear interpolation.
     """
     weights = motion.face["expressions"].astype(float)
-    at = np.arange(math.ceil(frames[0] - 1e-4), math.floor(frames[-1] + 1e-4) + 1.0) if whole_frames else frames
-    at = at if len(at) else np.round(frames[:1])
+    at = whole_frames_of(frames) if whole_frames else frames
     for name, column in zip(motion.face["expression_names"].tolist(), weights.T, strict=True):
         if name not in mesh.data.shape_keys.key_blocks or column.max() < MOVES:
             continue
         values = np.interp(at, frames, column) if whole_frames else column
-        moves = np.ptp(column) >= MOVES
         path = shape_key_path(name)
         mesh.data.shape_keys.key_blocks[name].value = float(values[0])
-        if moves:
+        if np.ptp(column) >= MOVES:
             channels.write(path, at, values, group="Face")
         else:
             channels.write(path, at[:1], values[:1], "CONSTANT", group="Face")
@@ -80,14 +74,8 @@ def key_expressions(
 def expression_offsets(mesh: bpy.types.Object) -> dict[str, NDArray[np.float32]]:
     """Return how far each expression's key moves the vertices (V, 3), by name; none if there are no such keys."""
     blocks = mesh.data.shape_keys.key_blocks
-    basis, moved = (np.empty((len(mesh.data.vertices), 3), np.float32) for _ in range(2))
-    blocks[0].data.foreach_get("co", basis.ravel())
-    offsets = {}
-    for name in EXPRESSIONS:
-        if name in blocks:
-            blocks[name].data.foreach_get("co", moved.ravel())
-            offsets[name] = moved - basis
-    return offsets
+    basis = _places(blocks[0])
+    return {name: _places(blocks[name]) - basis for name in EXPRESSIONS if name in blocks}
 
 
 def copy_expressions(
@@ -99,13 +87,9 @@ def copy_expressions(
     :param offsets: (V, 3) each, as from `expression_offsets`.
     :return: the new action.
     """
-    mesh.shape_key_add(name="Basis", from_mix=False)
-    rest = np.empty((len(mesh.data.vertices), 3), np.float32)
-    mesh.data.shape_keys.key_blocks[0].data.foreach_get("co", rest.ravel())
+    rest = _places(mesh.shape_key_add(name="Basis", from_mix=False))
     for name, offset in offsets.items():
-        key = mesh.shape_key_add(name=name, from_mix=False)
-        key.data.foreach_set("co", (rest + offset).ravel())
-        key.value = source.key_blocks[name].value
+        _add_key(mesh, name, rest + offset, source.key_blocks[name].value)
     animated = {curve.data_path: curve for curve in fcurves(source)}
     channels = Channels(mesh.data.shape_keys, bpy.data.actions.new(f"{mesh.name}_expressions"))
     for name in offsets:
@@ -114,3 +98,17 @@ def copy_expressions(
             if len(keys):
                 channels.write(curve.data_path, keys[:, 0], keys[:, 1])
     return channels.action
+
+
+def _places(key: bpy.types.ShapeKey) -> NDArray[np.float32]:
+    """Return where a shape key has the vertices (V, 3)."""
+    places = np.empty((len(key.data), 3), np.float32)
+    key.data.foreach_get("co", places.ravel())
+    return places
+
+
+def _add_key(mesh: bpy.types.Object, name: str, places: NDArray[np.float32], value: float) -> None:
+    """Add a shape key that has the vertices at ``places`` (V, 3)."""
+    key = mesh.shape_key_add(name=name, from_mix=False)
+    key.data.foreach_set("co", places.ravel())
+    key.value = value

@@ -7,7 +7,6 @@ armature's space. The keys are the only source, so undo and manual changes are r
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,6 +22,7 @@ from ...edit.reduce import angles_between, select_position_keys, select_quaterni
 from ...errors import UsageError
 from ...kinematics.axes import R_WORLD_MODEL
 from ..animation_data.actions import bone_path, change_keys, fcurves, read_keys, rewrite_keys
+from ..animation_data.timing import whole_frames_of
 from .animation import on_one_hemisphere
 from .armature import rest_orientations
 
@@ -113,9 +113,7 @@ def bake_whole_frames(armature: bpy.types.Object, body: Body, rate: float) -> tu
     :raises UsageError: when a bone or its keys are missing.
     """
     clip, frames = read_clip(armature, body, rate)
-    whole = np.arange(math.ceil(frames[0] - 1e-4), math.floor(frames[-1] + 1e-4) + 1, dtype=float)
-    if not len(whole):  # all keys lie between two frames
-        whole = np.round(frames[:1])
+    whole = whole_frames_of(frames)
     write_clip(armature, body, sample(band_limited(clip, rate), whole / rate), whole)
     return len(frames), len(whole)
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ...edit.clip import Clip
+from ...edit.pins.moved import moved_clip
 from ...edit.root_motion import floor_trajectory, relative_to_trajectory, with_trajectory
 from ...errors import UsageError
 from ..animation_data.actions import Channels, fcurves, read_keys
@@ -222,9 +223,9 @@ def _place(empty: bpy.types.Object) -> Matrix:
 
 def _moved(clip: Clip, place: Matrix, size: float) -> Clip:
     """Apply the rigid transform of an armature, whose scale is ``size``, to its clip."""
-    R, rotations = np.array(place.to_3x3()), clip.rotations.copy()
-    rotations[:, 0] = R @ rotations[:, 0]
-    return Clip(clip.times, rotations, clip.root @ R.T + np.array(place.translation) / size)
+    transform = np.array(place)
+    transform[:3, 3] /= size
+    return moved_clip(clip, transform)
 
 
 def _copy_parenting(obj: bpy.types.Object, other: bpy.types.Object) -> None:

@@ -79,15 +79,12 @@ def _triple(v: NDArray[np.float64]) -> str:
 
 def _channel_values(pose: SampledPose, order: list[int]) -> NDArray[np.float64]:
     """Return (T, channels) in the order of the hierarchy, lengths in the unit of ``pose``, angles in degrees."""
-    turned = R_GLTF_WORLD @ pose.rotations @ R_GLTF_WORLD.T
-    columns = []
-    for i in order:
-        parent = pose.parents[i]
-        if parent < 0:
-            columns.append(pose.joints[:, i] @ R_GLTF_WORLD.T)
-            columns.append(euler_zyx_degrees(turned[:, i]))
-        else:
-            columns.append(euler_zyx_degrees(np.swapaxes(turned[:, parent], 1, 2) @ turned[:, i]))
+    turned, parents = R_GLTF_WORLD @ pose.rotations @ R_GLTF_WORLD.T, np.array(pose.parents)
+    local = turned.copy()
+    child = parents >= 0
+    local[:, child] = np.swapaxes(turned[:, parents[child]], 2, 3) @ turned[:, child]
+    angles, positions = euler_zyx_degrees(local), pose.joints @ R_GLTF_WORLD.T
+    columns = [part[:, i] for i in order for part in ((angles,) if child[i] else (positions, angles))]
     values: NDArray[np.float64] = np.concatenate(columns, axis=1)
     return values
 
@@ -98,18 +95,20 @@ def euler_zyx_degrees(R: NDArray[np.float64]) -> NDArray[np.float64]:
     At gimbal lock (y = ±90°) x is set to zero; elsewhere, the equivalent angles nearest to the previous frame are
     chosen.
 
-    :param R: (T, 3, 3) rotations.
-    :return: (T, 3) angles z, y, x, degrees.
+    :param R: (T, N, 3, 3) rotations of N joints.
+    :return: (T, N, 3) angles z, y, x, degrees.
     """
-    sin_y = np.clip(-R[:, 2, 0], -1.0, 1.0)
+    sin_y = np.clip(-R[..., 2, 0], -1.0, 1.0)
     locked = np.abs(sin_y) > 1.0 - 1e-9
-    z = np.where(locked, np.arctan2(-R[:, 0, 1], R[:, 1, 1]), np.arctan2(R[:, 1, 0], R[:, 0, 0]))
-    x = np.where(locked, 0.0, np.arctan2(R[:, 2, 1], R[:, 2, 2]))
-    direct = np.degrees(np.stack([z, np.arcsin(sin_y), x], axis=1))
+    z = np.where(locked, np.arctan2(-R[..., 0, 1], R[..., 1, 1]), np.arctan2(R[..., 1, 0], R[..., 0, 0]))
+    x = np.where(locked, 0.0, np.arctan2(R[..., 2, 1], R[..., 2, 2]))
+    direct = np.degrees(np.stack([z, np.arcsin(sin_y), x], axis=-1))
     other = direct * [1, -1, 1] + [180.0, 180.0, 180.0]  # the other decomposition of the same rotation
+    both = np.stack([direct, other], axis=2)
     out: NDArray[np.float64] = direct.copy()
     for t in range(1, len(out)):
-        candidates = np.stack([direct[t], other[t]])
-        candidates += 360.0 * np.round((out[t - 1] - candidates) / 360.0)
-        out[t] = candidates[np.abs(candidates - out[t - 1]).sum(axis=1).argmin()]
+        before = out[t - 1][:, None]
+        both[t] += 360.0 * np.round((before - both[t]) / 360.0)
+        nearer = np.abs(both[t] - before).sum(axis=-1).argmin(axis=-1)
+        out[t] = both[t, np.arange(len(nearer)), nearer]
     return out

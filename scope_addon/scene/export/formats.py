@@ -155,7 +155,7 @@ def write_bvh(path: Path, scene: bpy.types.Scene, rig: bpy.types.Object, unit: s
 
 def sample_armature(scene: bpy.types.Scene, rig: bpy.types.Object) -> bvh.SampledPose:
     """Sample the pose of an armature at every frame of the scene's range, in the world frame."""
-    bones = [bone for bone in rig.data.bones]
+    bones = list(rig.data.bones)
     names = [bone.name for bone in bones]
     rest = np.array([np.array(bone.matrix_local) for bone in bones])
     frames = range(scene.frame_start, scene.frame_end + 1)
@@ -228,8 +228,9 @@ def quiet() -> Iterator[None]:
 @contextmanager
 def _discarded(number: int) -> Iterator[None]:
     """Discard what is written to a file descriptor."""
-    stream = sys.stdout if number == 1 else sys.stderr
-    stream.flush()
+    stream = sys.stdout if number == 1 else sys.stderr  # None where it was closed when Python started
+    if stream is not None:
+        stream.flush()
     try:
         keep = os.dup(number)
     except OSError:  # it is closed, as for a program without a terminal on Windows
@@ -240,7 +241,8 @@ def _discarded(number: int) -> Iterator[None]:
         os.dup2(devnull, number)
         yield
     finally:
-        stream.flush()
+        if stream is not None:
+            stream.flush()
         os.dup2(keep, number)
         os.close(keep)
         os.close(devnull)

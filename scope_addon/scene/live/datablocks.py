@@ -23,22 +23,6 @@ def found(kind: str, name: str, uid: int) -> bpy.types.ID | None:
     return next((block for block in blocks if block.session_uid == uid), None)
 
 
-class NewDatablocks:
-    """The datablocks that are new since a moment, to remove them later."""
-
-    def __init__(self) -> None:
-        self._before = {kind: {block.session_uid for block in getattr(bpy.data, kind)} for kind in KINDS}
-
-    def all(self) -> set[tuple[str, int]]:
-        """Return the kind and identifier of each."""
-        return {
-            (kind, block.session_uid)
-            for kind in KINDS
-            for block in getattr(bpy.data, kind)
-            if block.session_uid not in self._before[kind]
-        }
-
-
 def remove(blocks: set[tuple[str, int]]) -> None:
     """Remove those of the datablocks that still exist."""
     if not blocks:

@@ -23,9 +23,10 @@ from numpy.typing import NDArray
 from ....solver.body import Body
 from ....solver.rotations import matrix_from_quaternion
 from ...kinematics.axes import R_WORLD_MODEL
+from ..animation_data.removal import NewDatablocks
 from ..character import armature, body_mesh, bone_display, shape_keys
 from ..character.animation import quaternion_from_matrix, quaternion_product
-from .datablocks import NewDatablocks, found, remove
+from .datablocks import KINDS, found, remove
 
 _Q_MODEL_WORLD = quaternion_from_matrix(R_WORLD_MODEL.T)
 _MIN_CHANGE = 0.01  # of a shape coefficient that changes the mesh: less than half a millimetre
@@ -100,7 +101,7 @@ class LiveBody:
 
     def _create(self, betas: NDArray[np.float64]) -> tuple[bpy.types.Object, bpy.types.Object]:
         """Create the objects, in place of what is left of former ones."""
-        body, new = self._body, NewDatablocks()
+        body, new = self._body, NewDatablocks(KINDS)
         remove(self._blocks)
         scene = next(scene for scene in bpy.data.scenes if scene.session_uid == self._scene_uid)
         collection = bpy.data.collections.new(self._name)
@@ -117,7 +118,8 @@ class LiveBody:
         body_mesh.skin_to_armature(mesh, rig, body)
         ring = bpy.data.objects[bone_display.RING]  # which all captures share
         shared = {("objects", ring.session_uid), ("meshes", ring.data.session_uid)}
-        self._blocks |= new.all() - shared  # former ones stay in it, since redo may bring them back
+        # Former ones stay in it, since redo may bring them back.
+        self._blocks |= {(kind, block.session_uid) for kind, block in new.all()} - shared
         self._armature, self._mesh = (rig.name, rig.session_uid), (mesh.name, mesh.session_uid)
         self._betas, self._rest_joints, self._head = betas, body.rest_joints(betas), rest.joints[0]
         self._M = armature.rest_orientations(rig, body)

@@ -18,7 +18,7 @@ from ...retarget.face.face_frame import RestBone
 from ..animation_data.actions import Channels, bone_path
 from ..animation_data.transaction import all_or_nothing
 from .face_retarget import CapturedExpressions, key_names
-from .rig_action import channel_of_rotation, mark_written, override_nla, retire
+from .rig_action import channel_of_rotation, leave_tweak_mode, mark_written, override_nla, retire
 
 _STILL = 1e-3  # change of a channel, as a share of the bone's length or in radians, below which it is none
 _CHANNELS = ("location", "rotation_quaternion", "rotation_axis_angle", "rotation_euler")
@@ -60,9 +60,8 @@ def retarget_face_bones(
     :raises InputError: when the map cannot be used, or the rig's face cannot be measured.
     """
     keys = face_keys(captured, rig, expression_map)
+    leave_tweak_mode(rig)  # first: a failure would assign the strip's action
     with all_or_nothing(bpy.context.scene, rig):
-        if rig.animation_data and rig.animation_data.use_tweak_mode:  # in which no action can be assigned
-            rig.animation_data.use_tweak_mode = False
         former = rig.animation_data.action if rig.animation_data else None
         if former is None:
             Channels(rig, bpy.data.actions.new(rig.name))

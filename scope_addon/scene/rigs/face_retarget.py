@@ -16,7 +16,7 @@ from ...retarget.expression_map import ExpressionMap, guess_expression_map
 from ..animation_data.actions import Channels, fcurves, read_keys, shape_key_path
 from ..animation_data.transaction import all_or_nothing
 from ..character.expression_keys import MOVES, has_expression_keys
-from .rig_action import mark_written, override_nla, retire
+from .rig_action import leave_tweak_mode, mark_written, override_nla, retire
 
 
 @dataclass(frozen=True)
@@ -86,6 +86,8 @@ def retarget_expressions(
             f"no shape key of {meshes} is mapped to an expression; name them as ARKit, VRM or Oculus do, or give a map"
         )
     written = []
+    for face in faces:
+        leave_tweak_mode(face.data.shape_keys)  # first: a failure would assign the strip's action
     with all_or_nothing(bpy.context.scene, *faces, keys=[face.data.shape_keys for face in faces]):
         for face, values in plans:
             if values:
@@ -100,8 +102,6 @@ def _write(
     keys: bpy.types.Key, frames: NDArray[np.float64], values: dict[str, NDArray[np.float64]]
 ) -> tuple[bpy.types.Action, bpy.types.Action | None]:
     """Write the keys of one mesh; return the new action and the former one."""
-    if keys.animation_data and keys.animation_data.use_tweak_mode:  # in which no action can be assigned
-        keys.animation_data.use_tweak_mode = False
     former = keys.animation_data.action if keys.animation_data else None
     channels = Channels(keys, bpy.data.actions.new("Face"))
     for key, column in values.items():

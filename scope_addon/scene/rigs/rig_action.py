@@ -79,6 +79,12 @@ def mark_written(action: bpy.types.Action) -> None:
     action[_CHECKSUM] = _checksum(action)
 
 
+def leave_tweak_mode(animated: bpy.types.ID) -> None:
+    """Leave the NLA's Tweak Mode, in which no action can be assigned."""
+    if animated.animation_data and animated.animation_data.use_tweak_mode:
+        animated.animation_data.use_tweak_mode = False
+
+
 def override_nla(animation: bpy.types.AnimData) -> None:
     """Make the active action replace the NLA tracks below it for its bones, whatever the former action's blending."""
     animation.action_blend_type, animation.action_influence = "REPLACE", 1.0

@@ -14,15 +14,17 @@ from ....solver.errors import InputError
 from ...errors import UsageError
 from ...retarget.bone_map import PHALANGES, BoneMap
 from ...retarget.rig_source import RigSource
+from ..animation_data.removal import NewDatablocks
 from ..export import formats
 from ..export.export_states import temporary_scene
-from .rig_probe import check_bones_move
+from .rig_probe import at_rest, probe
 from .rig_retarget import guess_bone_map
 
-# Kinds of datablock that a file may contain, users before the datablocks that they use.
+# Kinds of datablock that a file or a capture may contain, users before the datablocks that they use. Scenes are removed
+# by ``temporary_scene``.
 _KINDS = (
-    "scenes", "collections", "objects", "meshes", "armatures", "curves", "cameras", "lights", "metaballs", "lattices",
-    "actions", "materials", "node_groups", "textures", "images", "texts", "worlds", "libraries",
+    "collections", "objects", "meshes", "armatures", "curves", "cameras", "lights", "metaballs", "lattices", "actions",
+    "materials", "node_groups", "textures", "images", "movieclips", "texts", "worlds", "libraries",
 )  # fmt: skip
 
 
@@ -57,8 +59,8 @@ def _check_finite(path: Path, rig: bpy.types.Object) -> None:
 
 def with_meshes(rig: bpy.types.Object, objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
     """Return the rig, those of the objects that are meshes deformed by it, and the parents of these."""
-    keep = [rig]
-    keep += [obj for obj in objects if obj.type == "MESH" and obj not in _widgets(rig) and _moved_by(obj, rig)]
+    widgets = {bone.custom_shape for bone in rig.pose.bones}
+    keep = [rig, *(obj for obj in objects if obj.type == "MESH" and obj not in widgets and _moved_by(obj, rig))]
     for obj in keep:
         while obj.parent is not None and obj.parent not in keep:
             keep.append(obj.parent)
@@ -77,7 +79,8 @@ def check_rig(source: RigSource, *, fingers: bool = True) -> None:
         rig = load_rig(source, scene.collection)
         bones = rig_bone_map(source, rig)
         moved = {b: part for b, part in bones.parts.items() if fingers or part.partition("_")[2] not in PHALANGES}
-        check_bones_move(rig, BoneMap(moved))
+        with at_rest(rig):
+            probe(rig, moved)
 
 
 def rig_bone_map(source: RigSource, rig: bpy.types.Object) -> BoneMap:
@@ -101,13 +104,11 @@ def rig_bone_map(source: RigSource, rig: bpy.types.Object) -> BoneMap:
 @contextmanager
 def temporary_datablocks() -> Iterator[None]:
     """Remove all datablocks that the block has added to the file."""
-    before = {kind: {block.session_uid for block in getattr(bpy.data, kind)} for kind in _KINDS}
+    new = NewDatablocks(_KINDS)
     try:
         yield
     finally:
-        # Scenes are removed by ``temporary_scene``.
-        kinds = [kind for kind in _KINDS if kind != "scenes"]
-        bpy.data.batch_remove([b for k in kinds for b in getattr(bpy.data, k) if b.session_uid not in before[k]])
+        new.remove()
 
 
 def _append(path: Path) -> list[bpy.types.Object]:
@@ -157,19 +158,12 @@ def _choose(path: Path, rigs: list[bpy.types.Object], name: str) -> bpy.types.Ob
     return rigs[0]
 
 
-def _widgets(rig: bpy.types.Object) -> set[bpy.types.Object]:
-    return {bone.custom_shape for bone in rig.pose.bones if bone.custom_shape is not None}
-
-
 def _moved_by(obj: bpy.types.Object, rig: bpy.types.Object) -> bool:
     if any(m.type == "ARMATURE" and m.object == rig for m in obj.modifiers):
         return True
-    parent = obj.parent
-    while parent is not None:
-        if parent == rig:
-            return True
-        parent = parent.parent
-    return False
+    while obj is not None and obj != rig:
+        obj = obj.parent
+    return obj is not None
 
 
 def _remove_animation(obj: bpy.types.Object) -> None:

@@ -16,7 +16,7 @@ from mathutils import Matrix, Quaternion
 from numpy.typing import NDArray
 
 from ....solver.errors import InputError
-from ...retarget.bone_map import PHALANGES, BoneMap
+from ...retarget.bone_map import PHALANGES
 from ...retarget.skeleton import Skeleton
 from ..character.root_object import root_object, topmost
 
@@ -25,15 +25,6 @@ SWITCHES = ("IK_FK", "neck_follow", "head_follow")
 _CARRIER_TOLERANCE = 0.02  # of a head's position relative to its carrier, as a share of their distance
 _MIN_RESPONSE = 0.1  # change of a rotation matrix's entries; the probe changes them by more than 0.3
 _CHECKED_FRAMES, _MAX_DEVIATION = 5, np.radians(20)
-
-
-def check_bones_move(rig: bpy.types.Object, bone_map: BoneMap) -> None:
-    """Check that the mapped bones can be rotated, and the pelvis moved.
-
-    :raises InputError: when one of them cannot.
-    """
-    with at_rest(rig):
-        probe(rig, bone_map.parts)
 
 
 def probe(rig: bpy.types.Object, parts: dict[str, str]) -> Skeleton:

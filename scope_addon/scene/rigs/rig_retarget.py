@@ -20,7 +20,7 @@ from ...retarget.expression_map import ExpressionMap
 from ...retarget.guess import RestBones, guess
 from ...retarget.rig_source import ROOTS
 from ...retarget.skeleton import Pose, Skeleton, basis
-from ...retarget.transfer import transfer
+from ...retarget.transfer import Transfer
 from ..animation_data.transaction import all_or_nothing
 from ..character.keys import read_clip
 from ..character.root_object import (
@@ -33,7 +33,7 @@ from ..character.root_object import (
 )
 from .face_bones import face_keys, key_face, rest_face
 from .face_retarget import captured_expressions
-from .rig_action import BoneKeys, override_nla, retire, root_locations, write_action
+from .rig_action import BoneKeys, leave_tweak_mode, override_nla, retire, root_locations, write_action
 from .rig_probe import at_rest, blocked_bones, probe
 from .rigify_ik import ik_keys
 
@@ -114,14 +114,13 @@ def retarget(
     clip = clip_as_displayed(source, clip, frames)
     captured = captured_expressions(source) if options.face is not None else None
     face = face_keys(captured, rig, options.face) if captured is not None and options.face is not None else None
-    if rig.animation_data and rig.animation_data.use_tweak_mode:  # in which no action can be assigned
-        rig.animation_data.use_tweak_mode = False
+    leave_tweak_mode(rig)
     with all_or_nothing(bpy.context.scene, rig, topmost(rig)):
         with at_rest(rig):
             skeleton, place = probe(rig, bone_map.parts), np.array(rig.matrix_world, float)
             root = skeleton.names.index(bone_map.bone("pelvis") or "")
             one_floor = not source.get("scope_uneven_ground", False)
-            pose = transfer(clip, body, betas, skeleton, bone_map, feet=options.feet, one_floor=one_floor)
+            pose = Transfer(body, betas, skeleton, bone_map, feet=options.feet, one_floor=one_floor).pose(clip)
             motion = _placed(source, clip, skeleton, place, pose, root, options)
             turns = basis(skeleton, motion.rotations)
             warnings = blocked_bones(rig, skeleton.names, turns, motion.rotations)

@@ -4,9 +4,8 @@
 import numpy as np
 import pytest
 from scope.scope_addon.edit.clip import Clip
-from scope.scope_addon.edit.pins.corrections import Contact, Exchange, Pin
+from scope.scope_addon.edit.pins.corrections import Contact, Pin
 from scope.scope_addon.edit.pins.solve_pins import Shot, missed, resolve
-from scope.scope_addon.edit.spans import swap_sides
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.kinematics.foot_skin import FootSkin
 from scope.solver.rotations import exp
@@ -215,17 +214,9 @@ def test_a_pinned_pelvis_moves_the_body_as_far_as_it_is_dragged():
     assert missed(resolve(TRUTH, BODY, BETAS, [pin], SHOT), BODY, BETAS, pin, SHOT) < 0.002
 
 
-def test_exchanged_sides_are_exchanged_before_pins():
-    swapped = swap_sides(TRUTH, BODY, TRUTH.times[30], TRUTH.times[50])
-    fixed = resolve(swapped, BODY, BETAS, [Exchange(30, 50)], SHOT)
-    np.testing.assert_allclose(fixed.rotations, TRUTH.rotations, atol=1e-12)
-    again = resolve(swapped, BODY, BETAS, [*pins((40,)), Exchange(30, 50)], SHOT)
-    np.testing.assert_allclose(again.joints(BODY, BETAS), JOINTS, atol=2e-4)
-
-
 def test_corrections_at_frames_without_keys_are_left_out():
     half = Clip(TRUTH.times[:40], TRUTH.rotations[:40], TRUTH.root[:40])
-    same = resolve(half, BODY, BETAS, [*pins((80,)), Contact(80, 85, "right"), Exchange(80, 85)], SHOT)
+    same = resolve(half, BODY, BETAS, [*pins((80,)), Contact(80, 85, "right")], SHOT)
     np.testing.assert_array_equal(same.rotations, half.rotations)
 
 

@@ -79,3 +79,14 @@ def test_names_are_unique_where_one_equals_another_clips_person(tmp_path):
     assert list(found_in(clips)) == short
     several = found_in(clips, several_people=True)
     assert list(several) == [*short[:2], "walk.person2.mp4"]
+
+
+def test_links_to_a_folder_above_are_not_followed(tmp_path):
+    """They would lead round and round, and each clip be found again each time."""
+    below = tmp_path / "clips" / "day"
+    below.mkdir(parents=True)
+    (below / "walk.mp4").touch()
+    (below / "up").symlink_to(tmp_path / "clips")
+    (below / "here").symlink_to(below)
+    found = find_clips(tmp_path / "clips", tmp_path / "out", recursive=True, several_people=False)
+    assert found == {"day/walk": below / "walk.mp4"}

@@ -89,3 +89,26 @@ def test_cycles_come_before_the_users_own_modifiers_and_keep_them(cube):
         assert [m.type for m in second.modifiers] == ["CYCLES", "NOISE"]
         assert (second.modifiers[1].strength, second.modifiers[1].phase) == (0.25, 3.5)
         assert [m.mode_before for m in third.modifiers] == ["REPEAT"]
+
+
+@pytest.mark.parametrize("interpolation", actions.INTERPOLATION)
+def test_keys_that_are_added_are_those_that_blender_inserts(cube, interpolation):
+    """Whatever the handles, kinds and selection of the keys around them."""
+    rng = np.random.default_rng(0)
+    channels = actions.Channels(cube, bpy.data.actions.new("a"))
+    frames, new = (np.sort(rng.choice(200, 60, replace=False)) / 2 for _ in range(2))
+    curves = [channels.write(path, frames, np.sin(frames), interpolation)[0] for path in ('["x"]', '["y"]')]
+    for curve in curves:
+        for key in list(curve.keyframe_points)[::3]:
+            key.handle_left_type = key.handle_right_type = "FREE"
+            key.select_control_point, key.type = True, "EXTREME"
+    actions.change_keys(curves[0], new, np.cos(new))
+    missing = dict(zip(new.tolist(), np.cos(new).tolist(), strict=True))
+    for key in curves[1].keyframe_points:
+        key.co.y = missing.pop(key.co.x, key.co.y)
+    for frame, value in missing.items():
+        curves[1].keyframe_points.insert(frame, value, options={"FAST"}).interpolation = "LINEAR"
+    curves[1].update()
+    found, expected = (actions.read_whole_keys(curve) for curve in curves)
+    for name, rows in expected.items():
+        np.testing.assert_array_equal(found[name], rows, err_msg=name)

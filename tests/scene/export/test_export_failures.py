@@ -152,3 +152,10 @@ def test_writers_keep_standard_output_clean(body, make_motion, tmp_path, capfd):
 )
 def test_one_path_per_person(path, people, expected):
     assert [p.as_posix() for p in person_paths(path, people)] == expected
+
+
+def test_exporters_are_quiet_without_standard_streams(monkeypatch):
+    monkeypatch.setattr("sys.stdout", None)
+    monkeypatch.setattr("sys.stderr", None)
+    with formats.quiet():
+        os.write(1, b"to nobody")

@@ -17,6 +17,7 @@ from scope.scope_addon.scene.export import formats
 from scope.scope_addon.scene.rigs import face_retarget
 from scope.scope_addon.scene.rigs.face_retarget import captured_expressions, faces_of, retarget_expressions
 from scope.scope_addon.scene.rigs.rig_export import RigExportOptions, export_on_rig
+from scope.solver.names import EXPRESSIONS
 
 from ...edit.walking import motion_of, walk
 from ...made_motion import made_face
@@ -169,3 +170,19 @@ def test_a_rig_file_whose_bones_move_the_face(whole_body, tmp_path, known_keys):
     bones = {curve.data_path.split('"')[1] for curve in actions.fcurves(written)}
     assert "upperarm01.L" in bones
     assert ("jaw" in bones) != known_keys
+
+
+def test_a_failure_in_tweak_mode_keeps_the_action_outside_of_it(captured, monkeypatch):
+    face = face_mesh(EXPRESSIONS)
+    keys = face.data.shape_keys
+    keys.key_blocks["jawOpen"].keyframe_insert("value", frame=1)
+    animation = keys.animation_data
+    animation.nla_tracks.new().strips.new("strip", 1, animation.action)
+    animation.action = own = bpy.data.actions.new("own")
+    animation.nla_tracks[0].strips[0].select = animation.nla_tracks[0].select = True
+    animation.use_tweak_mode = True
+    assert animation.action != own
+    monkeypatch.setattr(face_retarget, "mark_written", lambda action: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        retarget_expressions(captured, [face])
+    assert animation.action == own

@@ -285,3 +285,11 @@ def test_a_batch_refuses_a_bad_rig_once(tmp_path):
     assert sum(line.startswith("scope:") for line in done.stderr.splitlines()) == 1
     assert "rig.fbx" in done.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_footage_of_a_distorting_lens_does_not_stay_in_the_session(tmp_path):
+    source = rig_source(save_rig(tmp_path / "rig.blend"))
+    motion = motion_of(walk(0.2))
+    motion.dist[0] = -0.1
+    export_on_rig([motion], BODY, [tmp_path / "out.bvh"], source, RigExportOptions(NEW_SCENE), SAMPLE)
+    assert list(bpy.data.movieclips) == []

@@ -229,12 +229,10 @@ def _write_change(
     """
     old, new = change
     which = differ(old, new)
-    rotations, root = clip.rotations.copy(), clip.root.copy()
-    inverse = np.swapaxes(old.rotations[which], -1, -2)
+    changed, inverse = clip.copy(), np.swapaxes(old.rotations[which], -1, -2)
     shift = (inverse[:, 0] @ (new.root - old.root)[which, :, None])[..., 0]
-    root[which] += (clip.rotations[which, 0] @ shift[..., None])[..., 0]
-    rotations[which] = clip.rotations[which] @ inverse @ new.rotations[which]
-    changed = Clip(clip.times, rotations, root)
+    changed.root[which] += (clip.rotations[which, 0] @ shift[..., None])[..., 0]
+    changed.rotations[which] = clip.rotations[which] @ inverse @ new.rotations[which]
     if moves is not None:
         changed, moved = _moved_rows(changed, moves)
         which = which | moved
@@ -243,7 +241,7 @@ def _write_change(
 
 def _moved_rows(clip: Clip, moves: NDArray[np.float64]) -> tuple[Clip, NDArray[np.bool_]]:
     """Move each row in the world by its rigid transform (T, 4, 4); also return which rows (T,) that moves."""
-    rotations, root, moved = clip.rotations.copy(), clip.root.copy(), (moves != np.eye(4)).any(axis=(1, 2))
-    rotations[moved, 0] = moves[moved, :3, :3] @ rotations[moved, 0]
-    root[moved] = (moves[moved, :3, :3] @ root[moved, :, None])[..., 0] + moves[moved, :3, 3]
-    return Clip(clip.times, rotations, root), moved
+    out, moved = clip.copy(), (moves != np.eye(4)).any(axis=(1, 2))
+    out.rotations[moved, 0] = moves[moved, :3, :3] @ out.rotations[moved, 0]
+    out.root[moved] = (moves[moved, :3, :3] @ out.root[moved, :, None])[..., 0] + moves[moved, :3, 3]
+    return out, moved

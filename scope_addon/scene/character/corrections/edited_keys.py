@@ -57,18 +57,18 @@ def begin_with_edits(
     for each in (c for c in edits.corrections if isinstance(c, Interpolation)):
         new = each == edits.new
         rows = np.ones(len(frames), bool) if new else edits.rows
-        keys = _with_rows(keys, interpolated(keys, [each], edits.shot, strict=new), rows)
-        old = _with_rows(old, interpolated(old, [each], edits.shot), rows)
+        keys = _replaced(keys, rows, interpolated(keys, [each], edits.shot, strict=new).rows(rows))
+        old = _replaced(old, rows, interpolated(old, [each], edits.shot).rows(rows))
     feet = feet_on_floor(edits.corrections)
     # The floor of a few keys would not be that of all; others have the change of the motion.
     enough = edits.rows.all() if isinstance(edits.new, FeetOnFloor) else 2 * edits.rows.sum() > len(frames)
     if feet is None or not enough:
         return keys, old
-    only = np.flatnonzero(edits.rows)
-    placed = _placed(armature, body, _rows_of(keys, only), frames[only], edits, feet)
+    height = floor_above(edits.corrections, feet)
+    placed = floored(armature, body, edits.betas, (keys.rows(edits.rows), frames[edits.rows]), feet, height)
     others = tuple(c for c in edits.corrections if not isinstance(c, Interpolation))
-    compared = edited(_rows_of(old, only), body, edits.betas, others, edits.shot)
-    return _replaced(keys, only, placed), _replaced(old, only, compared)
+    compared = edited(old.rows(edits.rows), body, edits.betas, others, edits.shot)
+    return _replaced(keys, edits.rows, placed), _replaced(old, edits.rows, compared)
 
 
 def meet_floor(armature: bpy.types.Object, body: Body, rate: float, motion: Motion, edits: KeyEdits) -> None:
@@ -80,7 +80,8 @@ def meet_floor(armature: bpy.types.Object, body: Body, rate: float, motion: Moti
     if feet is None:
         return
     clip, frames = read_clip(armature, body, rate)
-    placed = _placed(armature, body, clip, frames, edits, feet)
+    height = floor_above(edits.corrections, feet)
+    placed = floored(armature, body, edits.betas, (clip, frames), feet, height)
     if np.abs(placed.root - clip.root).max() > _SAME_M:
         write_keys(armature, body, placed, frames, np.ones(len(frames), bool))
 
@@ -106,28 +107,8 @@ def floored(
     return relative_to_trajectory(placed, *path)
 
 
-def _placed(
-    armature: bpy.types.Object,
-    body: Body,
-    clip: Clip,
-    frames: NDArray[np.float64],
-    edits: KeyEdits,
-    feet: FeetOnFloor,
-) -> Clip:
-    return floored(armature, body, edits.betas, (clip, frames), feet, floor_above(edits.corrections, feet))
-
-
-def _rows_of(clip: Clip, rows: NDArray[np.intp]) -> Clip:
-    return Clip(clip.times[rows], clip.rotations[rows], clip.root[rows])
-
-
-def _with_rows(clip: Clip, other: Clip, rows: NDArray[np.bool_]) -> Clip:
-    only = np.flatnonzero(rows)
-    return _replaced(clip, only, _rows_of(other, only))
-
-
-def _replaced(clip: Clip, rows: NDArray[np.intp], part: Clip) -> Clip:
+def _replaced(clip: Clip, rows: NDArray[np.bool_], part: Clip) -> Clip:
     """Return a clip with other values in some rows."""
-    rotations, root = clip.rotations.copy(), clip.root.copy()
-    rotations[rows], root[rows] = part.rotations, part.root
-    return Clip(clip.times, rotations, root)
+    out = clip.copy()
+    out.rotations[rows], out.root[rows] = part.rotations, part.root
+    return out

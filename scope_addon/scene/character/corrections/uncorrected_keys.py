@@ -44,17 +44,17 @@ class UncorrectedKeys:
     @staticmethod
     def from_bytes(content: object, curves: int) -> UncorrectedKeys:
         """Read what ``to_bytes`` returned; without rows if it is something else: a .blend file may be hostile."""
-        none = np.zeros((0, curves), np.float32)
+        none = UncorrectedKeys(np.zeros(0), *(np.zeros((0, curves), np.float32) for _ in range(2)))
         if not isinstance(content, bytes):
-            return UncorrectedKeys(np.zeros(0), none, none)
+            return none
         try:
             found = read_npz(Path("keys"), MotionFileError, "record of keys", content)
             times, before, written = (np.asarray(found[name], float) for name in _NAMES)
         except (MotionFileError, KeyError, ValueError, TypeError):
-            return UncorrectedKeys(np.zeros(0), none, none)
+            return none
         shapes = times.ndim == 1 and before.shape == written.shape == (len(times), curves)
         if not shapes or not np.isfinite(times).all() or np.isinf(before).any():
-            return UncorrectedKeys(np.zeros(0), none, none)
+            return none
         return UncorrectedKeys(times, before.astype(np.float32), written.astype(np.float32))
 
 
