@@ -128,6 +128,15 @@ def _bt601_rgb(frame: av.VideoFrame) -> NDArray[np.uint8]:
     return cast(NDArray[np.uint8], image)
 
 
+def _is_mirrored(frame: av.VideoFrame) -> bool:
+    """Whether a frame's display matrix mirrors it, which PyAV's angle of rotation does not say."""
+    for data in frame.side_data:
+        if data.type.name == "DISPLAYMATRIX":
+            a, b, _, c, d = np.frombuffer(data, np.int32, 5).astype(float)
+            return bool(a * d < b * c)
+    return False
+
+
 def presented_duration_s(path: Path) -> float | None:
     """Read for how many seconds a video is shown; None if that is unknown.
 
@@ -237,8 +246,10 @@ class PyavReader:
         frame = next(self._frames, None)
         if frame is None:
             return None
-        image = upright(self._path, _bt601_rgb(frame), self._aspect, -round(frame.rotation))
-        return self._time(frame), image
+        image = _bt601_rgb(frame)
+        if _is_mirrored(frame):  # its matrix is this mirroring, followed by the rotation
+            image = cast(NDArray[np.uint8], cv2.flip(image, 0))
+        return self._time(frame), upright(self._path, image, self._aspect, -round(frame.rotation))
 
     def skip_to(self, seconds: float, fps: Fraction) -> int:
         """See `FrameReader`.

@@ -31,6 +31,10 @@ def ramp(count: int) -> list[np.ndarray]:
 CLOCKWISE = (0, 65536, 0, -65536, 0, 0, 0, 0, 1 << 30)
 HALF_TURN = (-65536, 0, 0, 0, -65536, 0, 0, 0, 1 << 30)
 COUNTERCLOCKWISE = (0, -65536, 0, 65536, 0, 0, 0, 0, 1 << 30)
+LEFT_RIGHT = (-65536, 0, 0, 0, 65536, 0, 0, 0, 1 << 30)
+UP_DOWN = (65536, 0, 0, 0, -65536, 0, 0, 0, 1 << 30)
+TRANSPOSED = (0, 65536, 0, 65536, 0, 0, 0, 0, 1 << 30)
+ACROSS = (0, -65536, 0, -65536, 0, 0, 0, 0, 1 << 30)
 
 
 def test_frames_are_in_order_as_rgb_with_their_times(tmp_path):
@@ -68,6 +72,24 @@ def test_the_container_rate_is_exact(tmp_path, rate):
     np.testing.assert_allclose([f.timestamp_s for f in video], [float(i / rate) for i in range(10)], atol=1e-6)
 
 
+@pytest.mark.parametrize("again", [1, 2])
+def test_a_repeated_time_does_not_move_what_follows(tmp_path, again):
+    """Each repeated time moved all later frames on by a frame."""
+    shown_ms = np.sort(np.append(np.arange(0, 400, 40), again * [160]))
+    path = tmp_path / "a.mkv"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("mjpeg", rate=25, width=W, height=H, pix_fmt="yuvj420p")
+        for time_ms, image in zip(shown_ms, ramp(len(shown_ms)), strict=True):
+            for packet in stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")):
+                packet.time_base, packet.pts, packet.dts = Fraction(1, 1000), int(time_ms), int(time_ms)
+                container.mux(packet)
+    with open_video(path) as video:
+        times_ms = np.array([f.timestamp_s for f in video]) * 1000
+    is_repeated = np.diff(shown_ms, prepend=-1) == 0
+    np.testing.assert_allclose(times_ms[~is_repeated], shown_ms[~is_repeated], atol=1e-6)
+    assert (np.diff(times_ms) > 0).all()
+
+
 def test_a_variable_rate_keeps_presentation_times(tmp_path):
     path = write_video(tmp_path / "a.mp4", ramp(9))
     with_time_table(path, 1000, [(3, 40), (3, 100), (3, 20)])
@@ -79,9 +101,17 @@ def test_a_variable_rate_keeps_presentation_times(tmp_path):
 
 @pytest.mark.parametrize(
     ("matrix", "expected", "size"),
-    [(CLOCKWISE, "brwg", (H, W)), (HALF_TURN, "wbgr", (W, H)), (COUNTERCLOCKWISE, "gwrb", (H, W))],
+    [
+        (CLOCKWISE, "brwg", (H, W)),
+        (HALF_TURN, "wbgr", (W, H)),
+        (COUNTERCLOCKWISE, "gwrb", (H, W)),
+        (LEFT_RIGHT, "grwb", (W, H)),
+        (UP_DOWN, "bwrg", (W, H)),
+        (TRANSPOSED, "rbgw", (H, W)),
+        (ACROSS, "wgbr", (H, W)),
+    ],
 )
-def test_rotation_metadata_is_applied(tmp_path, matrix, expected, size):
+def test_rotation_and_mirroring_of_the_metadata_are_applied(tmp_path, matrix, expected, size):
     path = write_video(tmp_path / "a.mp4", [corner_image()] * 2)
     patch_track_header(path, matrix=matrix)
     video = open_video(path)
