@@ -203,6 +203,8 @@ class PyavReader:
         self._path = path
         self._failure, container = _open_with_pyav(path)
         stream = next(iter(container.streams.video), None) if container is not None else None
+        if container is not None and stream is None and container.streams.audio:
+            raise VideoError(f"{path} contains only sound; give the file that contains the images")
         if container is None or stream is None or not stream.codec_context:
             raise VideoError(
                 f"{path} is not a video or image that can be decoded; copy it again if it may be incomplete, or "

@@ -239,6 +239,16 @@ def silence(path: Path) -> None:
         sound.writeframes(b"\0\0" * 8000)
 
 
+def sound_track(path: Path) -> None:
+    """Write an .mp4 of sound alone."""
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("aac", rate=8000)
+        sound = av.AudioFrame.from_ndarray(np.zeros((1, 8000), np.float32), format="fltp", layout="mono")
+        sound.rate = 8000
+        for packet in [*stream.encode(sound), *stream.encode()]:
+            container.mux(packet)
+
+
 @pytest.mark.parametrize(
     ("name", "make", "words"),
     [
@@ -247,6 +257,7 @@ def silence(path: Path) -> None:
         ("folder.mp4", lambda p: p.mkdir(), "is a folder"),
         ("text.mp4", lambda p: p.write_text("not a film at all\n" * 50), "not a video or image"),
         ("sound.wav", silence, "not a video or image"),
+        ("sound.mp4", sound_track, "contains only sound; give the file that contains the images"),
         ("noise.mp4", lambda p: p.write_bytes(np.random.default_rng(0).bytes(20000)), "not a video or image"),
         ("half.png", lambda p: p.write_bytes(encode(".png", corner_image())[:40]), "cannot be decoded"),
         ("cut.mp4", lambda p: p.write_bytes(write_video(p, ramp(9)).read_bytes()[:700]), "not a video or image"),
