@@ -130,11 +130,11 @@ def _bt601_rgb(frame: av.VideoFrame) -> NDArray[np.uint8]:
 
 def _is_mirrored(frame: av.VideoFrame) -> bool:
     """Whether a frame's display matrix mirrors it, which PyAV's angle of rotation does not say."""
-    for data in frame.side_data:
-        if data.type.name == "DISPLAYMATRIX":
-            a, b, _, c, d = np.frombuffer(data, np.int32, 5).astype(float)
-            return bool(a * d < b * c)
-    return False
+    matrix = frame.side_data.get("DISPLAYMATRIX")
+    if matrix is None:
+        return False
+    a, b, _, c, d = np.frombuffer(cast(memoryview, matrix), np.int32, 5).astype(float)
+    return bool(a * d < b * c)
 
 
 def presented_duration_s(path: Path) -> float | None:
