@@ -24,6 +24,7 @@ from .errors import InvalidValueError, ShapeError, UnitsWarning
 
 ROTATION_TOLERANCE = 0.01  # of the entries of R Rᵀ - I: rotations rounded to two decimals pass, scaled ones do not
 LARGEST_STEP = 10.0  # metres between two points or joints of one person, one after the other in a list
+_FEWEST_TIMES = 5  # whole numbers that are no coincidence
 _NO_WEIGHTS = np.zeros(0)
 _UNITS = "Scope's unit is the metre; divide millimetres by 1000"
 
@@ -174,6 +175,21 @@ def warn_of_units(points: Array, name: str) -> None:
     if _far_apart(points, LARGEST_STEP):
         warnings.warn(
             f"{name} lie more than {LARGEST_STEP:g} m apart from one to the next, too far for a person; {_UNITS}.",
+            UnitsWarning,
+            stacklevel=3,
+        )
+
+
+def warn_of_frame_numbers(times: Array) -> None:
+    """Warn of times (T,) of a motion's frames that are probably no seconds, with `UnitsWarning`.
+
+    Frame numbers are whole, and so are milliseconds; of frames that are seconds apart, few are captured.
+    """
+    if len(times) >= _FEWEST_TIMES and not (times % 1.0).any():
+        warnings.warn(
+            f"times are whole numbers, {times[0]:g}, {times[1]:g}, {times[2]:g}, …, probably frame numbers or "
+            "milliseconds instead of seconds; divide frame numbers by the frame rate, milliseconds by 1000. For frames "
+            "that are seconds apart, give smaller weights of acceleration than MotionPrior's.",
             UnitsWarning,
             stacklevel=3,
         )

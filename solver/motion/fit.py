@@ -22,7 +22,7 @@ from ..measurements import Measurements
 from ..options import Options, Priors, default_priors
 from ..rotations import nearest_rotation
 from ..state import State, Status
-from ..validation import as_number, check_finite, check_list, check_type, check_weight
+from ..validation import as_number, check_finite, check_list, check_type, check_weight, warn_of_frame_numbers
 from .covariance import joint_covariances
 from .initial import initial_states
 from .levenberg_marquardt import Optimizer
@@ -80,7 +80,8 @@ def fit_motion(
     is filled in.
 
     :param frames: of each frame its measurements, or one `View` for each camera that saw something.
-    :param times: (T,) seconds, increasing; they need not be evenly spaced.
+    :param times: (T,) seconds, increasing; they need not be evenly spaced. Whole numbers are probably those of frames,
+        which `UnitsWarning` says.
     :param init: each frame's state in the world's axes; without it, the frames are first fitted in order, several
         cameras by points triangulated from their 2D keypoints.
     :param priors: `default_priors(body)` unless given.
@@ -109,6 +110,8 @@ def fit_motion(
     for f, frame in enumerate(frames):
         views_of(frame, f"frames[{f}]")
     check_type(motion, MotionPrior, "motion")
+    if motion.weighs_by_default:  # weights of their own are given by those who know how far apart their frames are
+        warn_of_frame_numbers(clock)
     check_type(stands, (StandingPoints, type(None)), "stands")
     check_weight(focal_weight, "focal_weight")
     priors = default_priors(body) if priors is None else priors
