@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import as_array
 from ..compiled.part import Array
-from ..validation import as_indices, check_finite, check_not_negative, check_robust, check_weight
+from ..validation import as_indices, as_number, check_finite, check_not_negative, check_robust, check_weight
 
 
 @dataclass(frozen=True)
@@ -76,8 +76,9 @@ class MotionPrior:
 
 def _each(values: ArrayLike, K: int, name: str) -> Array:
     """Return one number for each joint (K,)."""
-    array = np.asarray(values, dtype=np.float64)
-    return np.full(K, float(array)) if array.ndim == 0 else as_array(array, (K,), name)
+    if isinstance(values, (list, tuple)) or np.ndim(values):
+        return as_array(values, (K,), name)
+    return np.full(K, as_number(values, name))
 
 
 def _inverse(sigma: float) -> float:
