@@ -118,6 +118,13 @@ def _open_with_pyav(path: Path) -> tuple[type[Exception], InputContainer | None]
     return av.error.FFmpegError, container
 
 
+def _film(container: InputContainer) -> av.VideoStream | None:
+    """Return the first stream of images that is not the picture of a cover, as files of music have."""
+    from av.stream import Disposition
+
+    return next((s for s in container.streams.video if not s.disposition & Disposition.attached_pic), None)
+
+
 def _rgb(frame: av.VideoFrame) -> NDArray[np.uint8]:
     return cast(NDArray[np.uint8], frame.to_ndarray(format="rgb24"))
 
@@ -149,7 +156,7 @@ def presented_duration_s(path: Path) -> float | None:
     if container is None:
         return None
     with container:
-        stream = next(iter(container.streams.video), None)
+        stream = _film(container)
         if stream is not None and stream.duration and stream.time_base:
             return float(stream.duration * stream.time_base)
         late = (container.start_time or 0) if "matroska" in container.format.name else 0
@@ -202,7 +209,7 @@ class PyavReader:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._failure, container = _open_with_pyav(path)
-        stream = next(iter(container.streams.video), None) if container is not None else None
+        stream = None if container is None else _film(container)
         if container is not None and stream is None and container.streams.audio:
             raise VideoError(f"{path} contains only sound; give the file that contains the images")
         if container is None or stream is None or not stream.codec_context:

@@ -14,6 +14,7 @@ import av
 import cv2
 import numpy as np
 import pytest
+from av.stream import Disposition
 from scope.scope_addon.capture.media.frame_readers import PyavReader
 from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.media.video_range import VideoRange
@@ -239,14 +240,21 @@ def silence(path: Path) -> None:
         sound.writeframes(b"\0\0" * 8000)
 
 
-def sound_track(path: Path) -> None:
-    """Write an .mp4 of sound alone."""
+def sound_track(path: Path, cover: bool = False) -> None:
+    """Write an .mp4 of sound alone, or with the picture of a cover."""
     with av.open(str(path), "w") as container:
         stream = container.add_stream("aac", rate=8000)
+        picture = container.add_stream("mjpeg", width=W, height=H, pix_fmt="yuvj420p") if cover else None
+        if picture is not None:
+            picture.disposition = Disposition.attached_pic
         sound = av.AudioFrame.from_ndarray(np.zeros((1, 8000), np.float32), format="fltp", layout="mono")
         sound.rate = 8000
         for packet in [*stream.encode(sound), *stream.encode()]:
             container.mux(packet)
+        if picture is not None:
+            frame = av.VideoFrame.from_ndarray(corner_image(), format="rgb24")
+            for packet in [*picture.encode(frame), *picture.encode()]:
+                container.mux(packet)
 
 
 @pytest.mark.parametrize(
@@ -258,6 +266,7 @@ def sound_track(path: Path) -> None:
         ("text.mp4", lambda p: p.write_text("not a film at all\n" * 50), "not a video or image"),
         ("sound.wav", silence, "not a video or image"),
         ("sound.mp4", sound_track, "contains only sound; give the file that contains the images"),
+        ("cover.mp4", lambda p: sound_track(p, cover=True), "contains only sound"),
         ("noise.mp4", lambda p: p.write_bytes(np.random.default_rng(0).bytes(20000)), "not a video or image"),
         ("half.png", lambda p: p.write_bytes(encode(".png", corner_image())[:40]), "cannot be decoded"),
         ("cut.mp4", lambda p: p.write_bytes(write_video(p, ramp(9)).read_bytes()[:700]), "not a video or image"),
