@@ -173,8 +173,10 @@ def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) ->
     try:
         args, unknown = build_parser().parse_known_args(argv)
         if unknown:
-            several = "; use scope batch for several clips" if not unknown[0].startswith("-") else ""
-            raise UsageError(f"unknown arguments: {' '.join(unknown)} (see scope {args.command} --help{several})")
+            advice = "; use scope batch for several clips" if not unknown[0].startswith("-") else ""
+            if file := next((each for each in unknown if each.startswith("-") and Path(each).exists()), ""):
+                advice = f"; write ./{file} for the file of that name"
+            raise UsageError(f"unknown arguments: {' '.join(unknown)} (see scope {args.command} --help{advice})")
         args.program = list(program)
         given = [*program, *(sys.argv[1:] if argv is None else argv)]
         shown = shlex.join([each for each in given if each != STOP_WITH_STDIN])

@@ -7,6 +7,7 @@ described and command lines read without it.
 
 from __future__ import annotations
 
+from types import EllipsisType
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from .errors import ShapeError
 
 Array = NDArray[Any]
+_Shape = tuple[int | EllipsisType | None, ...]
 _FLOAT64 = np.dtype(np.float64)
 
 
@@ -26,15 +28,22 @@ def as_array(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Arra
     :param name: what the array is, as a message begins.
     :raises ShapeError: it has another shape, or is no array of numbers.
     """
-    if type(value) is not np.ndarray or value.dtype is not _FLOAT64:
-        _refuse_unless_numbers(value, "fiub", "numbers", shape, name)
-        if isinstance(value, np.ma.MaskedArray):  # whose masked values numpy's conversion would take for measured ones
-            value = np.where(_masked(value), np.nan, value.data)
-    array = np.ascontiguousarray(value, dtype=np.float64)
+    array = np.ascontiguousarray(_numbers(value, shape, name))
     if array.shape == shape and array.ndim:
         return array
     if len(shape) != np.ndim(value) or any(n is not None and n != m for n, m in zip(shape, array.shape, strict=True)):
         raise ShapeError(f"{name} must have shape {_written(shape)}, but got shape {np.shape(value)}.")
+    return array
+
+
+def as_arrays(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
+    """Return `value` as float64 of shape (..., *shape), whatever its leading dimensions.
+
+    :raises ShapeError: it has another shape, or is no array of numbers.
+    """
+    array = _numbers(value, (..., *shape), name)
+    if array.shape[-len(shape) :] != shape:
+        raise ShapeError(f"{name} must have shape {_written((..., *shape))}, but got shape {array.shape}.")
     return array
 
 
@@ -88,7 +97,16 @@ def _masked(value: np.ma.MaskedArray[Any, Any]) -> Array:
     return mask
 
 
-def _refuse_unless_numbers(value: Any, kinds: str, what: str, shape: tuple[int | None, ...], name: str) -> None:
+def _numbers(value: ArrayLike, shape: _Shape, name: str) -> Array:
+    """Return `value` as float64 of any shape; `shape` is for the message."""
+    if type(value) is not np.ndarray or value.dtype is not _FLOAT64:
+        _refuse_unless_numbers(value, "fiub", "numbers", shape, name)
+        if isinstance(value, np.ma.MaskedArray):  # whose masked values numpy's conversion would take for measured ones
+            value = np.where(_masked(value), np.nan, value.data)
+    return np.asarray(value, dtype=np.float64)
+
+
+def _refuse_unless_numbers(value: Any, kinds: str, what: str, shape: _Shape, name: str) -> None:
     """Raise ShapeError for strings, None, ragged lists and numbers of another kind; an empty list is of any kind."""
     try:
         array = np.asarray(value)
@@ -100,6 +118,7 @@ def _refuse_unless_numbers(value: Any, kinds: str, what: str, shape: tuple[int |
     raise ShapeError(f"{name} must be {what} of shape {_written(shape)}, but got {found}.")
 
 
-def _written(shape: tuple[int | None, ...]) -> str:
-    """Return a shape as numpy writes it, with n for any length."""
-    return f"({', '.join('n' if n is None else str(n) for n in shape)}{',' if len(shape) == 1 else ''})"
+def _written(shape: _Shape) -> str:
+    """Return a shape as numpy writes it, with n for any length and ... for any leading dimensions."""
+    lengths = ["n" if n is None else "..." if n is ... else str(n) for n in shape]
+    return f"({', '.join(lengths)}{',' if len(shape) == 1 else ''})"

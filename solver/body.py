@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import as_array
-from .errors import ModelFileError, ShapeError
+from .arrays import as_array, as_arrays, as_integers, described
+from .errors import InvalidValueError, ModelFileError, ShapeError
 
 Array = NDArray[np.float64]
 
@@ -109,7 +109,10 @@ class Body:
         """Return the keypoints of one set, e.g. ``blazepose``: name without the prefix -> index, in file order.
 
         :raises ModelFileError: the body has no keypoints of that name.
+        :raises InvalidValueError: the name is no text.
         """
+        if not isinstance(prefix, str):
+            raise InvalidValueError(f"prefix must be a name such as 'coco', but is {described(prefix)}.")
         found = {n.split("/", 1)[1]: i for i, n in enumerate(self.keypoint_names) if n.startswith(prefix + "/")}
         if not found:
             sets = sorted({n.split("/", 1)[0] for n in self.keypoint_names})
@@ -150,11 +153,13 @@ class Body:
         :param trans: (..., 3) metres, target frame; the root joint comes to lie at J_0(β) + trans.
         :param betas: (P,); zeros if None.
         :return: R (..., K+1, 3, 3) and t (..., K+1, 3): part to target frame; t are the joints.
-        :raises ShapeError: rotations or betas have another shape.
+        :raises ShapeError: rotations, trans or betas have another shape.
         """
-        rotations = np.asarray(rotations, float)
-        if rotations.shape[-3:] != (self.K + 1, 3, 3):
-            raise ShapeError(f"rotations must have shape (..., {self.K + 1}, 3, 3), but got {rotations.shape}")
+        rotations = as_arrays(rotations, (self.K + 1, 3, 3), "rotations")
+        trans = as_arrays(trans, (3,), "trans")
+        if trans.shape[:-1] and trans.shape[:-1] != rotations.shape[:-3]:
+            wanted = (*rotations.shape[:-3], 3)
+            raise ShapeError(f"trans must have a row for each frame, shape {wanted} or (3,), but got {trans.shape}.")
         J = self.rest_joints(betas)
         R = np.empty_like(rotations)
         t = np.empty(rotations.shape[:-1])
@@ -172,8 +177,9 @@ class Body:
         :param R, t: (K+1, 3, 3), (K+1, 3) part poses from ``forward_kinematics``.
         :param betas: (P,); zeros if None.
         :return: (V, 3) vertices in the frame of R and t.
-        :raises ShapeError: betas have another shape.
+        :raises ShapeError: an array has another shape.
         """
+        R, t = as_array(R, (self.K + 1, 3, 3), "R"), as_array(t, (self.K + 1, 3), "t")
         offset = t - np.einsum("kij,kj->ki", R, self.rest_joints(betas))
         A = np.concatenate([R, offset[..., None]], axis=2).reshape(len(R), 12)
         blended = np.einsum("vs,vsa->va", self.skin_weights, A[self.skin_joints]).reshape(-1, 3, 4)
@@ -187,14 +193,25 @@ class Body:
 
         :param R, t: (..., K+1, 3, 3), (..., K+1, 3) part poses from ``forward_kinematics``.
         :param betas: (P,); zeros if None.
-        :param which: numbers (M',) of the keypoints; all if left out.
+        :param which: numbers (M',) of the keypoints, as ``keypoint_set`` returns them; all if left out.
         :return: (..., M', 3) in the frame of R and t.
-        :raises ShapeError: betas have another shape.
+        :raises ShapeError: an array has another shape, or the body has no keypoint of such a number.
         """
-        local = self.v_bar[which] if betas is None else self.v_bar[which] + self.V[which] @ self._betas(betas)
-        part = self.keypoint_part[which]
+        R, t = as_arrays(R, (self.K + 1, 3, 3), "R"), as_arrays(t, (self.K + 1, 3), "t")
+        if R.shape[:-3] != t.shape[:-2]:
+            raise ShapeError(f"R and t must be of the same frames, but got shapes {R.shape} and {t.shape}.")
+        chosen = which if isinstance(which, slice) else self._checked_numbers(which)
+        local = self.v_bar[chosen] if betas is None else self.v_bar[chosen] + self.V[chosen] @ self._betas(betas)
+        part = self.keypoint_part[chosen]
         p: Array = np.einsum("...mij,mj->...mi", R[..., part, :, :], local) + t[..., part, :]
         return p
+
+    def _checked_numbers(self, which: Sequence[int]) -> NDArray[np.int64]:
+        numbers = as_integers(which, "which, numbers of keypoints as keypoint_set returns them,")
+        if numbers.size and not 0 <= numbers.min() <= numbers.max() < len(self.keypoint_part):
+            last = len(self.keypoint_part) - 1
+            raise ShapeError(f"which must lie in 0..{last}, but goes from {numbers.min()} to {numbers.max()}.")
+        return numbers
 
     def triangles(self) -> NDArray[np.int32]:
         """(F', 3) int32: the faces split along the first diagonal."""

@@ -8,7 +8,7 @@
         └── InvalidValueError       an array or option of the right shape with a value that cannot be used
 
     ScopeWarning                    what is probably a mistake, but can be used (a UserWarning)
-    └── UnitsWarning                lengths that are probably not in metres
+    └── UnitsWarning                lengths that are probably not in metres, or times not in seconds
 
 ``scope_addon/errors.py`` adds what can go wrong with footage, files and the command line.
 Each message says what was wrong, with which file or value, and what to do about it.
@@ -40,4 +40,4 @@ class ScopeWarning(UserWarning):
 
 
 class UnitsWarning(ScopeWarning):
-    """Lengths are probably not in metres."""
+    """Lengths are probably not in metres, or times not in seconds."""

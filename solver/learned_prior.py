@@ -10,12 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from .arrays import as_array
+from .arrays import as_array, as_arrays, described
 from .compiled.part import Array
-from .errors import InvalidValueError, ModelFileError, ShapeError
+from .errors import InvalidValueError, ModelFileError
 from .loaders.npz import read_npz
+from .loaders.regular_file import as_path
 from .residuals import joint_flow
-from .validation import check_weight
+from .validation import check_count, check_list, check_type, check_weight
 
 BUILT_IN = Path(__file__).resolve().parent.parent / "assets" / "prior" / "joint_prior.npz"
 
@@ -31,20 +32,22 @@ class JointPrior:
         """Check the parameters.
 
         :raises ShapeError: they are not (n, SIZE), with one row for each name.
+        :raises InvalidValueError: the names are no list of texts.
         """
-        if np.shape(self.parameters) != (len(self.names), joint_flow.SIZE):
-            raise ShapeError(
-                f"Parameters of the joint prior must have shape ({len(self.names)}, {joint_flow.SIZE}), "
-                f"but got shape {np.shape(self.parameters)}."
-            )
+        check_list(self.names, "Names of the joint prior", "joint")
+        for k, name in enumerate(self.names):
+            check_type(name, str, f"Name {k} of the joint prior")
+        shape = len(self.names), joint_flow.SIZE
+        object.__setattr__(self, "parameters", as_array(self.parameters, shape, "Parameters of the joint prior"))
 
     def of(self, joint: str) -> Array:
         """Return the parameters (SIZE,) of a joint.
 
         :raises InvalidValueError: the prior has no joint of that name.
         """
-        if joint not in self.names:
-            raise InvalidValueError(f"The prior has no joint {joint!r}; it has {', '.join(self.names)}.")
+        if not isinstance(joint, str) or joint not in self.names:
+            what = repr(joint) if isinstance(joint, str) else f"that is {described(joint)}"
+            raise InvalidValueError(f"The prior has no joint {what}; it has {', '.join(self.names)}.")
         row: Array = self.parameters[self.names.index(joint)]
         return row
 
@@ -56,11 +59,15 @@ class JointPrior:
         :param weights: w by joint name, 1 for joints that are missing.
         :param log_det: h, one for the density's maximum, zero for the paper's 1/2 |z|^2.
         :return: (n, INTS) int64 and (n, FLOATS) float64.
-        :raises InvalidValueError: a weight or `log_det` is negative or no number.
+        :raises InvalidValueError: a weight or `log_det` is negative or no number, or there is no list of names.
         """
+        check_list(joint_names, "joint_names", "part")
+        check_type(weights, (Mapping, type(None)), "weights")
         check_weight(log_det, "log_det")
         for name, weight in (weights or {}).items():
             check_weight(weight, f"The weight of {name!r}")
+        for k, joint in enumerate(joint_names):
+            check_type(joint, str, f"joint_names[{k}]")
         rows = [(i, name) for i, name in enumerate(joint_names) if i > 0 and name in self.names]
         w = np.array([1.0 if weights is None else float(weights.get(name, 1.0)) for _, name in rows])
         parameters = np.array([self.of(name) for _, name in rows]).reshape(len(rows), joint_flow.SIZE)
@@ -69,8 +76,11 @@ class JointPrior:
     def sample(self, joint: str, count: int, rng: np.random.Generator) -> Array:
         """Return states (count, 3, 3) of a joint drawn from its prior.
 
-        :raises InvalidValueError: the prior has no joint of that name.
+        :raises InvalidValueError: the prior has no joint of that name, `count` is no whole number of at least 0, or
+            `rng` is no generator of numpy's.
         """
+        check_count(count, "count", 0)
+        check_type(rng, np.random.Generator, "rng")
         return joint_flow.invert(self.of(joint), rng.standard_normal((count, 3)))
 
     def log_density(self, joint: str, Omega: Array) -> Array:
@@ -79,19 +89,24 @@ class JointPrior:
         :raises InvalidValueError: the prior has no joint of that name.
         :raises ShapeError: the states have another shape.
         """
-        Omega = as_array(Omega, (None,) * max(0, np.ndim(Omega) - 2) + (3, 3), "Omega")
+        Omega = as_arrays(Omega, (3, 3), "Omega")
         return joint_flow.log_density(self.of(joint), Omega)
 
 
-@lru_cache(maxsize=4)
 def load_joint_prior(path: str | Path = BUILT_IN) -> JointPrior:
     """Read a prior written by tools/train_prior.
 
     File: joint_names (n,) str, parameters (n, SIZE) f64, layers and hidden ().
 
     :raises ModelFileError: the file is missing, or no prior that the solver can evaluate.
+    :raises InvalidValueError: `path` is no path.
     """
-    arrays = read_npz(Path(path), ModelFileError, "joint prior")
+    return _read(as_path(path, "path, the file of a joint prior,"))
+
+
+@lru_cache(maxsize=4)
+def _read(path: Path) -> JointPrior:
+    arrays = read_npz(path, ModelFileError, "joint prior")
     expected = {"layers": joint_flow.LAYERS, "hidden": joint_flow.HIDDEN}
     for key in ("joint_names", "parameters", *expected):
         if key not in arrays:

@@ -4,7 +4,6 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from numbers import Integral
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,11 +16,14 @@ from .residuals import joint_limits, joint_prior
 from .residuals.registry import COLUMNS, FIRST_EXTERNAL, RESIDUALS, column_of, registered
 from .validation import (
     as_number,
+    check_count,
     check_finite,
     check_information,
+    check_list,
     check_not_negative,
     check_robust,
     check_rotations,
+    check_switch,
     check_type,
     check_weight,
 )
@@ -95,10 +97,7 @@ class Stage:
         check_type(self.weights, Weights, "Stage.weights")
         if not as_number(self.tolerance, "Stage.tolerance") >= 0.0:
             raise InvalidValueError(f"Stage.tolerance must be a number of at least 0, but is {self.tolerance}.")
-        if not isinstance(self.max_iterations, Integral) or self.max_iterations < 0:
-            raise InvalidValueError(
-                f"Stage.max_iterations must be a whole number of at least 0, but is {self.max_iterations!r}."
-            )
+        check_count(self.max_iterations, "Stage.max_iterations", 0)
 
 
 # From far away: directions first, which have no bad minimum nearby, positions in the image and in space joining in.
@@ -165,7 +164,11 @@ class Options:
             check_robust(getattr(self, name), f"Options.{name}")
         if not 0.0 <= as_number(self.triggs, "Options.triggs") <= 1.0:
             raise InvalidValueError(f"Options.triggs must lie in 0..1, but is {self.triggs}.")
+        for name in ("curvature", "report"):
+            check_switch(getattr(self, name), f"Options.{name}")
         check_type(self.stages, (Sequence, type(None)), "Options.stages")
+        for k, stage in enumerate(self.stages or ()):
+            check_type(stage, Stage, f"Options.stages[{k}]")
 
     def schedule(self, cold: bool) -> Sequence[Stage]:
         """Return the stages of a fit, `cold` without an initial state.
@@ -252,13 +255,16 @@ def default_priors(body: object, log_det: float = 0.0) -> Priors:
     """Return what is known of any person: the learned prior of the joints that `body` names as SMPL does, the limits
     of its knees and elbows, and the population's shape. Joints without a learned prior are drawn to the rest pose.
 
-    :param body: `joint_names` (K+1,) are all that is read of it.
+    :param body: `joint_names` (K+1,) are all that is read of it; without any, only the shape is known.
     :param log_det: 0 for the learned prior's 1/2 |z|^2, as in the paper; 1 for its whole -log p
         (residuals/joint_flow.py).
     :raises ModelFileError: the prior cannot be read.
-    :raises InvalidValueError: `log_det` is negative or no number.
+    :raises InvalidValueError: `log_det` is negative or no number, or `joint_names` is no list.
     """
-    names = list(getattr(body, "joint_names", ()))
+    check_weight(log_det, "log_det")
+    names = getattr(body, "joint_names", ())
+    check_list(names, "joint_names of the body", "part")
+    names = list(names)
     limits = joint_limits.hinges_of(names)
     if not names:
         return Priors(limits=limits)

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .arrays import as_arrays
 from .compiled.kernel import kernel
-from .errors import ShapeError
 
 Array = NDArray[Any]
 
@@ -101,19 +101,12 @@ def left_jacobian_inverse3(x: float, y: float, z: float) -> tuple[float, ...]:
     )  # fmt: skip
 
 
-def _array(value: ArrayLike, tail: tuple[int, ...], name: str) -> Array:
-    array = np.asarray(value, dtype=np.float64)
-    if array.shape[-len(tail) :] != tail:
-        raise ShapeError(f"{name} must have shape (..., {', '.join(map(str, tail))}), but got shape {array.shape}.")
-    return array
-
-
 def hat(phi: ArrayLike) -> Array:
     """Return [phi]x, shape (..., 3, 3), with [phi]x p = phi x p.
 
     :raises ShapeError: the vectors have another shape.
     """
-    phi = _array(phi, (3,), "A rotation vector")
+    phi = as_arrays(phi, (3,), "A rotation vector")
     out = np.zeros((*phi.shape, 3))
     out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -phi[..., 2], phi[..., 1], -phi[..., 0]
     return out - np.swapaxes(out, -1, -2)
@@ -135,7 +128,7 @@ def exp(phi: ArrayLike) -> Array:
 
     :raises ShapeError: the vectors have another shape.
     """
-    phi = _array(phi, (3,), "A rotation vector")
+    phi = as_arrays(phi, (3,), "A rotation vector")
     a, b, _ = _coefficients(phi)
     cross = hat(phi)
     return np.eye(3) + a * cross + b * (cross @ cross)
@@ -160,7 +153,7 @@ def left_jacobian(phi: ArrayLike) -> Array:
 
     :raises ShapeError: the vectors have another shape.
     """
-    phi = _array(phi, (3,), "A rotation vector")
+    phi = as_arrays(phi, (3,), "A rotation vector")
     _, b, c = _coefficients(phi)
     cross = hat(phi)
     return np.eye(3) + b * cross + c * (cross @ cross)
@@ -171,7 +164,7 @@ def left_jacobian_inverse(phi: ArrayLike) -> Array:
 
     :raises ShapeError: the vectors have another shape.
     """
-    phi = _array(phi, (3,), "A rotation vector")
+    phi = as_arrays(phi, (3,), "A rotation vector")
     s = np.sum(phi * phi, axis=-1)[..., None, None]
     small = s < 1e-2
     h = 0.5 * np.sqrt(np.where(small, 1.0, s))
@@ -188,7 +181,7 @@ def quaternion_from_matrix(rotation: ArrayLike) -> Array:
 
     :raises ShapeError: the matrices have another shape.
     """
-    r = _array(rotation, (3, 3), "A rotation matrix")
+    r = as_arrays(rotation, (3, 3), "A rotation matrix")
     d = np.diagonal(r, axis1=-2, axis2=-1)
     squares = np.concatenate([1.0 + d.sum(-1, keepdims=True), 1.0 + 2.0 * d - d.sum(-1, keepdims=True)], axis=-1)
     antisymmetric = [r[..., 2, 1] - r[..., 1, 2], r[..., 0, 2] - r[..., 2, 0], r[..., 1, 0] - r[..., 0, 1]]
@@ -210,7 +203,7 @@ def matrix_from_quaternion(quaternion: ArrayLike) -> Array:
 
     :raises ShapeError: the quaternions have another shape.
     """
-    q = _array(quaternion, (4,), "A quaternion")
+    q = as_arrays(quaternion, (4,), "A quaternion")
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
     cross = hat(q[..., 1:])
     R: Array = np.eye(3) + 2.0 * q[..., :1, None] * cross + 2.0 * (cross @ cross)
@@ -247,7 +240,7 @@ def nearest_rotation(matrix: ArrayLike) -> Array:
 
     :raises ShapeError: the matrices have another shape.
     """
-    m = np.array(_array(matrix, (3, 3), "A matrix"), order="C")
+    m = np.array(as_arrays(matrix, (3, 3), "A matrix"), order="C")
     if orthonormalize(m.reshape(-1, 3, 3)):
         return m
     m = np.where(np.isfinite(m).all(axis=(-2, -1), keepdims=True), m, np.eye(3))
@@ -262,7 +255,7 @@ def shortest_turn(a: Array, b: Array) -> Array:
 
     :raises ShapeError: the directions have another shape.
     """
-    a, b = _array(a, (3,), "A direction"), _array(b, (3,), "A direction")
+    a, b = as_arrays(a, (3,), "A direction"), as_arrays(b, (3,), "A direction")
     a = a / np.maximum(np.linalg.norm(a, axis=-1, keepdims=True), 1e-12)
     b = b / np.maximum(np.linalg.norm(b, axis=-1, keepdims=True), 1e-12)
     axis, cosine = np.cross(a, b), (a * b).sum(axis=-1)

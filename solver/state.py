@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The unknowns of one frame, and what a fit gives back."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -9,9 +11,10 @@ import numpy as np
 from .arrays import as_array
 from .compiled.part import Array, Pose
 from .compiled.tree import Tree
+from .errors import InvalidValueError, ShapeError
 from .gauss_newton.linearize import make_pose, place_parts
 from .rotations import nearest_rotation
-from .validation import check_rotations
+from .validation import as_number, check_count, check_list, check_rotations, check_type
 
 
 class Status(Enum):
@@ -35,7 +38,14 @@ class State:
 
     @classmethod
     def rest(cls, K: int, P: int, distance: float = 3.0) -> "State":
-        """Return the rest pose of K joints, beta (P,) zero, upright and facing a camera `distance` metres away."""
+        """Return the rest pose of K joints, beta (P,) zero, upright and facing a camera `distance` metres away.
+
+        :raises InvalidValueError: K or P is no whole number of at least 0, or the distance is not positive.
+        """
+        check_count(K, "K", 0)
+        check_count(P, "P", 0)
+        if not 0.0 < as_number(distance, "distance") < math.inf:
+            raise InvalidValueError(f"distance must be positive and finite, but is {distance}.")
         R_camera_root = np.diag([1.0, -1.0, -1.0])
         return cls(R_camera_root, np.array([0.0, 0.0, distance]), np.tile(np.eye(3), (K, 1, 1)), np.zeros(P))
 
@@ -45,11 +55,12 @@ class State:
         :raises ShapeError: an array does not fit the tree.
         :raises InvalidValueError: R_camera_root, or a matrix of Omega, is no rotation.
         """
+        check_type(tree, Tree, "tree")
         K, P = len(tree.parents) - 1, tree.shape
         R = as_array(self.R_camera_root, (3, 3), "R_camera_root")
         t = as_array(self.t_camera_root, (3,), "t_camera_root")
         Omega = as_array(self.Omega, (K, 3, 3), "Omega")
-        self.check(R, Omega)
+        check_state_rotations(R, Omega)
         pose = make_pose(tree)
         pose.R[0], pose.t[0] = nearest_rotation(R), t
         pose.Omega[1:] = nearest_rotation(Omega)
@@ -57,19 +68,33 @@ class State:
         place_parts(tree, pose)
         return pose
 
-    @staticmethod
-    def check(R_camera_root: Array, Omega: Array) -> None:
-        """Check the rotations of an initial state, (3, 3) and (K, 3, 3).
-
-        :raises InvalidValueError: a matrix is no rotation.
-        """
-        check_rotations(R_camera_root[None], "R_camera_root of the initial state")
-        check_rotations(Omega, "Omega of the initial state")
-
     @classmethod
     def from_pose(cls, tree: Tree, pose: Pose) -> "State":
         """Copy the state out of the kernels' arrays."""
         return cls(pose.R[0].copy(), pose.t[0].copy(), pose.Omega[1:].copy(), pose.beta[: tree.shape].copy())
+
+
+def check_state_rotations(R_camera_root: Array, Omega: Array) -> None:
+    """Check the rotations of an initial state, (3, 3) and (K, 3, 3).
+
+    :raises InvalidValueError: a matrix is no rotation.
+    """
+    check_rotations(R_camera_root[None], "R_camera_root of the initial state")
+    check_rotations(Omega, "Omega of the initial state")
+
+
+def check_states(init: Sequence[State | None], frames: int, kinds: type | tuple[type, ...] = State) -> None:
+    """Check that there is an initial state for each frame.
+
+    :param kinds: what an entry may be.
+    :raises InvalidValueError: they are no list, or an entry is of another kind.
+    :raises ShapeError: there are more or fewer than `frames`.
+    """
+    check_list(init, "init", "frame")
+    if len(init) != frames:
+        raise ShapeError(f"There must be one initial state per frame, {frames}, but got {len(init)}.")
+    for k, state in enumerate(init):
+        check_type(state, kinds, f"init[{k}]")
 
 
 @dataclass

@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .arrays import as_array
-from .measurements import Measurements, PosePriors
+from .arrays import as_array, as_table
+from .measurements import Measurements, PosePriors, pose_prior_arrays
 from .residuals import joint_prior
 from .state import State
-from .validation import check_rotations, check_weight
+from .validation import check_rotations, check_type, check_weight
 
 
 @dataclass(frozen=True)
@@ -39,24 +39,26 @@ def with_previous(measurements: Measurements, previous: State, temporal: Tempora
     """Return the measurements with the pull towards `previous`, in the same camera frame, added to them.
 
     :param previous: the last frame's state: R_camera_root (3, 3), t_camera_root (3,) in metres, Omega (K, 3, 3).
-    :raises ShapeError: Omega has another shape.
-    :raises InvalidValueError: Omega holds a matrix that is no rotation.
+    :raises ShapeError: an array of the state or of the measurements has another shape.
+    :raises InvalidValueError: a matrix of the state is no rotation, or an argument is of another kind.
     """
+    check_type(measurements, Measurements, "measurements")
+    check_type(previous, State, "previous")
+    check_type(temporal, Temporal, "temporal")
+    R = as_array(previous.R_camera_root, (3, 3), "R_camera_root of the previous state")
+    check_rotations(R[None], "R_camera_root of the previous state")
+    t = as_array(previous.t_camera_root, (3,), "t_camera_root of the previous state")
     Omega = as_array(previous.Omega, (None, 3, 3), "Omega of the previous state")
     check_rotations(Omega, "Omega of the previous state")
     K = len(Omega)
     rows = joint_prior.pack(np.arange(1, K + 1), Omega, np.full(K, temporal.joints))
     tables = dict(measurements.tables)
     if "joint_prior" in tables:
-        ints, floats = tables["joint_prior"]
+        ints, floats = as_table(tables["joint_prior"], joint_prior.INTS, joint_prior.FLOATS, "joint_prior")
         rows = np.concatenate([ints, rows[0]]), np.concatenate([floats, rows[1]])
     tables["joint_prior"] = rows
     own = measurements.pose_priors or PosePriors(np.zeros(0, int), np.zeros((0, 3, 3)), np.zeros((0, 3)), [], [])
-    root = PosePriors(
-        np.append(own.parts, 0).astype(int),
-        np.concatenate([own.R_camera_part, np.asarray(previous.R_camera_root)[None]]),
-        np.concatenate([own.t_camera_part, np.asarray(previous.t_camera_root)[None]]),
-        np.append(own.weight_rotation, temporal.root_rotation),
-        np.append(own.weight_translation, temporal.root_position),
-    )
+    weights = np.array([temporal.root_rotation]), np.array([temporal.root_position])
+    pull = (np.zeros(1, np.int64), R[None], t[None], *weights)
+    root = PosePriors(*(np.concatenate(both) for both in zip(pose_prior_arrays(own), pull, strict=True)))
     return replace(measurements, pose_priors=root, tables=tables)

@@ -9,6 +9,7 @@ for so few numbers.
 from __future__ import annotations
 
 import math
+import sys
 import warnings
 from collections.abc import Mapping
 from numbers import Integral
@@ -24,6 +25,7 @@ from .errors import InvalidValueError, ShapeError, UnitsWarning
 
 ROTATION_TOLERANCE = 0.01  # of the entries of R Rᵀ - I: rotations rounded to two decimals pass, scaled ones do not
 LARGEST_STEP = 10.0  # metres between two points or joints of one person, one after the other in a list
+_FEWEST_TIMES = 5  # whole numbers that are no coincidence
 _NO_WEIGHTS = np.zeros(0)
 _UNITS = "Scope's unit is the metre; divide millimetres by 1000"
 
@@ -44,10 +46,12 @@ def as_number(value: Any, name: str) -> float:
 
     :raises InvalidValueError: it is none.
     """
-    if isinstance(value, (str, bytes)) or value is None or np.ndim(value) != 0:
-        raise InvalidValueError(f"{name} must be a number, but is {described(value)}.")
     try:
+        if isinstance(value, (str, bytes)) or value is None or np.ndim(value) != 0:  # of a ragged list: ValueError
+            raise TypeError
         return float(value)
+    except OverflowError:
+        raise InvalidValueError(f"{name} must be a number that fits in 64 bits, but is too large for them.") from None
     except (TypeError, ValueError):
         raise InvalidValueError(f"{name} must be a number, but is {described(value)}.") from None
 
@@ -64,10 +68,21 @@ def check_weight(value: Any, name: str) -> None:
 def check_count(value: Any, name: str, least: int = 1) -> None:
     """Check how many there are of something.
 
-    :raises InvalidValueError: it is no whole number, or less than `least`.
+    :raises InvalidValueError: it is no whole number, less than `least`, or too large for an index.
     """
     if isinstance(value, bool) or not isinstance(value, Integral) or value < least:
         raise InvalidValueError(f"{name} must be a whole number of at least {least}, but is {value!r}.")
+    if int(value) > sys.maxsize:
+        raise InvalidValueError(f"{name} must be a whole number of at most {sys.maxsize}, but is larger.")
+
+
+def check_switch(value: Any, name: str) -> None:
+    """Check whether to do something.
+
+    :raises InvalidValueError: it is neither True nor False.
+    """
+    if not isinstance(value, (bool, np.bool_)):
+        raise InvalidValueError(f"{name} must be True or False, but is {described(value)}.")
 
 
 def check_robust(value: Any, name: str) -> None:
@@ -164,7 +179,7 @@ def check_list(value: Any, name: str, what: str) -> None:
     :param what: what each entry is of, for the message: "frame", "clip".
     :raises InvalidValueError: it is a single entry, or a generator, which can be read only once.
     """
-    is_single = isinstance(value, (str, bytes, Mapping)) or (isinstance(value, np.ndarray) and value.ndim == 0)
+    is_single = isinstance(value, (str, bytes, Mapping, type)) or (isinstance(value, np.ndarray) and value.ndim == 0)
     if is_single or not (hasattr(value, "__len__") and hasattr(value, "__getitem__")):
         raise InvalidValueError(f"{name} must be a list with an entry for each {what}, but is {described(value)}.")
 
@@ -174,6 +189,21 @@ def warn_of_units(points: Array, name: str) -> None:
     if _far_apart(points, LARGEST_STEP):
         warnings.warn(
             f"{name} lie more than {LARGEST_STEP:g} m apart from one to the next, too far for a person; {_UNITS}.",
+            UnitsWarning,
+            stacklevel=3,
+        )
+
+
+def warn_of_frame_numbers(times: Array) -> None:
+    """Warn of times (T,) of a motion's frames that are probably no seconds, with `UnitsWarning`.
+
+    Frame numbers are whole, and so are milliseconds; of frames that are seconds apart, few are captured.
+    """
+    if len(times) >= _FEWEST_TIMES and not (times % 1.0).any():
+        warnings.warn(
+            f"times are whole numbers, {times[0]:g}, {times[1]:g}, {times[2]:g}, …, probably frame numbers or "
+            "milliseconds instead of seconds; divide frame numbers by the frame rate, milliseconds by 1000. For frames "
+            "that are seconds apart, give smaller weights of acceleration than MotionPrior's.",
             UnitsWarning,
             stacklevel=3,
         )

@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -103,6 +104,17 @@ def test_bad_arguments(tmp_path, capsys, argv, status, says):
     assert err.count("\n") == 1
     assert out == ""
     assert files_below(tmp_path) == []
+
+
+def test_a_file_whose_name_begins_with_a_dash_is_given_with_its_folder(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("-walk.mp4").touch()
+    status, _, err = run(capsys, "capture", "-walk.mp4")
+    assert status == 2
+    assert "unknown arguments: -walk.mp4 (see scope capture --help; write ./-walk.mp4 for the file of that name)" in err
+    status, _, err = run(capsys, "capture", "./-walk.mp4", "-o", "out.npz")
+    assert status == 1
+    assert "-walk.mp4 is empty" in err
 
 
 def test_a_picture_without_a_person_ends_with_status_3(tmp_path, capsys):

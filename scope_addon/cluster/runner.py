@@ -94,11 +94,12 @@ class DaskRunner:
                 self._start(self._waiting.popleft(), record.address)
             yield found | self._next_outcome()
 
-    def stop(self) -> None:
-        """See `Runner.stop`; workers end what nobody waits for."""
+    def stop(self) -> dict[str, Entry]:
+        """See `Runner.stop`; workers end what nobody waits for, and what is not published is not finished."""
         attempts, self._attempts = list(self._attempts.values()), {}
         self._cancel([attempt.future for attempt in attempts])
         self._client.close(timeout=5)
+        return {}
 
     def close(self) -> None:
         """Give up all attempts, disconnect, and remove what is not published; after the report is written."""

@@ -21,7 +21,7 @@ from ..errors import NO_PERSON, OutputError, UsageError
 from ..footage import FOOTAGE_SUFFIXES, json_text
 from .clips.find import find_clips
 from .clips.runner import LocalRunner, Runner
-from .clips.task import NO_EXTRAS, CaptureSettings, ClipTask, Entry, Extras
+from .clips.task import FINISHED, NO_EXTRAS, CaptureSettings, ClipTask, Entry, Extras
 from .request import program_version
 
 REPORT_NAME = "scope-batch.json"
@@ -110,7 +110,7 @@ class Batch:
                     self._write_report(_in_order(entries, clips), previous, runner, last=False)
                 progress("clips", len(entries), len(clips))
         except BaseException:
-            runner.stop()
+            entries = runner.stop() | entries
             with suppress(OutputError):
                 if entries:
                     self._write_report(_in_order(entries, clips), previous, runner, last=True)
@@ -126,7 +126,7 @@ class Batch:
 
     def _is_finished(self, entry: Entry) -> bool:
         """Return whether an entry of the previous report is of a finished clip whose files still exist."""
-        if entry.get("status") not in ("done", "skipped", "no_person"):
+        if entry.get("status") not in FINISHED:
             return False
         outputs = entry.get("outputs")
         with suppress(OSError):  # of a name that no file can have

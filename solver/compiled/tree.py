@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import as_array, as_integers
 from ..errors import ShapeError
-from ..validation import as_indices, check_finite, warn_of_units
+from ..validation import as_indices, check_finite, check_switch, warn_of_units
 from .rows import padded
 
 
@@ -56,8 +56,9 @@ def make_tree(body: BodyArrays, focal: bool = False) -> Tree:
     """Check a body's arrays and lay them out for the kernels; `focal` adds a column for an unknown focal length.
 
     :raises ShapeError: an array is missing, does not fit the others, or a parent does not come before its child.
-    :raises InvalidValueError: an array holds NaN or infinity.
+    :raises InvalidValueError: an array holds NaN or infinity, or `focal` is neither True nor False.
     """
+    check_switch(focal, "focal")
     missing = [name for name in _ARRAYS if not hasattr(body, name)]
     if missing:
         raise ShapeError(f"A body needs the arrays {', '.join(_ARRAYS)}, but {type(body).__name__} lacks {missing[0]}.")

@@ -5,16 +5,14 @@ import os
 import threading
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from numbers import Integral
 from typing import TypeVar
 
 from ..compiled.tree import BodyArrays, make_tree
-from ..errors import InvalidValueError, ShapeError
 from ..measurements import Measurements
 from ..options import Options, Priors, default_priors
-from ..state import ClipFit, Fit, State
+from ..state import ClipFit, Fit, State, check_states
 from ..temporal import Temporal
-from ..validation import check_list, check_type
+from ..validation import check_count, check_list, check_type
 from .clip import fit_clip
 from .frame_solver import FrameSolver
 
@@ -45,10 +43,8 @@ def fit_batch(
     check_list(measurements, "measurements", "frame")
     for k, m in enumerate(measurements):
         check_type(m, Measurements, f"measurements[{k}]")
-    for k, state in enumerate(init or ()):
-        check_type(state, (State, type(None)), f"init[{k}]")
-    if init is not None and len(init) != len(measurements):
-        raise ShapeError(f"There must be one initial state per frame, {len(measurements)}, but got {len(init)}.")
+    if init is not None:
+        check_states(init, len(measurements), (State, type(None)))
     starts = [None] * len(measurements) if init is None else list(init)
     tree = make_tree(body)
     priors = default_priors(body) if priors is None else priors
@@ -97,8 +93,7 @@ def fit_clips(
 def _spread(work: Callable[[_T], _R], jobs: Iterable[_T], threads: int) -> list[_R]:
     """Results in the jobs' order. The first job runs alone, so that kernels are compiled once, not by every thread."""
     queue = list(jobs)
-    if not isinstance(threads, Integral) or threads < 0:
-        raise InvalidValueError(f"threads must be a whole number of at least 0, but is {threads!r}.")
+    check_count(threads, "threads", 0)
     threads = min(threads if threads > 0 else os.cpu_count() or 1, max(1, len(queue)))
     if threads == 1:
         return [work(job) for job in queue]

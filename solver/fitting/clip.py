@@ -27,9 +27,9 @@ from ..gauss_newton.terms import Terms, fill_terms, pack_priors, usable
 from ..measurements import Measurements
 from ..options import Options, Priors, default_priors
 from ..residuals.registry import SHAPE_PRIOR
-from ..state import ClipFit, Fit, State, Status
+from ..state import ClipFit, Fit, State, Status, check_states
 from ..temporal import Temporal, with_previous
-from ..validation import check_count, check_list, check_type, check_weight
+from ..validation import check_count, check_list, check_switch, check_type, check_weight
 from .frame_solver import fit_tree
 from .report import Outcome, cost_by_term, make_fit
 
@@ -38,11 +38,17 @@ def carry(priors: Priors, fitted: Fit, shape_weight: float) -> Priors:
     """Return the priors of the next frame: the shape at this frame's estimate, with its information added.
 
     `shape_weight` is `Weights.shape` of the fit, over which the information is kept.
+
+    :raises ShapeError: the shape's information in `priors` does not fit the shape.
+    :raises InvalidValueError: `priors` or `fitted` is something else, or the weight is negative, infinite or no number.
     """
+    check_type(priors, Priors, "priors")
+    check_type(fitted, Fit, "fitted")
+    check_weight(shape_weight, "shape_weight")
     P = len(fitted.state.beta)
-    information = np.eye(P) if priors.shape_information is None else np.asarray(priors.shape_information, dtype=float)
-    if fitted.status in (Status.NO_MEASUREMENTS, Status.NON_FINITE) or shape_weight <= 0.0:
+    if fitted.status in (Status.NO_MEASUREMENTS, Status.NON_FINITE) or shape_weight == 0.0:
         return priors
+    _, information = priors.packed_shape(P)
     total = information + fitted.beta_information / shape_weight
     return replace(priors, shape_mean=fitted.state.beta.copy(), shape_information=0.5 * (total + total.T))
 
@@ -76,14 +82,13 @@ def fit_clip(
     check_list(measurements, "measurements", "frame")
     for k, m in enumerate(measurements):
         check_type(m, Measurements, f"measurements[{k}]")
-    for k, state in enumerate(init or ()):
-        check_type(state, State, f"init[{k}]")
     if len(measurements) == 0:
         raise ShapeError("A clip needs at least one frame of measurements, but got none.")
     check_weight(focal_weight, "focal_weight")
     check_count(shape_frames, "shape_frames")
-    if init is not None and len(init) != len(measurements):
-        raise ShapeError(f"There must be one initial state per frame, {len(measurements)}, but got {len(init)}.")
+    check_switch(focal, "focal")
+    if init is not None:
+        check_states(init, len(measurements))
     priors = default_priors(body) if priors is None else priors
     check_type(priors, Priors, "priors")
     check_type(options, Options, "options")

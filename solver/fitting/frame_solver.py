@@ -20,7 +20,7 @@ from ..measurements import Measurements
 from ..options import Options, Priors, Stage, default_priors
 from ..residuals.registry import SHAPE_PRIOR
 from ..rotations import nearest_rotation, orthonormalize
-from ..state import Fit, State, Status
+from ..state import Fit, State, Status, check_state_rotations
 from ..validation import check_type
 from .initialize import initial_state
 from .report import Outcome, cost_by_term, make_fit
@@ -70,11 +70,14 @@ class FrameSolver:
         """Check the body and allocate the working memory.
 
         :raises ShapeError: when an array does not fit the others.
+        :raises InvalidValueError: `priors` or `options` is something else.
         """
         announce_compilation(optimize)
         self.tree = body if isinstance(body, Tree) else make_tree(body)
         self.priors = default_priors(body) if priors is None else priors
         self.options = options
+        check_type(self.priors, Priors, "priors")
+        check_type(self.options, Options, "options")
         tree = self.tree
         poses, blocks = (make_pose(tree), make_pose(tree)), (make_blocks(tree), make_blocks(tree))
         self._memory = Memory(poses, blocks, make_curvature(tree), make_workspace(tree))
@@ -146,7 +149,7 @@ class FrameSolver:
         R = as_array(state.R_camera_root, (3, 3), "R_camera_root")
         t = as_array(state.t_camera_root, (3,), "t_camera_root")
         Omega = as_array(state.Omega, (K, 3, 3), "Omega")
-        State.check(R, Omega)
+        check_state_rotations(R, Omega)
         if not _enter(R, t, Omega, as_array(state.beta, (P,), "beta"), pose):
             pose.R[0], pose.Omega[1:] = nearest_rotation(R), nearest_rotation(Omega)
 

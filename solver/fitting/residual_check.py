@@ -16,7 +16,7 @@ from ..measurements import Measurements
 from ..options import Options, Priors, Stage, Weights
 from ..rotations import exp, hat
 from ..state import State
-from ..validation import check_count
+from ..validation import check_count, check_type
 
 _STEP = 1e-5  # of the differences, radians and metres
 _UNEXPLAINED = 1e-6  # of the gradient, outside the range of JᵀJ: more is no rounding
@@ -40,6 +40,7 @@ def check_residual(body: BodyArrays, name: str, ints: Any, floats: Any, *, seed:
         finite at that state, where derivatives say nothing; its Jᵀr or JᵀJ is not finite there; or the seed is no
         whole number of at least 0.
     """
+    check_type(name, str, "name")
     check_count(seed, "seed", 0)
     tree = make_tree(body)
     problem = _Problem(tree, name, ints, floats)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from ..errors import ModelFileError
 from .arrays import OPTIONAL, REQUIRED, check_arrays, check_body, check_extent
 from .model_file import is_motion, is_user_model, load_model
 from .npz import read_npz
+from .regular_file import as_path
 
 ASSETS = Path(__file__).resolve().parents[2] / "assets"
 # The built-in bodies whose last shape coefficient leads from adult to child -> those they add it to.
@@ -54,10 +56,11 @@ def load_body(which: str | Path = "scope") -> Body:
     material_names, material_colors, name, license. Shapes as in ``Body``.
 
     :raises ModelFileError: the file is missing, not a body, or contradicts itself.
+    :raises InvalidValueError: `which` is neither a name nor a path.
     """
-    path = BUILT_IN.get(str(which), Path(which))
+    path = BUILT_IN.get(str(which), as_path(which, "which, the name or file of a body,"))
     choice = f"give one of {', '.join(BUILT_IN)}, or a body's .npz or .pkl file"
-    if not path.is_file():
+    if not os.path.isfile(path):  # unlike Path.is_file also of names that are too long for the system
         raise ModelFileError(f"body '{which}' was not found: {choice}")
     if is_user_model(path):
         return load_model(path)

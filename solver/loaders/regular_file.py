@@ -3,10 +3,13 @@
 
 from __future__ import annotations
 
+import os
 import stat
 from pathlib import Path
+from typing import Any
 
-from ..errors import InputError
+from ..arrays import described
+from ..errors import InputError, InvalidValueError
 
 _LONGEST = 200  # characters
 
@@ -14,6 +17,16 @@ _LONGEST = 200  # characters
 def in_one_line(cause: Exception) -> str:
     """Return what another library said, for a message: one line of moderate length."""
     return " ".join(str(cause).split())[:_LONGEST]
+
+
+def as_path(value: Any, name: str) -> Path:
+    """Return the path of a file.
+
+    :raises InvalidValueError: it is neither a text nor a path.
+    """
+    if not isinstance(value, (str, os.PathLike)) or not isinstance(os.fspath(value), str):
+        raise InvalidValueError(f"{name} must be a str or a pathlib.Path, but is {described(value)}.")
+    return Path(value)
 
 
 def check_regular(path: Path, error: type[InputError], what: str, largest_bytes: int) -> None:

@@ -21,8 +21,16 @@ from ..gauss_newton.terms import pack_priors
 from ..measurements import Measurements
 from ..options import Options, Priors, default_priors
 from ..rotations import nearest_rotation
-from ..state import State, Status
-from ..validation import as_number, check_finite, check_list, check_type, check_weight
+from ..state import State, Status, check_state_rotations, check_states
+from ..validation import (
+    as_number,
+    check_finite,
+    check_list,
+    check_switch,
+    check_type,
+    check_weight,
+    warn_of_frame_numbers,
+)
 from .covariance import joint_covariances
 from .initial import initial_states
 from .levenberg_marquardt import Optimizer
@@ -80,7 +88,8 @@ def fit_motion(
     is filled in.
 
     :param frames: of each frame its measurements, or one `View` for each camera that saw something.
-    :param times: (T,) seconds, increasing; they need not be evenly spaced.
+    :param times: (T,) seconds, increasing; they need not be evenly spaced. Whole numbers are probably those of frames,
+        which `UnitsWarning` says.
     :param init: each frame's state in the world's axes; without it, the frames are first fitted in order, several
         cameras by points triangulated from their 2D keypoints.
     :param priors: `default_priors(body)` unless given.
@@ -100,8 +109,8 @@ def fit_motion(
     """
     check_list(frames, "frames", "frame")
     clock = _checked_times(times, len(frames))
-    if init is not None and len(init) != len(frames):
-        raise ShapeError(f"There must be one initial state per frame, {len(frames)}, but got {len(init)}.")
+    if init is not None:
+        check_states(init, len(frames))
     if not as_number(window, "window") > 0.0:
         raise InvalidValueError(f"window must be a positive number of seconds, or infinite for one, but is {window}.")
     if not 0.0 <= as_number(overlap, "overlap") < window:
@@ -109,8 +118,12 @@ def fit_motion(
     for f, frame in enumerate(frames):
         views_of(frame, f"frames[{f}]")
     check_type(motion, MotionPrior, "motion")
+    if motion.weighs_by_default:  # weights of their own are given by those who know how far apart their frames are
+        warn_of_frame_numbers(clock)
     check_type(stands, (StandingPoints, type(None)), "stands")
     check_weight(focal_weight, "focal_weight")
+    check_switch(focal, "focal")
+    check_switch(covariance, "covariance")
     priors = default_priors(body) if priors is None else priors
     check_type(priors, Priors, "priors")
     check_type(options, Options, "options")
@@ -192,7 +205,7 @@ class _Clip:
             self.R[f, 0] = as_array(state.R_camera_root, (3, 3), "R_camera_root")
             self.t[f, 0] = as_array(state.t_camera_root, (3,), "t_camera_root")
             self.Omega[f] = as_array(state.Omega, (K, 3, 3), "Omega")
-            State.check(self.R[f, 0], self.Omega[f])
+            check_state_rotations(self.R[f, 0], self.Omega[f])
         self.R[:, 0], self.Omega = nearest_rotation(self.R[:, 0]), nearest_rotation(self.Omega)
         self.beta, self.log_focal = as_array(init[-1].beta, (P,), "beta").copy(), 0.0
         self.information = np.zeros((P, P))

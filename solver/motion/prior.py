@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import as_array
 from ..compiled.part import Array
-from ..validation import as_indices, check_finite, check_not_negative, check_robust, check_weight
+from ..validation import as_indices, as_number, check_finite, check_not_negative, check_robust, check_weight
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,12 @@ class MotionPrior:
         for name in ("robust_root_rotation", "robust_root_position"):
             check_robust(getattr(self, name), f"MotionPrior.{name}")
 
+    @property
+    def weighs_by_default(self) -> bool:
+        """Whether the weights of the root's acceleration are the default ones, those of 60 frames per second."""
+        default = MotionPrior.root_rotation, MotionPrior.root_position
+        return (self.root_rotation, self.root_position) == default
+
     def packed(self, K: int) -> Array:
         """Return (K+2, 2) weights and 1/sigma: the root's rotation, joints 1..K, the root's position.
 
@@ -70,8 +76,9 @@ class MotionPrior:
 
 def _each(values: ArrayLike, K: int, name: str) -> Array:
     """Return one number for each joint (K,)."""
-    array = np.asarray(values, dtype=np.float64)
-    return np.full(K, float(array)) if array.ndim == 0 else as_array(array, (K,), name)
+    if isinstance(values, (list, tuple)) or np.ndim(values):
+        return as_array(values, (K,), name)
+    return np.full(K, as_number(values, name))
 
 
 def _inverse(sigma: float) -> float:

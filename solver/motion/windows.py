@@ -30,7 +30,11 @@ def overlapping(times: Array, length: float, overlap: float) -> list[Window]:
     last = np.searchsorted(times, starts + length, side="right")
     last[-1] = T
     middle = [0, *((a + b) // 2 for a, b in zip(first[1:], last[:-1], strict=True)), T]
-    return [Window(slice(int(first[k]), int(last[k])), slice(int(middle[k]), int(middle[k + 1]))) for k in range(count)]
+    return [
+        Window(slice(int(first[k]), int(last[k])), slice(int(middle[k]), int(middle[k + 1])))
+        for k in range(count)
+        if middle[k] < middle[k + 1]  # a longer gap between frames leaves windows empty
+    ]
 
 
 def tiles(windows: Sequence[Window]) -> list[Window]:

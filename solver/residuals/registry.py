@@ -17,15 +17,16 @@ those of one point into one term.
 """
 
 from collections.abc import Callable
-from numbers import Integral
 from typing import Any
 
 import numpy as np
 
+from ..arrays import described
 from ..compiled.kernel import inlined_kernel
 from ..compiled.part import Array
 from ..custom_residuals.external import INDEXES, MAX_EXTERNAL, Registered, external_residuals
 from ..errors import InvalidValueError
+from ..validation import check_count
 from . import floor, foot_contact, joint_flow, joint_limits, joint_prior, pose_prior
 from .image import outline
 
@@ -117,7 +118,7 @@ def register_residual(
         R (3, 3), t (3,) of `compiled.part.Part` the pose of part i in the camera frame, metres, Omega (3, 3) the state
         of its joint and beta (P,). Derivatives are central differences: slow, to try an idea.
     :raises InvalidValueError: the name is one of Scope's own, not exactly one of `kernel` and `function` is given, a
-        count is not a whole number of at least 1 (`floats`: 0), `indexes` is unknown or "points" with a `function`, or
+        count is no whole number of at least 1 (`floats`: 0), `indexes` is unknown or "points" with a `function`, or
         too many are registered.
     """
     external = external_residuals()
@@ -127,11 +128,11 @@ def register_residual(
     if (kernel is None) == (function is None) or not callable(kernel or function):
         raise InvalidValueError(f"Residual {name!r} needs exactly one callable, kernel or function.")
     for what, count, least in (("ints", ints, 1), ("floats", floats, 0)):
-        if not isinstance(count, Integral) or count < least:
-            raise InvalidValueError(f"{what} of {name!r} must be a whole number of at least {least}, but is {count!r}.")
+        check_count(count, f"{what} of {name!r}", least)
     allowed = INDEXES if function is None else INDEXES[1:]
-    if indexes not in allowed:
-        raise InvalidValueError(f"indexes of {name!r} must be one of {', '.join(allowed)}, but is {indexes!r}.")
+    if not isinstance(indexes, str) or indexes not in allowed:
+        found = repr(indexes) if isinstance(indexes, str) else described(indexes)
+        raise InvalidValueError(f"indexes of {name!r} must be one of {', '.join(allowed)}, but is {found}.")
     if name not in external and len(external) == MAX_EXTERNAL:
         raise InvalidValueError(f"There is room for {MAX_EXTERNAL} residuals from outside: {', '.join(external)}.")
     slot = external[name].slot if name in external else len(external)

@@ -27,7 +27,7 @@ from .processes import runs, wait_for
 FRAMES = 31  # of the sample clip up to --end 1, both ends included
 
 # Replaces the capture: the clip's text decides the outcome, and every call is logged in the folder of the clips. What
-# "hangs" runs until its standard input ends.
+# "hangs" runs until its standard input ends, what "lingers" also does after it has written its results.
 PROGRAM = """
 import json, sys, pathlib
 clip = pathlib.Path(sys.argv[2])
@@ -47,6 +47,8 @@ if text == "hangs":
 print("Blender says something")
 for path in outputs:
     pathlib.Path(path).write_text("result of " + text)
+if text == "lingers":
+    sys.stdin.read()
 print(json.dumps({"frames": 3, "outputs": outputs, "warnings": warnings}))
 """
 
@@ -220,6 +222,25 @@ def test_an_interrupt_stops_the_running_clips_and_keeps_the_finished(folder, tmp
     (folder / "c.png").write_text("nobody")
     batch(folder, out).run(1)
     assert "a.mp4" not in calls(folder)
+
+
+def test_a_clip_that_ends_while_the_batch_is_stopped_is_finished(folder, tmp_path):
+    """Its results were there without an entry, so that the next run captured it again."""
+    (folder / "b.mov").write_text("lingers")
+    out = tmp_path / "out"
+
+    def interrupt(stage, done, total):
+        if done == 1:
+            wait_for(lambda: (out / "b.glb").is_file())
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        batch(folder, out).run(1, progress=interrupt)
+    report = json.loads((out / REPORT_NAME).read_text("utf-8"))
+    assert {entry["file"]: entry["status"] for entry in report["files"]} == {"a.mp4": "done", "b.mov": "done"}
+    calls(folder)
+    batch(folder, out).run(1)
+    assert calls(folder) == ["c.png", "d.avi", "e.webm"]
 
 
 @pytest.mark.skipif(os.name == "nt", reason="select() on Windows is for sockets only")

@@ -118,6 +118,13 @@ def _open_with_pyav(path: Path) -> tuple[type[Exception], InputContainer | None]
     return av.error.FFmpegError, container
 
 
+def _film(container: InputContainer) -> av.VideoStream | None:
+    """Return the first stream of images that is not the picture of a cover, as files of music have."""
+    from av.stream import Disposition
+
+    return next((s for s in container.streams.video if not s.disposition & Disposition.attached_pic), None)
+
+
 def _rgb(frame: av.VideoFrame) -> NDArray[np.uint8]:
     return cast(NDArray[np.uint8], frame.to_ndarray(format="rgb24"))
 
@@ -126,6 +133,15 @@ def _bt601_rgb(frame: av.VideoFrame) -> NDArray[np.uint8]:
     """Convert a frame by ITU-R BT.601, also where it states another matrix, so that a tag alone changes no result."""
     image = frame.to_ndarray(format="rgb24", src_colorspace="ITU601", dst_colorspace="ITU601")
     return cast(NDArray[np.uint8], image)
+
+
+def _is_mirrored(frame: av.VideoFrame) -> bool:
+    """Whether a frame's display matrix mirrors it, which PyAV's angle of rotation does not say."""
+    matrix = frame.side_data.get("DISPLAYMATRIX")
+    if matrix is None:
+        return False
+    a, b, _, c, d = np.frombuffer(cast(memoryview, matrix), np.int32, 5).astype(float)
+    return bool(a * d < b * c)
 
 
 def presented_duration_s(path: Path) -> float | None:
@@ -140,7 +156,7 @@ def presented_duration_s(path: Path) -> float | None:
     if container is None:
         return None
     with container:
-        stream = next(iter(container.streams.video), None)
+        stream = _film(container)
         if stream is not None and stream.duration and stream.time_base:
             return float(stream.duration * stream.time_base)
         late = (container.start_time or 0) if "matroska" in container.format.name else 0
@@ -193,7 +209,9 @@ class PyavReader:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._failure, container = _open_with_pyav(path)
-        stream = next(iter(container.streams.video), None) if container is not None else None
+        stream = None if container is None else _film(container)
+        if container is not None and stream is None and container.streams.audio:
+            raise VideoError(f"{path} contains only sound; give the file that contains the images")
         if container is None or stream is None or not stream.codec_context:
             raise VideoError(
                 f"{path} is not a video or image that can be decoded; copy it again if it may be incomplete, or "
@@ -237,8 +255,10 @@ class PyavReader:
         frame = next(self._frames, None)
         if frame is None:
             return None
-        image = upright(self._path, _bt601_rgb(frame), self._aspect, -round(frame.rotation))
-        return self._time(frame), image
+        image = _bt601_rgb(frame)
+        if _is_mirrored(frame):  # its matrix is this mirroring, followed by the rotation
+            image = cast(NDArray[np.uint8], cv2.flip(image, 0))
+        return self._time(frame), upright(self._path, image, self._aspect, -round(frame.rotation))
 
     def skip_to(self, seconds: float, fps: Fraction) -> int:
         """See `FrameReader`.

@@ -223,6 +223,22 @@ def _open_moving(path: Path, requested: FootageRange) -> Video:
     return video
 
 
+def _next_time(time: float, given: float, period: float) -> float:
+    """Return the time of a frame, later than that of the frame before.
+
+    :param time: of the frame before.
+    :param given: in the container; some repeat one, and some have none, which is 0 here.
+    :param period: of the frame rate.
+    """
+    if given > time:
+        return given
+    if given <= 0.0:
+        return time + period
+    # A repeated time must not move the frames after it; where the times stand still, they advance by the frame rate.
+    share = next((step for late, step in ((0.25, 0.5), (0.75, 0.25)) if time - given < late * period), 1.0)
+    return time + share * period
+
+
 class _Decoder:
     """Decodes a video in its own thread into a bounded queue, so that decoding and inference overlap."""
 
@@ -275,8 +291,7 @@ class _Decoder:
         resized = False
         first = index = reader.skip_to(video.wanted.start_s, video.source_fps) if video.wanted.start_s > 0 else 0
         while not self._stop.is_set() and (decoded := reader.read()) is not None:
-            # Some containers have no timestamps, others repeat one: time then advances by the frame rate.
-            time = decoded[0] if index == first or decoded[0] > time else time + float(1 / video.source_fps)
+            time = decoded[0] if index == first else _next_time(time, decoded[0], float(1 / video.source_fps))
             image = decoded[1]
             if time > video.wanted.end_s + 1e-6:
                 break

@@ -8,6 +8,7 @@ The mesh is posed in the world from the motion file and transformed into each fr
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
+from fractions import Fraction
 from pathlib import Path
 from typing import Any, cast
 
@@ -34,6 +35,7 @@ from .video_writer import VideoWriter
 VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
 STILL_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
 LONGEST_SIDE = 1920
+_ROUNDED_S = 0.001  # by which containers change times; at high rates, less
 _FACE_COLOR = (255, 255, 255)
 _FAINT = 0.35  # opacity of a filled-in pose, relative to one that was seen
 _TINTS = np.array([[1.0, 0.55, 0.15], [0.2, 0.75, 1.0], [0.55, 0.9, 0.3], [0.95, 0.4, 0.75], [0.95, 0.85, 0.25]])
@@ -53,7 +55,7 @@ def write_overlay(
 ) -> None:
     """Write the footage with every person's body over it.
 
-    The video has the footage's rate and size (at most 1920 pixels along the longer side, both sides even). With the
+    The video has the footage's times and size (at most 1920 pixels along the longer side, both sides even). With the
     suffix of a picture (.png, .jpg, .webp), only the first frame in which a person was seen is written.
 
     :param opacity: of the bodies, 0..1.
@@ -309,14 +311,26 @@ def _write_still(path: Path, painter: _Painter, video: Video, index: int) -> Non
     path.write_bytes(data.tobytes())
 
 
+def _shown_s(time_s: float, fps: Fraction, before_s: float) -> float:
+    """Return a frame's time: that of the frame rate, where the container has only rounded it to milliseconds.
+
+    :param before_s: time of the frame before.
+    """
+    nominal = float(round(time_s * fps) / fps)
+    is_rounded = abs(time_s - nominal) <= min(_ROUNDED_S, 0.25 / float(fps)) and nominal > before_s
+    return nominal if is_rounded else time_s
+
+
 def _write_video(temporary: Path, painter: _Painter, video: Video, path: Path, progress: Progress | None) -> None:
-    writer = None
+    writer, start_s, shown_s = None, 0.0, -1.0
     try:
         for frame in video:
             image = painter.paint(frame)
             if writer is None:
                 writer = VideoWriter(temporary, video.fps, image.shape[1], image.shape[0], path)
-            writer.write(image)
+                start_s = frame.timestamp_s
+            shown_s = _shown_s(frame.timestamp_s - start_s, video.fps, shown_s)
+            writer.write(image, shown_s)
             if progress is not None:
                 progress(frame.index + 1, max(video.frame_count, frame.index + 1))
         if writer is not None:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 # Codec, and its options: visually without loss at a size and speed that suit a preview.
 _CODECS = (("libx264", {"preset": "veryfast", "crf": "20"}), ("mpeg4", {"qscale": "4"}))
 _LARGEST = 65535  # of numerator and denominator of MPEG-4's clock
-_CLOCK = Fraction(1, 60000)  # of images whose times are given, seconds
+_TICKS = 60000  # per second, about as many as MPEG-4's clock can have, for images whose times are given
 
 
 class VideoWriter:
@@ -51,7 +51,10 @@ class VideoWriter:
         except self._failures as error:
             self._name.close()
             raise self._refused() from error
-        self._stream = self._add_stream(_rate(fps), width, height)
+        rate = _rate(fps)
+        self._clock = Fraction(1, rate.numerator * max(1, _TICKS // rate.numerator))  # has every time of the rate
+        self._last = -1
+        self._stream = self._add_stream(rate, width, height)
 
     def _add_stream(self, rate: Fraction, width: int, height: int) -> Any:
         for codec, options in _CODECS:
@@ -67,13 +70,13 @@ class VideoWriter:
         """Append an image.
 
         :param image: (H, W, 3) uint8 RGB.
-        :param time_s: when it is shown, later than the one before; given for every image, or for none.
+        :param time_s: when it is shown, after the one before by at least a tick; given for every image, or for none.
         :raises OutputError: the system refused.
         """
         frame = self._av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="rgb24")
         if time_s is not None:
-            self._stream.codec_context.time_base = frame.time_base = _CLOCK
-            frame.pts = round(time_s / _CLOCK)
+            self._stream.codec_context.time_base = frame.time_base = self._clock
+            self._last = frame.pts = max(self._last + 1, round(time_s / self._clock))
         try:
             self._container.mux(self._stream.encode(frame))
         except self._failures as error:

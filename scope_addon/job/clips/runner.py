@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from .processes import ClipProcesses
-from .task import ClipTask, Entry, capture_clip
+from .task import FINISHED, ClipTask, Entry, capture_clip
 
 _WAIT_S = 1.0  # longest wait for a clip to finish
 
@@ -26,8 +26,11 @@ class Runner(Protocol):
         """
         ...
 
-    def stop(self) -> None:
-        """End what is running, because the batch ends early."""
+    def stop(self) -> dict[str, Entry]:
+        """End what is running, because the batch ends early.
+
+        :return: entries of finished clips by their names, also of those that ended meanwhile and were never yielded.
+        """
         ...
 
     def report(self) -> dict[str, Any]:
@@ -50,23 +53,31 @@ class LocalRunner:
         self._program, self._processes = list(program), ClipProcesses()
         self._threads = None if jobs == 1 else max(1, (os.cpu_count() or 1) // jobs)
         self._pool = ThreadPoolExecutor(jobs)
+        self._names: dict[Future[Entry], str] = {}
 
     def outcomes(self, tasks: Iterable[ClipTask]) -> Iterator[dict[str, Entry]]:
         """See `Runner.outcomes`."""
-        futures: dict[Future[Entry], str] = {self._pool.submit(self._capture, task): task.name for task in tasks}
-        places = {future: place for place, future in enumerate(futures)}
+        for task in tasks:
+            self._names[self._pool.submit(self._capture, task)] = task.name
+        places = {future: place for place, future in enumerate(self._names)}
         yield {}
-        pending = set(futures)
+        pending = set(self._names)
         while pending:
             finished, pending = wait(pending, timeout=_WAIT_S, return_when=FIRST_COMPLETED)
             # In the order of the clips, which the set of those that have ended together does not have.
-            yield {futures[future]: future.result() for future in sorted(finished, key=places.__getitem__)}
+            yield {self._names[future]: future.result() for future in sorted(finished, key=places.__getitem__)}
         self._pool.shutdown()
 
-    def stop(self) -> None:
+    def stop(self) -> dict[str, Entry]:
         """See `Runner.stop`."""
         self._processes.stop()
         self._pool.shutdown(cancel_futures=True)
+        ended = {
+            name: future.result()
+            for future, name in list(self._names.items())
+            if future.done() and not future.cancelled() and future.exception() is None
+        }
+        return {name: entry for name, entry in ended.items() if entry["status"] in FINISHED}
 
     def report(self) -> dict[str, Any]:
         """See `Runner.report`."""

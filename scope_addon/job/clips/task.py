@@ -22,6 +22,7 @@ from .find import OVERLAY
 SHOWN_COMMAND, STOP_WITH_STDIN = "--shown-command", "--stop-with-stdin"  # options that only a batch passes
 WINDOWS, WINDOWS_FOLDER = "--windows", "--windows-folder"  # likewise, only on a cluster
 COUNT = "count"  # value of WINDOWS: capture the clip, or only say into how many windows it can be divided
+FINISHED = ("done", "skipped", "no_person")  # statuses of clips that need not be captured again
 DIVIDED = "divided"  # status of a clip that has several
 REPORT = ".report"  # between a clip's name and the suffix of its page
 

@@ -14,6 +14,7 @@ import av
 import cv2
 import numpy as np
 import pytest
+from av.stream import Disposition
 from scope.scope_addon.capture.media.frame_readers import PyavReader
 from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.media.video_range import VideoRange
@@ -31,6 +32,10 @@ def ramp(count: int) -> list[np.ndarray]:
 CLOCKWISE = (0, 65536, 0, -65536, 0, 0, 0, 0, 1 << 30)
 HALF_TURN = (-65536, 0, 0, 0, -65536, 0, 0, 0, 1 << 30)
 COUNTERCLOCKWISE = (0, -65536, 0, 65536, 0, 0, 0, 0, 1 << 30)
+LEFT_RIGHT = (-65536, 0, 0, 0, 65536, 0, 0, 0, 1 << 30)
+UP_DOWN = (65536, 0, 0, 0, -65536, 0, 0, 0, 1 << 30)
+TRANSPOSED = (0, 65536, 0, 65536, 0, 0, 0, 0, 1 << 30)
+ACROSS = (0, -65536, 0, -65536, 0, 0, 0, 0, 1 << 30)
 
 
 def test_frames_are_in_order_as_rgb_with_their_times(tmp_path):
@@ -68,6 +73,24 @@ def test_the_container_rate_is_exact(tmp_path, rate):
     np.testing.assert_allclose([f.timestamp_s for f in video], [float(i / rate) for i in range(10)], atol=1e-6)
 
 
+@pytest.mark.parametrize("again", [1, 2])
+def test_a_repeated_time_does_not_move_what_follows(tmp_path, again):
+    """Each repeated time moved all later frames on by a frame."""
+    shown_ms = np.sort(np.append(np.arange(0, 400, 40), again * [160]))
+    path = tmp_path / "a.mkv"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("mjpeg", rate=25, width=W, height=H, pix_fmt="yuvj420p")
+        for time_ms, image in zip(shown_ms, ramp(len(shown_ms)), strict=True):
+            for packet in stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")):
+                packet.time_base, packet.pts, packet.dts = Fraction(1, 1000), int(time_ms), int(time_ms)
+                container.mux(packet)
+    with open_video(path) as video:
+        times_ms = np.array([f.timestamp_s for f in video]) * 1000
+    is_repeated = np.diff(shown_ms, prepend=-1) == 0
+    np.testing.assert_allclose(times_ms[~is_repeated], shown_ms[~is_repeated], atol=1e-6)
+    assert (np.diff(times_ms) > 0).all()
+
+
 def test_a_variable_rate_keeps_presentation_times(tmp_path):
     path = write_video(tmp_path / "a.mp4", ramp(9))
     with_time_table(path, 1000, [(3, 40), (3, 100), (3, 20)])
@@ -79,9 +102,17 @@ def test_a_variable_rate_keeps_presentation_times(tmp_path):
 
 @pytest.mark.parametrize(
     ("matrix", "expected", "size"),
-    [(CLOCKWISE, "brwg", (H, W)), (HALF_TURN, "wbgr", (W, H)), (COUNTERCLOCKWISE, "gwrb", (H, W))],
+    [
+        (CLOCKWISE, "brwg", (H, W)),
+        (HALF_TURN, "wbgr", (W, H)),
+        (COUNTERCLOCKWISE, "gwrb", (H, W)),
+        (LEFT_RIGHT, "grwb", (W, H)),
+        (UP_DOWN, "bwrg", (W, H)),
+        (TRANSPOSED, "rbgw", (H, W)),
+        (ACROSS, "wgbr", (H, W)),
+    ],
 )
-def test_rotation_metadata_is_applied(tmp_path, matrix, expected, size):
+def test_rotation_and_mirroring_of_the_metadata_are_applied(tmp_path, matrix, expected, size):
     path = write_video(tmp_path / "a.mp4", [corner_image()] * 2)
     patch_track_header(path, matrix=matrix)
     video = open_video(path)
@@ -209,6 +240,23 @@ def silence(path: Path) -> None:
         sound.writeframes(b"\0\0" * 8000)
 
 
+def sound_track(path: Path, cover: bool = False) -> None:
+    """Write an .mp4 of sound alone, or with the picture of a cover."""
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("aac", rate=8000)
+        picture = container.add_stream("mjpeg", width=W, height=H, pix_fmt="yuvj420p") if cover else None
+        if picture is not None:
+            picture.disposition = Disposition.attached_pic
+        sound = av.AudioFrame.from_ndarray(np.zeros((1, 8000), np.float32), format="fltp", layout="mono")
+        sound.rate = 8000
+        for packet in [*stream.encode(sound), *stream.encode()]:
+            container.mux(packet)
+        if picture is not None:
+            frame = av.VideoFrame.from_ndarray(corner_image(), format="rgb24")
+            for packet in [*picture.encode(frame), *picture.encode()]:
+                container.mux(packet)
+
+
 @pytest.mark.parametrize(
     ("name", "make", "words"),
     [
@@ -217,6 +265,8 @@ def silence(path: Path) -> None:
         ("folder.mp4", lambda p: p.mkdir(), "is a folder"),
         ("text.mp4", lambda p: p.write_text("not a film at all\n" * 50), "not a video or image"),
         ("sound.wav", silence, "not a video or image"),
+        ("sound.mp4", sound_track, "contains only sound; give the file that contains the images"),
+        ("cover.mp4", lambda p: sound_track(p, cover=True), "contains only sound"),
         ("noise.mp4", lambda p: p.write_bytes(np.random.default_rng(0).bytes(20000)), "not a video or image"),
         ("half.png", lambda p: p.write_bytes(encode(".png", corner_image())[:40]), "cannot be decoded"),
         ("cut.mp4", lambda p: p.write_bytes(write_video(p, ramp(9)).read_bytes()[:700]), "not a video or image"),

@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 import os
+from fractions import Fraction
 from pathlib import Path
 
+import av
 import cv2
 import numpy as np
 import pytest
@@ -17,6 +19,7 @@ from scope.scope_addon.capture.overlay.overlay_video import (
     painted_frames,
     write_overlay,
 )
+from scope.scope_addon.capture.overlay.video_writer import VideoWriter
 from scope.scope_addon.errors import CancelledError, OutputError, VideoError
 from scope.scope_addon.kinematics.axes import R_WORLD_MODEL, world_from_level_camera
 from scope.scope_addon.motion import Motion
@@ -24,6 +27,7 @@ from scope.solver.body import Body
 from scope.solver.errors import ShapeError
 
 from ...made_motion import made_face, made_motion
+from ..media.made_video import with_time_table
 
 W, H = 160, 120
 K = np.array([[130.0, 0, 80.0], [0, 130.0, 60.0], [0, 0, 1]])
@@ -154,6 +158,38 @@ def test_confident_keypoints_are_drawn_as_dots(tmp_path, footage, body):
     marks = changed(cv2.imread(str(tmp_path / "a.png")))
     assert marks[30, 20]
     assert not marks[85:95, 15:25].any()
+
+
+def times_of(path: Path) -> list[float]:
+    with av.open(str(path)) as container:
+        stream = container.streams.video[0]
+        assert stream.time_base is not None
+        return [float((frame.pts or 0) * stream.time_base) for frame in container.decode(stream)]
+
+
+@pytest.mark.parametrize("steps", [[(4, 40), (3, 200), (3, 20)], [(9, 1), (1, 500)]])
+def test_the_video_has_the_times_of_footage_with_a_variable_rate(tmp_path, footage, body, steps):
+    """Its frames followed each other at the footage's nominal rate."""
+    with_time_table(footage, 1000, steps)
+    out = tmp_path / "overlay.mp4"
+    write_overlay(out, footage, standing(body, list(range(10))), body)
+    np.testing.assert_allclose(times_of(out), times_of(footage), atol=2e-5)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "rate"), [(".mp4", Fraction(24000, 1001)), (".mkv", Fraction(30)), (".mp4", Fraction(1000))]
+)
+def test_the_video_of_footage_with_a_constant_rate_has_exactly_that(tmp_path, body, suffix, rate):
+    """Also where the container rounds its times to milliseconds, as Matroska does."""
+    footage, out = tmp_path / f"footage{suffix}", tmp_path / "overlay.mp4"
+    writer = VideoWriter(footage, rate, W, H, footage)
+    for _ in range(10):
+        writer.write(np.full((H, W, 3), GREY, np.uint8))
+    writer.close()
+    write_overlay(out, footage, standing(body, list(range(10))), body)
+    with av.open(str(out)) as container:
+        assert container.streams.video[0].average_rate == rate
+    np.testing.assert_allclose(times_of(out), [float(k / rate) for k in range(10)], atol=1e-9)
 
 
 def test_odd_sizes_are_cropped_and_large_ones_are_limited(tmp_path, body):

@@ -31,6 +31,15 @@ def test_a_short_clip_is_one_window() -> None:
     assert window.kept == slice(0, 1)
 
 
+def test_a_gap_longer_than_a_window_leaves_none_empty() -> None:
+    """`fit_motion` failed on a window without frames."""
+    times = np.concatenate([np.arange(90) / 30, 40.0 + np.arange(90) / 30, [70.0, 100.0]])
+    windows = overlapping(times, 8.0, 2.0)
+    kept = np.concatenate([np.arange(len(times))[w.kept] for w in windows])
+    np.testing.assert_array_equal(kept, np.arange(len(times)))
+    assert all(w.frames.start <= w.kept.start < w.kept.stop <= w.frames.stop for w in windows)
+
+
 def test_tiles_are_what_is_kept() -> None:
     windows = overlapping(np.arange(900) / 30, 8.0, 2.0)
     assert [(t.frames, t.kept) for t in tiles(windows)] == [(w.kept, w.kept) for w in windows]
