@@ -10,12 +10,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-FPS = 60  # of the clips
+FRAMES = range(0, 100, 2)  # of the clips, which have 60 per second
 
 
 @cache
 def panels(shared: Path, camera: str) -> tuple[list[np.ndarray], np.ndarray]:
-    """The middle of a clip, 500 pixels high, and the true centre of the trunk in each frame, (100, 2) pixels."""
+    """The middle of `FRAMES` of a clip, 500 pixels high, and the true centre of the trunk in each, (50, 2) pixels."""
     truth = np.load(shared / f"data/pose2sim/truth_{camera}.npz")
     names = [str(n) for n in truth["names"]]
     trunk = [names.index(n) for n in ("LShoulder", "RShoulder", "LHip", "RHip")]
@@ -23,20 +23,27 @@ def panels(shared: Path, camera: str) -> tuple[list[np.ndarray], np.ndarray]:
     at[truth["frame_index"]] = np.nanmean(truth["uv"][:, trunk], axis=1)
     left, top, right, bottom = 60, 330, 860, 1330
     video = cv2.VideoCapture(str(shared / f"data/pose2sim/{camera}.mp4"))
-    images = (video.read()[1][top:bottom, left:right] for _ in range(100))
-    small = (cv2.resize(i, (400, 500), interpolation=cv2.INTER_AREA) for i in images)
-    return [cv2.cvtColor(i, cv2.COLOR_BGR2RGB) for i in small], (at - [left, top]) / 2
+    images = []
+    for t in range(FRAMES.stop):
+        video.grab()
+        if t in FRAMES:
+            image = cv2.resize(video.retrieve()[1][top:bottom, left:right], (400, 500), interpolation=cv2.INTER_AREA)
+            images.append(cv2.cvtColor(image, cv2.COLOR_BGR2RGB))
+    return images, (at[FRAMES] - [left, top]) / 2
 
 
 def composite(shared: Path, cameras: tuple[str, str], crossing: bool) -> Iterator[tuple[np.ndarray, np.ndarray, bool]]:
-    """Frames, true positions (2, 2), and whether the first person is occluded; the second one passes in front."""
+    """Frames, true positions (2, 2), and whether the first person is occluded; the second one passes in front.
+
+    30 per second, as of `visit`.
+    """
     (back, back_at), (front, front_at) = (panels(shared, camera) for camera in cameras)
-    for t in range(100):
+    for k, t in enumerate(FRAMES):
         x = [round(11 * t), round(11 * (99 - t))] if crossing else [0, 700]
         image = np.full((520, 1500, 3), 140, np.uint8)
-        for offset, panel in zip(x, (back[t], front[t]), strict=True):
+        for offset, panel in zip(x, (back[k], front[k]), strict=True):
             image[:500, offset : offset + 400] = panel
-        places = np.stack([back_at[t] + [x[0], 0], front_at[t] + [x[1], 0]])
+        places = np.stack([back_at[k] + [x[0], 0], front_at[k] + [x[1], 0]])
         yield image, places, bool(x[1] < places[0, 0] < x[1] + 400)
 
 
@@ -48,13 +55,13 @@ def visit(shared: Path) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     (stays, stays_at), (visits, visits_at) = (panels(shared, camera) for camera in ("cam3", "cam2"))
     noise = np.random.default_rng(3).integers(60, 200, (26, 60, 3), np.uint8)
     background = cv2.resize(noise, (1200, 520), interpolation=cv2.INTER_CUBIC)
-    for t in range(100):
+    for k, t in enumerate(FRAMES):
         x = round(1200 - 520 * np.sin(np.pi * max(t - 10, 0) / 80)) if t < 90 else 1200
         image = background.copy()
-        image[:500, :400] = stays[t]
+        image[:500, :400] = stays[k]
         width = max(min(400, 1200 - x), 0)
-        image[:500, x : x + width] = visits[t][:, :width]
-        yield image, np.stack([stays_at[t], visits_at[t] + [x, 0]])
+        image[:500, x : x + width] = visits[k][:, :width]
+        yield image, np.stack([stays_at[k], visits_at[k] + [x, 0]])
 
 
 def distant_view(image: np.ndarray) -> np.ndarray:

@@ -16,7 +16,6 @@ from scope.solver.body import Body
 
 from .composites import visit
 
-EVERY = 2  # of the frames, for 30 per second
 EDGE = 1200.0
 
 
@@ -24,11 +23,10 @@ EDGE = 1200.0
 def footage(shared: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, np.ndarray]:
     """A video, and the true positions of the two, (T, 2, 2) pixels."""
     path, places, writer = tmp_path_factory.mktemp("visit") / "visit.avi", [], None
-    for t, (image, at) in enumerate(visit(shared)):
-        if t % EVERY == 0:
-            writer = writer or cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 30, image.shape[1::-1])
-            writer.write(np.ascontiguousarray(image[:, :, ::-1]))
-            places.append(at)
+    for image, at in visit(shared):
+        writer = writer or cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 30, image.shape[1::-1])
+        writer.write(np.ascontiguousarray(image[:, :, ::-1]))
+        places.append(at)
     assert writer is not None
     writer.release()
     return path, np.array(places)

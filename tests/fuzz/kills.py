@@ -144,7 +144,7 @@ def _may_be_empty(path: Path) -> bool:
 
 
 def check_command(command: Command, action: str, calls: Iterable[int] | None = None) -> tuple[int, list[str]]:
-    """Run a command with a fault at each of its calls, and again after each kill that leaves something else.
+    """Run a command with a fault at each of its calls, again after each kill that leaves something else, and at last.
 
     :param calls: only these; negative ones count from the last.
     :return: how many faults there were, and what was not as it should be.
@@ -153,8 +153,9 @@ def check_command(command: Command, action: str, calls: Iterable[int] | None = N
         place = Workplace(Path(folder), command)
         count = place.prepare()
         numbers = itertools.count(1) if calls is None else (n if n > 0 else count + 1 + n for n in calls)
-        done, problems, seen = 0, [], set[object]()
+        done, problems, seen, ran_again = 0, [], set[object](), False
         for n in numbers:
+            ran_again = False
             try:
                 if not place.fault(n, action):
                     break
@@ -164,7 +165,10 @@ def check_command(command: Command, action: str, calls: Iterable[int] | None = N
             if (action == KILL or place.leftovers()) and (command.continues or place.state() not in seen):
                 seen.add(place.state())
                 problems += place.problems_of_next_run(f"after {action} at call {n}")
-        return done, problems + place.problems_of_next_run(f"after all faults of {action}")
+                ran_again = True
+        if not ran_again:
+            problems += place.problems_of_next_run(f"after all faults of {action}")
+        return done, problems
 
 
 def chosen(names: list[str]) -> list[tuple[Command, str]]:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What once broke under attack, F1 to F15 and three more, each as its finder saw it: from outside.
 
-Details are tested beside the modules. Where a finding was a crash, much memory or the shell's, a process of its own is
-started, so that it would fail alone.
+Details are tested beside the modules, and all of F1, damaged machine code and no place for it, in
+``tests/solver/compiled/test_code_cache.py``. Where a finding was a crash, much memory or the shell's, a process of its
+own is started, so that it would fail alone.
 """
 
 from __future__ import annotations
@@ -79,35 +80,6 @@ def python(code: str, folder: Path, *arguments: str, **environment: str) -> subp
 
 def walk(folder: Path) -> None:
     (folder / "walk.npz").write_bytes(TARGETS["motion"].seeds(folder)[0])
-
-
-# F1
-
-THREE = "from .compiled.kernel import kernel\n" + "".join(
-    f"@kernel\ndef add{n}(x): return x + {n}.0\n" for n in range(3)
-)
-RUN_THREE = """
-from package import kernels
-made = [kernels.add0, kernels.add1, kernels.add2]
-print([kernel(1.0) for kernel in made], sum(sum(kernel.stats.cache_hits.values()) for kernel in made))
-"""
-
-
-def test_f1_damaged_code_of_kernels_is_compiled_again(tmp_path: Path) -> None:
-    """An empty, cut or changed file stopped every capture for ever, and so did a cache folder without room."""
-    (make_package(tmp_path) / "kernels.py").write_text(THREE)
-    cache = tmp_path / "cache"
-    assert python(RUN_THREE, tmp_path, NUMBA_CACHE_DIR=str(cache)).stdout == "[1.0, 2.0, 3.0] 0\n"
-    empty, cut, flipped = cache.rglob("*.code")
-    empty.write_bytes(b"")
-    cut.write_bytes(cut.read_bytes()[:500])
-    flipped.write_bytes(bytes([*flipped.read_bytes()[:-1], 0xFF]))
-    for hits in (0, 3):
-        done = python(RUN_THREE, tmp_path, NUMBA_CACHE_DIR=str(cache))
-        assert (done.stdout, done.stderr) == (f"[1.0, 2.0, 3.0] {hits}\n", "")
-    done = python(RUN_THREE, tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "package" / "kernels.py"))  # is no folder
-    assert done.stdout == "[1.0, 2.0, 3.0] 0\n"
-    assert "cannot be kept" in done.stderr
 
 
 # F2, F3, F8, F13: footage

@@ -138,7 +138,8 @@ def vertex_normals(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) 
     for i in range(len(normals)):
         length = np.sqrt(normals[i, 0] ** 2 + normals[i, 1] ** 2 + normals[i, 2] ** 2)
         if length > 0:
-            normals[i] /= length
+            for k in range(3):  # the row at once takes two seconds to compile
+                normals[i, k] /= length
     return normals
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Streams that lose packets on their way: what is shown is what the camera saw, and it goes on with a key frame."""
 
+from functools import cache
 from itertools import chain
 
 import numpy as np
@@ -21,6 +22,7 @@ def patient(monkeypatch):
     monkeypatch.setattr(stream, "STALLED_S", 300.0)
 
 
+@cache
 def walking(count=COUNT):
     """Grainy pictures of a bar that moves, of which an encoder predicts much, but not everything, from those before."""
     random = np.random.default_rng(1)
@@ -32,6 +34,11 @@ def walking(count=COUNT):
     return pictures
 
 
+@cache
+def encoded_once(codec, kind="mpegts"):
+    return encoded(walking(), codec, kind, GROUP)
+
+
 def shown(address, clock=None):
     """The pictures that a stream shows, in the place of those that were left out None."""
     return [None if p is None else p.image_rgb for p in open_source(address).pictures(clock or FakeClock())]
@@ -40,6 +47,25 @@ def shown(address, clock=None):
 def served_pictures(tmp_path, data):
     with served(tmp_path, "a.ts", data) as address:
         return shown(address)
+
+
+@pytest.fixture(scope="module")
+def truth_of(tmp_path_factory):
+    """``truth_of(codec)``: what the stream shows of which nothing is lost, which all tests compare with."""
+    folder = tmp_path_factory.mktemp("intact")
+    return cache(lambda codec, kind="mpegts": served_pictures(folder, encoded_once(codec, kind)))
+
+
+@pytest.fixture(scope="module")
+def truth_of_camera():
+    """``truth_of_camera()``: the same from a network camera."""
+
+    def intact():
+        pictures, media = rtp_of_h264(encoded_once("libx264"))
+        with rtsp_server(list(chain(*pictures)), media) as address:
+            return shown(address)
+
+    return cache(intact)
 
 
 def numbers(pictures, truth):
@@ -66,29 +92,25 @@ ALL, MIDDLE, LAST, FIRST = slice(None), slice(2, 4), slice(-2, None), slice(0, 2
 
 @pytest.mark.parametrize("codec", ["libx264", "libx265", "mpeg4", "mpeg2video"])
 @pytest.mark.parametrize("packets", [ALL, MIDDLE, LAST, FIRST], ids=["all", "middle", "last", "first"])
-def test_after_lost_packets_nothing_is_shown_until_the_next_key_frame(tmp_path, codec, packets):
-    intact = encoded(walking(), codec, group=GROUP)
-    truth = served_pictures(tmp_path, intact)
-    found = served_pictures(tmp_path, cut(intact, LOST, packets))
+def test_after_lost_packets_nothing_is_shown_until_the_next_key_frame(tmp_path, truth_of, codec, packets):
+    truth = truth_of(codec)
+    found = served_pictures(tmp_path, cut(encoded_once(codec), LOST, packets))
     assert numbers(truth, truth) == list(range(COUNT))
     assert numbers(found, truth) in [[k for k in INTACT if k not in range(LOST - early, LOST)] for early in range(3)]
     assert any(picture is None for picture in found)
 
 
-def test_a_lost_picture_is_noticed_by_the_numbers_of_the_others(tmp_path):
+def test_a_lost_picture_is_noticed_by_the_numbers_of_the_others(tmp_path, truth_of):
     """As a camera leaves out pictures that its connection is too slow for: no packet says that one is missing."""
-    intact = encoded(walking(), "libx264", group=GROUP)
-    truth = served_pictures(tmp_path, intact)
-    found = served_pictures(tmp_path, without(intact, [LOST]))
-    assert numbers(found, truth) == INTACT
+    found = served_pictures(tmp_path, without(encoded_once("libx264"), [LOST]))
+    assert numbers(found, truth_of("libx264")) == INTACT
     assert sum(picture is None for picture in found) == 2 * GROUP - LOST - 1
 
 
 @pytest.mark.parametrize("packets", [ALL, slice(1, 2), FIRST, LAST], ids=["all", "second", "first", "last"])
-def test_a_network_camera_that_loses_packets(packets):
-    pictures, media = rtp_of_h264(encoded(walking(), "libx264", group=GROUP))
-    with rtsp_server(list(chain(*pictures)), media) as address:
-        truth = shown(address)
+def test_a_network_camera_that_loses_packets(truth_of_camera, packets):
+    truth = truth_of_camera()
+    pictures, media = rtp_of_h264(encoded_once("libx264"))
     assert len(pictures[LOST]) >= 4
     pictures[LOST] = [packet for packet in pictures[LOST] if packet not in pictures[LOST][packets]]
     with rtsp_server(list(chain(*pictures)), media) as address:
@@ -97,27 +119,22 @@ def test_a_network_camera_that_loses_packets(packets):
     assert numbers(found, truth) == [k for k in INTACT if k < last]
 
 
-def test_a_lost_key_frame_costs_its_group(tmp_path):
-    intact = encoded(walking(), "libx264", group=GROUP)
-    truth = served_pictures(tmp_path, intact)
-    found = numbers(served_pictures(tmp_path, cut(intact, GROUP, ALL)), truth)
+def test_a_lost_key_frame_costs_its_group(tmp_path, truth_of):
+    data = cut(encoded_once("libx264"), GROUP, ALL)
+    found = numbers(served_pictures(tmp_path, data), truth_of("libx264"))
     assert found == [*range(GROUP), *range(2 * GROUP, COUNT)]
 
 
-def test_lost_data_just_before_a_key_frame_costs_nothing_after_it(tmp_path):
-    intact = encoded(walking(), "libx264", group=GROUP)
-    truth = served_pictures(tmp_path, intact)
-    found = served_pictures(tmp_path, cut(intact, GROUP - 1, ALL))
-    assert numbers(found, truth) == [k for k in range(COUNT) if k != GROUP - 1]
+def test_lost_data_just_before_a_key_frame_costs_nothing_after_it(tmp_path, truth_of):
+    found = served_pictures(tmp_path, cut(encoded_once("libx264"), GROUP - 1, ALL))
+    assert numbers(found, truth_of("libx264")) == [k for k in range(COUNT) if k != GROUP - 1]
     assert all(picture is not None for picture in found)
 
 
-def test_pictures_of_their_own_are_left_out_alone(tmp_path):
+def test_pictures_of_their_own_are_left_out_alone(tmp_path, truth_of):
     """MJPEG: no picture builds on another one."""
-    intact = encoded(walking(), "mjpeg", "nut")
-    truth = served_pictures(tmp_path, intact)
-    found = served_pictures(tmp_path, without(intact, [LOST], "nut"))
-    assert numbers(found, truth) == [k for k in range(COUNT) if k != LOST]
+    found = served_pictures(tmp_path, without(encoded_once("mjpeg", "nut"), [LOST], "nut"))
+    assert numbers(found, truth_of("mjpeg", "nut")) == [k for k in range(COUNT) if k != LOST]
     assert all(picture is not None for picture in found)
 
 
@@ -126,7 +143,7 @@ def test_a_stream_without_another_key_frame_is_shown_again_after_a_while(tmp_pat
     clock = FakeClock()
     times = iter(np.arange(100.0, 200.0, 0.05))
     clock.now = lambda: next(times)
-    intact = encoded(walking(200), "libx264", group=400)
+    intact = encoded(walking(120), "libx264", group=400)
     with served(tmp_path, "a.ts", without(intact, [LOST])) as address:
         found = shown(address, clock)
     again = next(k for k in range(LOST, len(found)) if found[k] is not None)

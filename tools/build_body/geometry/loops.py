@@ -22,6 +22,7 @@ class QuadLoops:
             for v in quad:
                 self.faces_at[v].append(f)
         self.face_sets = [frozenset(quad) for quad in self.quads]
+        self._ending: set[tuple[int, int]] = set()  # directed edges that lead to a pole or a border
 
     def neighbours(self, v: int) -> list[int]:
         """Return the vertices that share an edge with ``v``, in ascending order."""
@@ -37,17 +38,22 @@ class QuadLoops:
         loop = [start, second]
         while len(loop) <= MAX_LENGTH:
             previous, here = loop[-2:]
-            around = self.faces_at[here]
-            if len(around) != 4:
-                return None
-            beside = set().union(*(self.face_sets[f] for f in around if previous in self.face_sets[f]))
-            ahead = [v for v in self.neighbours(here) if v not in beside]
+            ahead = [] if (previous, here) in self._ending else self._ahead(previous, here)
             if len(ahead) != 1:
+                self._ending.update(zip(loop, loop[1:], strict=False))
                 return None
             if ahead[0] == start:
                 return loop
             loop.append(ahead[0])
         return None
+
+    def _ahead(self, previous: int, here: int) -> list[int]:
+        """Return the end of the edge opposite to the one from ``previous`` to ``here``, if there is just one."""
+        around = self.faces_at[here]
+        if len(around) != 4:
+            return []
+        beside = set().union(*(self.face_sets[f] for f in around if previous in self.face_sets[f]))
+        return [v for v in self.neighbours(here) if v not in beside]
 
     def nearest(
         self, vertices: NDArray[np.float64], point: NDArray[np.float64], normal: NDArray[np.float64], radius: float
