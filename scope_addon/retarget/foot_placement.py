@@ -133,17 +133,20 @@ def place_feet(
     joints: NDArray[np.float64],
     times: NDArray[np.float64],
     one_floor: bool = True,
+    travel: float | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Move the rig's ankles, and with them heels and balls, to where the body's are.
 
     :param joints: (T, K+1, 3) of the body, metres, world frame.
     :param times: (T,) seconds.
     :param one_floor: keep feet and toes above the floor; False on uneven ground.
+    :param travel: scale of positions on the floor; None: that of the legs.
     :return: the changed rotations (T, B, 3, 3) and heads (T, B, 3).
     """
     world, heads = motion.rotations.copy(), motion.heads.copy()
     turns = motion.turns[:, legs.ankles]
-    goals = ankle_goal(legs.body, legs.rig, legs.scale, turns, joints[:, legs.joints], one_floor=one_floor)
+    places = joints[:, legs.joints]
+    goals = ankle_goal(legs.body, legs.rig, legs.scale, turns, places, one_floor=one_floor, travel=travel)
     if legs.toed and one_floor:
         balls = (goals + rotated(turns, legs.rig.ball))[:, legs.toed]
         rested = (legs.rig.height + legs.rig.ball[:, 2])[legs.toed]
