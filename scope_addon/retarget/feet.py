@@ -46,33 +46,31 @@ class FootRest:
 def ankle_goal(
     source: FootRest,
     rig: FootRest,
-    scale: float,
+    scales: NDArray[np.float64],
     turn: NDArray[np.float64],
     ankle: NDArray[np.float64],
     floor: float = 0.0,
     one_floor: bool = True,
-    travel: float | None = None,
 ) -> NDArray[np.float64]:
     """Compute the goals of the rig's ankles, for any number of frames and feet at once.
 
     :param source: the body's feet.
     :param rig: the rig's feet.
-    :param scale: the rig's leg length divided by the body's.
+    :param scales: (3,), t, t and s.
     :param turn: (..., 3, 3) D, the rotation of both feet from rest.
     :param ankle: (..., 3) the body's, metres.
     :param floor: height of the body's floor, metres.
     :param one_floor: keep the feet above the floor; False on uneven ground.
-    :param travel: scale of positions on the floor; None: ``scale``.
     :return: (..., 3) metres.
     """
-    yaw, travel = _heading(turn), scale if travel is None else travel
+    yaw = _heading(turn)
     goals, heights, rolled = [], [], []
     for s, q in ((source.heel, rig.heel), (source.ball, rig.ball)):
         point, rig_point = ankle + rotated(turn, s), rotated(turn, q)
         above = point[..., 2] - floor - (source.height + s[..., 2])  # height above its rest position on the floor
-        place = travel * point
-        place[..., 2] = scale * above + rig.height + q[..., 2]
-        goals.append(place + rotated(yaw, (q - travel * s) * _LEVEL) - rig_point)
+        place = scales * point
+        place[..., 2] = scales[2] * above + rig.height + q[..., 2]
+        goals.append(place + rotated(yaw, (q - scales * s) * _LEVEL) - rig_point)
         heights.append(above)
         rolled.append(rig_point[..., 2] - (rig.height + q[..., 2]))
     share = 1.0 / (1.0 + np.exp(np.clip((heights[1] - heights[0]) / _SOFT_M, -50, 50)))  # 1: the ball is in contact

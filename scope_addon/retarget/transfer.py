@@ -38,17 +38,14 @@ def transfer(
     *,
     feet: bool = True,
     one_floor: bool = True,
-    travel: float | None = None,
 ) -> Pose:
     """Compute the rig's motion.
 
     :param betas: (P,) shape coefficients of the body.
-    :param feet: place the feet where the body's are, scaled; bends the legs a little.
+    :param feet: place the feet where the body's are, scaled by the ratio of leg lengths; bends the legs a little.
     :param one_floor: with ``feet``, keep the feet above the floor; False on uneven ground.
-    :param travel: scale of positions on the floor; None: the ratio of leg lengths, by which heights are scaled too.
-        Rigs that share it keep the distances between the people in proportion.
     """
-    return Transfer(body, betas, rig, bone_map, feet=feet, one_floor=one_floor, travel=travel).pose(clip)
+    return Transfer(body, betas, rig, bone_map, feet=feet, one_floor=one_floor).pose(clip)
 
 
 def leg_ratio(body: Body, betas: NDArray[np.floating[Any]], rig: Skeleton, bone_map: BoneMap) -> float:
@@ -75,7 +72,9 @@ class Transfer:
         """Compare both at rest.
 
         :param betas: (P,) shape coefficients of the body.
-        :param feet, one_floor, travel: as in ``transfer``.
+        :param feet, one_floor: as in ``transfer``.
+        :param travel: scale of positions on the floor; None: the ratio of leg lengths, by which heights are scaled in
+            any case. Rigs that share it keep the distances between the people in proportion.
         """
         self._body, self._betas, self._rig, self._one_floor = body, betas, rig, one_floor
         index = {part: k for k, part in enumerate(body.joint_names)}
@@ -96,7 +95,7 @@ class Transfer:
         vertices = body.rest_vertices(betas) @ R_WORLD_MODEL.T
         rested = rest[self._source_hips, 2].mean() - vertices[:, 2].min()
         self._lift[2] = (rig.heads[self._hips, 2].mean() - rig.floor) - legs * rested
-        self._legs = legs_at_rest(rig, row, self._alignment, body, (vertices, rest), legs) if feet else None
+        self._legs = legs_at_rest(rig, row, self._alignment, body, (vertices, rest), self._scales) if feet else None
 
     def pose(self, clip: Clip) -> Pose:
         """Compute the rig's motion."""
@@ -109,8 +108,7 @@ class Transfer:
         heads += (self._scales * source_hips + self._lift - heads[:, self._hips].mean(axis=1))[:, None]
         if self._legs is not None:
             motion = RigMotion(turns, self._alignment, world, heads)
-            travel = float(self._scales[0])
-            world, heads = place_feet(rig, self._legs, motion, joints, clip.times, self._one_floor, travel)
+            world, heads = place_feet(rig, self._legs, motion, joints, clip.times, self._one_floor)
         return Pose(world, heads, self._facing)
 
     def _turns(self, D: NDArray[np.float64]) -> NDArray[np.float64]:

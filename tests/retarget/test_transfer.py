@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scope.scope_addon.edit.clip import Clip
-from scope.scope_addon.retarget.transfer import transfer
+from scope.scope_addon.retarget.transfer import Transfer, transfer
 from scope.solver.rotations import exp
 
 from ..edit.walking import BETAS, BODY, NAMES, walk
@@ -34,7 +34,7 @@ def test_a_rig_of_another_size_takes_steps_of_its_own_size() -> None:
 @pytest.mark.parametrize("feet", [False, True])
 def test_travel_scales_positions_on_the_floor_and_legs_scale_heights(feet: bool) -> None:
     rig = body_rig(scale=1.2)
-    pose = transfer(CLIP, BODY, BETAS, rig, same_names(), feet=feet, travel=1.1)
+    pose = Transfer(BODY, BETAS, rig, same_names(), feet=feet, travel=1.1).pose(CLIP)
     hips = [MAPPED.index(f"{side}_hip") for side in ("left", "right")]
     ours, theirs = pose.heads[:, hips].mean(axis=1), JOINTS[:, hips].mean(axis=1)
     np.testing.assert_allclose(ours, theirs * [1.1, 1.1, 1.2], atol=5e-3)

@@ -21,7 +21,7 @@ from ...retarget.expression_map import ExpressionMap
 from ...retarget.guess import RestBones, guess
 from ...retarget.rig_source import ROOTS
 from ...retarget.skeleton import Pose, Skeleton, basis
-from ...retarget.transfer import leg_ratio, transfer
+from ...retarget.transfer import Transfer, leg_ratio
 from ..animation_data.transaction import all_or_nothing
 from ..character.keys import read_clip
 from ..character.root_object import (
@@ -127,9 +127,9 @@ def retarget(
             root = skeleton.names.index(bone_map.bone("pelvis") or "")
             one_floor = not source.get("scope_uneven_ground", False)
             travel = options.travel or leg_ratio(body, betas, skeleton, bone_map)
-            pose = transfer(
-                clip, body, betas, skeleton, bone_map, feet=options.feet, one_floor=one_floor, travel=travel
-            )
+            pose = Transfer(
+                body, betas, skeleton, bone_map, feet=options.feet, one_floor=one_floor, travel=travel
+            ).pose(clip)
             motion = _placed(source, clip, skeleton, place, pose, root, options)
             turns = basis(skeleton, motion.rotations)
             warnings = blocked_bones(rig, skeleton.names, turns, motion.rotations)

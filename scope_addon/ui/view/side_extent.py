@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How much the view from the side must show for nobody to be cut off.
 
-It follows the pelvis of one person, so the others must stay within the view on either side of it, over the whole motion.
+It follows the pelvis of one person, so the others must stay within the view on either side of it, in every frame.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _HALF_WIDTH_M = 0.5  # to the left and right of it
 def side_extent(
     followed: bpy.types.Object, people: Sequence[bpy.types.Object], R_world_view: NDArray[np.float64]
 ) -> tuple[float, float]:
-    """Return the width and height that a view along -z must show, metres, with the pelvis of ``followed`` in the middle.
+    """Return the width and height, metres, that a view along -z must show around the pelvis of ``followed``.
 
     :param people: captured armatures; one whose keys are missing is left out.
     :param R_world_view: (3, 3), view axes to world.
@@ -31,10 +31,11 @@ def side_extent(
 
     rate, far = scene_rate(bpy.context.scene), np.zeros(2)
     path = _pelvis_path(followed, rate)
-    for other in people if path is not None else ():
-        if other != followed and (their := _pelvis_path(other, rate)) is not None:
-            away = np.stack([np.interp(path[:, 0], their[:, 0], their[:, k]) for k in (1, 2, 3)], axis=1) - path[:, 1:]
-            far = np.maximum(far, np.abs(away @ R_world_view[:, :2]).max(axis=0))
+    paths = [_pelvis_path(person, rate) for person in people if person != followed]
+    if path is not None:
+        for their in (other for other in paths if other is not None):
+            place = np.stack([np.interp(path[:, 0], their[:, 0], their[:, k]) for k in (1, 2, 3)], axis=1)
+            far = np.maximum(far, np.abs((place - path[:, 1:]) @ R_world_view[:, :2]).max(axis=0))
     return 2.0 * (float(far[0]) + _HALF_WIDTH_M), 2.0 * (float(far[1]) + _HALF_HEIGHT_M)
 
 
