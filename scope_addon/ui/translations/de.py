@@ -402,6 +402,7 @@ TEXTS = (
         "The scene has {scene:.5g} frames/s and the footage {footage:.5g}: the strip will not stay synchronized with the motion": "Die Szene hat {scene:.5g} Bilder/s und das Filmmaterial {footage:.5g}: der Streifen bleibt nicht synchron zur Bewegung",
         "The scene's frame rate was changed from {was:.5g} to {now:.5g}, which changed the motion's speed; importing an FBX file does that": "Die Bildrate der Szene wurde von {was:.5g} auf {now:.5g} geändert, was das Tempo der Bewegung verändert hat; der Import einer FBX-Datei bewirkt das",
         "This Blender was built without USD; use a build from blender.org, or another format": "Dieses Blender wurde ohne USD gebaut; eines von blender.org oder ein anderes Format benutzen",
+        "This motion was captured on uneven ground, where feet rest at any height: use Floor Here": "Diese Bewegung wurde auf unebenem Boden erfasst, wo Füße in jeder Höhe ruhen: Hier ist der Boden verwenden",
         "Threads": "Threads",
         "Toggle the view of the body over the footage. Sets the scene's camera and resolution": "Ansicht des Körpers über dem Filmmaterial ein- oder ausschalten. Setzt Kamera und Auflösung der Szene",
         "Transfer the captured expressions to the mesh's shape keys or the rig's face, as a new action": "Die erfassten Ausdrücke als neue Aktion auf die Formschlüssel des Mesh oder das Gesicht des Rigs übertragen",

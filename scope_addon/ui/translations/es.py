@@ -402,6 +402,7 @@ TEXTS = (
         "The scene has {scene:.5g} frames/s and the footage {footage:.5g}: the strip will not stay synchronized with the motion": "La escena tiene {scene:.5g} fotogramas/s y la filmación {footage:.5g}: el clip no seguirá sincronizado con el movimiento",
         "The scene's frame rate was changed from {was:.5g} to {now:.5g}, which changed the motion's speed; importing an FBX file does that": "La velocidad de fotogramas de la escena cambió de {was:.5g} a {now:.5g}, lo que cambió el ritmo del movimiento; importar un archivo FBX tiene ese efecto",
         "This Blender was built without USD; use a build from blender.org, or another format": "Este Blender se compiló sin USD; use uno de blender.org u otro formato",
+        "This motion was captured on uneven ground, where feet rest at any height: use Floor Here": "Este movimiento se capturó en un suelo irregular, donde los pies se apoyan a cualquier altura: use El suelo está aquí",
         "Threads": "Hilos",
         "Toggle the view of the body over the footage. Sets the scene's camera and resolution": "Alternar la vista del cuerpo sobre la filmación. Define la cámara y la resolución de la escena",
         "Transfer the captured expressions to the mesh's shape keys or the rig's face, as a new action": "Transferir las expresiones capturadas a las formas clave de la malla o a la cara del rig, como una acción nueva",

@@ -402,6 +402,7 @@ TEXTS = (
         "The scene has {scene:.5g} frames/s and the footage {footage:.5g}: the strip will not stay synchronized with the motion": "La scène a {scene:.5g} images/s et le métrage {footage:.5g} : la bande ne restera pas synchronisée avec le mouvement",
         "The scene's frame rate was changed from {was:.5g} to {now:.5g}, which changed the motion's speed; importing an FBX file does that": "La fréquence d’images de la scène est passée de {was:.5g} à {now:.5g}, ce qui a changé la vitesse du mouvement ; l’import d’un fichier FBX a cet effet",
         "This Blender was built without USD; use a build from blender.org, or another format": "Ce Blender est compilé sans USD ; utilisez une version de blender.org ou un autre format",
+        "This motion was captured on uneven ground, where feet rest at any height: use Floor Here": "Ce mouvement a été capturé sur un sol irrégulier, où les pieds reposent à toute hauteur : utilisez Le sol est ici",
         "Threads": "Threads",
         "Toggle the view of the body over the footage. Sets the scene's camera and resolution": "Afficher ou non le corps sur le métrage. Définit la caméra et la résolution de la scène",
         "Transfer the captured expressions to the mesh's shape keys or the rig's face, as a new action": "Transférer les expressions capturées aux clés de forme du maillage ou au visage du rig, dans une nouvelle action",

@@ -402,6 +402,7 @@ TEXTS = (
         "The scene has {scene:.5g} frames/s and the footage {footage:.5g}: the strip will not stay synchronized with the motion": "シーンは {scene:.5g} フレーム/秒、フッテージは {footage:.5g} です。ストリップはモーションと同期しません",
         "The scene's frame rate was changed from {was:.5g} to {now:.5g}, which changed the motion's speed; importing an FBX file does that": "シーンのフレームレートが {was:.5g} から {now:.5g} に変わり、モーションの速さが変わりました。FBX ファイルのインポートで起こります",
         "This Blender was built without USD; use a build from blender.org, or another format": "この Blender は USD なしでビルドされています。blender.org のビルドか、他の形式を使ってください",
+        "This motion was captured on uneven ground, where feet rest at any height: use Floor Here": "このモーションは平らでない地面でキャプチャされ、足はどの高さにも接地します。「ここが床」を使ってください",
         "Threads": "スレッド",
         "Toggle the view of the body over the footage. Sets the scene's camera and resolution": "フッテージに重ねたボディの表示を切り替えます。シーンのカメラと解像度を設定します",
         "Transfer the captured expressions to the mesh's shape keys or the rig's face, as a new action": "キャプチャした表情をメッシュのシェイプキーまたはリグの顔に新しいアクションとして転送",

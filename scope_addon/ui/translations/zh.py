@@ -402,6 +402,7 @@ TEXTS = (
         "The scene has {scene:.5g} frames/s and the footage {footage:.5g}: the strip will not stay synchronized with the motion": "场景为 {scene:.5g} 帧/秒，素材为 {footage:.5g}：片段将无法与动作保持同步",
         "The scene's frame rate was changed from {was:.5g} to {now:.5g}, which changed the motion's speed; importing an FBX file does that": "场景帧率已从 {was:.5g} 变为 {now:.5g}，动作速度也随之改变；导入 FBX 文件会导致这种情况",
         "This Blender was built without USD; use a build from blender.org, or another format": "此 Blender 构建不含 USD；请使用 blender.org 的版本或其他格式",
+        "This motion was captured on uneven ground, where feet rest at any height: use Floor Here": "此动作捕捉于不平地面，双脚可停在任何高度：请使用“地面在此”",
         "Threads": "线程",
         "Toggle the view of the body over the footage. Sets the scene's camera and resolution": "切换身体叠加在素材上的视图。会设置场景的摄像机和分辨率",
         "Transfer the captured expressions to the mesh's shape keys or the rig's face, as a new action": "将捕捉的表情作为新动作传递到网格的形态键或骨架的面部",
