@@ -33,8 +33,8 @@ BODIES = (
 )
 HANDS = (  # the numbers of off and on are those that .blend files stored when hands were a checkbox
     Choice(OFF, "Off", "Leave the fingers at rest", 0),
-    Choice(AUTO, "Automatic", "Capture hands that are large enough in the image to be read", 2),
     Choice(ON, "On", "Capture hands of all sizes", 1),
+    Choice(AUTO, "Automatic", "Capture hands that are large enough in the image to be read", 2),
 )
 LENSES = (
     Choice("auto", "Automatic", "Read from the file's metadata if present, estimated otherwise", 0),
