@@ -158,6 +158,7 @@ def common_travel(
     With a scale of their own each, people who stand side by side would move apart or into each other.
 
     :param people_betas: (P,) shape coefficients of each person.
+    :raises UsageError: when the rig lacks a mapped bone.
     """
     bone_map = usable_map(None, body, rig, bone_map)
     with at_rest(rig):
