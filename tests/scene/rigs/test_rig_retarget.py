@@ -189,7 +189,7 @@ def test_a_rig_whose_nla_plays_moves_as_captured(source, prepare):
 @pytest.mark.parametrize(
     "step",
     [
-        "rig_retarget.transfer",
+        "rig_retarget.Transfer",
         "rig_retarget.probe",
         "rig_action.channel_of_rotation",
         "rig_retarget.remove_root_object",
