@@ -4,15 +4,16 @@
 A foot that rolls from the heel onto the ball rotates about the one that is on the floor, and that point must not move.
 The ankle follows from either point i, heel or ball:
 
-    a_i = G(p_i) + Y c_i − D q_i,      c_i = q_i − s s_i, with its height set to 0,
+    a_i = G(p_i) + Y c_i − D q_i,      c_i = q_i − t s_i, with its height set to 0,
 
     p_i   the point on the body, metres, world frame
     s_i   from the body's ankle to the point, at rest;  q_i: the same on the rig
     s     the rig's leg length divided by the body's
-    G(p)  s p, but the height is that of the rig's point at rest plus s times the rise of p above its height at rest
+    t     the scale of positions on the floor, usually s
+    G(p)  t p, but the height is that of the rig's point at rest plus s times the rise of p above its height at rest
     D, Y  rotation of the foot from rest, and its rotation about the vertical alone (heading)
 
-So a point that is at rest on the body is at rest on the rig. On a flat foot both goals are the same: s times the body's
+So a point that is at rest on the body is at rest on the rig. On a flat foot both goals are the same: t times the body's
 ankle, at the height of the rig's ankle; so a longer foot extends at both ends, and nothing jumps. The two goals are
 blended by a logistic function of the difference in height of the points, in favour of the lower one. Neither point
 penetrates the floor, even where the captured foot does.
@@ -46,7 +47,7 @@ class FootRest:
 def ankle_goal(
     source: FootRest,
     rig: FootRest,
-    scale: float,
+    scales: NDArray[np.float64],
     turn: NDArray[np.float64],
     ankle: NDArray[np.float64],
     floor: float = 0.0,
@@ -56,7 +57,7 @@ def ankle_goal(
 
     :param source: the body's feet.
     :param rig: the rig's feet.
-    :param scale: the rig's leg length divided by the body's.
+    :param scales: (3,), t, t and s.
     :param turn: (..., 3, 3) D, the rotation of both feet from rest.
     :param ankle: (..., 3) the body's, metres.
     :param floor: height of the body's floor, metres.
@@ -68,9 +69,9 @@ def ankle_goal(
     for s, q in ((source.heel, rig.heel), (source.ball, rig.ball)):
         point, rig_point = ankle + rotated(turn, s), rotated(turn, q)
         above = point[..., 2] - floor - (source.height + s[..., 2])  # height above its rest position on the floor
-        place = scale * point
-        place[..., 2] = scale * above + rig.height + q[..., 2]
-        goals.append(place + rotated(yaw, (q - scale * s) * _LEVEL) - rig_point)
+        place = scales * point
+        place[..., 2] = scales[2] * above + rig.height + q[..., 2]
+        goals.append(place + rotated(yaw, (q - scales * s) * _LEVEL) - rig_point)
         heights.append(above)
         rolled.append(rig_point[..., 2] - (rig.height + q[..., 2]))
     share = 1.0 / (1.0 + np.exp(np.clip((heights[1] - heights[0]) / _SOFT_M, -50, 50)))  # 1: the ball is in contact

@@ -32,7 +32,7 @@ class Legs:
     rig: FootRest
     tips: NDArray[np.float64]  # (len(toed), 3) from the ball to the tip of the toes, metres
     lengths: NDArray[np.float64]  # (L,) of the legs, nearly stretched, metres
-    scale: float  # the rig's leg length divided by the body's
+    scales: NDArray[np.float64]  # (3,) of positions: on the floor, and the rig's leg length divided by the body's
 
 
 @dataclass(frozen=True)
@@ -51,14 +51,14 @@ def legs_at_rest(
     alignment: NDArray[np.float64],
     body: Body,
     rest: tuple[NDArray[np.float64], NDArray[np.float64]],
-    scale: float,
+    scales: NDArray[np.float64],
 ) -> Legs | None:
     """Measure the legs of a rig and of the body at rest; None if the rig has no ankles.
 
     :param row: the rig's bone of each body part.
     :param alignment: (B, 3, 3) A_b F.
     :param rest: the body's vertices (V, 3) and joints (K+1, 3) at rest, metres, world axes.
-    :param scale: the rig's leg length divided by the body's.
+    :param scales: (3,) of positions on the floor, twice, and the rig's leg length divided by the body's.
     """
     sides = [side for side in _SIDES if f"{side}_ankle" in row]
     if not sides:
@@ -67,7 +67,7 @@ def legs_at_rest(
     toe_of = [row.get(f"{side}_foot") for side in sides]
     source = _body_feet(body, *rest, sides)
     pairs = zip(ankles, toe_of, source, strict=True)
-    feet = [_rig_foot(rig, alignment[ankle], ankle, toe, foot, scale) for ankle, toe, foot in pairs]
+    feet = [_rig_foot(rig, alignment[ankle], ankle, toe, foot, float(scales[2])) for ankle, toe, foot in pairs]
     toed = [leg for leg, toe in enumerate(toe_of) if toe is not None]
     toes = [toe for toe in toe_of if toe is not None]
     sizes = [np.linalg.norm(rig.tails[toe] - rig.heads[toe]) for toe in toes]
@@ -88,7 +88,7 @@ def legs_at_rest(
         rig=_stacked(feet),
         tips=np.array(tips).reshape(-1, 3),
         lengths=_REACH * np.linalg.norm(np.diff(places, axis=0), axis=2).sum(axis=0),
-        scale=scale,
+        scales=scales,
     )
 
 
@@ -142,7 +142,7 @@ def place_feet(
     """
     world, heads = motion.rotations.copy(), motion.heads.copy()
     turns = motion.turns[:, legs.ankles]
-    goals = ankle_goal(legs.body, legs.rig, legs.scale, turns, joints[:, legs.joints], one_floor=one_floor)
+    goals = ankle_goal(legs.body, legs.rig, legs.scales, turns, joints[:, legs.joints], one_floor=one_floor)
     if legs.toed and one_floor:
         balls = (goals + rotated(turns, legs.rig.ball))[:, legs.toed]
         rested = (legs.rig.height + legs.rig.ball[:, 2])[legs.toed]

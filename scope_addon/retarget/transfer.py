@@ -29,6 +29,13 @@ from .rest_alignment import heading_alignment, rest_alignment
 from .skeleton import Pose, Skeleton, head_positions
 
 
+def leg_ratio(body: Body, betas: NDArray[np.floating[Any]], rig: Skeleton, bone_map: BoneMap) -> float:
+    """Return the rig's leg length divided by that of the body with the shape ``betas`` (P,)."""
+    rows = {part: rig.names.index(bone) for bone, part in bone_map.parts.items() if bone in rig.names}
+    parts = {part: body.joint_names.index(part) for part in rows}
+    return _leg_length(rig.heads, rows) / _leg_length(body.rest_joints(betas), parts)
+
+
 class Transfer:
     """The transfer from one body to one rig, with everything that does not depend on the motion computed once."""
 
@@ -41,12 +48,15 @@ class Transfer:
         *,
         feet: bool = True,
         one_floor: bool = True,
+        travel: float | None = None,
     ) -> None:
         """Compare both at rest.
 
         :param betas: (P,) shape coefficients of the body.
-        :param feet: place the feet where the body's are, scaled by the ratio of leg lengths; bends the legs a little.
+        :param feet: place the feet where the body's are, scaled; bends the legs a little.
         :param one_floor: with ``feet``, keep the feet above the floor; False on uneven ground.
+        :param travel: scale of positions on the floor; None: the ratio of leg lengths, by which heights are scaled in
+            any case. Rigs that share it keep the distances between the people in proportion.
         """
         self._body, self._betas, self._rig, self._one_floor = body, betas, rig, one_floor
         index = {part: k for k, part in enumerate(body.joint_names)}
@@ -58,15 +68,16 @@ class Transfer:
         self._facing = float(np.arctan2(F[1, 0], F[0, 0]))
         self._alignment = rest_alignment(rig, part_of, row, rest, index, F) @ F
         self._rested = self._alignment @ rig.rotations
-        self._scale = _leg_length(rig.heads, row) / _leg_length(rest, {part: index[part] for part in row})
+        legs = leg_ratio(body, betas, rig, bone_map)
+        self._scales = np.array([legs if travel is None else travel] * 2 + [legs])
         self._hips = [row["left_hip"], row["right_hip"]]
         self._source_hips = [index["left_hip"], index["right_hip"]]
         # Both stand on their floors at rest: heights are measured from there.
         self._lift = np.zeros(3)
         vertices = body.rest_vertices(betas) @ R_WORLD_MODEL.T
         rested = rest[self._source_hips, 2].mean() - vertices[:, 2].min()
-        self._lift[2] = (rig.heads[self._hips, 2].mean() - rig.floor) - self._scale * rested
-        self._legs = legs_at_rest(rig, row, self._alignment, body, (vertices, rest), self._scale) if feet else None
+        self._lift[2] = (rig.heads[self._hips, 2].mean() - rig.floor) - legs * rested
+        self._legs = legs_at_rest(rig, row, self._alignment, body, (vertices, rest), self._scales) if feet else None
 
     def pose(self, clip: Clip) -> Pose:
         """Compute the rig's motion."""
@@ -76,7 +87,7 @@ class Transfer:
         world = turns @ self._rested
         heads = head_positions(rig, world)
         source_hips = joints[:, self._source_hips].mean(axis=1)
-        heads += (self._scale * source_hips + self._lift - heads[:, self._hips].mean(axis=1))[:, None]
+        heads += (self._scales * source_hips + self._lift - heads[:, self._hips].mean(axis=1))[:, None]
         if self._legs is not None:
             motion = RigMotion(turns, self._alignment, world, heads)
             world, heads = place_feet(rig, self._legs, motion, joints, clip.times, self._one_floor)

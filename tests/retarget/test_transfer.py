@@ -31,6 +31,18 @@ def test_a_rig_of_another_size_takes_steps_of_its_own_size() -> None:
     np.testing.assert_allclose(pose.heads, 1.7 * JOINTS, atol=1e-9)
 
 
+@pytest.mark.parametrize("feet", [False, True])
+def test_travel_scales_positions_on_the_floor_and_legs_scale_heights(feet: bool) -> None:
+    rig = body_rig(scale=1.2)
+    pose = Transfer(BODY, BETAS, rig, same_names(), feet=feet, travel=1.1).pose(CLIP)
+    hips = [MAPPED.index(f"{side}_hip") for side in ("left", "right")]
+    ours, theirs = pose.heads[:, hips].mean(axis=1), JOINTS[:, hips].mean(axis=1)
+    np.testing.assert_allclose(ours, theirs * [1.1, 1.1, 1.2], atol=5e-3)
+    if feet:  # they stand still where the body's do
+        ankles = [MAPPED.index(f"{side}_ankle") for side in ("left", "right")]
+        np.testing.assert_allclose(pose.heads[:, ankles, :2], 1.1 * JOINTS[:, ankles, :2], atol=0.02)
+
+
 def test_feet_go_below_the_floor_only_on_uneven_ground() -> None:
     """A walk one metre down, as at the foot of stairs: hips and ankles of the rig are lower by its own metre."""
     lower = Clip(CLIP.times, CLIP.rotations, CLIP.root - VERTICAL)

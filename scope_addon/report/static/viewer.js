@@ -83,6 +83,12 @@ class MotionView {
     this.look("front");
   }
 
+  /** Between all people, so that none of several is followed out of the view. */
+  middleAt(row) {
+    const places = this.motion.people.map((_, n) => this.motion.pelvis(n, row));
+    return [0, 1, 2].map((i) => places.reduce((sum, place) => sum + place[i], 0) / places.length);
+  }
+
   /** Turn to one of the named views. */
   look(name) {
     this.through = name === "camera";
@@ -169,7 +175,7 @@ class MotionView {
   /** Projection · view, in column order, and the direction to the eye. */
   matrices(width, height) {
     if (this.through) return this.throughCamera(width, height);
-    if (this.follow) this.target = this.motion.pelvis(0, this.row);
+    if (this.follow) this.target = this.middleAt(this.row);
     const { back, side, up } = this.axes();
     const eye = this.target.map((x, i) => x + this.distance * back[i]);
     const f = 2.1 * Math.min(1, (1.2 * width) / height);

@@ -83,7 +83,7 @@ def _entry(armature: bpy.types.Object, motion: Motion, correction: Correction, r
     elif isinstance(correction, Floor):
         kind, text, span = "FLOOR", "Floor", (correction.frame,) * 2
     else:
-        what = {"both": "Left and Right", "arms": "Arms", "legs": "Legs"}[correction.limbs]
+        what = {"both": "Sides", "arms": "Arms", "legs": "Legs"}[correction.limbs]
         kind, text, span = "EXCHANGE", f"{what} Exchanged", (correction.first, correction.last)
     first, last = (round(scene_frame(armature, motion, frame, rate)) for frame in span)
     joint = correction.joint if isinstance(correction, Pin) else ""

@@ -130,7 +130,8 @@ class LiveRig:
         is_due = np.abs(betas - self._betas).max(initial=0.0) > _MIN_CHANGE and now_s > self._due_s
         if self._transfer is None or is_due:
             self._betas, self._due_s = np.array(betas, float), now_s + _MIN_PAUSE_S
-            self._transfer = Transfer(self._body, self._betas, self._skeleton, self._map, feet=self._options.feet)
+            feet, travel = self._options.feet, self._options.travel
+            self._transfer = Transfer(self._body, self._betas, self._skeleton, self._map, feet=feet, travel=travel)
         return self._transfer
 
     def restore(self) -> None:

@@ -21,7 +21,7 @@ from ..export.output_paths import check_output
 from .face_bones import guess_face_bones, only_bones_move
 from .face_retarget import captured_expressions, faces_of, retarget_expressions
 from .rig_file import load_rig, rig_bone_map, temporary_datablocks, with_meshes
-from .rig_retarget import RetargetOptions, retarget
+from .rig_retarget import RetargetOptions, common_travel, retarget
 
 
 @dataclass(frozen=True)
@@ -55,16 +55,19 @@ def export_on_rig(
     with temporary_datablocks(), temporary_scene("Retargeting"):
         result = build_scene(motions, body, footage, options.build)
         warnings = list(result.warnings)
+        travel: float | None = None  # of one person: their own
         for number, person in enumerate(result.people, 1):
             rig = load_rig(source, result.collection)
             bones = rig_bone_map(source, rig)
             if number == 1 and any(c <= 0.5 for c in bones.confidence.values()):
                 warnings.append(f"the bones of '{rig.name}' were guessed from its rest pose alone; check the result")
             if len(motions) > 1:
+                if travel is None:
+                    travel = common_travel(body, [each.motion.betas for each in result.people], rig, bones)
                 rig.name = f"{rig.name}_person{number}"
             betas, rate = person.motion.betas, result.frame_rate
             faces = faces_of(with_meshes(rig, bpy.context.scene.objects))
-            retargeting = RetargetOptions(root=options.root, face=_face_of_bones(rig, faces, source))
+            retargeting = RetargetOptions(root=options.root, face=_face_of_bones(rig, faces, source), travel=travel)
             warnings += retarget(person.armature, body, betas, rig, bones, rate, retargeting).warnings
             warnings += _retarget_face(person.armature, faces, source, bones_move_it=retargeting.face is not None)
         bpy.data.batch_remove([obj for person in result.people for obj in (person.armature, person.mesh)])

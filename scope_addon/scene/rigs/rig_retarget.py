@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,7 +21,7 @@ from ...retarget.expression_map import ExpressionMap
 from ...retarget.guess import RestBones, guess
 from ...retarget.rig_source import ROOTS
 from ...retarget.skeleton import Pose, Skeleton, basis
-from ...retarget.transfer import Transfer
+from ...retarget.transfer import Transfer, leg_ratio
 from ..animation_data.transaction import all_or_nothing
 from ..character.keys import read_clip
 from ..character.root_object import (
@@ -46,22 +47,26 @@ class RetargetOptions:
     root: str = "bone"  # where the root motion goes: one of ``ROOTS``
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0)  # metres, of the rig from the captured person
     face: ExpressionMap | None = None  # of the bones that move the rig's face; None: it keeps its pose
+    travel: float | None = None  # scale of positions on the floor; None: the ratio of leg lengths
 
     def __post_init__(self) -> None:
         """Check the values.
 
-        :raises UsageError: when ``root`` is unknown.
+        :raises UsageError: when ``root`` is unknown or ``travel`` is not positive.
         """
+        if self.travel is not None and not self.travel > 0.0:
+            raise UsageError(f"travel must be above 0, but is {self.travel:g}")
         if self.root not in ROOTS:
             raise UsageError(f"root must be one of {', '.join(ROOTS)}, but is '{self.root}'")
 
 
 @dataclass(frozen=True)
 class RetargetResult:
-    """The result of ``retarget``: the rig's new action, and warnings for the user."""
+    """The result of ``retarget``: the rig's new action, warnings for the user, and the scale of positions."""
 
     action: bpy.types.Action
     warnings: list[str]
+    travel: float
 
 
 @dataclass(frozen=True)
@@ -120,7 +125,10 @@ def retarget(
             skeleton, place = probe(rig, bone_map.parts), np.array(rig.matrix_world, float)
             root = skeleton.names.index(bone_map.bone("pelvis") or "")
             one_floor = not source.get("scope_uneven_ground", False)
-            pose = Transfer(body, betas, skeleton, bone_map, feet=options.feet, one_floor=one_floor).pose(clip)
+            travel = options.travel or leg_ratio(body, betas, skeleton, bone_map)
+            pose = Transfer(
+                body, betas, skeleton, bone_map, feet=options.feet, one_floor=one_floor, travel=travel
+            ).pose(clip)
             motion = _placed(source, clip, skeleton, place, pose, root, options)
             turns = basis(skeleton, motion.rotations)
             warnings = blocked_bones(rig, skeleton.names, turns, motion.rotations)
@@ -138,7 +146,24 @@ def retarget(
         action.name = f"{rig.name}_{source.name}"
     if face is not None:
         rest_face(rig, face)
-    return RetargetResult(action, warnings)
+    return RetargetResult(action, warnings, travel)
+
+
+def common_travel(
+    body: Body, people_betas: Sequence[NDArray[np.floating[Any]]], rig: bpy.types.Object, bone_map: BoneMap
+) -> float:
+    """Return the scale of positions for several people on copies of one rig: by their mean leg length.
+
+    With a scale of their own each, people who stand side by side would move apart or into each other.
+
+    :param people_betas: (P,) shape coefficients of each person.
+    :raises UsageError: when the rig lacks a mapped bone.
+    """
+    bone_map = usable_map(None, body, rig, bone_map)
+    with at_rest(rig):
+        skeleton = probe(rig, bone_map.parts)
+    ratios = [leg_ratio(body, betas, skeleton, bone_map) for betas in people_betas]
+    return len(ratios) / sum(1.0 / ratio for ratio in ratios)
 
 
 def usable_map(source: bpy.types.Object | None, body: Body, rig: bpy.types.Object, bone_map: BoneMap) -> BoneMap:

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import BoolProperty
 
-from ..captured_person import betas_of, motion_of
+from ..captured_person import betas_of, captured_armature, motion_of
 from ..edit.edit_base import edit_clip
+from ..reporting import tip_
 from .corrected_person import CorrectionOperator, change_corrections
 from .correction_operators import CorrectSpanOperator, ExchangeOperator, floor_warning
 
@@ -89,6 +90,19 @@ class SCOPE_OT_refloor(CorrectionOperator):
     lift: BoolProperty(
         name="Lift Sunken Feet", default=True, description="Raise the frames in which a foot is below the floor"
     )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Require a motion with one floor: on stairs, everything below their middle would be raised to it."""
+        if not super().poll(context):
+            return False
+        armature = captured_armature(context)
+        if armature is not None and armature.get("scope_uneven_ground", False):
+            cls.poll_message_set(
+                tip_("This motion was captured on uneven ground, where feet rest at any height: use Floor Here")
+            )
+            return False
+        return True
 
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
         """Edit all keys, and keep that with the motion."""

@@ -91,8 +91,12 @@ class SCOPE_OT_retarget(_RigOperator):
         if result.warnings:
             self.report({"WARNING"}, sentence(result.warnings[0]))
             return ""
-        name, action = settings.rig.name, result.action.name
-        return rpt_("'{rig}' is now animated by the action '{action}'", rig=name, action=action)
+        return rpt_(
+            "'{rig}' is now animated by the action '{action}', with positions scaled by {scale:.3f}",
+            rig=settings.rig.name,
+            action=result.action.name,
+            scale=result.travel,
+        )
 
 
 def retarget_to_chosen_rig(context: bpy.types.Context, source: bpy.types.Object) -> RetargetResult:
@@ -144,7 +148,8 @@ def retarget_options(settings: bpy.types.PropertyGroup, face: ExpressionMap | No
     from ...scene.rigs.rig_retarget import RetargetOptions
 
     offset = _SIDE_OFFSET_M if settings.captured == "beside" else (0.0, 0.0, 0.0)
-    return RetargetOptions(feet=settings.feet, root=settings.root, offset=offset, face=face)
+    travel = settings.travel or None
+    return RetargetOptions(feet=settings.feet, root=settings.root, offset=offset, face=face, travel=travel)
 
 
 class SCOPE_OT_save_bone_map(_RigOperator, SaveMapOperator):

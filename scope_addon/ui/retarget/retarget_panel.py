@@ -74,6 +74,7 @@ class SCOPE_PT_retarget(Tab, bpy.types.Panel):
             column.alert = pair.bone not in settings.rig.data.bones
             column.prop_search(pair, "bone", settings.rig.data, "bones", text="")
         layout.prop(settings, "feet")
+        layout.prop(settings, "travel")
         column = layout.column()
         column.label(text="Root Motion")
         column.row(align=True).prop(settings, "root", expand=True)

@@ -151,6 +151,15 @@ class SCOPE_PG_retarget(bpy.types.PropertyGroup):
         default=True,
         description="Lock feet that are in contact, scaled to the rig, and keep them above the floor",
     )
+    travel: FloatProperty(
+        name="Travel Scale",
+        default=0.0,
+        min=0.0,
+        soft_max=10.0,
+        precision=3,
+        description="Scale of positions on the floor. 0: the ratio of leg lengths, so that steps fit the rig. Several "
+        "people who touch or meet need the same value for all their rigs",
+    )
     root: EnumProperty(
         name="Root Motion",
         items=(

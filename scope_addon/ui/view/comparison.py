@@ -9,17 +9,18 @@ from __future__ import annotations
 import math
 
 import bpy
+import numpy as np
 from mathutils import Matrix, Quaternion, Vector
 
 from ..capture.captures import captures_of
 from ..captured_person import captured_armature
 from .frame_fit import fit_frame, unfit_frame
+from .side_extent import side_extent
 from .viewports import viewport_at, viewports
 
 _MIN_SIDE = 0.3  # of the viewport's width
 _DRAWN_AFTER_S = 0.2
 _SIDE_TILT = math.radians(5.0)
-_SIDE_HEIGHT_M = 2.6  # vertical extent of the side view
 _SENSOR_MM = 72.0  # a viewport shows the distance times this over its focal length, across its longer side
 _had_bones: dict[int, bool] = {}  # by viewport: whether it showed bones before the comparison
 
@@ -143,10 +144,19 @@ def open_side_view(context: bpy.types.Context, area: bpy.types.Area) -> None:
     view = space.region_3d
     view.view_perspective = "ORTHO"
     # Slightly from above: in an orthographic view that is level, Blender draws no floor.
-    view.view_rotation = _side_rotation(camera.matrix_world).to_quaternion() @ Quaternion((1.0, 0.0, 0.0), -_SIDE_TILT)
-    span = _SIDE_HEIGHT_M * max(1.0, width / max(1, area.height))
-    view.view_distance = span * space.lens / _SENSOR_MM
+    turn = _side_rotation(camera.matrix_world).to_quaternion() @ Quaternion((1.0, 0.0, 0.0), -_SIDE_TILT)
+    view.view_rotation = turn
+    shown = side_extent(space.lock_object, people, np.array(turn.to_matrix()))
+    view.view_distance = _span(shown, width / max(1, area.height)) * space.lens / _SENSOR_MM
     _fit_later(area)
+
+
+def _span(shown: tuple[float, float], aspect: float) -> float:
+    """Return what a viewport must show across its longer side for a width and height, metres, to fit.
+
+    :param aspect: width divided by height of the viewport.
+    """
+    return max(shown[0] / aspect, shown[1]) * max(1.0, aspect)
 
 
 def close_side_view(window: bpy.types.Window, side: bpy.types.Area) -> None:

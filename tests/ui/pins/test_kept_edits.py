@@ -240,6 +240,17 @@ def test_damaged_edits_in_a_file_are_a_sentence(rig, name, value):
     assert bpy.ops.scope.refloor() == {"FINISHED"}  # edits what is displayed, as without a motion
 
 
+def test_feet_of_uneven_ground_are_not_put_on_one_floor(rig):
+    assert bpy.ops.scope.refloor.poll()
+    rig["scope_uneven_ground"], before = True, keys(rig)
+    assert not bpy.ops.scope.refloor.poll()
+    with pytest.raises(RuntimeError, match="uneven ground"):
+        bpy.ops.scope.refloor()
+    for curve, now in keys(rig).items():
+        np.testing.assert_array_equal(now, before[curve])
+    assert bpy.ops.scope.floor_here.poll()
+
+
 def test_feet_of_poses_that_were_moved_by_hand_are_put_on_the_floor_and_stay_there(rig):
     clip, frames = read_clip(rig, BODY, RATE)
     clip.root[:, 2] += 0.1 + 0.2 * (np.arange(len(clip)) > 45)

@@ -39,6 +39,18 @@ def test_guess_keep_and_retarget(rig, tmp_path):
     assert np.ptp(seen(rig, ["pelvis"])[:, 0, 1]) > 1.0  # it walks
 
 
+def test_travel_scale_multiplies_the_path(rig):
+    settings = bpy.context.scene.scope_retarget
+    paths = {}
+    for scale in (0.0, 0.5, 1.0):
+        settings.travel = scale
+        bpy.ops.scope.retarget()
+        paths[scale] = seen(rig, ["pelvis"])[:, 0, :2]
+    np.testing.assert_allclose(np.ptp(paths[1.0], axis=0), 2.0 * np.ptp(paths[0.5], axis=0), atol=0.01)
+    legs = np.ptp(paths[0.0][:, 1]) / np.ptp(paths[1.0][:, 1])
+    assert legs == pytest.approx(1.3, abs=0.01)  # the size of this rig
+
+
 def test_saving_a_bone_map_overwrites_bone_maps_only(rig, tmp_path):
     bpy.ops.scope.guess_bones()
     saved, other, empty = (tmp_path / name for name in ("bones.json", "package.json", "empty.json"))

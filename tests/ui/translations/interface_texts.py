@@ -21,9 +21,9 @@ OPERATOR, DEFAULT = "Operator", "*"  # Blender's contexts
 UNTRANSLATED = {"Scope", "FBX", "glTF", "BVH", "USD", "NPZ", "CPU", "CUDA", "TensorRT", "DirectML", "Core ML", "Y", "Z"}
 # Texts that are composed, in .blend files as well: joints under the mouse, corrections, stages of the progress.
 _JOINTS = {name.replace("_", " ").title() for name in HANDLES}
-_CORRECTIONS = {
+CORRECTIONS = {
     *("Left Foot Stands", "Right Foot Stands", "Upright Line", "Floor", "Feet on the Floor", "Interpolated"),
-    *(f"{what} Exchanged" for what in ("Left and Right", "Arms", "Legs")),
+    *(f"{what} Exchanged" for what in ("Sides", "Arms", "Legs")),
 }
 _STAGES = {stage.capitalize() for stage in (*STAGES, *FIRST_ONLY, BUILDING)}
 _LOOKUPS = {"iface_", "rpt_", "tip_", "translate"}
@@ -40,7 +40,7 @@ def stage_texts() -> set[str]:
 
 def interface_texts() -> set[Message]:
     """Return the context and text of everything to translate."""
-    found = {(DEFAULT, text) for text in _JOINTS | _CORRECTIONS | stage_texts()}
+    found = {(DEFAULT, text) for text in _JOINTS | CORRECTIONS | stage_texts()}
     for module in ui._MODULES:
         for cls in module.CLASSES:
             found |= set(_of_class(cls))

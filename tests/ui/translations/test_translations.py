@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import bpy
 import pytest
+from scope.scope_addon.options import Place, options_at
 from scope.scope_addon.ui import reporting
 from scope.scope_addon.ui.translations import CONTEXT, LANGUAGES
 
-from .interface_texts import OPERATOR, ROOT, interface_texts, texts_without_lookup
+from .interface_texts import CORRECTIONS, OPERATOR, ROOT, interface_texts, texts_without_lookup
 from .tables import assert_end_as_the_english_texts, assert_have_the_same_placeholders
 
 MODULES = {module.__name__.rpartition(".")[2]: module for module in LANGUAGES.values()}
@@ -46,6 +47,16 @@ def test_the_texts_found_come_from_classes_layouts_reports_and_lists():
     assert ("Operator", "Left Foot Stands") in texts  # literal that a loop gives to a layout
     assert (CONTEXT, "{count} people") in texts  # either branch of a lookup's condition
     assert ("*", "Capture finished") in texts  # report
+
+
+@pytest.mark.parametrize("language", [MODULES[code] for code in ("de", "es", "fr")], ids=("de", "es", "fr"))
+def test_labels_fit_into_a_sidebar_of_the_usual_width(language):
+    """Characters that fit, counted on screen: a checkbox of the options has room for 20, a listed correction for 18."""
+    options = {each.blender.label or each.name for each in options_at(Place.PANEL) if each.value_type is bool}
+    for text in options & set(language.TEXTS):
+        assert len(language.TEXTS[text]) <= 20, text
+    for text in CORRECTIONS - {"Interpolated"}:
+        assert len(language.TEXTS[text]) <= 18, text
 
 
 def test_languages_that_share_a_code_are_those_of_blender():

@@ -6,7 +6,7 @@ OPTIONS = {
     "Add timeline markers where the motion should be reviewed": "Zeitleistenmarker setzen, wo die Bewegung geprüft werden sollte",
     "At Most": "Höchstens",
     "Calibration": "Kalibrierung",
-    "Camera with Footage": "Kamera mit Filmmaterial",
+    "Camera with Footage": "Kamera mit Film",
     "Capture only a part of the video": "Nur einen Teil des Videos erfassen",
     "Capture the expressions of the face and the gaze as well; takes longer": "Auch Mimik und Blickrichtung erfassen; dauert länger",
     "Capture the fingers as well, on the body with hands; takes longer": "Auch die Finger erfassen, am Körper mit Händen; dauert länger",
