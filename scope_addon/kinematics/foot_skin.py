@@ -94,8 +94,7 @@ def under_floor(motion: Motion, body: Body) -> NDArray[np.bool_]:
 
     :param body: that of the motion.
     """
-    under: NDArray[np.bool_] = depth_under_floor(motion, body) > UNDER_FLOOR_M
-    return under
+    return depth_under_floor(motion, body) > UNDER_FLOOR_M
 
 
 def depth_under_floor(motion: Motion, body: Body) -> NDArray[np.float64]:

@@ -65,8 +65,7 @@ def standing_probability(
         upwards = np.abs(line_of_sight(soles - np.expand_dims(center, -2)) @ up)
         mean_speed = np.sqrt(gaussian_smooth(np.square(speed), times, STILL_CUTOFF_HZ))
         allowed += WRONG_DEPTH_M * upwards * logistic(4 * (1 - mean_speed / STILL_M_S))
-    p: NDArray[np.floating[Any]] = logistic(4 * (1 - speed / CONTACT_SPEED_M_S)) * logistic(4 * (1 - height / allowed))
-    return p
+    return logistic(4 * (1 - speed / CONTACT_SPEED_M_S)) * logistic(4 * (1 - height / allowed))
 
 
 def resting_probability(

@@ -104,17 +104,14 @@ class RotationFilter:
         share, before, lead_s = self._response.share(step_s), self._values[-1], self._response.lead(self._age_s)
         for k, state in enumerate(self._values):
             self._values[k] = x = _nearest(state @ rotations.exp(share * _between(state, x)))
-        moved: NDArray[np.float64] = x @ rotations.exp(lead_s / step_s * _between(before, x))
-        return moved
+        return x @ rotations.exp(lead_s / step_s * _between(before, x))
 
 
 def _nearest(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the rotations nearest to matrices (J, 3, 3), without what rounding has added up."""
-    nearest: NDArray[np.float64] = rotations.nearest_rotation(matrices)
-    return nearest
+    return rotations.nearest_rotation(matrices)
 
 
 def _between(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the rotation vectors (J, 3) from rotations a to b, in a's axes."""
-    vectors: NDArray[np.float64] = rotations.log(np.swapaxes(a, 1, 2) @ b)
-    return vectors
+    return rotations.log(np.swapaxes(a, 1, 2) @ b)

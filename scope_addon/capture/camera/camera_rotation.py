@@ -215,8 +215,7 @@ class BackgroundTracker:
 
     def _box(self, box_px: NDArray[Any]) -> NDArray[np.float64]:
         """Return a box x0, y0, x1, y1 in the working image, with a margin."""
-        box: NDArray[np.float64] = box_px * self._scale + [-4.0, -4.0, 4.0, 4.0]
-        return box
+        return box_px * self._scale + [-4.0, -4.0, 4.0, 4.0]
 
 
 def consensus_rotation(

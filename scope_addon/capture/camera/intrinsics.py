@@ -61,8 +61,7 @@ def pinhole(width: int, height: int, focal_px: float) -> NDArray[np.float64]:
 def scaled_intrinsics(intrinsics: NDArray[np.float64], scale: float) -> NDArray[np.float64]:
     """Return the intrinsics (3, 3) of a scaled image; pixel centres have integer coordinates, the corner is at -1/2."""
     scaling = np.array([[scale, 0, (scale - 1) / 2], [0, scale, (scale - 1) / 2], [0, 0, 1]])
-    scaled: NDArray[np.float64] = scaling @ intrinsics
-    return scaled
+    return scaling @ intrinsics
 
 
 def choose_camera(

@@ -62,8 +62,7 @@ class Measurer:
 
     @cached_property
     def _unproject(self) -> NDArray[np.float64]:
-        inverse: NDArray[np.float64] = np.linalg.inv(self.intrinsics)
-        return inverse
+        return np.linalg.inv(self.intrinsics)
 
     def rays(self, pixels: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
         """Convert undistorted pixels (..., 2) to normalized image coordinates (..., 2)."""

@@ -61,8 +61,7 @@ class PoseEstimate:
     @property
     def keypoints_confidence(self) -> NDArray[np.float64]:
         """(33,) probability that a keypoint is in the image and not occluded."""
-        confidence: NDArray[np.float64] = self.visibility * self.in_frame
-        return confidence
+        return self.visibility * self.in_frame
 
     @property
     def spread(self) -> float:

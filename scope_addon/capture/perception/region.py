@@ -65,8 +65,7 @@ class Region:
         """Rotate 3D vectors (..., 3) from the square's axes (x right, y down, z forward) to the camera's axes."""
         R_camera_crop = np.eye(3)
         R_camera_crop[:2, :2] = self.R_image_crop
-        rotated: NDArray[np.float64] = np.asarray(vectors) @ R_camera_crop.T
-        return rotated
+        return np.asarray(vectors) @ R_camera_crop.T
 
     def is_near(self, other: Region) -> bool:
         """Check if a person in one may occlude one in the other: centres within three quarters of a side."""

@@ -42,8 +42,7 @@ def appearance(image_rgb: NDArray[np.uint8], keypoints_px: NDArray[np.floating[A
         for a, b in ((hip, knee), (knee, ankle)):
             legs.append(keypoints_px[a] + _LEG_FRACTIONS[:, None] * (keypoints_px[b] - keypoints_px[a]))
     histograms = [_histogram(_sample(image_rgb, points)) for points in (torso, np.concatenate(legs))]
-    roots: NDArray[np.float64] = np.sqrt(np.concatenate(histograms))
-    return roots
+    return np.sqrt(np.concatenate(histograms))
 
 
 def distance(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:

@@ -64,8 +64,7 @@ def _thumbnail(image_rgb: NDArray[np.uint8]) -> NDArray[np.float32]:
     is_large = min(height, width) >= _STRIDE * max(_SIZE)
     coarse = (width // _STRIDE, height // _STRIDE)
     source = cv2.resize(image_rgb, coarse, interpolation=cv2.INTER_NEAREST) if is_large else image_rgb
-    thumbnail: NDArray[np.float32] = cv2.resize(source, _SIZE, interpolation=cv2.INTER_AREA).astype(np.float32)
-    return thumbnail
+    return cv2.resize(source, _SIZE, interpolation=cv2.INTER_AREA).astype(np.float32)
 
 
 def _difference(a: NDArray[np.float32], b: NDArray[np.float32]) -> float:

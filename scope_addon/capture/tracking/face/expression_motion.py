@@ -148,5 +148,4 @@ def calmed(
     """
     calm = gaussian_smooth(values, times, CALM_HZ)
     deviation = values - calm
-    kept: NDArray[np.float64] = calm + deviation**3 / (deviation**2 + noise**2)
-    return kept
+    return calm + deviation**3 / (deviation**2 + noise**2)
