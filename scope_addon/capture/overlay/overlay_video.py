@@ -75,7 +75,8 @@ def write_overlay(
         try:
             with atomic_path(path) as temporary:
                 if suffix in STILL_SUFFIXES:
-                    _write_still(temporary, painter, video, _first_seen(people))
+                    first = min((int(m.frames[m.valid][0]) for m in people if m.valid.any()), default=0)
+                    _write_still(temporary, painter, video, first)
                 else:
                     _write_video(temporary, painter, video, path, progress)
         except OSError as error:
@@ -242,14 +243,14 @@ class _Painter:
         width, height = (max(2, round(side * self._scale)) for side in (video.width, video.height))
         self._resized = (width, height)
         # Encoders need even sides. Cropping the last row or column does not change the intrinsics.
-        self._size = (width - width % 2, height - height % 2) if even else self._resized
-        self._canvas = Canvas.blank(*self._size)
+        self.size = (width - width % 2, height - height % 2) if even else self._resized
+        self._canvas = Canvas.blank(*self.size)
 
     def paint(self, frame: Frame) -> NDArray[np.uint8]:
         image = frame.image_rgb
         if image.shape[1::-1] != self._resized:
             image = cast(NDArray[np.uint8], cv2.resize(image, self._resized, interpolation=cv2.INTER_AREA))
-        width, height = self._size
+        width, height = self.size
         image = np.ascontiguousarray(image[:height, :width])
         shown = [(i, rows[frame.index]) for i, rows in enumerate(self._rows) if frame.index in rows]
         if not shown:
@@ -294,11 +295,6 @@ class _Painter:
                 cv2.circle(image, (round(float(u)), round(float(v))), 1, _FACE_COLOR, -1, cv2.LINE_AA)
 
 
-def _first_seen(people: list[Motion]) -> int:
-    """Find the index of the first frame in which a person was seen; 0 if there is none."""
-    return min((int(m.frames[m.valid][0]) for m in people if m.valid.any()), default=0)
-
-
 def _write_still(path: Path, painter: _Painter, video: Video, index: int) -> None:
     for frame in video:  # keeps the last one
         if frame.index >= index:
@@ -310,18 +306,8 @@ def _write_still(path: Path, painter: _Painter, video: Video, index: int) -> Non
 
 
 def _write_video(temporary: Path, painter: _Painter, video: Video, path: Path, progress: Progress | None) -> None:
-    writer = None
-    try:
+    with VideoWriter(temporary, video.fps, *painter.size, path) as writer:
         for frame in video:
-            image = painter.paint(frame)
-            if writer is None:
-                writer = VideoWriter(temporary, video.fps, image.shape[1], image.shape[0], path)
-            writer.write(image)
+            writer.write(painter.paint(frame))
             if progress is not None:
                 progress(frame.index + 1, max(video.frame_count, frame.index + 1))
-        if writer is not None:
-            writer.close()
-    except BaseException:
-        if writer is not None:
-            writer.abandon()
-        raise
