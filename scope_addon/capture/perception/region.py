@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import cv2
@@ -48,11 +48,9 @@ class Region:
         return cropped
 
     def cut(self, image_rgb: NDArray[np.uint8], size: int) -> NDArray[np.uint8]:
-        """Resample the square to a (size, size, 3) uint8 image; outside the image, its border pixels are repeated.
+        """Resample the square to (size, size, 3); outside the image (H, W, 3), its border pixels are repeated.
 
         A black border would cost the landmark networks 3 mm of accuracy on people at the edge.
-
-        :param image_rgb: (H, W, 3) uint8.
         """
         source, A = image_rgb, self._image_from_pixel(size)
         if self.side_px >= 2 * size:
@@ -66,6 +64,11 @@ class Region:
         R_camera_crop = np.eye(3)
         R_camera_crop[:2, :2] = self.R_image_crop
         return np.asarray(vectors) @ R_camera_crop.T
+
+    def moved(self, motion_px: NDArray[np.floating[Any]]) -> Region:
+        """Return the square moved by (2,) pixels."""
+        x, y = np.asarray(self.center_px) + motion_px
+        return replace(self, center_px=(float(x), float(y)))
 
     def is_near(self, other: Region) -> bool:
         """Check if a person in one may occlude one in the other: centres within three quarters of a side."""
@@ -125,6 +128,16 @@ def region_from_points(center_px: NDArray[np.float64], top_px: NDArray[np.float6
     dx, dy = (np.asarray(top_px, float) - np.asarray(center_px, float)).tolist()
     side = 2.0 * MARGIN * math.hypot(dx, dy)
     return Region((float(center_px[0]), float(center_px[1])), side, math.atan2(dx, -dy))
+
+
+def box_along(
+    points: NDArray[np.floating[Any]], rotation: float
+) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
+    """Calculate the centre (2,) and the sides (2,) of the box around points (n, 2) in the axes of a rotated region."""
+    R_image_box = Region((0.0, 0.0), 1.0, rotation).R_image_crop
+    along = points @ R_image_box
+    low, high = along.min(axis=0), along.max(axis=0)
+    return R_image_box @ ((low + high) / 2), high - low
 
 
 def bounds(points: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:

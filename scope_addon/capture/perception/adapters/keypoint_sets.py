@@ -108,8 +108,3 @@ KEYPOINT_SETS = {
     "halpe26": KeypointSet("halpe26", 26, _halpe()),
     "wholebody133": KeypointSet("wholebody133", 133, _wholebody()),
 }
-
-
-def keypoint_set_of_count(count: int) -> KeypointSet | None:
-    """Find the set by its number of keypoints; None if there is none."""
-    return next((s for s in KEYPOINT_SETS.values() if s.count == count), None)

@@ -248,11 +248,9 @@ class HandTracker:
 
     def _palms_near(self, sight: Sight, predicted: Region, square: Region, threshold: float) -> list[Region]:
         """Return the hands' regions by the palms in a square that are nearest to the predicted region."""
-        palms = sorted(
-            self._palms.detect(sight.image_rgb, square, threshold),
-            key=lambda palm: float(np.hypot(*np.subtract(palm.region.center_px, predicted.center_px))),
-        )
-        return [palm.region for palm in palms[:MAX_PALMS]]
+        palms = self._palms.detect(sight.image_rgb, square, threshold)
+        palms.sort(key=lambda palm: math.dist(palm.center_px, predicted.center_px))
+        return palms[:MAX_PALMS]
 
     def _first_sure(
         self,
