@@ -29,13 +29,6 @@ def line_of_sight(position: NDArray[np.floating[Any]]) -> NDArray[np.floating[An
     return unit
 
 
-def horizontal_line_of_sight(
-    position: NDArray[np.floating[Any]], up: NDArray[np.floating[Any]]
-) -> NDArray[np.floating[Any]]:
-    """Return the (..., 3) unit vectors over the floor, towards positions (..., 3) relative to the camera's centre."""
-    return line_of_sight(position - (position @ up)[..., None] * up)
-
-
 def standing_probability(
     soles: NDArray[np.floating[Any]],
     up: NDArray[np.floating[Any]],

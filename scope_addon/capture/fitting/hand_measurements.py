@@ -21,7 +21,7 @@ from ...errors import UsageError
 from ...kinematics.smoothing import fill_rotation_gaps
 from ..perception.hand_landmarks import HAND_NAMES, HAND_POINTS
 from ..perception.hand_region import SIDES
-from ..perception.lifter import KEYPOINT_COUNT, virtual_camera
+from ..perception.lifter import camera_towards
 
 FINGERS = ("index", "middle", "ring", "pinky", "thumb")
 HAND_KEYPOINT_NAMES = tuple(f"hand/{side}_{name}" for side in SIDES for name in HAND_NAMES)
@@ -120,7 +120,7 @@ class HandMeasurer:
     def _directions(self, hands: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
         """Return the (n, bones, 3) vectors along the bones of n hands (n, 21, 6), camera axes."""
         rays = hands[..., :2].mean(axis=1) @ self._unproject[:2, :2].T + self._unproject[:2, 2]
-        R_virtual_camera = virtual_camera(np.repeat(rays[:, None], KEYPOINT_COUNT, axis=1))
+        R_virtual_camera = camera_towards(rays)
         bones: NDArray[np.floating[Any]] = (hands[:, self._to, 3:] - hands[:, self._from, 3:]) @ R_virtual_camera
         return bones
 

@@ -68,7 +68,11 @@ def virtual_camera(rays: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]
     :param rays: (T, 33, 2) normalized image coordinates.
     :return: (T, 3, 3) R_virtual_camera, see the module's equation.
     """
-    center = rays[:, TORSO].mean(axis=1)
+    return camera_towards(rays[:, TORSO].mean(axis=1))
+
+
+def camera_towards(center: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    """Calculate the rotations (T, 3, 3) that bring rays (T, 2), in normalized image coordinates, onto the z axis."""
     z = np.concatenate([center, np.ones_like(center[:, :1])], axis=1)
     z /= np.linalg.norm(z, axis=1, keepdims=True)
     x = np.stack([z[:, 2], np.zeros_like(z[:, 0]), -z[:, 0]], axis=1)

@@ -105,8 +105,7 @@ class FaceTracker:
         if predicted.side_px < SMALLEST_REGION_PX or not np.isfinite(predicted.side_px):
             return None
         if face.region is not None:
-            x, y = np.asarray(face.region.center_px) + head_px - face.head_px
-            estimate = self._network.estimate(image_rgb, replace(face.region, center_px=(float(x), float(y))))
+            estimate = self._network.estimate(image_rgb, face.region.moved(head_px).moved(-face.head_px))
             if belongs(estimate, predicted):
                 return estimate
         elif not is_search_due(time_s, face.seen_s, face.searched_s):

@@ -55,8 +55,7 @@ class Sight:
 
     def estimate(self, network: HandNetwork, region: Region) -> HandEstimate:
         """Run the network in a region of the frame."""
-        x, y = np.subtract(region.center_px, self.offset_px).tolist()
-        found = network.estimate(self.image_rgb, replace(region, center_px=(x, y)))
+        found = network.estimate(self.image_rgb, region.moved(-np.array(self.offset_px)))
         return replace(found, keypoints_px=found.keypoints_px + self.offset_px, region=region)
 
     def around_wrist(self) -> Sight:
@@ -111,8 +110,7 @@ def followed_regions(estimate: HandEstimate, motion_px: NDArray[np.float64], han
     region = estimate.next_region
     if np.linalg.norm(motion_px) < FAR_MOTION * hand_px:
         return [region]
-    x, y = np.asarray(region.center_px) + motion_px
-    return [replace(region, center_px=(float(x), float(y))), region]
+    return [region.moved(motion_px), region]
 
 
 def better(a: Found | None, b: Found | None) -> Found | None:
