@@ -145,18 +145,13 @@ class LandmarkNetwork:
         return [pending.result() for pending in [self.begin(image_rgb, region, with_masks) for region in regions]]
 
     def begin(self, image_rgb: NDArray[np.uint8], region: Region, with_mask: bool = False) -> Future[PoseEstimate]:
-        """Start the estimate of one region in another thread; the image must not change until it is done.
-
-        :param image_rgb: (H, W, 3) uint8.
-        """
+        """Start the estimate of one region in another thread; the image (H, W, 3) must not change until it is done."""
         return self._pool.submit(self._estimate, self._shared, image_rgb, region, with_mask)
 
     def mask(self, image_rgb: NDArray[np.uint8], region: Region) -> NDArray[np.float32]:
-        """Return the probability (256, 256) that a pixel of the region shows its person, also beside other people.
+        """Return the probability (256, 256) that a pixel of the region of an (H, W, 3) image shows its person.
 
         This is a run of its own; `estimate` and `begin` give the mask of the run that they make anyway.
-
-        :param image_rgb: (H, W, 3) uint8.
         """
         (logits,) = self._alone.run(["mask"], {"input": _blob(region.cut(image_rgb, INPUT_SIZE))} | _WITH_MASK)
         return _probability(logits)
