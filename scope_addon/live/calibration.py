@@ -25,7 +25,7 @@ from ..capture.fitting.frame_sequence import FittedTrack
 from ..capture.fitting.prepared_track import prepare_track
 from ..capture.fitting.track_fit import fit_track
 from ..capture.perception.observation import Observation
-from ..capture.tracking.track import Track, Tracklet, make_track
+from ..capture.tracking.track import Track, track_of
 from ..capture.world.placement import place_track
 from ..capture.world.world_frame import find_world, floor_height
 from ..kinematics.axes import transform_points, world_from_level_camera
@@ -173,13 +173,3 @@ class Calibrator:
         if not len(self._segments.ends_px):
             return False
         return bool(abs(np.log(camera.intrinsics[0, 0] / self._focal_of_lines)) > SAME_FOCAL)
-
-
-def track_of(times_s: Sequence[float], observations: Sequence[Observation]) -> Track:
-    """Make a track of frames in all of which the person was seen."""
-    tracklet = Tracklet()
-    for row, observation in enumerate(observations):
-        tracklet.add(row, replace(observation, reference_landmarks=None, hands=None, face=None, mask=None))
-    track = make_track(range(len(times_s)), times_s, [tracklet])
-    track.acquired[:] = [observation.acquired for observation in observations]
-    return track

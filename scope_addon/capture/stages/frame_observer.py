@@ -34,14 +34,14 @@ class BrightenedFrame(NamedTuple):
 
 
 class FrameObserver:
-    """Runs the networks on each frame; ``cuts`` holds the cuts so far."""
+    """Runs the networks on each frame."""
 
     def __init__(self, trackers: Trackers, masks: MaskSchedule, clock: StageClock) -> None:
         self._trackers, self._masks, self._clock = trackers, masks, clock
-        self.cuts = SceneCuts()
+        self._cuts = SceneCuts()
 
     def step(
-        self, now: BrightenedFrame, upcoming: BrightenedFrame | None, with_masks: bool = True
+        self, now: BrightenedFrame, upcoming: BrightenedFrame | None, with_masks: bool
     ) -> tuple[list[tuple[int, Observation]], bool]:
         """Observe one frame.
 
@@ -52,7 +52,7 @@ class FrameObserver:
         frame, lit = now
         with self._clock.stage("networks"):
             upcoming_rgb = upcoming.frame.image_rgb if upcoming else None
-            is_cut = self.cuts.is_cut(frame.image_rgb, upcoming_rgb, frame.timestamp_s)
+            is_cut = self._cuts.is_cut(frame.image_rgb, upcoming_rgb)
             if is_cut:
                 self._trackers.people.forget()
             due = with_masks and self._masks.upcoming_is_due
@@ -66,8 +66,3 @@ class FrameObserver:
             with self._clock.stage("face"):
                 observations = self._trackers.faces.step(lit, observations, frame.timestamp_s)
         return observations, is_cut
-
-
-def largest_of(people: list[Observation]) -> Observation | None:
-    """Return the person with the largest region."""
-    return max(people, key=lambda observation: observation.region.side_px, default=None)

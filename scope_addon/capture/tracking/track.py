@@ -104,11 +104,6 @@ class Tracklet:
             del self.rows[count:], self.values[count:], self.centers_px[count:], self.sides_px[count:]
             del self.hands[count:], self.faces[count:]
 
-    @property
-    def prominence(self) -> float:
-        """Size in the image, summed over the frames."""
-        return float(np.sum(self.sides_px))
-
 
 def trunk_px(keypoints_px: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
     """Return the middle (2,) of the trunk, of keypoints (33, 2) in the image."""
@@ -157,8 +152,19 @@ def make_track(frames: Sequence[int], times: Sequence[float], tracklets: Sequenc
     )
 
 
-def single_frame_track(observation: Observation) -> Track:
-    """Make a track of one frame, without hands, face, mask, and reference landmarks, which may be pending."""
+def track_of(times_s: Sequence[float], observations: Sequence[Observation]) -> Track:
+    """Make a track of frames in all of which the person was seen.
+
+    Hands, face and mask are left out, and reference landmarks, which may be pending.
+    """
     tracklet = Tracklet()
-    tracklet.add(0, replace(observation, reference_landmarks=None, hands=None, face=None, mask=None))
-    return make_track([0], [0.0], [tracklet])
+    for row, observation in enumerate(observations):
+        tracklet.add(row, replace(observation, reference_landmarks=None, hands=None, face=None, mask=None))
+    track = make_track(range(len(times_s)), times_s, [tracklet])
+    track.acquired[:] = [observation.acquired for observation in observations]
+    return track
+
+
+def single_frame_track(observation: Observation) -> Track:
+    """Make a track of one frame; see `track_of`."""
+    return track_of([0.0], [observation])

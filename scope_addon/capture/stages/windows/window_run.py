@@ -17,7 +17,7 @@ from ...perception.observation import Observation
 from ...perception.region import Region
 from ...tracking.track import Tracklet
 from ..clock import StageClock
-from ..frame_observer import BrightenedFrame, FrameObserver, largest_of
+from ..frame_observer import BrightenedFrame, FrameObserver
 from .plan import Window
 from .window_record import WindowRecord, known_reference
 
@@ -41,7 +41,7 @@ class WindowRun:
         clock: StageClock,
     ) -> None:
         self.window, self._following = window, following
-        self._observer, self._background, self._pool, self._clock = observer, background, pool, clock
+        self._observer, self.background, self._pool, self._clock = observer, background, pool, clock
         self._exposure = AutoExposure()
         self._upcoming: BrightenedFrame | None = None
         self._pending: Future[None] | None = None
@@ -80,7 +80,7 @@ class WindowRun:
         people = [observation for _, observation in observations]
         with self._clock.stage("background"):
             self._follow_background(frame.image_rgb, time_s, people, (is_cut, is_anchor))
-        return largest_of(people)
+        return max(people, key=lambda observation: observation.region.side_px, default=None)
 
     def record(self, execution: str = "", warnings: Sequence[str] = ()) -> WindowRecord:
         """Return what was found so far; waits for the background and the reference network."""
@@ -97,7 +97,7 @@ class WindowRun:
             self._tracklets,
             self._anchor_regions,
             list(self._cut_rows),
-            self._background.record(),
+            self.background.record(),
             execution,
             tuple(warnings),
         )
@@ -110,7 +110,7 @@ class WindowRun:
     ) -> None:
         self._wait()
         points = [observation.keypoints_px for observation in people]
-        self._pending = self._pool.submit(self._background.add, image_rgb, time_s, points, *flags)
+        self._pending = self._pool.submit(self.background.add, image_rgb, time_s, points, *flags)
 
     def _wait(self) -> None:
         if self._pending is not None:
