@@ -9,7 +9,6 @@ the standard deviation that the network predicts for it.
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -44,7 +43,7 @@ class Measurer:
     """
 
     def __init__(self, body: Body, intrinsics: NDArray[np.float64]) -> None:
-        self.body, self.intrinsics = body, intrinsics
+        self.body, self.intrinsics, self._unproject = body, intrinsics, np.linalg.inv(intrinsics)
         at = body.keypoint_set("blazepose")
         self.indices = np.array([at[name] for name in KEYPOINT_NAMES])
         self.weight = np.array([_relative_weight(name) for name in KEYPOINT_NAMES])
@@ -59,10 +58,6 @@ class Measurer:
             np.array([first_joint + body.joint_names.index(pair[k]) for pair in pairs]) for k in (0, 1)
         )
         self.from_landmark, self.to_landmark = (np.array([KEYPOINT_NAMES.index(p[k]) for p in pairs]) for k in (0, 1))
-
-    @cached_property
-    def _unproject(self) -> NDArray[np.float64]:
-        return np.linalg.inv(self.intrinsics)
 
     def rays(self, pixels: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
         """Convert undistorted pixels (..., 2) to normalized image coordinates (..., 2)."""

@@ -100,7 +100,9 @@ class HandMeasurer:
         if not seen:
             return measured
         confidence = hands[seen, :, 2]
-        reliable = confidence * np.minimum(confidence / RELIABLE, 1.0) ** 2 * _weight_by_size(hands[seen])[:, None]
+        size_px = np.linalg.norm(hands[seen, _MIDDLE_KNUCKLE, :2] - hands[seen, 0, :2], axis=-1)
+        by_size = np.minimum(size_px / FULL_SIZE_PX, 1.0) ** 2
+        reliable = confidence * np.minimum(confidence / RELIABLE, 1.0) ** 2 * by_size[:, None]
         directions = self._directions(hands[seen])
         return replace(
             measured,
@@ -131,13 +133,6 @@ class HandMeasurer:
             for joint in (self.wrists[side], *joints):
                 out[:, joint] = hands[:, side, 0, 2]
         return out
-
-
-def _weight_by_size(hands: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
-    """Return the (n,) factors 0..1 on the directions of hands (n, 21, 6)."""
-    size = np.linalg.norm(hands[:, _MIDDLE_KNUCKLE, :2] - hands[:, 0, :2], axis=-1)
-    factor: NDArray[np.floating[Any]] = np.minimum(size / FULL_SIZE_PX, 1.0) ** 2
-    return factor
 
 
 def _bones() -> list[tuple[int, int]]:

@@ -154,13 +154,13 @@ class Lifter:
     :raises ModelFileError: it is not a lifting network of this version.
     """
 
-    def __init__(self, path: Path | None = None, threads: int = 1) -> None:
+    def __init__(self, path: Path | None = None) -> None:
         self.path = path or LIFTER_FILE
         if not self.path.is_file():
             raise SetupError(
                 f"{self.path} is missing; install the extension again, or restore the file from the repository."
             )
-        self._session = open_session(self.path, threads)
+        self._session = open_session(self.path, 1)
         shapes = [s.shape[1:] for s in (*self._session.get_inputs(), *self._session.get_outputs())]
         if shapes != [[WINDOW, INPUT_SIZE], [KEYPOINT_COUNT, 3], [KEYPOINT_COUNT, 2]]:
             raise ModelFileError(f"{self.path} is not a lifting network of this version: its shapes are {shapes}.")

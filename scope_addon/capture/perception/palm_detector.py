@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +25,8 @@ class PalmDetector:
     :raises ModelFileError: its file is damaged.
     """
 
-    def __init__(self, threads: int, folder: Path | None = None, execution: Execution | None = None) -> None:
-        self._session = open_session(network_path("palm_detection", folder), threads, execution)
+    def __init__(self, threads: int, execution: Execution | None = None) -> None:
+        self._session = open_session(network_path("palm_detection"), threads, execution)
         self._anchors = make_anchors(INPUT_SIZE, _LAYERS)
 
     def detect(self, image_rgb: NDArray[np.uint8], square: Region, threshold: float = SCORE_THRESHOLD) -> list[Region]:

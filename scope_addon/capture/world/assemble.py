@@ -49,7 +49,9 @@ def assemble_motion(
         T_world_camera, J0, placed.rotations[:, 0], placed.root, rotation_vectors_of_joints(placed.rotations)
     )
     joints = placed.place(placed.rotations, placed.root)[0]
-    sigma = raw.joint_sigma_m
+    sigma, face = raw.joint_sigma_m, {}
+    if track.face is not None:
+        face = expression_motion(with_expressions(track.face, placed.times), placed.times, shot.smoothing)
     return Motion(
         poses=poses,
         trans=trans,
@@ -77,7 +79,7 @@ def assemble_motion(
         joint_sigma_depth_m=None if sigma is None else sigma[..., 0],
         height_sigma_m=raw.height_sigma_m,
         uneven_ground=shot.uneven_ground,
-        face=_face(track, placed.times, shot.smoothing),
+        face=face,
     )
 
 
@@ -98,11 +100,6 @@ def _to_world(
 
     poses, trans = by_blocks(to_world, R_root, t_root, joints)
     return poses, trans
-
-
-def _face(track: Track, times: NDArray[np.float64], smoothing: bool) -> dict[str, NDArray[Any]]:
-    """Return the motion file's arrays about the face; none if it was not looked for."""
-    return {} if track.face is None else expression_motion(with_expressions(track.face, times), times, smoothing)
 
 
 def _keypoints2d(track: Track) -> NDArray[np.floating[Any]]:

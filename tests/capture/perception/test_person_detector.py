@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scope.scope_addon.capture.perception import sessions
 from scope.scope_addon.capture.perception.person_detector import (
     PersonDetector,
     decode,
@@ -147,9 +148,10 @@ def test_no_detections_in_a_blank_image(detector: PersonDetector) -> None:
     assert detector.detect(np.full((90, 160, 3), 128, np.uint8)) == []
 
 
-def test_missing_and_damaged_networks_are_named(tmp_path: Path) -> None:
+def test_missing_and_damaged_networks_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sessions, "NETWORKS_FOLDER", tmp_path)
     with pytest.raises(SetupError, match="pose_detection.onnx is missing"):
-        network_path("pose_detection", tmp_path)
+        network_path("pose_detection")
     broken = tmp_path / "broken.onnx"
     broken.write_bytes(b"no network")
     with pytest.raises(ModelFileError, match=r"broken\.onnx"):

@@ -8,7 +8,6 @@ import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,7 +81,6 @@ class HandTracker:
     run of these small networks takes twice the processor time.
 
     :param threads: number of hands that are looked for in parallel.
-    :param folder: of the networks; None: the built-in ones.
     :param execution: what the networks run on.
     :param least_px: length of the smallest hands that are looked for, by the body's scale; pixels.
     :raises SetupError: a network is missing.
@@ -91,13 +89,12 @@ class HandTracker:
     def __init__(
         self,
         threads: int,
-        folder: Path | None = None,
         execution: Execution | None = None,
         least_px: float = SMALLEST_HAND_PX,
     ) -> None:
         self._least_px = least_px
-        self._network = HandNetwork(1, folder, execution)
-        self._palms = PalmDetector(1, folder, execution)
+        self._network = HandNetwork(1, execution)
+        self._palms = PalmDetector(1, execution)
         self._pool = ThreadPoolExecutor(threads, "scope-hands")
         self._hands: dict[Key, _Hand] = {}
         self._missed: dict[Key, list[_Missed]] = {}

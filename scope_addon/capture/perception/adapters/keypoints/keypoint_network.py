@@ -79,8 +79,7 @@ class KeypointNetwork:
         in_frame = ((ours >= -0.5) & (ours <= [width - 0.5, height - 0.5])).all(axis=1)
         return PoseEstimate(
             keypoints_px=ours,
-            visibility=confidence,
-            in_frame=in_frame.astype(float),
+            keypoints_confidence=confidence * in_frame,
             world_landmarks=np.zeros((len(KEYPOINT_NAMES), 3)),
             presence=float((confidence[_BODY] >= self._threshold).mean()),
             region=region,
