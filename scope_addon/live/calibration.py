@@ -158,18 +158,14 @@ class Calibrator:
         """Add the world: as offline where no lines tell which way is up, otherwise with their direction."""
         placed = place_track(self._body, track, fitted, smoothing=True)
         T = find_world([placed]).T_world_camera
-        if self._lines_differ(calibration.camera):
+        focal_px = calibration.camera.intrinsics[0, 0]
+        # The search for the lines' direction takes long, so another one follows only where the focal length changes.
+        if len(self._segments.ends_px) and abs(np.log(focal_px / self._focal_of_lines)) > SAME_FOCAL:
             self._up_of_lines = estimate_up_from_lines(self._segments.lines(calibration.camera), T[2, :3]).up
-            self._focal_of_lines = float(calibration.camera.intrinsics[0, 0])
+            self._focal_of_lines = float(focal_px)
         if self._up_of_lines is not None:
             up, valid = self._up_of_lines, placed.valid
             contact = placed.contact(up)[valid, : len(SOLES)]
             T = world_from_level_camera(up, -floor_height(placed.soles[valid], contact, up))
             T[:2, 3] -= transform_points(T, placed.joints[valid.argmax(), :1])[0, :2]
         return replace(calibration, up=T[2, :3], camera_position=T[:3, 3])
-
-    def _lines_differ(self, camera: Camera) -> bool:
-        """Whether to search for the lines' direction again, which takes long: the focal length has changed."""
-        if not len(self._segments.ends_px):
-            return False
-        return bool(abs(np.log(camera.intrinsics[0, 0] / self._focal_of_lines)) > SAME_FOCAL)

@@ -33,6 +33,7 @@ from .intrinsics import Camera
 from .line_segments import find_segments
 
 WORKING_SIDE_PX = 480  # the longer side of the image in which corners are followed
+HYPOTHESES = 128  # of two directions each
 MAX_CORNERS = 240
 MIN_CORNERS = 24
 KEY_SHARE = 0.5  # of a key frame's corners; with fewer left, the next key frame begins
@@ -45,8 +46,7 @@ class BackgroundTracker:
     """Follows the background through a clip; frames come in order, each with the people's positions.
 
     :param camera: the intrinsics of the full image.
-    :param width: of the full image in pixels.
-    :param height: likewise.
+    :param width, height: of the full image in pixels.
     """
 
     def __init__(self, camera: Camera, width: int, height: int) -> None:
@@ -205,7 +205,6 @@ def consensus_rotation(
     b: NDArray[np.float64],
     tolerance: float,
     random: np.random.Generator,
-    hypotheses: int = 128,
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Find the rotation R with b = R a that most directions agree with.
 
@@ -213,10 +212,9 @@ def consensus_rotation(
     :param b: (n, 3) unit vectors.
     :param tolerance: radians.
     :param random: draws the hypotheses.
-    :param hypotheses: how many are drawn.
     :return: R (3, 3), and (n,) whether each pair agrees with it.
     """
-    pairs = random.integers(0, len(a), (hypotheses, 2))
+    pairs = random.integers(0, len(a), (HYPOTHESES, 2))
     pairs = pairs[pairs[:, 0] != pairs[:, 1]]
     R = _kabsch(a[pairs], b[pairs])
     # |R a − b|² = 2 − 2 bᵀ R a, for all hypotheses and directions in one matrix product

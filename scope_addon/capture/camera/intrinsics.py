@@ -75,8 +75,7 @@ def choose_camera(
 ) -> Camera:
     """Choose the camera for footage of this size: from the user, otherwise the metadata, otherwise the default.
 
-    :param width: of the footage in pixels.
-    :param height: likewise.
+    :param width, height: of the footage in pixels.
     :param focal_mm: 35 mm equivalent focal length along the longer side, f_px = f_mm / 36 · max(width, height).
     :param fov_deg: field of view along the longer side, f_px = max(width, height) / (2 tan(fov / 2)).
     :param calibration: JSON file; see `calibration`.
@@ -112,8 +111,7 @@ def choose_camera(
 def assumed_camera(width: int, height: int, longer_px: float) -> Camera:
     """Return the camera with the default field of view.
 
-    :param width: of the footage in pixels.
-    :param height: likewise.
+    :param width, height: of the footage in pixels.
     :param longer_px: the longer side of the camera's image, which is smaller than the footage's between bars.
     """
     source = f"assumed, {DEFAULT_FOV_DEG:g} degrees"
@@ -126,8 +124,7 @@ def assumed_camera(width: int, height: int, longer_px: float) -> Camera:
 def estimated_camera(width: int, height: int, focal_px: float, deviation: float, longer_px: float) -> Camera:
     """Return the camera with an estimated focal length.
 
-    :param width: of the footage in pixels.
-    :param height: likewise.
+    :param width, height: of the footage in pixels.
     :param focal_px: focal length in pixels.
     :param deviation: its relative error, one standard deviation.
     :param longer_px: as for `assumed_camera`.

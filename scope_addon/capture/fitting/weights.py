@@ -91,12 +91,12 @@ def clip_weights(weights: Weights) -> Weights:
     )
 
 
-def clip_stages(weights: Weights) -> tuple[Stage, ...]:
-    """Return the stages of a fit of all frames of a clip together.
+def clip_stages(weights: Weights, steps: int = 50) -> tuple[Stage, ...]:
+    """Return the stages of a fit of all frames of a clip together, of at most so many steps.
 
     A tenth of the tolerance takes twice the steps, and changes errors on Pose2Sim and the sample clip by 0.1 mm.
     """
-    return (Stage(clip_weights(weights), 1e-3, 50),)
+    return (Stage(clip_weights(weights), 1e-3, steps),)
 
 
 def motion_priors(body: Body, times: NDArray[np.float64]) -> tuple[MotionPrior, MotionPrior]:

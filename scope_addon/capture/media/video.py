@@ -34,7 +34,7 @@ from .frame_readers import PyavReader
 from .image_sequence import PictureSequence, SequenceReader, find_sequence
 from .quicktime import focal_35mm
 from .stills.still_images import is_picture, read_picture
-from .video_range import FootageRange, VideoRange
+from .video_range import FootageRange, FrameSampler, VideoRange
 
 cv2.setLogLevel(0)  # silent: failures are reported as exceptions
 
@@ -270,7 +270,7 @@ class _Decoder:
 
     def _decode(self, reader: PyavReader | SequenceReader) -> None:
         video, index, time = self._video, 0, 0.0
-        sampler = video.wanted.sampler()
+        sampler = FrameSampler(video.wanted.fps)
         resized = False
         first = index = reader.skip_to(video.wanted.start_s, video.source_fps) if video.wanted.start_s > 0 else 0
         while not self._stop.is_set() and (decoded := reader.read()) is not None:

@@ -35,6 +35,7 @@ VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
 STILL_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
 LONGEST_SIDE = 1920
 _FACE_COLOR = (255, 255, 255)
+OPACITY = 0.6  # of the bodies
 _FAINT = 0.35  # opacity of a filled-in pose, relative to one that was seen
 _TINTS = np.array([[1.0, 0.55, 0.15], [0.2, 0.75, 1.0], [0.55, 0.9, 0.3], [0.95, 0.4, 0.75], [0.95, 0.85, 0.25]])
 
@@ -47,7 +48,6 @@ def write_overlay(
     motions: Motion | Sequence[Motion],
     body: Body,
     *,
-    opacity: float = 0.6,
     progress: Progress | None = None,
     wanted: FootageRange | None = None,
 ) -> None:
@@ -56,7 +56,6 @@ def write_overlay(
     The video has the footage's rate and size (at most 1920 pixels along the longer side, both sides even). With the
     suffix of a picture (.png, .jpg, .webp), only the first frame in which a person was seen is written.
 
-    :param opacity: of the bodies, 0..1.
     :param wanted: the range of the footage that was captured.
     :param progress: called with (frames done, frames expected). An exception that it raises stops the work, and no file
         is left behind.
@@ -71,7 +70,7 @@ def write_overlay(
         known = ", ".join(VIDEO_SUFFIXES + STILL_SUFFIXES)
         raise OutputError(f"cannot write the overlay {path}: its suffix must be one of {known}")
     with open_video(video_path, wanted) as video:
-        painter = _Painter(people, body, video, opacity, even=suffix in VIDEO_SUFFIXES)
+        painter = _Painter(people, body, video, even=suffix in VIDEO_SUFFIXES)
         try:
             with atomic_path(path) as temporary:
                 if suffix in STILL_SUFFIXES:
@@ -90,19 +89,17 @@ def painted_frames(
     indices: Collection[int],
     *,
     wanted: FootageRange | None = None,
-    opacity: float = 0.6,
 ) -> Iterator[tuple[int, NDArray[np.uint8]]]:
     """Generate some frames of the overlay: source frame index and (H, W, 3) RGB, at most 1920 pixels wide and high.
 
     :param indices: source frame indices; those that the footage does not have are left out.
     :param wanted: the range of the footage that was captured.
-    :param opacity: of the bodies, 0..1.
     :raises VideoError: the footage cannot be read.
     :raises ShapeError: a motion does not have the joints of the body.
     """
     remaining = set(indices)
     with open_video(video_path, wanted) as video:
-        painter = _Painter(list(motions), body, video, opacity, even=False)
+        painter = _Painter(list(motions), body, video, even=False)
         for frame in video:
             if frame.index in remaining:
                 remaining.remove(frame.index)
@@ -232,11 +229,11 @@ def _blend(image: NDArray[np.uint8], rgba: NDArray[np.uint8]) -> None:
 class _Painter:
     """Draws the overlay of the frames of one clip; scales the intrinsics with the image."""
 
-    def __init__(self, people: list[Motion], body: Body, video: Video, opacity: float, even: bool) -> None:
+    def __init__(self, people: list[Motion], body: Body, video: Video, even: bool) -> None:
         for motion in people:
             if motion.joint_count != body.K + 1:
                 raise ShapeError(f"the motion has {motion.joint_count} joints, but body '{body.name}' has {body.K + 1}")
-        self._people, self._body, self._opacity = people, body, opacity
+        self._people, self._body = people, body
         self._rows = [{int(f): row for row, f in enumerate(motion.frames)} for motion in people]
         self._colors = [body_colors(body, i) for i in range(len(people))]
         self._scale = min(1.0, LONGEST_SIDE / max(video.width, video.height))
@@ -265,7 +262,7 @@ class _Painter:
             scaled_intrinsics(motion.intrinsics, self._scale),
             motion.dist,
             [self._colors[i] for i, _ in shown],
-            [self._opacity * (1.0 if self._people[i].valid[row] else _FAINT) for i, row in shown],
+            [OPACITY * (1.0 if self._people[i].valid[row] else _FAINT) for i, row in shown],
         )
         image = blended(image, self._canvas)
         for i, row in shown:

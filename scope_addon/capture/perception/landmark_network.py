@@ -41,10 +41,10 @@ class PoseEstimate:
     """The network's estimate for one region.
 
     ``keypoints_px`` (33, 2) image pixels; ``keypoints_confidence`` (33,) probability that a keypoint is in the image
-    and not occluded; ``world_landmarks`` (33, 3) metres in camera axes (x right, y down, z forward), the hip centre at 0, or all 0 from a network without depth; ``presence``: probability that there is a
-    person; ``region``: the input region; ``next_region``: the region for the next frame; ``mask``: the probability
-    (256, 256), half precision, that a pixel of the region shows its person, if it was requested. In a region where
-    nobody is, the network invents somebody.
+    and not occluded; ``world_landmarks`` (33, 3) metres in camera axes (x right, y down, z forward), the hip centre at
+    0, or all 0 from a network without depth; ``presence``: probability that there is a person; ``region``: the input
+    region; ``next_region``: the region for the next frame; ``mask``: the probability (256, 256), half precision, that a
+    pixel of the region shows its person, if it was requested. Where nobody is, the network invents somebody.
     """
 
     keypoints_px: NDArray[np.float64]
@@ -119,32 +119,28 @@ class LandmarkNetwork:
             self._sessions[threads] = open_session(self._path, threads, self._execution)
         return self._sessions[threads]
 
-    @property
-    def _alone(self) -> onnxruntime.InferenceSession:
-        return self._session(self._threads_alone)
-
-    @property
-    def _shared(self) -> onnxruntime.InferenceSession:
-        return self._session(max(1, self._threads // _WORKERS))
-
     def estimate(
         self, image_rgb: NDArray[np.uint8], regions: Sequence[Region], with_masks: bool = False
     ) -> list[PoseEstimate]:
         """Estimate one pose per region of an (H, W, 3) uint8 RGB image."""
         if len(regions) < 2 or self._threads == 1:
-            return [self._estimate(self._alone, image_rgb, region, with_masks) for region in regions]
+            alone = self._session(self._threads_alone)
+            return [self._estimate(alone, image_rgb, region, with_masks) for region in regions]
         return [pending.result() for pending in [self.begin(image_rgb, region, with_masks) for region in regions]]
 
     def begin(self, image_rgb: NDArray[np.uint8], region: Region, with_mask: bool = False) -> Future[PoseEstimate]:
         """Start the estimate of one region in another thread; the image (H, W, 3) must not change until it is done."""
-        return self._pool.submit(self._estimate, self._shared, image_rgb, region, with_mask)
+        shared = self._session(max(1, self._threads // _WORKERS))
+        return self._pool.submit(self._estimate, shared, image_rgb, region, with_mask)
 
     def mask(self, image_rgb: NDArray[np.uint8], region: Region) -> NDArray[np.float32]:
         """Return the probability (256, 256) that a pixel of the region of an (H, W, 3) image shows its person.
 
         This is a run of its own; `estimate` and `begin` give the mask of the run that they make anyway.
         """
-        (logits,) = self._alone.run(["mask"], {"input": _blob(region.cut(image_rgb, INPUT_SIZE))} | _WITH_MASK)
+        (logits,) = self._session(self._threads_alone).run(
+            ["mask"], {"input": _blob(region.cut(image_rgb, INPUT_SIZE))} | _WITH_MASK
+        )
         return _probability(logits)
 
     def _estimate(
@@ -155,16 +151,14 @@ class LandmarkNetwork:
         values = self._kept.find(key)
         if values is not None and len(values) == _VALUES:
             return _unpacked(values, region)
-        inputs = {"input": _blob(crop_rgb)}
-        if not with_mask:
-            landmarks, presence, heatmap, world = session.run(_OUTPUTS, inputs)
-            estimate = interpret(landmarks[0], float(presence[0, 0]), heatmap[0], world[0], region)
-            if key is not None:
-                self._kept.add(key, _packed(estimate))
-            return estimate
-        landmarks, presence, heatmap, world, logits = session.run([*_OUTPUTS, "mask"], inputs | _WITH_MASK)
+        outputs, inputs = list(_OUTPUTS), {"input": _blob(crop_rgb)}
+        if with_mask:
+            outputs, inputs = [*outputs, "mask"], inputs | _WITH_MASK
+        landmarks, presence, heatmap, world, *logits = session.run(outputs, inputs)
         estimate = interpret(landmarks[0], float(presence[0, 0]), heatmap[0], world[0], region)
-        return replace(estimate, mask=_probability(logits).astype(np.float16))
+        if key is not None:
+            self._kept.add(key, _packed(estimate))
+        return replace(estimate, mask=_probability(logits[0]).astype(np.float16)) if with_mask else estimate
 
 
 def _probability(logits: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...camera.camera_rotation import BackgroundTracker
 from ...media.exposure import AutoExposure
@@ -79,7 +78,9 @@ class WindowRun:
             self._tracklets.setdefault(number, Tracklet()).add(row, observation)
         people = [observation for _, observation in observations]
         with self._clock.stage("background"):
-            self._follow_background(frame.image_rgb, time_s, people, (is_cut, is_anchor))
+            self._wait()
+            points = [observation.keypoints_px for observation in people]
+            self._pending = self._pool.submit(self.background.add, frame.image_rgb, time_s, points, is_cut, is_anchor)
         return max(people, key=lambda observation: observation.region.side_px, default=None)
 
     def record(self, execution: str = "", warnings: Sequence[str] = ()) -> WindowRecord:
@@ -104,13 +105,6 @@ class WindowRun:
 
     def _brighten(self, frame: Frame) -> BrightenedFrame:
         return BrightenedFrame(frame, self._exposure.brighten(frame.image_rgb))
-
-    def _follow_background(
-        self, image_rgb: NDArray[np.uint8], time_s: float, people: list[Observation], flags: tuple[bool, bool]
-    ) -> None:
-        self._wait()
-        points = [observation.keypoints_px for observation in people]
-        self._pending = self._pool.submit(self.background.add, image_rgb, time_s, points, *flags)
 
     def _wait(self) -> None:
         if self._pending is not None:

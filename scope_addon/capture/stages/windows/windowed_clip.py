@@ -21,6 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ....errors import VideoError
 from ...camera.camera_rotation import BackgroundTracker
 from ...fitting.background_estimators import KERNELS, BackgroundEstimators
 from ...fitting.live_body import LiveBody
@@ -34,7 +35,7 @@ from ...perception.region import Region
 from ...tracking.landmarks.mask_schedule import MaskSchedule
 from ...tracking.track import Track
 from ..clock import COMPILING, Progress, StageClock
-from ..footage import Footage, Listeners, given_camera, no_frames_error
+from ..footage import Footage, Listeners, given_camera
 from ..frame_observer import FrameObserver, Trackers
 from ..networks import network_threads, open_trackers
 from .joined_windows import JoinedWindows
@@ -93,7 +94,7 @@ class WindowedClip:
         else:
             self._gather(folder, listeners.progress)
         if not len(self._joined):
-            raise no_frames_error(self._video)
+            raise VideoError(f"{self._video.path} has no frames between the given start and end; change one of them")
         background.wait_for_solver(lambda done: listeners.progress(COMPILING, min(done, KERNELS), KERNELS))
         with self._clock.stage("solver"):
             return self._footage(background), self._joined.tracks(most_people(self._options.people))

@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...perception.hand_landmarks import HAND_POINTS, HandEstimate, HandNetwork
-from ...perception.hand_region import HAND_LENGTH_M, WRISTS
+from ...perception.hand_region import HAND_LENGTH_M, WRISTS, region_from_body
 from ...perception.observation import Observation
 from ...perception.region import Region
 from .hand_assignment import CERTAIN_PRESENCE, SAME_WRIST, Least, assigned, is_same_hand, side_of
@@ -82,6 +83,11 @@ class Sight:
     def hand_px(self) -> float:
         """Length of the hand in pixels."""
         return HAND_LENGTH_M * self.scale
+
+    @cached_property
+    def predicted(self) -> Region:
+        """Where the body's arm predicts the hand."""
+        return region_from_body(self.person.keypoints_px, self.scale, self.side)
 
     def judge(
         self, estimate: HandEstimate, sure: Least, tentative: Least, same_wrist: float = SAME_WRIST
