@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+from typing import NamedTuple
 
 from ...options.capture import AUTO, LARGEST, OFF
 from ..options import CaptureOptions, most_people
@@ -12,7 +13,14 @@ from ..perception.kept.kept_estimates import KeptEstimates
 from ..tracking.face.face_tracker import FaceTracker
 from ..tracking.hands.hand_tracker import LARGE_HAND_PX, SMALLEST_HAND_PX, HandTracker
 from ..tracking.tracker import PeopleTracker
-from .frame_observer import Trackers
+
+
+class Trackers(NamedTuple):
+    """The trackers of people, and of what is captured only on request."""
+
+    people: PeopleTracker
+    hands: HandTracker | None
+    faces: FaceTracker | None
 
 
 def network_threads(options: CaptureOptions, execution: Execution) -> int:

@@ -36,8 +36,7 @@ from ...tracking.landmarks.mask_schedule import MaskSchedule
 from ...tracking.track import Track
 from ..clock import COMPILING, Progress, StageClock
 from ..footage import Footage, Listeners, given_camera
-from ..frame_observer import FrameObserver, Trackers
-from ..networks import network_threads, open_trackers
+from ..networks import Trackers, network_threads, open_trackers
 from .joined_windows import JoinedWindows
 from .kept_windows import KeptWindows
 from .plan import Window
@@ -136,9 +135,7 @@ class WindowedClip:
         def seam(ended: WindowRun, following: WindowRun | None) -> WindowRun | None:
             self._add(ended, is_whole=following is not None or ended.window.number + 1 == len(self._windows))
             regions = self._joined.missed(following.record()) if following is not None else []
-            if following is None or not regions:
-                return following
-            return self._warmed_up(following, regions)
+            return self._warmed_up(following, regions) if following is not None and regions else following
 
         def watch(frame: Frame, largest: Observation | None) -> None:
             nonlocal done
@@ -258,7 +255,8 @@ class WindowedClip:
         return WindowRun(
             window,
             following,
-            FrameObserver(own, masks, self._clock),
+            own,
+            masks,
             BackgroundTracker(self._camera, self._video.width, self._video.height),
             self._pool,
             self._clock,
