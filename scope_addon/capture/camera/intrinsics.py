@@ -94,18 +94,19 @@ def choose_camera(
     if focal_mm is not None:
         if not 1.0 <= focal_mm <= 2000.0:
             raise UsageError(f"--focal-mm {focal_mm:g} is not a focal length: give 35 mm equivalent ones, such as 26")
-        return Camera(pinhole(width, height, focal_mm / FILM_WIDTH_MM * longer), np.zeros(5), f"given, {focal_mm:g} mm")
-    if fov_deg is not None:
+        focal_px, source = focal_mm / FILM_WIDTH_MM * longer, f"given, {focal_mm:g} mm"
+    elif fov_deg is not None:
         if not 1.0 <= fov_deg <= 175.0:
             raise UsageError(
                 f"--fov {fov_deg:g} is not a field of view: give degrees along the longer side, such as 60"
             )
-        focal_px = _focal_from_fov(longer, fov_deg)
-        return Camera(pinhole(width, height, focal_px), np.zeros(5), f"given, {fov_deg:g} degrees")
-    if metadata_focal_mm:
+        focal_px, source = _focal_from_fov(longer, fov_deg), f"given, {fov_deg:g} degrees"
+    elif metadata_focal_mm:
         focal_px = metadata_focal_mm / FILM_WIDTH_MM * longer
-        return Camera(pinhole(width, height, focal_px), np.zeros(5), f"the file's metadata, {metadata_focal_mm:g} mm")
-    return assumed_camera(width, height, longer)
+        source = f"the file's metadata, {metadata_focal_mm:g} mm"
+    else:
+        return assumed_camera(width, height, longer)
+    return Camera(pinhole(width, height, focal_px), np.zeros(5), source)
 
 
 def assumed_camera(width: int, height: int, longer_px: float) -> Camera:

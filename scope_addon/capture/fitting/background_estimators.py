@@ -42,6 +42,7 @@ class BackgroundEstimators:
         self._solver = ThreadPoolExecutor(1, "scope-solver")
         self._largest: tuple[float, Observation] | None = None  # time and largest person of the last frame
         self._longer_px = float(max(width, height))
+        self._assumed = assumed_camera(width, height, self._longer_px)
         self._by_edges: Future[Camera] | None = None
         self._costs: list[Future[NDArray[np.float64] | None]] = []
         self._loading = self._solver.submit(live.load)
@@ -65,10 +66,11 @@ class BackgroundEstimators:
             return
         if self._by_edges is None:
             self._longer_px = longer_content_side(followed.bars, *self._size)
+            self._assumed = assumed_camera(*self._size, self._longer_px)
             segments = followed.edge_frames[0].segments
             self._by_edges = self.pool.submit(camera_by_edges, segments, *self._size, self._longer_px)
         if before is not None and self._fits.is_due(before[0]):
-            self._costs.append(self._solver.submit(self._fits.costs, before[1], self._assumed()))
+            self._costs.append(self._solver.submit(self._fits.costs, before[1], self._assumed))
 
     def camera(self, record: BackgroundRecord, people: Iterable[tuple[float, Observation]]) -> Camera:
         """Return the clip's camera; an assumed focal length is replaced by the estimate from edges and fits.
@@ -85,7 +87,7 @@ class BackgroundEstimators:
         if self._by_edges is None:
             return self._given_camera
         costs = [costs for each in self._costs if (costs := each.result()) is not None]
-        return camera_by_fits(self._by_edges.result(), self._assumed(), costs, self._longer_px)
+        return camera_by_fits(self._by_edges.result(), self._assumed, costs, self._longer_px)
 
     def wait_for_solver(self, progress: Callable[[int], None]) -> None:
         """Wait until the solver is loaded.
@@ -95,6 +97,3 @@ class BackgroundEstimators:
         while wait_for([self._loading], timeout=_POLLING_INTERVAL_S).not_done:
             if compiled := compiled_kernels():
                 progress(compiled)
-
-    def _assumed(self) -> Camera:
-        return assumed_camera(*self._size, self._longer_px)

@@ -52,7 +52,10 @@ class Region:
 
         A black border would cost the landmark networks 3 mm of accuracy on people at the edge.
         """
-        source, A = image_rgb, self._image_from_pixel(size)
+        # The affine map (2, 3) from pixels of the crop to the image.
+        A = self.R_image_crop * (self.side_px / size)
+        A = np.column_stack([A, np.asarray(self.center_px) + A @ np.full(2, 0.5 - size / 2)])
+        source = image_rgb
         if self.side_px >= 2 * size:
             source, A = _shrink(image_rgb, A, size, int(self.side_px / size).bit_length() - 1)
         flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
@@ -84,11 +87,6 @@ class Region:
         """Return the distance of the centres in sides of the larger square plus |log| of the ratio of the sides."""
         smaller, larger = sorted((max(self.side_px, 1e-9), max(other.side_px, 1e-9)))
         return math.dist(self.center_px, other.center_px) / larger + math.log(larger / smaller)
-
-    def _image_from_pixel(self, size: int) -> NDArray[np.float64]:
-        """Calculate the (2, 3) affine map from pixel indices of a ``size`` crop to image coordinates."""
-        A = self.R_image_crop * (self.side_px / size)
-        return np.column_stack([A, np.asarray(self.center_px) + A @ np.full(2, 0.5 - size / 2)])
 
 
 def _shrink(

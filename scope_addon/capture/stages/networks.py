@@ -23,12 +23,12 @@ class Trackers(NamedTuple):
     faces: FaceTracker | None
 
 
-def network_threads(options: CaptureOptions, execution: Execution) -> int:
-    """Use at most as many threads as there are cores, since more would only wait for each other."""
+def network_threads(wanted: int, execution: Execution) -> int:
+    """Return how many threads to use: at most as many as there are cores, since more would wait for each other."""
     cores = os.cpu_count() or 1
-    if options.threads > cores:
-        execution.warnings.append(f"{options.threads} threads were requested, but there are only {cores} cores")
-    return min(options.threads or cores, cores)
+    if wanted > cores:
+        execution.warnings.append(f"{wanted} threads were requested, but there are only {cores} cores")
+    return min(wanted or cores, cores)
 
 
 def open_trackers(

@@ -50,10 +50,10 @@ class SceneCuts:
                 self._before = before  # a short disturbance, after which the scene may continue
                 return False
             usual = max(usual, _difference(now, self._upcoming))
-        if not has_contrast or change < max(MIN_DIFFERENCE, MIN_RATIO * usual):
+        is_cut = bool(has_contrast and change >= max(MIN_DIFFERENCE, MIN_RATIO * usual))
+        if not is_cut:
             self._differences.append(change)
-            return False
-        return True
+        return is_cut
 
 
 def _thumbnail(image_rgb: NDArray[np.uint8]) -> NDArray[np.float32]:

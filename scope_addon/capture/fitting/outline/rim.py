@@ -59,7 +59,9 @@ class OutlineMeasurer:
         candidates = np.flatnonzero(usable)
         self.vertices = candidates[one_per_cell(body.v_template[candidates], SPACING_M)]
         self.part = part[self.vertices]
-        self._width = np.array([_width(body.joint_names[i]) for i in self.part])
+        joints = [body.joint_names[i] for i in self.part]
+        widths_m = _WIDTHS_M.items()
+        self._width = np.array([next((w for key, w in widths_m if key in joint), _WIDTH_M) for joint in joints])
         self._triangles = np.ascontiguousarray(body.triangles(), np.int32)
         self._around = self._triangles[np.isin(self._triangles, self.vertices).any(axis=1)]
         self.first = len(body.keypoint_names)
@@ -160,7 +162,3 @@ def _crossings(
     outward /= np.maximum(np.linalg.norm(outward, axis=1), 1e-9)[:, None]
     agree = (outward * normal[rows]).sum(axis=1) > AGREEMENT_COS
     return rows[agree], place[agree], outward[agree]
-
-
-def _width(joint: str) -> float:
-    return next((width for key, width in _WIDTHS_M.items() if key in joint), _WIDTH_M)

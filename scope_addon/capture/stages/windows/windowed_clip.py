@@ -71,7 +71,7 @@ class WindowedClip:
         self._kept_windows = KeptWindows(unfinished, options, (video.width, video.height))
         self._camera, self._pool = given_camera(video, options), pool
         self._execution = Execution(options.provider)
-        self._threads = network_threads(options, self._execution)
+        self._threads = network_threads(options.threads, self._execution)
         self._trackers: Trackers | None = None
         self._joined = JoinedWindows()
 

@@ -119,7 +119,6 @@ class HandTracker:
         :param time_s: when the frame is shown; None: a thirtieth of a second after the one before.
         """
         self._time_s = now = self._time_s + FRAME_S if time_s is None else time_s
-        people = dict(observations)
         sights = {
             (n, side): self._sight(image_rgb, o, (n, side)) for n, o in observations for side in range(len(SIDES))
         }
@@ -132,7 +131,7 @@ class HandTracker:
         for (number, side), sight in sights.items():
             if found[number, side] is None:
                 found[number, side] = _of_other_side(sight, sights[number, 1 - side].opposite)
-        kept = without_duplicates({key: hand and hand.estimate for key, hand in found.items()}, people)
+        kept = without_duplicates({key: hand and hand.estimate for key, hand in found.items()}, dict(observations))
         for key, sight in sights.items():
             if found[key] is not None and kept[key] is None:
                 # Another one was found there: look beside all of them, which this one may touch.
@@ -144,7 +143,11 @@ class HandTracker:
             state.found, state.wrist_px = hand, sights[key].wrist_px
             if hand is not None and hand.is_sure:
                 state.seen_s, state.color = now, hand.color
-        rows = {n: _as_array([found[n, s] for s in range(len(SIDES))]) for n, _ in observations}
+        nothing = np.zeros((HAND_POINTS, 6), np.float32)
+        rows = {
+            n: np.array([hand.row if (hand := found[n, side]) else nothing for side in range(len(SIDES))])
+            for n, _ in observations
+        }
         before, self._missed = self._missed, {}
         for key, sight in sights.items():
             hand = found[key]
@@ -269,15 +272,6 @@ def _of_other_side(sight: Sight, seen: Sequence[HandEstimate]) -> Found | None:
     for estimate in seen:
         found = better(found, sight.judge(estimate, DETECTED, TENTATIVE))
     return found
-
-
-def _as_array(hands: Sequence[Found | None]) -> NDArray[np.float32]:
-    """Return (2, 21, 6) pixels, confidence and world landmarks of both hands; zeros where one was not found.
-
-    The confidence of a tentative hand is negative.
-    """
-    nothing = np.zeros((HAND_POINTS, 6), np.float32)
-    return np.array([nothing if hand is None else hand.row for hand in hands])
 
 
 def _is_in_image(region: Region, image_rgb: NDArray[np.uint8]) -> bool:
