@@ -13,6 +13,7 @@ from __future__ import annotations
 import os
 import sys
 import time
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -28,7 +29,8 @@ from ..scope_addon.capture.fitting.prepared_track import prepare_track
 from ..scope_addon.capture.media.video import open_video
 from ..scope_addon.capture.media.video_range import VideoRange
 from ..scope_addon.capture.tracking.left_right import repair_left_right
-from ..scope_addon.capture.tracking.people import PeopleBuilder
+from ..scope_addon.capture.tracking.people import build_tracks
+from ..scope_addon.capture.tracking.track import Tracklet
 from ..scope_addon.capture.tracking.tracker import PeopleTracker
 from ..scope_addon.errors import NoPersonError
 from ..solver import Body, Fit, FrameSolver, Options, Priors, Stage, State, fit_batch, load_body
@@ -71,12 +73,15 @@ def load_clips(names: Sequence[str]) -> list[Clip]:
 
 def _record(video: Path, body: Body, path: Path) -> None:
     """Find the person in a clip and keep what the first pass over it hands to the solver."""
-    tracker, people = PeopleTracker("best", os.cpu_count() or 1, None), PeopleBuilder()
+    tracker, times = PeopleTracker("best", os.cpu_count() or 1, None), list[float]()
+    tracklets: defaultdict[int, Tracklet] = defaultdict(Tracklet)
     with open_video(video, VideoRange()) as footage:
         camera = choose_camera(footage.width, footage.height, metadata_focal_mm=footage.focal_35mm)
         for frame in footage:
-            people.add(frame.index, frame.timestamp_s, tracker.step(frame.image_rgb, time_s=frame.timestamp_s))
-    tracks = people.build(1)
+            for number, observation in tracker.step(frame.image_rgb, time_s=frame.timestamp_s):
+                tracklets[number].add(len(times), observation)
+            times.append(frame.timestamp_s)
+    tracks = build_tracks(range(len(times)), times, list(tracklets.values()), 1)
     if not tracks:
         raise NoPersonError(f"no person was found in {video}: the benchmark needs the clips of ../shared")
     prepared = prepare_track(body, repair_left_right(tracks[0], camera), camera)

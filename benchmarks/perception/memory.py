@@ -25,7 +25,8 @@ from ...scope_addon.capture.perception.observation import Observation
 from ...scope_addon.capture.stages.freed_memory import return_freed_memory
 from ...scope_addon.capture.stages.solve import solve
 from ...scope_addon.capture.tracking.left_right import repair_left_right
-from ...scope_addon.capture.tracking.people import PeopleBuilder
+from ...scope_addon.capture.tracking.people import build_tracks
+from ...scope_addon.capture.tracking.track import Tracklet
 from ...scope_addon.capture.tracking.tracker import PeopleTracker
 from ...scope_addon.capture.world.camera_path import CameraPath
 from ...scope_addon.capture.world.shot import Shot
@@ -44,13 +45,14 @@ def replay(frames: int, people: int) -> dict[str, float]:
         camera, size = choose_camera(video.width, video.height), (video.width, video.height)
         for frame in video:
             seen.append([o for _, o in tracker.step(frame.image_rgb, time_s=frame.timestamp_s)][0])
-    builder, fps = PeopleBuilder(), 30
+    tracklets, fps = [Tracklet() for _ in range(people)], 30
     peaks["networks"] = peak_mib()
     for k in range(frames):
-        builder.add(k, k / fps, [(p, moved(seen[k % len(seen)], p * APART_PX)) for p in range(people)])
+        for p, tracklet in enumerate(tracklets):
+            tracklet.add(k, moved(seen[k % len(seen)], p * APART_PX))
     peaks["tracking"] = peak_mib()
-    tracks = builder.build(people)
-    del builder, tracker
+    tracks = build_tracks(range(frames), [k / fps for k in range(frames)], tracklets, people)
+    del tracklets, tracklet, tracker
     return_freed_memory()
     repaired = (repair_left_right(tracks.pop(0), camera) for _ in range(people))
     shot = Shot(body, camera, CameraPath.static(frames), Lines.none(), Fraction(fps), size, SAMPLE.name)

@@ -50,5 +50,4 @@ def transform_points(
     T_a_b: NDArray[np.floating[Any]], points_b: NDArray[np.floating[Any]]
 ) -> NDArray[np.floating[Any]]:
     """Return ``p_a = R p_b + t`` for (..., 4, 4) transforms and (..., N, 3) points."""
-    points_a: NDArray[np.floating[Any]] = points_b @ np.swapaxes(T_a_b[..., :3, :3], -1, -2) + T_a_b[..., None, :3, 3]
-    return points_a
+    return points_b @ np.swapaxes(T_a_b[..., :3, :3], -1, -2) + T_a_b[..., None, :3, 3]

@@ -66,12 +66,13 @@ class BodySurface:
         strongest = body.skin_joints[np.arange(len(v)), body.skin_weights.argmax(1)]
         sampled = [k for k, name in enumerate(body.joint_names) if name in _TRUNK or name.endswith(_LEGS)]
         rows = np.flatnonzero(np.isin(strongest, sampled) & normals.any(axis=1))
-        rows = rows[_one_per_cell(v[rows])]
+        rows = rows[one_per_cell(v[rows], SPACING_M)]
         arms = v[np.isin(strongest, _arm_parts(body))]
         self._body, self._betas = body, betas
         self._count, self._skin = len(rows), list(_skin(body, rows, v[rows], J, normals[rows]))
         self.indices = _points_on_arms(body) if len(rows) and len(arms) else np.zeros(0, np.intp)
-        self._room = self._distance_to_skin(arms)
+        points = (body.keypoint_template + body.keypoint_shapedirs @ betas)[self.indices]
+        self._room = np.linalg.norm(points[:, None] - arms, axis=-1).min(axis=1, initial=np.inf)
 
     def planes(self, R: NDArray[np.floating[Any]], t: NDArray[np.floating[Any]]) -> TangentPlanes:
         """Return the tangent planes next to the points `indices` of a posed body.
@@ -104,12 +105,6 @@ class BodySurface:
             v[:, rows] += local @ R_transposed + weights * t[:, joint, None]
             normals[:, rows] += normal @ R_transposed
         return v, normals / np.linalg.norm(normals, axis=-1, keepdims=True)
-
-    def _distance_to_skin(self, arms: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
-        """Return the (C,) distances from the points to the nearest of the arms' vertices (n, 3) in the rest pose."""
-        points = (self._body.keypoint_template + self._body.keypoint_shapedirs @ self._betas)[self.indices]
-        distance: NDArray[np.float64] = np.linalg.norm(points[:, None] - arms, axis=-1).min(axis=1, initial=np.inf)
-        return distance
 
 
 def _skin(
@@ -167,7 +162,7 @@ def _vertex_normals(body: Body, betas: NDArray[np.floating[Any]]) -> NDArray[np.
     return unit
 
 
-def _one_per_cell(points: NDArray[np.floating[Any]]) -> NDArray[np.intp]:
-    """Return the rows of points (n, 3), one in each cell of a grid."""
-    _, first = np.unique(np.floor(points / SPACING_M).astype(int), axis=0, return_index=True)
+def one_per_cell(points: NDArray[np.floating[Any]], side_m: float) -> NDArray[np.intp]:
+    """Return the rows of points (n, 3), metres, one in each cell of a grid; in order."""
+    _, first = np.unique(np.floor(points / side_m).astype(int), axis=0, return_index=True)
     return np.sort(first)

@@ -20,14 +20,6 @@ PALMS = ("palm/left", "palm/right")
 CONTACT_POINTS = SOLES + PALMS
 
 
-def _palm_parts(body: Body) -> tuple[str, str]:
-    """Return the parts that carry the palms: the hands, or the wrists of a body with fingers."""
-    left, right = (
-        f"{side}_hand" if f"{side}_hand" in body.joint_names else f"{side}_wrist" for side in ("left", "right")
-    )
-    return left, right
-
-
 def with_contact_points(body: Body, betas: NDArray[np.floating[Any]]) -> Body:
     """Add six keypoints to a body, `CONTACT_POINTS`.
 
@@ -39,7 +31,10 @@ def with_contact_points(body: Body, betas: NDArray[np.floating[Any]]) -> Body:
     """
     v, J = body.rest_vertices(betas), body.rest_joints(betas)
     strongest = body.skin_joints[np.arange(len(v)), body.skin_weights.argmax(1)]
-    parts = np.array([body.joint_names.index(name) for name in FOOT_PARTS + _palm_parts(body)], np.int32)
+    # The palms are on the hands, or on the wrists of a body with fingers.
+    kind = "hand" if "left_hand" in body.joint_names else "wrist"
+    names = (*FOOT_PARTS, f"left_{kind}", f"right_{kind}")
+    parts = np.array([body.joint_names.index(name) for name in names], np.int32)
     local = np.zeros((len(parts), 3))
     for k, part in enumerate(parts):
         own = v[strongest == part] if (strongest == part).any() else J[part : part + 1]

@@ -88,21 +88,12 @@ def foot_heights(motion: Motion, body: Body, raw: bool = False) -> NDArray[np.fl
 
 
 def under_floor(motion: Motion, body: Body) -> NDArray[np.bool_]:
-    """Return the (T,) frames of a motion in which a foot is more than `UNDER_FLOOR_M` under the floor.
-
-    There are none on uneven ground.
-
-    :param body: that of the motion.
-    """
-    under: NDArray[np.bool_] = depth_under_floor(motion, body) > UNDER_FLOOR_M
-    return under
+    """Return the (T,) frames in which a foot is more than `UNDER_FLOOR_M` under the floor; none on uneven ground."""
+    return depth_under_floor(motion, body) > UNDER_FLOOR_M
 
 
 def depth_under_floor(motion: Motion, body: Body) -> NDArray[np.float64]:
-    """Return how far the lowest foot of each frame is under the floor, (T,) metres; 0 above it and on uneven ground.
-
-    :param body: that of the motion.
-    """
+    """Return how far the lowest foot of each frame is under the floor, (T,) metres; 0 above it and on uneven ground."""
     if motion.uneven_ground:
         return np.zeros(len(motion))
     depth: NDArray[np.float64] = np.maximum(-foot_heights(motion, body).min(axis=1), 0.0)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ...solver.rotations import shortest_turn
 from .runs import runs
+from .standing import line_of_sight
 
 LIMBS = (
     ("left_shoulder", "left_elbow", "left_wrist"),
@@ -35,7 +36,7 @@ def bone_depths(
     :param ends: (T, 3) the next one.
     :param center: (T, 3) the camera.
     """
-    depths: NDArray[np.float64] = ((ends - starts) * _line_of_sight(ends, center)).sum(axis=1)
+    depths: NDArray[np.float64] = ((ends - starts) * line_of_sight(ends - center)).sum(axis=1)
     return depths
 
 
@@ -81,13 +82,7 @@ def _mirrored(
     ends: NDArray[np.floating[Any]],
     center: NDArray[np.floating[Any]],
 ) -> NDArray[np.floating[Any]]:
-    bone, sight = ends - starts, _line_of_sight(ends, center)
+    bone, sight = ends - starts, line_of_sight(ends - center)
     other = bone - 2.0 * (bone * sight).sum(axis=1, keepdims=True) * sight
     turned: NDArray[np.floating[Any]] = shortest_turn(bone, other) @ R
     return turned
-
-
-def _line_of_sight(points: NDArray[np.floating[Any]], center: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
-    away = points - center
-    sight: NDArray[np.floating[Any]] = away / np.linalg.norm(away, axis=1, keepdims=True)
-    return sight

@@ -37,8 +37,7 @@ def fill_gaps(
     flat = values.reshape(len(values), -1)
     good = np.flatnonzero(valid)
     out = np.stack([np.interp(times, times[good], flat[good, k]) for k in range(flat.shape[1])], axis=1)
-    filled: NDArray[np.float64] = out.reshape(values.shape)
-    return filled
+    return out.reshape(values.shape)
 
 
 def continuous_quaternions(R: NDArray[np.floating[Any]]) -> NDArray[np.float64]:

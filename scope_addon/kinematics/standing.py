@@ -32,13 +32,6 @@ def line_of_sight(position: NDArray[np.floating[Any]]) -> NDArray[np.floating[An
     return unit
 
 
-def horizontal_line_of_sight(
-    position: NDArray[np.floating[Any]], up: NDArray[np.floating[Any]]
-) -> NDArray[np.floating[Any]]:
-    """Return the (..., 3) unit vectors over the floor, towards positions (..., 3) relative to the camera's centre."""
-    return line_of_sight(position - (position @ up)[..., None] * up)
-
-
 def standing_probability(
     soles: NDArray[np.floating[Any]],
     up: NDArray[np.floating[Any]],
@@ -69,9 +62,8 @@ def standing_probability(
         upwards = np.abs(line_of_sight(soles - np.expand_dims(center, -2)) @ up)
         mean_speed = np.sqrt(gaussian_smooth(np.square(speed), times, STILL_CUTOFF_HZ))
         allowed += WRONG_DEPTH_M * upwards * logistic(4 * (1 - mean_speed / STILL_M_S))
-    p: NDArray[np.floating[Any]] = logistic(4 * (1 - speed / CONTACT_SPEED_M_S)) * logistic(4 * (1 - height / allowed))
-    p *= logistic(8 * (1 - _downward_acceleration(velocity, up, times) / FALL_M_S2)) / logistic(8)
-    return p
+    p = logistic(4 * (1 - speed / CONTACT_SPEED_M_S)) * logistic(4 * (1 - height / allowed))
+    return p * logistic(8 * (1 - _downward_acceleration(velocity, up, times) / FALL_M_S2)) / logistic(8)
 
 
 def resting_probability(

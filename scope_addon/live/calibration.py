@@ -25,7 +25,7 @@ from ..capture.fitting.frame_sequence import FittedTrack
 from ..capture.fitting.prepared_track import prepare_track
 from ..capture.fitting.track_fit import fit_track
 from ..capture.perception.observation import Observation
-from ..capture.tracking.track import Track, Tracklet, make_track
+from ..capture.tracking.track import Track, track_of
 from ..capture.world.placement import place_track
 from ..capture.world.world_frame import find_world, floor_height
 from ..kinematics.axes import transform_points, world_from_level_camera
@@ -158,28 +158,14 @@ class Calibrator:
         """Add the world: as offline where no lines tell which way is up, otherwise with their direction."""
         placed = place_track(self._body, track, fitted, smoothing=True)
         T = find_world([placed]).T_world_camera
-        if self._lines_differ(calibration.camera):
+        focal_px = calibration.camera.intrinsics[0, 0]
+        # The search for the lines' direction takes long, so another one follows only where the focal length changes.
+        if len(self._segments.ends_px) and abs(np.log(focal_px / self._focal_of_lines)) > SAME_FOCAL:
             self._up_of_lines = estimate_up_from_lines(self._segments.lines(calibration.camera), T[2, :3]).up
-            self._focal_of_lines = float(calibration.camera.intrinsics[0, 0])
+            self._focal_of_lines = float(focal_px)
         if self._up_of_lines is not None:
             up, valid = self._up_of_lines, placed.valid
             contact = placed.contact(up)[valid, : len(SOLES)]
             T = world_from_level_camera(up, -floor_height(placed.soles[valid], contact, up))
             T[:2, 3] -= transform_points(T, placed.joints[valid.argmax(), :1])[0, :2]
         return replace(calibration, up=T[2, :3], camera_position=T[:3, 3])
-
-    def _lines_differ(self, camera: Camera) -> bool:
-        """Whether to search for the lines' direction again, which takes long: the focal length has changed."""
-        if not len(self._segments.ends_px):
-            return False
-        return bool(abs(np.log(camera.intrinsics[0, 0] / self._focal_of_lines)) > SAME_FOCAL)
-
-
-def track_of(times_s: Sequence[float], observations: Sequence[Observation]) -> Track:
-    """Make a track of frames in all of which the person was seen."""
-    tracklet = Tracklet()
-    for row, observation in enumerate(observations):
-        tracklet.add(row, replace(observation, reference_landmarks=None, hands=None, face=None, mask=None))
-    track = make_track(range(len(times_s)), times_s, [tracklet])
-    track.acquired[:] = [observation.acquired for observation in observations]
-    return track

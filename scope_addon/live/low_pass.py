@@ -62,59 +62,36 @@ class VectorFilter:
         self._values: list[NDArray[np.float64]] = []
 
     def __call__(self, value: NDArray[np.floating[Any]], step_s: float) -> NDArray[np.float64]:
-        """Return the filtered value (n,).
+        """Return the filtered value (...).
 
-        :param value: (n,).
+        :param value: (...), of the kind that the filter is for.
         :param step_s: seconds since the value before.
         """
-        x = np.array(value, float)
+        x: NDArray[np.float64] = np.array(value, float)
         if not self._values or not 0.0 < step_s <= LONGEST_STEP_S:
             self._values, self._age_s = [x] * self._response.stages, 0.0
             return x
         self._age_s += step_s
         share, before = self._response.share(step_s), self._values[-1]
         for k, state in enumerate(self._values):
-            self._values[k] = x = state + share * (x - state)
-        moved: NDArray[np.float64] = x + self._response.lead(self._age_s) / step_s * (x - before)
-        return moved
+            self._values[k] = x = self._between(state, x, share)
+        return self._beyond(before, x, self._response.lead(self._age_s) / step_s)
+
+    def _between(self, a: NDArray[np.float64], b: NDArray[np.float64], share: float) -> NDArray[np.float64]:
+        """Return what lies between a and b, at a share of the way."""
+        return a + share * (b - a)
+
+    def _beyond(self, a: NDArray[np.float64], b: NDArray[np.float64], lead: float) -> NDArray[np.float64]:
+        """Return what lies beyond b, by a multiple of the way from a."""
+        return b + lead * (b - a)
 
 
-class RotationFilter:
+class RotationFilter(VectorFilter):
     """Filters rotations (J, 3, 3), each for itself."""
 
-    def __init__(self, response: Response) -> None:
-        self._response = response
-        self.reset()
+    def _between(self, a: NDArray[np.float64], b: NDArray[np.float64], share: float) -> NDArray[np.float64]:
+        between = a @ rotations.exp(share * rotations.log(np.swapaxes(a, 1, 2) @ b))
+        return rotations.nearest_rotation(between)  # without what rounding has added up
 
-    def reset(self) -> None:
-        """Start again with the next rotations."""
-        self._values: list[NDArray[np.float64]] = []
-
-    def __call__(self, R: NDArray[np.floating[Any]], step_s: float) -> NDArray[np.float64]:
-        """Return the filtered rotations (J, 3, 3).
-
-        :param R: (J, 3, 3).
-        :param step_s: seconds since the rotations before.
-        """
-        x: NDArray[np.float64] = np.array(R, float)
-        if not self._values or not 0.0 < step_s <= LONGEST_STEP_S:
-            self._values, self._age_s = [x] * self._response.stages, 0.0
-            return x
-        self._age_s += step_s
-        share, before, lead_s = self._response.share(step_s), self._values[-1], self._response.lead(self._age_s)
-        for k, state in enumerate(self._values):
-            self._values[k] = x = _nearest(state @ rotations.exp(share * _between(state, x)))
-        moved: NDArray[np.float64] = x @ rotations.exp(lead_s / step_s * _between(before, x))
-        return moved
-
-
-def _nearest(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the rotations nearest to matrices (J, 3, 3), without what rounding has added up."""
-    nearest: NDArray[np.float64] = rotations.nearest_rotation(matrices)
-    return nearest
-
-
-def _between(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the rotation vectors (J, 3) from rotations a to b, in a's axes."""
-    vectors: NDArray[np.float64] = rotations.log(np.swapaxes(a, 1, 2) @ b)
-    return vectors
+    def _beyond(self, a: NDArray[np.float64], b: NDArray[np.float64], lead: float) -> NDArray[np.float64]:
+        return b @ rotations.exp(lead * rotations.log(np.swapaxes(a, 1, 2) @ b))

@@ -99,8 +99,10 @@ class LivePeople:
         """Return the poses in the next frame, one of each person."""
         image_rgb = self._exposure.brighten(frame.image_rgb)
         observations = dict(self._tracker.step(image_rgb, None, frame.timestamp_s))
-        if len(self._followed) == 1:
-            self._follow_largest(self._followed[0], observations)
+        if len(self._followed) == 1:  # who stays the same while they are seen, and then is the largest one
+            if self._followed[0].tracklet not in observations:
+                largest = max(observations, key=lambda k: observations[k].region.side_px, default=None)
+                self._followed[0].tracklet = largest
         else:
             self._assign_people(observations, frame.timestamp_s)
         poses = []
@@ -108,11 +110,6 @@ class LivePeople:
             observation = None if person.tracklet is None else observations.get(person.tracklet)
             poses.append(replace(person.session.step(frame, observation), person=number))
         return poses
-
-    def _follow_largest(self, followed: _FollowedPerson, observations: Mapping[int, Observation]) -> None:
-        """Keep the person while they are seen, and then take the largest one."""
-        if followed.tracklet not in observations:
-            followed.tracklet = max(observations, key=lambda k: observations[k].region.side_px, default=None)
 
     def _assign_people(self, observations: Mapping[int, Observation], time_s: float) -> None:
         """Give sessions to those who have none, as far as there are free ones, and note who was seen."""

@@ -7,7 +7,6 @@ includes the first estimates of focal length, shape and floor.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -21,6 +20,7 @@ from ..capture.fitting.stature import require_stature
 from ..capture.media.frame import Frame
 from ..capture.media.opencv_threads import opencv_in_one_thread
 from ..capture.perception.execution import Execution
+from ..capture.stages.networks import network_threads
 from ..capture.tracking.tracker import PeopleTracker
 from .clock import Clock
 from .people import LivePeople
@@ -116,9 +116,8 @@ def run_live(
         require_stature(body, height_m)
     clock = clock or Clock()
     execution = Execution(options.provider)
-    cores = os.cpu_count() or 1
     people = options.people if options.people > 1 else None  # None: the largest one
-    tracker = PeopleTracker(options.quality, min(options.threads or cores, cores), people, execution=execution)
+    tracker = PeopleTracker(options.quality, network_threads(options.threads, execution), people, execution=execution)
     LiveBody(body, assumed_camera(*CAMERA_SIZE, CAMERA_SIZE[0])).load()
     statistics = Statistics()
     reader = NewestFrame(source, clock, options.reconnect_s, listeners.say, listeners.received)

@@ -17,7 +17,8 @@ from ..capture.camera.intrinsics import Camera
 from ..capture.fitting.frame_sequence import FittedTrack
 from ..capture.media.frame import Frame
 from ..capture.perception.observation import Observation
-from .calibration import Calibration, Calibrator, GradualCalibration, track_of
+from ..capture.tracking.track import track_of
+from .calibration import Calibration, Calibrator, GradualCalibration
 from .causal_fit import CausalFit, FittedFrame
 from .feet.hold import FootHold
 from .feet.support import Support

@@ -130,8 +130,7 @@ class FakeLandmarks:
         there = Region((float(place[0]), float(place[1])), 2.5 * person.size_px, 0.0)
         return PoseEstimate(
             keypoints_px=place + body[:, :2] * person.size_px,
-            visibility=np.ones(33),
-            in_frame=np.ones(33),
+            keypoints_confidence=np.ones(33),
             world_landmarks=body,
             presence=0.99 if seen else 0.0,
             region=region if seen else there,

@@ -65,10 +65,9 @@ def draw_clip(body: Body, shot: TalkShot, room: NDArray[np.uint8], path: Path, t
     :raises OutputError: the file cannot be written.
     """
     painter = PersonPainter(body, shot, room)
-    writer = VideoWriter(temporary, Fraction(round(shot.fps)), *shot.size, path)
-    for frame in range(len(shot)):
-        writer.write(painter.picture(frame))
-    writer.close()
+    with VideoWriter(temporary, Fraction(round(shot.fps)), *shot.size, path) as writer:
+        for frame in range(len(shot)):
+            writer.write(painter.picture(frame))
 
 
 def _colors(body: Body) -> NDArray[np.float32]:

@@ -90,11 +90,6 @@ class BackgroundRecord:
             R = remove_heading_drift(R, times, self.edge_frames, camera, image_size)
         return CameraMotion(R, known)
 
-    @property
-    def segments(self) -> Segments:
-        """Straight edges of the background, in the first frame in which somebody is seen."""
-        return self.edge_frames[0].segments if self.edge_frames else Segments.none()
-
     def lines(self, motion: CameraMotion, camera: Camera) -> Lines:
         """Return the lines of the background in the first frame's axes.
 
@@ -104,7 +99,8 @@ class BackgroundRecord:
             return Lines.none()
         if motion.is_static:
             return Segments.of_all([edge.segments for edge in self.edge_frames if self._is_new(edge)]).lines(camera)
-        return self.segments.lines(camera).rotated(motion.R_first_camera[self.edge_frames[0].row])
+        first = self.edge_frames[0]
+        return first.segments.lines(camera).rotated(motion.R_first_camera[first.row])
 
     def _is_new(self, edge: FrameEdges) -> bool:
         """Return whether none of a frame's edges were seen before.

@@ -48,8 +48,7 @@ def longer_content_side(bars: Sequence[NDArray[np.float64]], width: int, height:
     """Return the longer side, in pixels, of the content between the bars.
 
     :param bars: (4,) each, as `find_bars` returns them.
-    :param width: of the whole picture in pixels.
-    :param height: likewise.
+    :param width, height: of the whole picture in pixels.
     """
     sizes = np.array([bar[2:] - bar[:2] for bar in bars]).reshape(-1, 2)
     is_upright = sizes[:, 1] == height

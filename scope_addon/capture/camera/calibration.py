@@ -96,8 +96,7 @@ class Calibration:
                 f"{self.path}: dist {self.dist.tolist()} folds or tears the image; give OpenCV's k1, k2, p1, p2, k3, "
                 "in this order, from the same calibration as the intrinsics"
             )
-        scaled: NDArray[np.float64] = np.diag([width / known_width, height / known_height, 1.0]) @ K
-        return scaled
+        return np.diag([width / known_width, height / known_height, 1.0]) @ K
 
 
 def read_calibration(path: Path) -> Calibration:

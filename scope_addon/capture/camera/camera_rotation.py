@@ -25,14 +25,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..perception.region import inside, surroundings
-from .background_record import REVEALING_S, SAMPLES_HZ, BackgroundRecord, CameraMotion, is_rotated
+from .background_record import REVEALING_S, SAMPLES_HZ, BackgroundRecord, is_rotated
 from .bars import find_bars
 from .heading_drift import EDGE_INTERVAL_S, EDGE_SIDE_PX, FrameEdges
 from .hidden_background import HiddenBackground
 from .intrinsics import Camera
-from .line_segments import Lines, Segments, find_segments
+from .line_segments import find_segments
 
 WORKING_SIDE_PX = 480  # the longer side of the image in which corners are followed
+HYPOTHESES = 128  # of two directions each
 MAX_CORNERS = 240
 MIN_CORNERS = 24
 KEY_SHARE = 0.5  # of a key frame's corners; with fewer left, the next key frame begins
@@ -45,15 +46,14 @@ class BackgroundTracker:
     """Follows the background through a clip; frames come in order, each with the people's positions.
 
     :param camera: the intrinsics of the full image.
-    :param width: of the full image in pixels.
-    :param height: likewise.
+    :param width, height: of the full image in pixels.
     """
 
     def __init__(self, camera: Camera, width: int, height: int) -> None:
         self._scale = WORKING_SIDE_PX / max(width, height)
         self._step = min(max(1, int(0.5 / self._scale)), width, height)
         self._size = (max(1, round(width * self._scale)), max(1, round(height * self._scale)))
-        self._camera, self._full_size = camera, (width, height)
+        self._camera = camera
         self._tolerance = INLIER_PX / (self._scale * camera.intrinsics[0, 0])  # radians
         self._random = np.random.default_rng(0)
         self._times: list[float] = []
@@ -66,7 +66,7 @@ class BackgroundTracker:
         self._R_first_key = np.eye(3)
         self._R_key_last = np.eye(3)
         self._inlier_shares: list[float] = []
-        self._edge_frames: list[FrameEdges] = []  # the first one is the first frame in which somebody is seen
+        self.edge_frames: list[FrameEdges] = []  # the first one is the first frame in which somebody is seen
         self._hidden = HiddenBackground((width, height))
         self.bars: list[NDArray[np.float64]] = []  # in that frame
 
@@ -88,9 +88,9 @@ class BackgroundTracker:
         """
         self._times.append(time_s)
         row = len(self._times) - 1
-        if people and not self._edge_frames:
+        if people and not self.edge_frames:
             self.bars = find_bars(image_rgb)
-            self._edge_frames.append(FrameEdges(row, find_segments(image_rgb, people, bars=self.bars)))
+            self.edge_frames.append(FrameEdges(row, find_segments(image_rgb, people, bars=self.bars)))
             self._hidden.reveal(people)
         if time_s - self._last_used < 0.98 / SAMPLES_HZ and not (is_cut or is_sampled):
             self._rotations.append(None)
@@ -104,7 +104,7 @@ class BackgroundTracker:
             return
         R_camera_key = None if is_cut else self._follow(image, boxes)
         if R_camera_key is None:  # a cut, or too few corners: start again at the last known rotation
-            if self._edge_frames:  # what is seen from now on may be something else
+            if self.edge_frames:  # what is seen from now on may be something else
                 self._hidden.reveal([])
             self._R_first_key = self._R_first_key @ self._R_key_last
             self._begin_key(image, boxes)
@@ -114,10 +114,10 @@ class BackgroundTracker:
         R_first_camera = self._R_first_key @ self._R_key_last
         self._rotations.append(R_first_camera)
         if self._is_edge_frame(R_first_camera):
-            self._edge_frames.append(FrameEdges(row, find_segments(image_rgb, people, EDGE_SIDE_PX, self.bars)))
+            self.edge_frames.append(FrameEdges(row, find_segments(image_rgb, people, EDGE_SIDE_PX, self.bars)))
         elif self._may_reveal_edges(R_first_camera, people):
             segments = find_segments(image_rgb, people, bars=self.bars)
-            self._edge_frames.append(FrameEdges(row, segments.where(self._hidden.hides(segments.ends_px.mean(axis=1)))))
+            self.edge_frames.append(FrameEdges(row, segments.where(self._hidden.hides(segments.ends_px.mean(axis=1)))))
             self._hidden.reveal(people)
         self._image = image
         if len(self._points) < max(KEY_SHARE * self._key_count, MIN_CORNERS):
@@ -129,31 +129,13 @@ class BackgroundTracker:
         known = np.array([R is not None for R in self._rotations], bool)
         R = np.array([np.eye(3) if R is None else R for R in self._rotations]).reshape(-1, 3, 3)
         times = np.array(self._times)
-        return BackgroundRecord(times, R, known, list(self._inlier_shares), list(self._edge_frames), self.bars)
-
-    def motion(self, camera: Camera) -> CameraMotion:
-        """Return the rotation in all frames so far; see `BackgroundRecord.motion`."""
-        return self.record().motion(self._camera, camera, self._full_size)
-
-    @property
-    def has_searched_edges(self) -> bool:
-        """Whether somebody was seen, so that straight edges were searched for."""
-        return bool(self._edge_frames)
-
-    @property
-    def segments(self) -> Segments:
-        """Straight edges of the background, in the first frame in which somebody is seen."""
-        return self._edge_frames[0].segments if self._edge_frames else Segments.none()
-
-    def lines(self, motion: CameraMotion, camera: Camera) -> Lines:
-        """Return the lines of the background in the first frame's axes; see `BackgroundRecord.lines`."""
-        return self.record().lines(motion, camera)
+        return BackgroundRecord(times, R, known, list(self._inlier_shares), list(self.edge_frames), self.bars)
 
     def _is_edge_frame(self, R_first_camera: NDArray[np.float64]) -> bool:
         """Return whether to detect edges in the last frame: at intervals, once the camera (3, 3) has rotated."""
-        if not self._edge_frames:
+        if not self.edge_frames:
             return False
-        elapsed_s = self._times[-1] - self._times[self._edge_frames[-1].row]
+        elapsed_s = self._times[-1] - self._times[self.edge_frames[-1].row]
         return elapsed_s >= EDGE_INTERVAL_S and is_rotated(R_first_camera)
 
     def _may_reveal_edges(self, R_first_camera: NDArray[np.float64], people: Sequence[NDArray[Any]]) -> bool:
@@ -161,10 +143,10 @@ class BackgroundTracker:
 
         The camera (3, 3) must not have rotated. Without anybody in the frame, somebody may have been missed.
         """
-        if not self._edge_frames or not people or is_rotated(R_first_camera):
+        if not self.edge_frames or not people or is_rotated(R_first_camera):
             return False
-        elapsed_s = self._times[-1] - self._times[self._edge_frames[-1].row]
-        since_first_s = self._times[-1] - self._times[self._edge_frames[0].row]
+        elapsed_s = self._times[-1] - self._times[self.edge_frames[-1].row]
+        since_first_s = self._times[-1] - self._times[self.edge_frames[0].row]
         is_due = elapsed_s >= EDGE_INTERVAL_S and since_first_s <= REVEALING_S
         return is_due and self._hidden.share_in_view(people) >= REVEALED_SHARE
 
@@ -215,8 +197,7 @@ class BackgroundTracker:
 
     def _box(self, box_px: NDArray[Any]) -> NDArray[np.float64]:
         """Return a box x0, y0, x1, y1 in the working image, with a margin."""
-        box: NDArray[np.float64] = box_px * self._scale + [-4.0, -4.0, 4.0, 4.0]
-        return box
+        return box_px * self._scale + [-4.0, -4.0, 4.0, 4.0]
 
 
 def consensus_rotation(
@@ -224,7 +205,6 @@ def consensus_rotation(
     b: NDArray[np.float64],
     tolerance: float,
     random: np.random.Generator,
-    hypotheses: int = 128,
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Find the rotation R with b = R a that most directions agree with.
 
@@ -232,10 +212,9 @@ def consensus_rotation(
     :param b: (n, 3) unit vectors.
     :param tolerance: radians.
     :param random: draws the hypotheses.
-    :param hypotheses: how many are drawn.
     :return: R (3, 3), and (n,) whether each pair agrees with it.
     """
-    pairs = random.integers(0, len(a), (hypotheses, 2))
+    pairs = random.integers(0, len(a), (HYPOTHESES, 2))
     pairs = pairs[pairs[:, 0] != pairs[:, 1]]
     R = _kabsch(a[pairs], b[pairs])
     # |R a − b|² = 2 − 2 bᵀ R a, for all hypotheses and directions in one matrix product

@@ -61,8 +61,7 @@ def pinhole(width: int, height: int, focal_px: float) -> NDArray[np.float64]:
 def scaled_intrinsics(intrinsics: NDArray[np.float64], scale: float) -> NDArray[np.float64]:
     """Return the intrinsics (3, 3) of a scaled image; pixel centres have integer coordinates, the corner is at -1/2."""
     scaling = np.array([[scale, 0, (scale - 1) / 2], [0, scale, (scale - 1) / 2], [0, 0, 1]])
-    scaled: NDArray[np.float64] = scaling @ intrinsics
-    return scaled
+    return scaling @ intrinsics
 
 
 def choose_camera(
@@ -76,8 +75,7 @@ def choose_camera(
 ) -> Camera:
     """Choose the camera for footage of this size: from the user, otherwise the metadata, otherwise the default.
 
-    :param width: of the footage in pixels.
-    :param height: likewise.
+    :param width, height: of the footage in pixels.
     :param focal_mm: 35 mm equivalent focal length along the longer side, f_px = f_mm / 36 · max(width, height).
     :param fov_deg: field of view along the longer side, f_px = max(width, height) / (2 tan(fov / 2)).
     :param calibration: JSON file; see `calibration`.
@@ -96,25 +94,25 @@ def choose_camera(
     if focal_mm is not None:
         if not 1.0 <= focal_mm <= 2000.0:
             raise UsageError(f"--focal-mm {focal_mm:g} is not a focal length: give 35 mm equivalent ones, such as 26")
-        return Camera(pinhole(width, height, focal_mm / FILM_WIDTH_MM * longer), np.zeros(5), f"given, {focal_mm:g} mm")
-    if fov_deg is not None:
+        focal_px, source = focal_mm / FILM_WIDTH_MM * longer, f"given, {focal_mm:g} mm"
+    elif fov_deg is not None:
         if not 1.0 <= fov_deg <= 175.0:
             raise UsageError(
                 f"--fov {fov_deg:g} is not a field of view: give degrees along the longer side, such as 60"
             )
-        focal_px = _focal_from_fov(longer, fov_deg)
-        return Camera(pinhole(width, height, focal_px), np.zeros(5), f"given, {fov_deg:g} degrees")
-    if metadata_focal_mm:
+        focal_px, source = _focal_from_fov(longer, fov_deg), f"given, {fov_deg:g} degrees"
+    elif metadata_focal_mm:
         focal_px = metadata_focal_mm / FILM_WIDTH_MM * longer
-        return Camera(pinhole(width, height, focal_px), np.zeros(5), f"the file's metadata, {metadata_focal_mm:g} mm")
-    return assumed_camera(width, height, longer)
+        source = f"the file's metadata, {metadata_focal_mm:g} mm"
+    else:
+        return assumed_camera(width, height, longer)
+    return Camera(pinhole(width, height, focal_px), np.zeros(5), source)
 
 
 def assumed_camera(width: int, height: int, longer_px: float) -> Camera:
     """Return the camera with the default field of view.
 
-    :param width: of the footage in pixels.
-    :param height: likewise.
+    :param width, height: of the footage in pixels.
     :param longer_px: the longer side of the camera's image, which is smaller than the footage's between bars.
     """
     source = f"assumed, {DEFAULT_FOV_DEG:g} degrees"
@@ -127,8 +125,7 @@ def assumed_camera(width: int, height: int, longer_px: float) -> Camera:
 def estimated_camera(width: int, height: int, focal_px: float, deviation: float, longer_px: float) -> Camera:
     """Return the camera with an estimated focal length.
 
-    :param width: of the footage in pixels.
-    :param height: likewise.
+    :param width, height: of the footage in pixels.
     :param focal_px: focal length in pixels.
     :param deviation: its relative error, one standard deviation.
     :param longer_px: as for `assumed_camera`.

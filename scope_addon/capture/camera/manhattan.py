@@ -96,7 +96,8 @@ class Edges:
     def _up_candidates(self, normals: NDArray[Any], focal_px: float) -> list[NDArray[Any]]:
         """Return distinct directions near the picture's vertical in which pairs of edges intersect, the best first."""
         up = np.array([0.0, -1.0, 0.0])
-        found = intersection_directions(normals[may_be_vertical(normals, up)], up)
+        may_be_vertical = np.abs(normals @ up) < np.sin(MAX_TILT + PLANE_SIGMA)
+        found = intersection_directions(normals[may_be_vertical], up)
         if not len(found):
             return []
         blocks = np.array_split(found, len(found) // _BLOCK + 1)
@@ -117,12 +118,6 @@ class Edges:
         sine2 = across * across / np.maximum(x * x + y * y, np.float32(1e-12))
         explained: NDArray[Any] = np.exp(np.float32(-0.5 / EDGE_SIGMA**2) * sine2)
         return explained
-
-
-def may_be_vertical(normals: NDArray[Any], up: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return (N,) whether lines with these plane normals (N, 3) can run along a direction near ``up`` (3,)."""
-    mask: NDArray[np.bool_] = np.abs(normals @ up) < np.sin(MAX_TILT + PLANE_SIGMA)
-    return mask
 
 
 def intersection_directions(normals: NDArray[Any], up: NDArray[np.float64]) -> NDArray[Any]:

@@ -9,6 +9,7 @@ of the threads.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures import wait as wait_for
@@ -22,7 +23,6 @@ from ..camera.background_record import BackgroundRecord
 from ..camera.bars import longer_content_side
 from ..camera.camera_rotation import BackgroundTracker
 from ..camera.intrinsics import Camera, assumed_camera
-from ..media.frame import Frame
 from ..perception.observation import Observation
 from .focal_fits import FocalFits
 from .focal_length import camera_by_edges, camera_by_fits
@@ -37,13 +37,12 @@ class BackgroundEstimators:
     """A context that takes frames in order; leaving it with an error, such as a cancel, drops work not yet begun."""
 
     def __init__(self, camera: Camera, width: int, height: int, live: LiveBody, fits: FocalFits) -> None:
-        self.tracker = BackgroundTracker(camera, width, height)
         self._given_camera, self._size, self._fits = camera, (width, height), fits
         self.pool = ThreadPoolExecutor(_THREADS, "scope-background")
         self._solver = ThreadPoolExecutor(1, "scope-solver")
-        self._pending: Future[None] | None = None
-        self._largest: tuple[float, Observation] | None = None  # time and largest person of the pending frame
+        self._largest: tuple[float, Observation] | None = None  # time and largest person of the last frame
         self._longer_px = float(max(width, height))
+        self._assumed = assumed_camera(width, height, self._longer_px)
         self._by_edges: Future[Camera] | None = None
         self._costs: list[Future[NDArray[np.float64] | None]] = []
         self._loading = self._solver.submit(live.load)
@@ -56,30 +55,39 @@ class BackgroundEstimators:
         for pool in (self.pool, self._solver):
             pool.shutdown(wait=False, cancel_futures=kind is not None)
 
-    def add(self, frame: Frame, people: list[Observation], largest: Observation | None, is_cut: bool = False) -> None:
-        """Begin with a frame, after waiting for the previous one; errors of the previous frame are raised here.
+    def add(self, time_s: float, largest: Observation | None, followed: BackgroundTracker | BackgroundRecord) -> None:
+        """Begin with the focal length, or go on, in the frame before this one.
 
-        :param largest: the largest of the people.
-        :param is_cut: whether the frame is the first of a scene.
+        :param largest: the largest person of the frame.
+        :param followed: the background, at least of all frames before.
         """
-        self.wait()
-        points = [o.keypoints_px for o in people]
-        self._pending = self.pool.submit(self.tracker.add, frame.image_rgb, frame.timestamp_s, points, is_cut)
-        if largest is not None:
-            self._largest = frame.timestamp_s, largest
-
-    def wait(self) -> None:
-        """Wait for the backgrounds of all frames so far, and begin with the focal length if it is due."""
-        if self._pending is not None:
-            self._pending.result()
-        if self._given_camera.focal_deviation == 0.0 or not self.tracker.has_searched_edges:
+        before, self._largest = self._largest, None if largest is None else (time_s, largest)
+        if self._given_camera.focal_deviation == 0.0 or not followed.edge_frames:
             return
         if self._by_edges is None:
-            self._longer_px = longer_content_side(self.tracker.bars, *self._size)
-            self._by_edges = self.pool.submit(camera_by_edges, self.tracker.segments, *self._size, self._longer_px)
-        if self._largest is not None and self._fits.is_due(self._largest[0]):
-            self._costs.append(self._solver.submit(self._fits.costs, self._largest[1], self._assumed()))
-        self._largest = None
+            self._longer_px = longer_content_side(followed.bars, *self._size)
+            self._assumed = assumed_camera(*self._size, self._longer_px)
+            segments = followed.edge_frames[0].segments
+            self._by_edges = self.pool.submit(camera_by_edges, segments, *self._size, self._longer_px)
+        if before is not None and self._fits.is_due(before[0]):
+            self._costs.append(self._solver.submit(self._fits.costs, before[1], self._assumed))
+
+    def camera(self, record: BackgroundRecord, people: Iterable[tuple[float, Observation]]) -> Camera:
+        """Return the clip's camera; an assumed focal length is replaced by the estimate from edges and fits.
+
+        :param record: the background of all frames.
+        :param people: time and largest person of the frames from the first of the record's ``edge_frames`` on; those
+            that have been added count once.
+        """
+        if self._given_camera.focal_deviation == 0.0:
+            return self._given_camera
+        for time_s, largest in people:
+            self.add(time_s, largest, record)
+        self.add(math.inf, None, record)
+        if self._by_edges is None:
+            return self._given_camera
+        costs = [costs for each in self._costs if (costs := each.result()) is not None]
+        return camera_by_fits(self._by_edges.result(), self._assumed, costs, self._longer_px)
 
     def wait_for_solver(self, progress: Callable[[int], None]) -> None:
         """Wait until the solver is loaded.
@@ -89,34 +97,3 @@ class BackgroundEstimators:
         while wait_for([self._loading], timeout=_POLLING_INTERVAL_S).not_done:
             if compiled := compiled_kernels():
                 progress(compiled)
-
-    def camera(self) -> Camera:
-        """Return the camera; an assumed focal length is replaced by the estimate from edges and fits."""
-        if self._by_edges is None:
-            return self._given_camera
-        costs = [costs for each in self._costs if (costs := each.result()) is not None]
-        return camera_by_fits(self._by_edges.result(), self._assumed(), costs, self._longer_px)
-
-    def _assumed(self) -> Camera:
-        return assumed_camera(*self._size, self._longer_px)
-
-
-def camera_of_clip(
-    given: Camera,
-    size: tuple[int, int],
-    record: BackgroundRecord,
-    people: Iterable[tuple[float, Observation]],
-    fits: FocalFits,
-) -> Camera:
-    """Return the camera of a clip that was observed before; an assumed focal length is replaced by the estimate.
-
-    :param size: of the image, width and height in pixels.
-    :param people: time and largest person of the frames from the first of the record's ``edge_frames`` on.
-    """
-    if given.focal_deviation == 0.0 or not record.edge_frames:
-        return given
-    longer_px = longer_content_side(record.bars, *size)
-    assumed = assumed_camera(*size, longer_px)
-    due = (observation for time_s, observation in people if fits.is_due(time_s))
-    costs = [costs for each in due if (costs := fits.costs(each, assumed)) is not None]
-    return camera_by_fits(camera_by_edges(record.segments, *size, longer_px), assumed, costs, longer_px)

@@ -80,5 +80,4 @@ def log_likelihood(costs: list[NDArray[np.float64]], log_ratio: NDArray[np.float
     """
     if not costs:
         return np.zeros(len(log_ratio))
-    values: NDArray[np.float64] = -SHARE * np.interp(log_ratio, LOG_RATIOS, np.mean(costs, axis=0))
-    return values
+    return -SHARE * np.interp(log_ratio, LOG_RATIOS, np.mean(costs, axis=0))

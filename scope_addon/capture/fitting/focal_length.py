@@ -13,8 +13,6 @@ Source: Caprile and Torre 1990 (f from vanishing points).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -29,14 +27,6 @@ FITTED_STEP = 0.0025  # finer, since evaluating the fits' likelihood costs nothi
 MAX_DEVIATION = 0.1  # of log f; a less certain estimate is no better than the assumption
 
 
-@dataclass(frozen=True)
-class FocalLength:
-    """Estimated focal length in pixels, and standard deviation of its logarithm: the relative error."""
-
-    focal_px: float
-    deviation: float
-
-
 def camera_by_edges(segments: Segments, width: int, height: int, longer_px: float) -> Camera:
     """Return the camera with the focal length estimated from edges or, if that fails, the assumed one.
 
@@ -44,7 +34,7 @@ def camera_by_edges(segments: Segments, width: int, height: int, longer_px: floa
     """
     camera = assumed_camera(width, height, longer_px)
     found = focal_from_edges(segments, width, height, camera.intrinsics[0, 0])
-    return estimated_camera(width, height, found.focal_px, found.deviation, longer_px) if found else camera
+    return estimated_camera(width, height, *found, longer_px) if found else camera
 
 
 def camera_by_fits(camera: Camera, assumed: Camera, costs: list[NDArray[np.float64]], longer_px: float) -> Camera:
@@ -64,8 +54,8 @@ def camera_by_fits(camera: Camera, assumed: Camera, costs: list[NDArray[np.float
     return estimated_camera(width, height, assumed_px * float(np.exp(mean)), deviation, longer_px)
 
 
-def focal_from_edges(segments: Segments, width: int, height: int, assumed_px: float) -> FocalLength | None:
-    """Estimate the focal length from an image's edges; None if it is uncertain."""
+def focal_from_edges(segments: Segments, width: int, height: int, assumed_px: float) -> tuple[float, float] | None:
+    """Estimate the focal length in pixels and its relative error from an image's edges; None if it is uncertain."""
     edges = Edges.of(segments, width, height)
     coarse = np.arange(-LOG_RANGE, LOG_RANGE + 1e-9, COARSE_STEP)
     scores = [edges.support(assumed_px * np.exp(x)) for x in coarse]
@@ -75,7 +65,7 @@ def focal_from_edges(segments: Segments, width: int, height: int, assumed_px: fl
     known = dict(zip(coarse.tolist(), scores, strict=True))
     scores = [known.get(x) or edges.support(assumed_px * np.exp(x)) for x in log_ratio.tolist()]
     mean, deviation = _moments(log_ratio, _log_posterior(log_ratio, scores))
-    return FocalLength(assumed_px * float(np.exp(mean)), deviation) if deviation < MAX_DEVIATION else None
+    return (assumed_px * float(np.exp(mean)), deviation) if deviation < MAX_DEVIATION else None
 
 
 def _log_posterior(log_ratio: NDArray[np.float64], scores: list[float]) -> NDArray[np.float64]:

@@ -9,7 +9,6 @@ the standard deviation that the network predicts for it.
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -44,10 +43,11 @@ class Measurer:
     """
 
     def __init__(self, body: Body, intrinsics: NDArray[np.float64]) -> None:
-        self.body, self.intrinsics = body, intrinsics
+        self.body, self.intrinsics, self._unproject = body, intrinsics, np.linalg.inv(intrinsics)
         at = body.keypoint_set("blazepose")
         self.indices = np.array([at[name] for name in KEYPOINT_NAMES])
-        self.weight = np.array([_relative_weight(name) for name in KEYPOINT_NAMES])
+        weights = _RELATIVE_WEIGHT.items()
+        self.weight = np.array([next((w for key, w in weights if key in name), 1.0) for name in KEYPOINT_NAMES])
         pairs = [(f"{s}_{a}", f"{s}_{b}") for s in ("left", "right") for a, b in _BONES] + [("right_hip", "left_hip")]
         first_joint = len(body.keypoint_names)  # the solver numbers the joints after the keypoints
         # Lifted points of limbs are the body's joints, wherever the network places their keypoints in the image; lifted
@@ -59,11 +59,6 @@ class Measurer:
             np.array([first_joint + body.joint_names.index(pair[k]) for pair in pairs]) for k in (0, 1)
         )
         self.from_landmark, self.to_landmark = (np.array([KEYPOINT_NAMES.index(p[k]) for p in pairs]) for k in (0, 1))
-
-    @cached_property
-    def _unproject(self) -> NDArray[np.float64]:
-        inverse: NDArray[np.float64] = np.linalg.inv(self.intrinsics)
-        return inverse
 
     def rays(self, pixels: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
         """Convert undistorted pixels (..., 2) to normalized image coordinates (..., 2)."""
@@ -183,7 +178,3 @@ def place(
 
 def _root_prior(root_cam: NDArray[np.floating[Any]]) -> PosePriors:
     return PosePriors([0], np.eye(3)[None], root_cam[None], [0.0], [1 / ROOT_SIGMA_M**2])
-
-
-def _relative_weight(name: str) -> float:
-    return next((value for key, value in _RELATIVE_WEIGHT.items() if key in name), 1.0)

@@ -22,7 +22,7 @@ from .prepared_track import PreparedTrack
 from .weights import ROBUST, cold_stages, warm_stages
 
 LONGEST_COAST_S = 0.5  # the last pose says little about a person who has not been seen for longer
-_SAME_POSE_RAD = np.radians(10.0)
+_SAME_POSE_RAD = np.radians(10.0)  # by which no joint differs between two poses
 
 
 @dataclass
@@ -129,7 +129,8 @@ class FrameSequence:
             k -= 1
             found = self._solve(self._prepared.measure_all(k), later, self._warm)
             is_worth_it = is_usable(found) and found.cost - self._cost[k] <= gain
-            if not is_worth_it or _is_same_pose(found.state.Omega, self._rotations[k, 1:]):
+            traces = np.einsum("kij,kij->k", found.state.Omega, self._rotations[k, 1:])  # of what is between the poses
+            if not is_worth_it or (traces > 1 + 2 * np.cos(_SAME_POSE_RAD)).all():
                 return
             self._store(k, found)
             later = found.state
@@ -147,8 +148,3 @@ class FrameSequence:
 def is_usable(fit: Fit) -> bool:
     """Whether a fit had measurements and gave finite values."""
     return fit.status not in (Status.NO_MEASUREMENTS, Status.NON_FINITE)
-
-
-def _is_same_pose(a: NDArray[np.floating[Any]], b: NDArray[np.floating[Any]]) -> bool:
-    """Whether no joint differs by more than 10 degrees between two poses (K, 3, 3)."""
-    return bool((np.einsum("kij,kij->k", a, b) > 1 + 2 * np.cos(_SAME_POSE_RAD)).all())

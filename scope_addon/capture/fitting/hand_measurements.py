@@ -21,7 +21,7 @@ from ...errors import UsageError
 from ...kinematics.smoothing import fill_rotation_gaps
 from ..perception.hand_landmarks import HAND_NAMES, HAND_POINTS
 from ..perception.hand_region import SIDES
-from ..perception.lifter import KEYPOINT_COUNT, virtual_camera
+from ..perception.lifter import camera_towards
 
 FINGERS = ("index", "middle", "ring", "pinky", "thumb")
 HAND_KEYPOINT_NAMES = tuple(f"hand/{side}_{name}" for side in SIDES for name in HAND_NAMES)
@@ -100,7 +100,9 @@ class HandMeasurer:
         if not seen:
             return measured
         confidence = hands[seen, :, 2]
-        reliable = confidence * np.minimum(confidence / RELIABLE, 1.0) ** 2 * _weight_by_size(hands[seen])[:, None]
+        size_px = np.linalg.norm(hands[seen, _MIDDLE_KNUCKLE, :2] - hands[seen, 0, :2], axis=-1)
+        by_size = np.minimum(size_px / FULL_SIZE_PX, 1.0) ** 2
+        reliable = confidence * np.minimum(confidence / RELIABLE, 1.0) ** 2 * by_size[:, None]
         directions = self._directions(hands[seen])
         return replace(
             measured,
@@ -120,7 +122,7 @@ class HandMeasurer:
     def _directions(self, hands: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
         """Return the (n, bones, 3) vectors along the bones of n hands (n, 21, 6), camera axes."""
         rays = hands[..., :2].mean(axis=1) @ self._unproject[:2, :2].T + self._unproject[:2, 2]
-        R_virtual_camera = virtual_camera(np.repeat(rays[:, None], KEYPOINT_COUNT, axis=1))
+        R_virtual_camera = camera_towards(rays)
         bones: NDArray[np.floating[Any]] = (hands[:, self._to, 3:] - hands[:, self._from, 3:]) @ R_virtual_camera
         return bones
 
@@ -131,13 +133,6 @@ class HandMeasurer:
             for joint in (self.wrists[side], *joints):
                 out[:, joint] = hands[:, side, 0, 2]
         return out
-
-
-def _weight_by_size(hands: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
-    """Return the (n,) factors 0..1 on the directions of hands (n, 21, 6)."""
-    size = np.linalg.norm(hands[:, _MIDDLE_KNUCKLE, :2] - hands[:, 0, :2], axis=-1)
-    factor: NDArray[np.floating[Any]] = np.minimum(size / FULL_SIZE_PX, 1.0) ** 2
-    return factor
 
 
 def _bones() -> list[tuple[int, int]]:

@@ -91,12 +91,12 @@ def clip_weights(weights: Weights) -> Weights:
     )
 
 
-def clip_stages(weights: Weights) -> tuple[Stage, ...]:
-    """Return the stages of a fit of all frames of a clip together.
+def clip_stages(weights: Weights, steps: int = 50) -> tuple[Stage, ...]:
+    """Return the stages of a fit of all frames of a clip together, of at most so many steps.
 
     A tenth of the tolerance takes twice the steps, and changes errors on Pose2Sim and the sample clip by 0.1 mm.
     """
-    return (Stage(clip_weights(weights), 1e-3, 50),)
+    return (Stage(clip_weights(weights), 1e-3, steps),)
 
 
 def motion_priors(body: Body, times: NDArray[np.float64]) -> tuple[MotionPrior, MotionPrior]:
@@ -110,8 +110,9 @@ def motion_priors(body: Body, times: NDArray[np.float64]) -> tuple[MotionPrior, 
     """
     rate = 1.0 / (_RATE_HZ * float(np.median(np.diff(times)))) if len(times) > 1 else 1.0
     scale = _ACCELERATION * min(rate * rate, rate)
-    usual = np.array([_usual_acceleration(name) for name in body.joint_names[1:]])
-    share = np.array([_LEGS if name.endswith(("hip", "knee", "ankle")) else 1.0 for name in body.joint_names[1:]])
+    names, of_fingers = body.joint_names[1:], _USUAL["hand"]
+    usual = np.array([next((_USUAL[end] for end in _USUAL if name.endswith(end)), of_fingers) for name in names])
+    share = np.array([_LEGS if name.endswith(("hip", "knee", "ankle")) else 1.0 for name in names])
     quadratic = MotionPrior(
         joints=scale * share / usual**2,
         root_rotation=scale / _USUAL_ROOT**2,
@@ -127,11 +128,6 @@ def motion_priors(body: Body, times: NDArray[np.float64]) -> tuple[MotionPrior, 
         robust_root_rotation=(_LANDING * _USUAL_ROOT) ** 2,
         robust_root_position=(_LANDING * _USUAL_ROOT_POSITION) ** 2,
     )
-
-
-def _usual_acceleration(joint: str) -> float:
-    """Return a joint's typical angular acceleration; that of the hand for fingers."""
-    return next((usual for name, usual in _USUAL.items() if joint.endswith(name)), _USUAL["hand"])
 
 
 def joint_weights(body: Body) -> NDArray[np.float64]:

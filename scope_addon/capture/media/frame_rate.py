@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from .frame_readers import FrameReader
+from .frame_readers import PyavReader
 
 DEFAULT_FPS = Fraction(30)  # where footage has no rate; the most common one
 _STANDARD_RATES = [Fraction(n) for n in (24, 25, 30, 48, 50, 60, 120, 240)]
@@ -31,7 +31,7 @@ def exact_fps(fps: float) -> Fraction | None:
     return Fraction(fps).limit_denominator(100_000)
 
 
-def estimate_fps(reader: FrameReader) -> Fraction:
+def estimate_fps(reader: PyavReader) -> Fraction:
     """Estimate the rate from the timestamps of the next 30 frames, for a container that does not report it."""
     times: list[float] = []
     while len(times) < 30 and (decoded := reader.read()) is not None:

@@ -11,7 +11,7 @@ import itertools
 from collections.abc import Collection, Iterator
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, cast
+from typing import TYPE_CHECKING, cast
 
 import cv2
 import numpy as np
@@ -37,37 +37,6 @@ _MIN_SEEK_S = 20.0  # start from which seeking is tried
 _DAMAGED_PACKETS = 4096  # in a row, after which no more are tried
 # Degrees clockwise by which an image has to be rotated to be upright.
 _ROTATIONS = {90: cv2.ROTATE_90_CLOCKWISE, 180: cv2.ROTATE_180, 270: cv2.ROTATE_90_COUNTERCLOCKWISE}
-
-
-class FrameReader(Protocol):
-    """Decoder of one file."""
-
-    rate: float  # frames per second according to the container; 0 if it does not say
-    frame_count: float  # according to the container
-
-    def read(self) -> tuple[float, NDArray[np.uint8]] | None:
-        """Decode the next frame.
-
-        :return: time in seconds and the upright image (H, W, 3) uint8 RGB; None at the end, or where decoding fails.
-        """
-
-    def skip_to(self, seconds: float, fps: Fraction) -> int:
-        """Skip to the first frame at or after a time.
-
-        :param fps: rate by which an index is converted to a time.
-        :return: index of the frame that is read next; the number of frames if the video ends before.
-        """
-
-    def close(self) -> None:
-        """Close the file."""
-
-
-def open_reader(path: Path) -> FrameReader:
-    """Open a file.
-
-    :raises VideoError: see `PyavReader`.
-    """
-    return PyavReader(path)
 
 
 def _size(width: float, height: float, aspect: float) -> tuple[int, int]:
@@ -125,10 +94,6 @@ def _film(container: InputContainer) -> av.VideoStream | None:
     return next((s for s in container.streams.video if not s.disposition & Disposition.attached_pic), None)
 
 
-def _rgb(frame: av.VideoFrame) -> NDArray[np.uint8]:
-    return cast(NDArray[np.uint8], frame.to_ndarray(format="rgb24"))
-
-
 def _bt601_rgb(frame: av.VideoFrame) -> NDArray[np.uint8]:
     """Convert a frame by ITU-R BT.601, also where it states another matrix, so that a tag alone changes no result."""
     image = frame.to_ndarray(format="rgb24", src_colorspace="ITU601", dst_colorspace="ITU601")
@@ -142,26 +107,6 @@ def _is_mirrored(frame: av.VideoFrame) -> bool:
         return False
     a, b, _, c, d = np.frombuffer(cast(memoryview, matrix), np.int32, 5).astype(float)
     return bool(a * d < b * c)
-
-
-def presented_duration_s(path: Path) -> float | None:
-    """Read for how many seconds a video is shown; None if that is unknown.
-
-    A video that was cut without re-encoding holds more frames than it shows.
-    """
-    try:
-        _, container = _open_with_pyav(path)
-    except VideoError:
-        return None
-    if container is None:
-        return None
-    with container:
-        stream = _film(container)
-        if stream is not None and stream.duration and stream.time_base:
-            return float(stream.duration * stream.time_base)
-        late = (container.start_time or 0) if "matroska" in container.format.name else 0
-        length_s = ((container.duration or 0) - late) / 1e6
-        return length_s if length_s > 0 else None
 
 
 def decode_items(path: Path, numbers: Collection[int], max_pixels: int) -> dict[int, NDArray[np.uint8]]:
@@ -191,7 +136,7 @@ def decode_items(path: Path, numbers: Collection[int], max_pixels: int) -> dict[
                     if pixels_left < 0:
                         return {}
                     if packet.stream.id not in pictures:
-                        pictures[packet.stream.id] = _rgb(frame)
+                        pictures[packet.stream.id] = cast(NDArray[np.uint8], frame.to_ndarray(format="rgb24"))
                 if len(pictures) == len(streams):
                     break
         except (failure, OSError, ValueError):
@@ -200,7 +145,11 @@ def decode_items(path: Path, numbers: Collection[int], max_pixels: int) -> dict[
 
 
 class PyavReader:
-    """PyAV's decoders.
+    """A video file, decoded by PyAV, in which frames are read in order.
+
+    ``rate``: frames per second, 0 if the container does not say; ``frame_count`` according to the container;
+    ``shown_s``: for how many seconds it is shown, None if unknown. A video that was cut without re-encoding holds more
+    frames than it shows.
 
     :raises VideoError: PyAV is not installed or cannot open the file, or its images are too large or too long (see
         `image_size`).
@@ -226,6 +175,12 @@ class PyavReader:
         self.rate = float(self._stream.guessed_rate or self._stream.average_rate or 0)
         duration_s = (container.duration or 0) / 1e6
         self.frame_count = float(self._stream.frames or round(duration_s * self.rate))
+        if self._stream.duration and self._stream.time_base:
+            self.shown_s: float | None = float(self._stream.duration * self._stream.time_base)
+        else:
+            late = (container.start_time or 0) if "matroska" in container.format.name else 0
+            length_s = ((container.duration or 0) - late) / 1e6
+            self.shown_s = length_s if length_s > 0 else None
 
     def _decoded(self) -> Iterator[av.VideoFrame]:
         """Decode from where the container is; what is damaged is left out."""
@@ -251,7 +206,10 @@ class PyavReader:
         return milliseconds / 1000
 
     def read(self) -> tuple[float, NDArray[np.uint8]] | None:
-        """See `FrameReader`."""
+        """Decode the next frame.
+
+        :return: time in seconds and the upright image (H, W, 3) uint8 RGB; None at the end, or where decoding fails.
+        """
         frame = next(self._frames, None)
         if frame is None:
             return None
@@ -261,9 +219,12 @@ class PyavReader:
         return self._time(frame), upright(self._path, image, self._aspect, -round(frame.rotation))
 
     def skip_to(self, seconds: float, fps: Fraction) -> int:
-        """See `FrameReader`.
+        """Skip to the first frame at or after a time.
 
         Seeks if the timestamps tell which frame the seek has led to, which saves decoding; else decodes frame by frame.
+
+        :param fps: rate by which an index is converted to a time.
+        :return: index of the frame that is read next; the number of frames if the video ends before.
         """
         if seconds > _MIN_SEEK_S and self._seek(seconds - _MIN_SEEK_S / 2):
             frame = next(self._frames, None)
@@ -299,5 +260,5 @@ class PyavReader:
         return index
 
     def close(self) -> None:
-        """See `FrameReader`."""
+        """Close the file."""
         self._container.close()

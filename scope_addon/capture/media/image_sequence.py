@@ -82,7 +82,7 @@ def find_sequence(path: Path, rate_given: bool) -> PictureSequence | None:
 
 
 class SequenceReader:
-    """Reads the pictures in order, with the interface of `FrameReader` that decoding needs."""
+    """Reads the pictures in order, with the interface of `PyavReader` that decoding needs."""
 
     def __init__(self, sequence: PictureSequence, fps: Fraction) -> None:
         self._sequence, self._fps, self._next = sequence, fps, 0

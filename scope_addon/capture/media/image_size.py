@@ -15,8 +15,7 @@ def check_size(path: Path, width: float, height: float) -> None:
     """Refuse an image that is too large or too long, from what its header says.
 
     :param path: of the file, for the message.
-    :param width: of the image, in square pixels.
-    :param height: likewise.
+    :param width, height: of the image, in square pixels.
     :raises VideoError: it has more than `MAX_PIXELS` pixels, or its sides differ by more than a factor of `MAX_RATIO`.
     """
     if width * height > MAX_PIXELS:
@@ -33,8 +32,7 @@ def check_depth(path: Path, width: int, height: int, bits: int) -> None:
     """Refuse a still that takes more memory than one of `MAX_PIXELS` pixels with four channels of 16 bits: 2.2 GB.
 
     :param path: of the file, for the message.
-    :param width: of the image, pixels.
-    :param height: likewise.
+    :param width, height: of the image, pixels.
     :param bits: of one channel.
     :raises VideoError: it does.
     """

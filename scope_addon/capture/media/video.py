@@ -30,11 +30,11 @@ from numpy.typing import NDArray
 from ...errors import VideoError
 from .frame import Frame
 from .frame_rate import DEFAULT_FPS, estimate_fps, exact_fps
-from .frame_readers import FrameReader, open_reader, presented_duration_s
+from .frame_readers import PyavReader
 from .image_sequence import PictureSequence, SequenceReader, find_sequence
 from .quicktime import focal_35mm
 from .stills.still_images import is_picture, read_picture
-from .video_range import FootageRange, VideoRange
+from .video_range import FootageRange, FrameSampler, VideoRange
 
 cv2.setLogLevel(0)  # silent: failures are reported as exceptions
 
@@ -196,15 +196,14 @@ def _damaged(picture: Path) -> VideoError:
 
 
 def _open_moving(path: Path, requested: FootageRange) -> Video:
-    with closing(open_reader(path)) as reader:
+    with closing(PyavReader(path)) as reader:
         first = reader.read()
         if first is None:
             raise VideoError(f"{path} can be opened, but none of its frames can be decoded; convert it to H.264 .mp4")
         fps = exact_fps(reader.rate) or estimate_fps(reader)
         count = reader.frame_count
     height, width = first[1].shape[:2]
-    shown_s = presented_duration_s(path)
-    claimed = shown_s * fps if shown_s else count
+    claimed = reader.shown_s * fps if reader.shown_s else count
     frame_count = max(1, round(claimed)) if 0 < claimed < 1e9 else 1
     wanted = requested.at_rate(fps)
     video = Video(path, width, height, fps, frame_count, focal_35mm(path), wanted=wanted)
@@ -278,16 +277,16 @@ class _Decoder:
     def _run(self) -> None:
         try:
             sequence = self._video._sequence
-            source = SequenceReader(sequence, self._video.fps) if sequence else open_reader(self._video.path)
+            source = SequenceReader(sequence, self._video.fps) if sequence else PyavReader(self._video.path)
             with closing(source) as reader:
                 self._decode(reader)
             self._put(None)
         except Exception as error:  # raised again by the thread that iterates
             self._put(error)
 
-    def _decode(self, reader: FrameReader | SequenceReader) -> None:
+    def _decode(self, reader: PyavReader | SequenceReader) -> None:
         video, index, time = self._video, 0, 0.0
-        sampler = video.wanted.sampler()
+        sampler = FrameSampler(video.wanted.fps)
         resized = False
         first = index = reader.skip_to(video.wanted.start_s, video.source_fps) if video.wanted.start_s > 0 else 0
         while not self._stop.is_set() and (decoded := reader.read()) is not None:

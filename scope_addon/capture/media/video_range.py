@@ -37,10 +37,6 @@ class VideoRange:
         """Return the range itself: times in seconds do not depend on the rate."""
         return self
 
-    def sampler(self) -> FrameSampler:
-        """Create the sampler for one pass over the video."""
-        return FrameSampler(self.fps)
-
 
 @dataclass(frozen=True)
 class TimecodeRange:

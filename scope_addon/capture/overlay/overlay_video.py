@@ -37,6 +37,7 @@ STILL_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
 LONGEST_SIDE = 1920
 _ROUNDED_S = 0.001  # by which containers change times; at high rates, less
 _FACE_COLOR = (255, 255, 255)
+OPACITY = 0.6  # of the bodies
 _FAINT = 0.35  # opacity of a filled-in pose, relative to one that was seen
 _TINTS = np.array([[1.0, 0.55, 0.15], [0.2, 0.75, 1.0], [0.55, 0.9, 0.3], [0.95, 0.4, 0.75], [0.95, 0.85, 0.25]])
 
@@ -49,7 +50,6 @@ def write_overlay(
     motions: Motion | Sequence[Motion],
     body: Body,
     *,
-    opacity: float = 0.6,
     progress: Progress | None = None,
     wanted: FootageRange | None = None,
 ) -> None:
@@ -58,7 +58,6 @@ def write_overlay(
     The video has the footage's times and size (at most 1920 pixels along the longer side, both sides even). With the
     suffix of a picture (.png, .jpg, .webp), only the first frame in which a person was seen is written.
 
-    :param opacity: of the bodies, 0..1.
     :param wanted: the range of the footage that was captured.
     :param progress: called with (frames done, frames expected). An exception that it raises stops the work, and no file
         is left behind.
@@ -73,11 +72,12 @@ def write_overlay(
         known = ", ".join(VIDEO_SUFFIXES + STILL_SUFFIXES)
         raise OutputError(f"cannot write the overlay {path}: its suffix must be one of {known}")
     with open_video(video_path, wanted) as video:
-        painter = _Painter(people, body, video, opacity, even=suffix in VIDEO_SUFFIXES)
+        painter = _Painter(people, body, video, even=suffix in VIDEO_SUFFIXES)
         try:
             with atomic_path(path) as temporary:
                 if suffix in STILL_SUFFIXES:
-                    _write_still(temporary, painter, video, _first_seen(people))
+                    first = min((int(m.frames[m.valid][0]) for m in people if m.valid.any()), default=0)
+                    _write_still(temporary, painter, video, first)
                 else:
                     _write_video(temporary, painter, video, path, progress)
         except OSError as error:
@@ -91,19 +91,17 @@ def painted_frames(
     indices: Collection[int],
     *,
     wanted: FootageRange | None = None,
-    opacity: float = 0.6,
 ) -> Iterator[tuple[int, NDArray[np.uint8]]]:
     """Generate some frames of the overlay: source frame index and (H, W, 3) RGB, at most 1920 pixels wide and high.
 
     :param indices: source frame indices; those that the footage does not have are left out.
     :param wanted: the range of the footage that was captured.
-    :param opacity: of the bodies, 0..1.
     :raises VideoError: the footage cannot be read.
     :raises ShapeError: a motion does not have the joints of the body.
     """
     remaining = set(indices)
     with open_video(video_path, wanted) as video:
-        painter = _Painter(list(motions), body, video, opacity, even=False)
+        painter = _Painter(list(motions), body, video, even=False)
         for frame in video:
             if frame.index in remaining:
                 remaining.remove(frame.index)
@@ -233,25 +231,25 @@ def _blend(image: NDArray[np.uint8], rgba: NDArray[np.uint8]) -> None:
 class _Painter:
     """Draws the overlay of the frames of one clip; scales the intrinsics with the image."""
 
-    def __init__(self, people: list[Motion], body: Body, video: Video, opacity: float, even: bool) -> None:
+    def __init__(self, people: list[Motion], body: Body, video: Video, even: bool) -> None:
         for motion in people:
             if motion.joint_count != body.K + 1:
                 raise ShapeError(f"the motion has {motion.joint_count} joints, but body '{body.name}' has {body.K + 1}")
-        self._people, self._body, self._opacity = people, body, opacity
+        self._people, self._body = people, body
         self._rows = [{int(f): row for row, f in enumerate(motion.frames)} for motion in people]
         self._colors = [body_colors(body, i) for i in range(len(people))]
         self._scale = min(1.0, LONGEST_SIDE / max(video.width, video.height))
         width, height = (max(2, round(side * self._scale)) for side in (video.width, video.height))
         self._resized = (width, height)
         # Encoders need even sides. Cropping the last row or column does not change the intrinsics.
-        self._size = (width - width % 2, height - height % 2) if even else self._resized
-        self._canvas = Canvas.blank(*self._size)
+        self.size = (width - width % 2, height - height % 2) if even else self._resized
+        self._canvas = Canvas.blank(*self.size)
 
     def paint(self, frame: Frame) -> NDArray[np.uint8]:
         image = frame.image_rgb
         if image.shape[1::-1] != self._resized:
             image = cast(NDArray[np.uint8], cv2.resize(image, self._resized, interpolation=cv2.INTER_AREA))
-        width, height = self._size
+        width, height = self.size
         image = np.ascontiguousarray(image[:height, :width])
         shown = [(i, rows[frame.index]) for i, rows in enumerate(self._rows) if frame.index in rows]
         if not shown:
@@ -266,7 +264,7 @@ class _Painter:
             scaled_intrinsics(motion.intrinsics, self._scale),
             motion.dist,
             [self._colors[i] for i, _ in shown],
-            [self._opacity * (1.0 if self._people[i].valid[row] else _FAINT) for i, row in shown],
+            [OPACITY * (1.0 if self._people[i].valid[row] else _FAINT) for i, row in shown],
         )
         image = blended(image, self._canvas)
         for i, row in shown:
@@ -296,11 +294,6 @@ class _Painter:
                 cv2.circle(image, (round(float(u)), round(float(v))), 1, _FACE_COLOR, -1, cv2.LINE_AA)
 
 
-def _first_seen(people: list[Motion]) -> int:
-    """Find the index of the first frame in which a person was seen; 0 if there is none."""
-    return min((int(m.frames[m.valid][0]) for m in people if m.valid.any()), default=0)
-
-
 def _write_still(path: Path, painter: _Painter, video: Video, index: int) -> None:
     for frame in video:  # keeps the last one
         if frame.index >= index:
@@ -322,20 +315,11 @@ def _shown_s(time_s: float, fps: Fraction, before_s: float) -> float:
 
 
 def _write_video(temporary: Path, painter: _Painter, video: Video, path: Path, progress: Progress | None) -> None:
-    writer, start_s, shown_s = None, 0.0, -1.0
-    try:
+    start_s, shown_s = None, -1.0
+    with VideoWriter(temporary, video.fps, *painter.size, path) as writer:
         for frame in video:
-            image = painter.paint(frame)
-            if writer is None:
-                writer = VideoWriter(temporary, video.fps, image.shape[1], image.shape[0], path)
-                start_s = frame.timestamp_s
+            start_s = frame.timestamp_s if start_s is None else start_s
             shown_s = _shown_s(frame.timestamp_s - start_s, video.fps, shown_s)
-            writer.write(image, shown_s)
+            writer.write(painter.paint(frame), shown_s)
             if progress is not None:
                 progress(frame.index + 1, max(video.frame_count, frame.index + 1))
-        if writer is not None:
-            writer.close()
-    except BaseException:
-        if writer is not None:
-            writer.abandon()
-        raise

@@ -24,7 +24,7 @@ _TICKS = 60000  # per second, about as many as MPEG-4's clock can have, for imag
 
 
 class VideoWriter:
-    """A video that is being written. Its file is complete after `close` alone.
+    """A video that is being written, as a context. Leaving it without an error, or `close`, completes the file.
 
     :raises OutputError: PyAV is not installed, or the file cannot be written.
     """
@@ -66,6 +66,15 @@ class VideoWriter:
         self.abandon()
         raise OutputError(f"cannot write {self._path}: no video encoder was found; choose a .png or .jpg overlay")
 
+    def __enter__(self) -> VideoWriter:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: object, trace: object) -> None:
+        if kind is None:
+            self.close()
+        else:
+            self.abandon()
+
     def write(self, image: NDArray[np.uint8], time_s: float | None = None) -> None:
         """Append an image.
 
@@ -91,9 +100,9 @@ class VideoWriter:
             self._container.mux(self._stream.encode())
             self._container.close()
         except self._failures as error:
+            self.abandon()
             raise self._refused() from error
-        finally:
-            self._name.close()
+        self._name.close()
 
     def abandon(self) -> None:
         """Close the file, which then is of no use."""

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -69,8 +68,8 @@ class HandNetwork:
     :raises ModelFileError: its file is damaged.
     """
 
-    def __init__(self, threads: int, folder: Path | None = None, execution: Execution | None = None) -> None:
-        self._session = open_session(network_path("hand_landmark", folder), threads, execution)
+    def __init__(self, threads: int, execution: Execution | None = None) -> None:
+        self._session = open_session(network_path("hand_landmark"), threads, execution)
 
     def estimate(self, image_rgb: NDArray[np.uint8], region: Region) -> HandEstimate:
         """Estimate the hand in a region of an (H, W, 3) uint8 RGB image."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .landmark_network import KEYPOINT_NAMES
-from .region import Region
+from .region import Region, box_along
 
 SIDES = ("left", "right")
 HAND_LENGTH_M = 0.18  # wrist to the tip of the middle finger
@@ -87,10 +87,8 @@ def region_from_landmarks(keypoints_px: NDArray[np.float64]) -> Region:
     """
     up = 0.25 * (keypoints_px[5] + keypoints_px[13]) + 0.5 * keypoints_px[9] - keypoints_px[0]
     rotation = _rotation(up)
-    R_image_crop = Region((0.0, 0.0), 1.0, rotation).R_image_crop
-    rotated = keypoints_px[_RIGID] @ R_image_crop
-    low, high = rotated.min(axis=0), rotated.max(axis=0)
-    return _shifted(R_image_crop @ ((low + high) / 2), float((high - low).max()), rotation, _TRACK_SCALE, _TRACK_SHIFT)
+    center, sides = box_along(keypoints_px[_RIGID], rotation)
+    return _shifted(center, float(sides.max()), rotation, _TRACK_SCALE, _TRACK_SHIFT)
 
 
 def _shifted(center: NDArray[np.float64], size: float, rotation: float, scale: float, shift: float) -> Region:

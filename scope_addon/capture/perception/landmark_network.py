@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 import cv2
@@ -33,7 +32,7 @@ _HEAT_THRESHOLD = 0.5
 _WORKERS = 2  # regions processed in parallel
 _WORTH_ALL_THREADS = ("pose_landmark_heavy",)
 _OUTPUTS = ["landmarks", "presence", "heatmap", "world"]
-_VALUES = 7 * KEYPOINT_COUNT + 5  # of an estimate that is kept
+_VALUES = 6 * KEYPOINT_COUNT + 5  # of an estimate that is kept
 _WITH_MASK = {"with_mask": np.array(True)}  # an input without which the mask is not computed
 
 
@@ -41,28 +40,20 @@ _WITH_MASK = {"with_mask": np.array(True)}  # an input without which the mask is
 class PoseEstimate:
     """The network's estimate for one region.
 
-    ``keypoints_px`` (33, 2) image pixels; ``visibility``, ``in_frame`` (33,) probabilities that a keypoint is not
-    occluded and that it lies inside the image; ``world_landmarks`` (33, 3) metres in camera axes (x right, y down,
-    z forward), the hip centre at 0, or all 0 from a network without depth; ``presence``: probability that there is a
-    person; ``region``: the input region; ``next_region``: the region for the next frame; ``mask``: the probability
-    (256, 256), half precision, that a pixel of the region shows its person, if it was requested. In a region where
-    nobody is, the network invents somebody.
+    ``keypoints_px`` (33, 2) image pixels; ``keypoints_confidence`` (33,) probability that a keypoint is in the image
+    and not occluded; ``world_landmarks`` (33, 3) metres in camera axes (x right, y down, z forward), the hip centre at
+    0, or all 0 from a network without depth; ``presence``: probability that there is a person; ``region``: the input
+    region; ``next_region``: the region for the next frame; ``mask``: the probability (256, 256), half precision, that a
+    pixel of the region shows its person, if it was requested. Where nobody is, the network invents somebody.
     """
 
     keypoints_px: NDArray[np.float64]
-    visibility: NDArray[np.float64]
-    in_frame: NDArray[np.float64]
+    keypoints_confidence: NDArray[np.float64]
     world_landmarks: NDArray[np.float64]
     presence: float
     region: Region
     next_region: Region
     mask: NDArray[np.float16] | None = None
-
-    @property
-    def keypoints_confidence(self) -> NDArray[np.float64]:
-        """(33,) probability that a keypoint is in the image and not occluded."""
-        confidence: NDArray[np.float64] = self.visibility * self.in_frame
-        return confidence
 
     @property
     def spread(self) -> float:
@@ -113,11 +104,10 @@ class LandmarkNetwork:
         self,
         name: str,
         threads: int,
-        folder: Path | None = None,
         execution: Execution | None = None,
         kept: KeptEstimates | None = None,
     ) -> None:
-        self._path, self._threads, self._execution = network_path(name, folder), threads, execution
+        self._path, self._threads, self._execution = network_path(name), threads, execution
         self._name, self._kept = name, kept or KeptEstimates()
         self._threads_alone = threads if name in _WORTH_ALL_THREADS else max(1, threads // _WORKERS)
         self._pool = ThreadPoolExecutor(min(_WORKERS, threads), "scope-landmarks")
@@ -129,37 +119,28 @@ class LandmarkNetwork:
             self._sessions[threads] = open_session(self._path, threads, self._execution)
         return self._sessions[threads]
 
-    @property
-    def _alone(self) -> onnxruntime.InferenceSession:
-        return self._session(self._threads_alone)
-
-    @property
-    def _shared(self) -> onnxruntime.InferenceSession:
-        return self._session(max(1, self._threads // _WORKERS))
-
     def estimate(
         self, image_rgb: NDArray[np.uint8], regions: Sequence[Region], with_masks: bool = False
     ) -> list[PoseEstimate]:
         """Estimate one pose per region of an (H, W, 3) uint8 RGB image."""
         if len(regions) < 2 or self._threads == 1:
-            return [self._estimate(self._alone, image_rgb, region, with_masks) for region in regions]
+            alone = self._session(self._threads_alone)
+            return [self._estimate(alone, image_rgb, region, with_masks) for region in regions]
         return [pending.result() for pending in [self.begin(image_rgb, region, with_masks) for region in regions]]
 
     def begin(self, image_rgb: NDArray[np.uint8], region: Region, with_mask: bool = False) -> Future[PoseEstimate]:
-        """Start the estimate of one region in another thread; the image must not change until it is done.
-
-        :param image_rgb: (H, W, 3) uint8.
-        """
-        return self._pool.submit(self._estimate, self._shared, image_rgb, region, with_mask)
+        """Start the estimate of one region in another thread; the image (H, W, 3) must not change until it is done."""
+        shared = self._session(max(1, self._threads // _WORKERS))
+        return self._pool.submit(self._estimate, shared, image_rgb, region, with_mask)
 
     def mask(self, image_rgb: NDArray[np.uint8], region: Region) -> NDArray[np.float32]:
-        """Return the probability (256, 256) that a pixel of the region shows its person, also beside other people.
+        """Return the probability (256, 256) that a pixel of the region of an (H, W, 3) image shows its person.
 
         This is a run of its own; `estimate` and `begin` give the mask of the run that they make anyway.
-
-        :param image_rgb: (H, W, 3) uint8.
         """
-        (logits,) = self._alone.run(["mask"], {"input": _blob(region.cut(image_rgb, INPUT_SIZE))} | _WITH_MASK)
+        (logits,) = self._session(self._threads_alone).run(
+            ["mask"], {"input": _blob(region.cut(image_rgb, INPUT_SIZE))} | _WITH_MASK
+        )
         return _probability(logits)
 
     def _estimate(
@@ -170,16 +151,14 @@ class LandmarkNetwork:
         values = self._kept.find(key)
         if values is not None and len(values) == _VALUES:
             return _unpacked(values, region)
-        inputs = {"input": _blob(crop_rgb)}
-        if not with_mask:
-            landmarks, presence, heatmap, world = session.run(_OUTPUTS, inputs)
-            estimate = interpret(landmarks[0], float(presence[0, 0]), heatmap[0], world[0], region)
-            if key is not None:
-                self._kept.add(key, _packed(estimate))
-            return estimate
-        landmarks, presence, heatmap, world, logits = session.run([*_OUTPUTS, "mask"], inputs | _WITH_MASK)
+        outputs, inputs = list(_OUTPUTS), {"input": _blob(crop_rgb)}
+        if with_mask:
+            outputs, inputs = [*outputs, "mask"], inputs | _WITH_MASK
+        landmarks, presence, heatmap, world, *logits = session.run(outputs, inputs)
         estimate = interpret(landmarks[0], float(presence[0, 0]), heatmap[0], world[0], region)
-        return replace(estimate, mask=_probability(logits).astype(np.float16))
+        if key is not None:
+            self._kept.add(key, _packed(estimate))
+        return replace(estimate, mask=_probability(logits[0]).astype(np.float16)) if with_mask else estimate
 
 
 def _probability(logits: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -199,8 +178,7 @@ def _packed(estimate: PoseEstimate) -> NDArray[np.float64]:
     return np.concatenate(
         [
             estimate.keypoints_px.ravel(),
-            estimate.visibility,
-            estimate.in_frame,
+            estimate.keypoints_confidence,
             estimate.world_landmarks.ravel(),
             [estimate.presence, *after.center_px, after.side_px, after.rotation],
         ]
@@ -210,10 +188,10 @@ def _packed(estimate: PoseEstimate) -> NDArray[np.float64]:
 def _unpacked(values: NDArray[np.float64], region: Region) -> PoseEstimate:
     """Return the estimate of which `_packed` made these values (_VALUES,)."""
     K = KEYPOINT_COUNT
-    keypoints, visibility, in_frame, world, others = np.split(values, np.cumsum([2 * K, K, K, 3 * K]))
+    keypoints, confidence, world, others = np.split(values, np.cumsum([2 * K, K, 3 * K]))
     presence, x, y, side_px, rotation = others.tolist()
     after = Region((x, y), side_px, rotation)
-    return PoseEstimate(keypoints.reshape(K, 2), visibility, in_frame, world.reshape(K, 3), presence, region, after)
+    return PoseEstimate(keypoints.reshape(K, 2), confidence, world.reshape(K, 3), presence, region, after)
 
 
 def interpret(
@@ -237,8 +215,7 @@ def interpret(
     body = region.rotate_to_camera(world.reshape(_POINTS, 3)[:KEYPOINT_COUNT].astype(float))
     return PoseEstimate(
         keypoints_px=points_px[:KEYPOINT_COUNT],
-        visibility=visibility,
-        in_frame=in_frame,
+        keypoints_confidence=visibility * in_frame,
         world_landmarks=body - body[_HIPS, :].mean(axis=0),
         presence=presence,
         region=region,

@@ -26,8 +26,7 @@ class Letterbox:
 
     def to_image(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Convert positions (..., 2) in the network's input to pixels (..., 2) of the image."""
-        pixels: NDArray[np.float64] = (points - self.offset) / self.scale - 0.5
-        return pixels
+        return (points - self.offset) / self.scale - 0.5
 
 
 def fit_in(

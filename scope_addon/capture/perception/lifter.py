@@ -68,7 +68,11 @@ def virtual_camera(rays: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]
     :param rays: (T, 33, 2) normalized image coordinates.
     :return: (T, 3, 3) R_virtual_camera, see the module's equation.
     """
-    center = rays[:, TORSO].mean(axis=1)
+    return camera_towards(rays[:, TORSO].mean(axis=1))
+
+
+def camera_towards(center: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    """Calculate the rotations (T, 3, 3) that bring rays (T, 2), in normalized image coordinates, onto the z axis."""
     z = np.concatenate([center, np.ones_like(center[:, :1])], axis=1)
     z /= np.linalg.norm(z, axis=1, keepdims=True)
     x = np.stack([z[:, 2], np.zeros_like(z[:, 0]), -z[:, 0]], axis=1)
@@ -150,13 +154,13 @@ class Lifter:
     :raises ModelFileError: it is not a lifting network of this version.
     """
 
-    def __init__(self, path: Path | None = None, threads: int = 1) -> None:
+    def __init__(self, path: Path | None = None) -> None:
         self.path = path or LIFTER_FILE
         if not self.path.is_file():
             raise SetupError(
                 f"{self.path} is missing; install the extension again, or restore the file from the repository."
             )
-        self._session = open_session(self.path, threads)
+        self._session = open_session(self.path, 1)
         shapes = [s.shape[1:] for s in (*self._session.get_inputs(), *self._session.get_outputs())]
         if shapes != [[WINDOW, INPUT_SIZE], [KEYPOINT_COUNT, 3], [KEYPOINT_COUNT, 2]]:
             raise ModelFileError(f"{self.path} is not a lifting network of this version: its shapes are {shapes}.")

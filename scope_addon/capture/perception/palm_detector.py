@@ -3,9 +3,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from pathlib import Path
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -21,14 +18,6 @@ SCORE_THRESHOLD = 0.5
 _LAYERS = ((8, 2), (16, 6))  # stride, anchors per cell; the three stride-16 layers are combined
 
 
-@dataclass(frozen=True)
-class Palm:
-    """A detected palm: ``score`` 0..1, and the ``region`` for the hand network."""
-
-    score: float
-    region: Region
-
-
 class PalmDetector:
     """The palm detection network; stateless between calls.
 
@@ -36,16 +25,16 @@ class PalmDetector:
     :raises ModelFileError: its file is damaged.
     """
 
-    def __init__(self, threads: int, folder: Path | None = None, execution: Execution | None = None) -> None:
-        self._session = open_session(network_path("palm_detection", folder), threads, execution)
+    def __init__(self, threads: int, execution: Execution | None = None) -> None:
+        self._session = open_session(network_path("palm_detection"), threads, execution)
         self._anchors = make_anchors(INPUT_SIZE, _LAYERS)
 
-    def detect(self, image_rgb: NDArray[np.uint8], square: Region, threshold: float = SCORE_THRESHOLD) -> list[Palm]:
-        """Detect all palms in a square of an (H, W, 3) uint8 RGB image, best first."""
+    def detect(self, image_rgb: NDArray[np.uint8], square: Region, threshold: float = SCORE_THRESHOLD) -> list[Region]:
+        """Return the hands' regions by all palms in a square of an (H, W, 3) uint8 RGB image, the best palm first."""
         blob = cv2.dnn.blobFromImage(square.cut(image_rgb, INPUT_SIZE), 1 / 255.0)
         boxes, scores = self._session.run(["boxes", "scores"], {"input": blob})
-        score, values = merge_overlapping(*decode(boxes[0], scores[0, :, 0], self._anchors, threshold))
-        return [Palm(float(s), _in_image(v, square)) for s, v in zip(score, values, strict=True)]
+        _, values = merge_overlapping(*decode(boxes[0], scores[0, :, 0], self._anchors, threshold))
+        return [_in_image(v, square) for v in values]
 
 
 def _in_image(values: NDArray[np.float64], square: Region) -> Region:

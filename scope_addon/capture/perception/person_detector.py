@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -56,8 +55,8 @@ class PersonDetector:
     :raises ModelFileError: its file is damaged.
     """
 
-    def __init__(self, threads: int, folder: Path | None = None, execution: Execution | None = None) -> None:
-        self._session = open_session(network_path("pose_detection", folder), threads, execution)
+    def __init__(self, threads: int, execution: Execution | None = None) -> None:
+        self._session = open_session(network_path("pose_detection"), threads, execution)
         self._anchors = make_anchors()
 
     def detect(
@@ -102,12 +101,12 @@ class PersonDetector:
         return unique(found)
 
     def _detect_in(self, image_rgb: NDArray[np.uint8], threshold: float, corner: tuple[int, int]) -> list[Detection]:
-        picture, scale, offset = letterbox(image_rgb)
-        blob = cv2.dnn.blobFromImage(picture, 1 / 127.5, mean=(127.5, 127.5, 127.5))
+        fitted, scale = fit_in(image_rgb, INPUT_SIZE, INPUT_SIZE, border=0), INPUT_SIZE / max(image_rgb.shape[:2])
+        blob = cv2.dnn.blobFromImage(fitted.picture_rgb, 1 / 127.5, mean=(127.5, 127.5, 127.5))
         boxes, scores = self._session.run(["boxes", "scores"], {"input": blob})
         score, values = decode(boxes[0], scores[0, :, 0], self._anchors, threshold)
         score, values = merge_overlapping(score, values)
-        values = (values.reshape(-1, 6, 2) - offset) / scale - 0.5 + corner
+        values = (values.reshape(-1, 6, 2) - fitted.offset) / scale - 0.5 + corner
         return [Detection(float(s), v[:2].ravel(), v[2:]) for s, v in zip(score, values, strict=True)]
 
 
@@ -149,16 +148,6 @@ def unique(detections: list[Detection]) -> list[Detection]:
         if not any(detection.region.resembles(other.region, 0.25) for other in kept):
             kept.append(detection)
     return kept
-
-
-def letterbox(image_rgb: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], float, NDArray[np.float64]]:
-    """Fit the image into the centre of a black 224 × 224 square.
-
-    :param image_rgb: (H, W, 3) uint8.
-    :return: the square (224, 224, 3), the scale and the (x, y) offset: square = scale · (pixel + ½) + offset.
-    """
-    fitted = fit_in(image_rgb, INPUT_SIZE, INPUT_SIZE, border=0)
-    return fitted.picture_rgb, INPUT_SIZE / max(image_rgb.shape[:2]), fitted.offset
 
 
 def make_anchors(size: int = INPUT_SIZE, strides: tuple[tuple[int, int], ...] = _LAYERS) -> NDArray[np.float64]:

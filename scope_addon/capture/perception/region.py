@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import cv2
@@ -48,13 +48,14 @@ class Region:
         return cropped
 
     def cut(self, image_rgb: NDArray[np.uint8], size: int) -> NDArray[np.uint8]:
-        """Resample the square to a (size, size, 3) uint8 image; outside the image, its border pixels are repeated.
+        """Resample the square to (size, size, 3); outside the image (H, W, 3), its border pixels are repeated.
 
         A black border would cost the landmark networks 3 mm of accuracy on people at the edge.
-
-        :param image_rgb: (H, W, 3) uint8.
         """
-        source, A = image_rgb, self._image_from_pixel(size)
+        # The affine map (2, 3) from pixels of the crop to the image.
+        A = self.R_image_crop * (self.side_px / size)
+        A = np.column_stack([A, np.asarray(self.center_px) + A @ np.full(2, 0.5 - size / 2)])
+        source = image_rgb
         if self.side_px >= 2 * size:
             source, A = _shrink(image_rgb, A, size, int(self.side_px / size).bit_length() - 1)
         flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
@@ -65,8 +66,12 @@ class Region:
         """Rotate 3D vectors (..., 3) from the square's axes (x right, y down, z forward) to the camera's axes."""
         R_camera_crop = np.eye(3)
         R_camera_crop[:2, :2] = self.R_image_crop
-        rotated: NDArray[np.float64] = np.asarray(vectors) @ R_camera_crop.T
-        return rotated
+        return np.asarray(vectors) @ R_camera_crop.T
+
+    def moved(self, motion_px: NDArray[np.floating[Any]]) -> Region:
+        """Return the square moved by (2,) pixels."""
+        x, y = np.asarray(self.center_px) + motion_px
+        return replace(self, center_px=(float(x), float(y)))
 
     def is_near(self, other: Region) -> bool:
         """Check if a person in one may occlude one in the other: centres within three quarters of a side."""
@@ -82,11 +87,6 @@ class Region:
         """Return the distance of the centres in sides of the larger square plus |log| of the ratio of the sides."""
         smaller, larger = sorted((max(self.side_px, 1e-9), max(other.side_px, 1e-9)))
         return math.dist(self.center_px, other.center_px) / larger + math.log(larger / smaller)
-
-    def _image_from_pixel(self, size: int) -> NDArray[np.float64]:
-        """Calculate the (2, 3) affine map from pixel indices of a ``size`` crop to image coordinates."""
-        A = self.R_image_crop * (self.side_px / size)
-        return np.column_stack([A, np.asarray(self.center_px) + A @ np.full(2, 0.5 - size / 2)])
 
 
 def _shrink(
@@ -126,6 +126,16 @@ def region_from_points(center_px: NDArray[np.float64], top_px: NDArray[np.float6
     dx, dy = (np.asarray(top_px, float) - np.asarray(center_px, float)).tolist()
     side = 2.0 * MARGIN * math.hypot(dx, dy)
     return Region((float(center_px[0]), float(center_px[1])), side, math.atan2(dx, -dy))
+
+
+def box_along(
+    points: NDArray[np.floating[Any]], rotation: float
+) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
+    """Calculate the centre (2,) and the sides (2,) of the box around points (n, 2) in the axes of a rotated region."""
+    R_image_box = Region((0.0, 0.0), 1.0, rotation).R_image_crop
+    along = points @ R_image_box
+    low, high = along.min(axis=0), along.max(axis=0)
+    return R_image_box @ ((low + high) / 2), high - low
 
 
 def bounds(points: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:

@@ -35,12 +35,12 @@ def landmark_network_name(quality: str) -> str:
     return LANDMARK_NETWORK_OF_QUALITY[quality]
 
 
-def network_path(name: str, folder: Path | None = None) -> Path:
+def network_path(name: str) -> Path:
     """Locate the file of a network.
 
     :raises SetupError: it has not been built.
     """
-    path = (folder or NETWORKS_FOLDER) / f"{name}.onnx"
+    path = NETWORKS_FOLDER / f"{name}.onnx"
     if not path.is_file():
         raise SetupError(
             f"{path} is missing. Build the networks in the repository with: python -m scope.tools.convert_networks"

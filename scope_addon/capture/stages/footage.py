@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import VideoError
 from ..camera.background_record import CameraMotion
 from ..camera.intrinsics import Camera, choose_camera
 from ..camera.line_segments import Lines
@@ -43,11 +42,6 @@ class Footage:
     cuts_s: list[float]
     execution: str  # what the networks ran on, for the report
     warnings: list[str]
-
-
-def no_frames_error(video: Video) -> VideoError:
-    """Return the error of footage without frames in the chosen range."""
-    return VideoError(f"{video.path} has no frames between the given start and end; change one of them")
 
 
 def given_camera(video: Video, options: CaptureOptions) -> Camera:

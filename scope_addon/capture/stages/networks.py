@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+from typing import NamedTuple
 
 from ...options.capture import AUTO, LARGEST, OFF
 from ..options import CaptureOptions, most_people
@@ -12,15 +13,22 @@ from ..perception.kept.kept_estimates import KeptEstimates
 from ..tracking.face.face_tracker import FaceTracker
 from ..tracking.hands.hand_tracker import LARGE_HAND_PX, SMALLEST_HAND_PX, HandTracker
 from ..tracking.tracker import PeopleTracker
-from .frame_observer import Trackers
 
 
-def network_threads(options: CaptureOptions, execution: Execution) -> int:
-    """Use at most as many threads as there are cores, since more would only wait for each other."""
+class Trackers(NamedTuple):
+    """The trackers of people, and of what is captured only on request."""
+
+    people: PeopleTracker
+    hands: HandTracker | None
+    faces: FaceTracker | None
+
+
+def network_threads(wanted: int, execution: Execution) -> int:
+    """Return how many threads to use: at most as many as there are cores, since more would wait for each other."""
     cores = os.cpu_count() or 1
-    if options.threads > cores:
-        execution.warnings.append(f"{options.threads} threads were requested, but there are only {cores} cores")
-    return min(options.threads or cores, cores)
+    if wanted > cores:
+        execution.warnings.append(f"{wanted} threads were requested, but there are only {cores} cores")
+    return min(wanted or cores, cores)
 
 
 def open_trackers(

@@ -41,9 +41,8 @@ def appearance(image_rgb: NDArray[np.uint8], keypoints_px: NDArray[np.floating[A
     for hip, knee, ankle in _LEGS:
         for a, b in ((hip, knee), (knee, ankle)):
             legs.append(keypoints_px[a] + _LEG_FRACTIONS[:, None] * (keypoints_px[b] - keypoints_px[a]))
-    histograms = [_histogram(_sample(image_rgb, points)) for points in (torso, np.concatenate(legs))]
-    roots: NDArray[np.float64] = np.sqrt(np.concatenate(histograms))
-    return roots
+    histograms = [_histogram(sample(image_rgb, points)) for points in (torso, np.concatenate(legs))]
+    return np.sqrt(np.concatenate(histograms))
 
 
 def distance(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
@@ -63,7 +62,7 @@ def distance(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
     return float(np.mean(values)) if values else 0.5
 
 
-def _sample(image_rgb: NDArray[np.uint8], points: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
+def sample(image_rgb: NDArray[np.uint8], points: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
     """Return the (N, 3) pixels at those of the points that are inside the image."""
     height, width = image_rgb.shape[:2]
     x, y = np.round(points).astype(int).T

@@ -266,10 +266,6 @@ def _limb_distance(a: NDArray[np.floating[Any]], b: NDArray[np.floating[Any]]) -
 
 
 def mean_distance(a: NDArray[np.floating[Any]], b: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
-    """Return the (...) mean distance of corresponding points.
-
-    :param a: (..., n, m), m at least 3.
-    :param b: (..., n, m).
-    """
+    """Return the (...) mean distance of corresponding points a (..., n, m) and b (..., n, m)."""
     distance: NDArray[np.floating[Any]] = np.linalg.norm(a - b, axis=-1).mean(axis=-1)
     return distance

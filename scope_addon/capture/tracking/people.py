@@ -7,9 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..perception.observation import Observation
 from .association import link
-from .scene_cuts import SCENE_GAP_S
 from .track import Track, Tracklet, make_track
 
 MIN_SHARE = 0.02  # of the frames; a person who was seen in fewer is a mistake of the detector
@@ -18,45 +16,6 @@ MIN_PROMINENCE = 0.05  # of the most prominent person's
 MERGER_DISTANCE = 0.25  # mean distance of the keypoints, in sides of the region, while a target drifts onto another
 MAX_MERGER_S = 0.38
 MIN_REAPPEARANCE_S = 0.1  # a lost person who is found for a shorter time, and lost again, was something else
-
-
-class PeopleBuilder:
-    """Collects observations frame by frame; memory grows by a kilobyte per person and frame."""
-
-    def __init__(self) -> None:
-        self._frames: list[int] = []
-        self._times: list[float] = []
-        self._tracklets: dict[int, Tracklet] = {}
-        self._offset_s = 0.0
-        self.timestamps: list[float] = []  # when each frame is shown
-
-    def add(self, frame: int, time_s: float, observations: Sequence[tuple[int, Observation]]) -> None:
-        """Append one frame.
-
-        :param frame: source frame index.
-        :param time_s: when it is shown.
-        :param observations: everybody who was seen in it, with the number of the tracklet.
-        """
-        row = len(self._frames)
-        self._frames.append(frame)
-        self.timestamps.append(time_s)
-        self._times.append(time_s + self._offset_s)
-        for number, observation in observations:
-            self._tracklets.setdefault(number, Tracklet()).add(row, observation)
-
-    def cut(self) -> None:
-        """Begin another scene with the next frame.
-
-        The tracks' times have a long gap there, so that nothing is interpolated across it; ``timestamps`` do not.
-        """
-        self._offset_s += SCENE_GAP_S
-
-    def __len__(self) -> int:
-        return len(self._frames)
-
-    def build(self, most: int) -> list[Track]:
-        """Return the tracks of at most ``most`` people; see `build_tracks`."""
-        return build_tracks(self._frames, self._times, list(self._tracklets.values()), most)
 
 
 def build_tracks(
@@ -143,4 +102,5 @@ def frames_before_flicker(tracklet: Tracklet, times: Sequence[float]) -> int:
 
 
 def _prominence(person: list[Tracklet]) -> float:
-    return sum(t.prominence for t in person)
+    """Return the person's size in the image, summed over the frames."""
+    return sum(float(np.sum(t.sides_px)) for t in person)

@@ -25,20 +25,18 @@ SCENE_GAP_S = 10.0  # added to a track's times at a cut, so that nothing is inte
 
 
 class SceneCuts:
-    """Detects cuts in frames that come in order; ``times_s`` holds the times of the first frames after cuts."""
+    """Detects cuts in frames that come in order."""
 
     def __init__(self) -> None:
-        self.times_s: list[float] = []
         self._before: NDArray[np.float32] | None = None
         self._upcoming: NDArray[np.float32] | None = None
         self._differences: deque[float] = deque(maxlen=HISTORY_FRAMES)
 
-    def is_cut(self, image_rgb: NDArray[np.uint8], upcoming_rgb: NDArray[np.uint8] | None, time_s: float) -> bool:
+    def is_cut(self, image_rgb: NDArray[np.uint8], upcoming_rgb: NDArray[np.uint8] | None) -> bool:
         """Return whether this frame begins another scene; the first frame of a clip does not.
 
         :param image_rgb: (H, W, 3).
         :param upcoming_rgb: (H, W, 3) the frame after it; None at the end of the clip.
-        :param time_s: when the frame is shown.
         """
         now = _thumbnail(image_rgb) if self._upcoming is None else self._upcoming
         self._upcoming = None if upcoming_rgb is None else _thumbnail(upcoming_rgb)
@@ -52,11 +50,10 @@ class SceneCuts:
                 self._before = before  # a short disturbance, after which the scene may continue
                 return False
             usual = max(usual, _difference(now, self._upcoming))
-        if not has_contrast or change < max(MIN_DIFFERENCE, MIN_RATIO * usual):
+        is_cut = bool(has_contrast and change >= max(MIN_DIFFERENCE, MIN_RATIO * usual))
+        if not is_cut:
             self._differences.append(change)
-            return False
-        self.times_s.append(time_s)
-        return True
+        return is_cut
 
 
 def _thumbnail(image_rgb: NDArray[np.uint8]) -> NDArray[np.float32]:
@@ -64,8 +61,7 @@ def _thumbnail(image_rgb: NDArray[np.uint8]) -> NDArray[np.float32]:
     is_large = min(height, width) >= _STRIDE * max(_SIZE)
     coarse = (width // _STRIDE, height // _STRIDE)
     source = cv2.resize(image_rgb, coarse, interpolation=cv2.INTER_NEAREST) if is_large else image_rgb
-    thumbnail: NDArray[np.float32] = cv2.resize(source, _SIZE, interpolation=cv2.INTER_AREA).astype(np.float32)
-    return thumbnail
+    return cv2.resize(source, _SIZE, interpolation=cv2.INTER_AREA).astype(np.float32)
 
 
 def _difference(a: NDArray[np.float32], b: NDArray[np.float32]) -> float:

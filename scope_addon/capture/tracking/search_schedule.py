@@ -24,7 +24,7 @@ EAGER_S = 15 * FRAME_S  # for which a lost person is looked for in every frame
 
 
 class SearchSchedule:
-    """Decides for each frame whether and how to search.
+    """Decides for each frame (H, W, 3) whether and how to search, from the people tracked and the lost ones remembered.
 
     :param clock: of the tracker.
     :param people: how many people are wanted; None: only the most prominent one of the clip.
@@ -43,20 +43,12 @@ class SearchSchedule:
     def is_due(
         self, image_rgb: NDArray[np.uint8], live: Sequence[TrackedTarget], lost: Sequence[TrackedTarget]
     ) -> bool:
-        """Return whether to search this frame.
-
-        :param image_rgb: (H, W, 3).
-        :param live: the people who are tracked.
-        :param lost: the people who are remembered.
-        """
+        """Return whether to search this frame (H, W, 3)."""
         return self._clock.has_passed(self._interval_s(image_rgb, live, lost), self._clock.time_s - self._search_s)
 
     def begin(self, image_rgb: NDArray[np.uint8], live: Sequence[TrackedTarget], lost: Sequence[TrackedTarget]) -> bool:
-        """Note a search in this frame.
+        """Note a search in this frame (H, W, 3).
 
-        :param image_rgb: (H, W, 3).
-        :param live: the people who are tracked.
-        :param lost: the people who are remembered.
         :return: whether to search closely: where somebody small may be, and less often at a low frame rate, because
             it costs more.
         """
@@ -73,13 +65,9 @@ class SearchSchedule:
     def begin_small(
         self, image_rgb: NDArray[np.uint8], live: Sequence[TrackedTarget], lost: Sequence[TrackedTarget]
     ) -> bool:
-        """Return whether to look for small people in this frame, and if so, note it.
+        """Return whether to look for small people in this frame (H, W, 3), and if so, note it.
 
         Only where nobody is tracked, and nobody is remembered whom a plain detection would find again.
-
-        :param image_rgb: (H, W, 3).
-        :param live: the people who are tracked.
-        :param lost: the people who are remembered.
         """
         due = self._clock.has_passed(SMALL_SEARCH_S, self._clock.time_s - self._small_search_s)
         if live or not due or not _are_small(image_rgb, lost):
@@ -92,8 +80,6 @@ class SearchSchedule:
 
         Only where fewer people are tracked than are wanted, and more and more rarely until their number changes:
         somebody whom a close search missed is mostly there from the start.
-
-        :param live: the people who are tracked.
         """
         if len(live) != self._parts_beside:
             self._parts_beside, self._parts_interval_s = len(live), SEARCH_LOST_S

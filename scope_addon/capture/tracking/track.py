@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -16,6 +17,8 @@ from ..perception.observation import Observation, PendingReference, PersonMask
 from .appearance import SIZE as APPEARANCE_SIZE
 
 _TRUNK = [11, 12, 23, 24]  # shoulders and hips
+# Lists of a tracklet with one entry for each row; the last two may be empty.
+_FOR_EACH_ROW = ("rows", "values", "centers_px", "sides_px", "hands", "faces")
 
 
 @dataclass
@@ -101,13 +104,26 @@ class Tracklet:
             end = self.rows[count]
             self.references = [(row, call) for row, call in self.references if row < end]
             self.masks = [(row, mask) for row, mask in self.masks if row < end]
-            del self.rows[count:], self.values[count:], self.centers_px[count:], self.sides_px[count:]
-            del self.hands[count:], self.faces[count:]
+            for name in _FOR_EACH_ROW:
+                del getattr(self, name)[count:]
 
-    @property
-    def prominence(self) -> float:
-        """Size in the image, summed over the frames."""
-        return float(np.sum(self.sides_px))
+    def since(self, first: int, offset: int) -> Tracklet:
+        """Return the frames from a row on as another tracklet, whose rows are larger by an offset."""
+        at = bisect_left(self.rows, first)
+        own = replace(
+            self,
+            references=[(row + offset, call) for row, call in self.references if row >= first],
+            masks=[(row + offset, mask) for row, mask in self.masks if row >= first],
+            **{name: getattr(self, name)[at:] for name in _FOR_EACH_ROW},
+        )
+        own.rows = [row + offset for row in own.rows]
+        return own
+
+    def extend(self, later: Tracklet) -> None:
+        """Append another tracklet's frames, whose rows come after these."""
+        for name in (*_FOR_EACH_ROW, "references", "masks"):
+            getattr(self, name).extend(getattr(later, name))
+        self.appearance = self.appearance + later.appearance
 
 
 def trunk_px(keypoints_px: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
@@ -157,8 +173,19 @@ def make_track(frames: Sequence[int], times: Sequence[float], tracklets: Sequenc
     )
 
 
-def single_frame_track(observation: Observation) -> Track:
-    """Make a track of one frame, without hands, face, mask, and reference landmarks, which may be pending."""
+def track_of(times_s: Sequence[float], observations: Sequence[Observation]) -> Track:
+    """Make a track of frames in all of which the person was seen.
+
+    Hands, face and mask are left out, and reference landmarks, which may be pending.
+    """
     tracklet = Tracklet()
-    tracklet.add(0, replace(observation, reference_landmarks=None, hands=None, face=None, mask=None))
-    return make_track([0], [0.0], [tracklet])
+    for row, observation in enumerate(observations):
+        tracklet.add(row, replace(observation, reference_landmarks=None, hands=None, face=None, mask=None))
+    track = make_track(range(len(times_s)), times_s, [tracklet])
+    track.acquired[:] = [observation.acquired for observation in observations]
+    return track
+
+
+def single_frame_track(observation: Observation) -> Track:
+    """Make a track of one frame; see `track_of`."""
+    return track_of([0.0], [observation])

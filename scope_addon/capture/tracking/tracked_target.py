@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import math
 from concurrent.futures import Future
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..perception.landmark_network import PoseEstimate
 from ..perception.region import Region
+from .left_right import mean_distance
 
 OCCLUSION_INNOVATION = 0.08  # see `TrackedTarget.innovation`
 CONFIDENCE_DROP = 0.8  # share of the recent confidence below which it has dropped
@@ -81,21 +81,17 @@ class TrackedTarget:
     @property
     def prefetch_region(self) -> Region:
         """Predict the region for the frame after the next one, before the next one is known."""
-        region = self.estimate.next_region
-        x, y = np.asarray(region.center_px) + self.velocity_px
-        return replace(region, center_px=(float(x), float(y)))
+        return self.estimate.next_region.moved(self.velocity_px)
 
     @property
     def predicted_region(self) -> Region:
         """Predict the region ``frames_lost`` frames later, at constant velocity."""
-        region = self.estimate.next_region
-        x, y = np.asarray(region.center_px) + self.velocity_px * self.frames_lost
-        return replace(region, center_px=(float(x), float(y)))
+        return self.estimate.next_region.moved(self.velocity_px * self.frames_lost)
 
     def innovation(self, estimate: PoseEstimate) -> float:
         """Return the mean distance of the keypoints from the prediction, in sides of the region."""
         predicted_px = self.estimate.keypoints_px + self.velocity_px * max(self.frames_lost, 1)
-        return mean_distance(estimate.keypoints_px, predicted_px) / self.estimate.region.side_px
+        return float(mean_distance(estimate.keypoints_px, predicted_px)) / self.estimate.region.side_px
 
     def update(self, estimate: PoseEstimate, swapped: bool, time_s: float, step_s: float) -> None:
         """Take over the estimate of the next frame.
@@ -115,8 +111,3 @@ class TrackedTarget:
 
 def _confidence(estimate: PoseEstimate) -> float:
     return float(estimate.keypoints_confidence.mean())
-
-
-def mean_distance(a: NDArray[np.floating[Any]], b: NDArray[np.floating[Any]]) -> float:
-    """Return the mean distance between the points a (..., n) and b (..., n)."""
-    return float(np.linalg.norm(a - b, axis=-1).mean())

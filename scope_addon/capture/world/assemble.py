@@ -16,7 +16,6 @@ from ..fitting.hand_measurements import HAND_KEYPOINT_NAMES
 from ..perception.landmark_network import KEYPOINT_NAMES
 from ..tracking.face.expression_motion import expression_motion
 from ..tracking.face.expressions import with_expressions
-from ..tracking.track import Track
 from .camera_path import CameraPath
 from .placement import PlacedTrack
 from .raw_motion import rotation_vectors_of_joints
@@ -49,7 +48,14 @@ def assemble_motion(
         T_world_camera, J0, placed.rotations[:, 0], placed.root, rotation_vectors_of_joints(placed.rotations)
     )
     joints = placed.place(placed.rotations, placed.root)[0]
-    sigma = raw.joint_sigma_m
+    keypoints = np.concatenate([track.keypoints_px, track.confidence[..., None]], axis=-1)
+    names: tuple[str, ...] = KEYPOINT_NAMES
+    if track.hands is not None:
+        keypoints = np.concatenate([keypoints, track.hands[..., :3].reshape(len(track), -1, 3)], axis=1)
+        names += HAND_KEYPOINT_NAMES
+    sigma, face = raw.joint_sigma_m, {}
+    if track.face is not None:
+        face = expression_motion(with_expressions(track.face, placed.times), placed.times, shot.smoothing)
     return Motion(
         poses=poses,
         trans=trans,
@@ -63,8 +69,8 @@ def assemble_motion(
         timestamps=placed.times,
         valid=placed.valid,
         joints_cam=path.points_to_frames(joints).astype(np.float32, copy=False),
-        keypoints2d=_keypoints2d(track),
-        keypoints2d_names=np.array(KEYPOINT_NAMES if track.hands is None else KEYPOINT_NAMES + HAND_KEYPOINT_NAMES),
+        keypoints2d=keypoints,
+        keypoints2d_names=np.array(names),
         intrinsics=shot.camera.intrinsics,
         dist=shot.camera.dist,
         joint_confidence=raw.joint_confidence,
@@ -77,7 +83,7 @@ def assemble_motion(
         joint_sigma_depth_m=None if sigma is None else sigma[..., 0],
         height_sigma_m=raw.height_sigma_m,
         uneven_ground=shot.uneven_ground,
-        face=_face(track, placed.times, shot.smoothing),
+        face=face,
     )
 
 
@@ -98,19 +104,6 @@ def _to_world(
 
     poses, trans = by_blocks(to_world, R_root, t_root, joints)
     return poses, trans
-
-
-def _face(track: Track, times: NDArray[np.float64], smoothing: bool) -> dict[str, NDArray[Any]]:
-    """Return the motion file's arrays about the face; none if it was not looked for."""
-    return {} if track.face is None else expression_motion(with_expressions(track.face, times), times, smoothing)
-
-
-def _keypoints2d(track: Track) -> NDArray[np.floating[Any]]:
-    """Return the (T, J, 3) pixels and confidence of the body's keypoints, and of the hands' if they were looked for."""
-    body: NDArray[np.floating[Any]] = np.concatenate([track.keypoints_px, track.confidence[..., None]], axis=-1)
-    if track.hands is None:
-        return body
-    return np.concatenate([body, track.hands[..., :3].reshape(len(track), -1, 3)], axis=1)
 
 
 def reprojection_error(shot: Shot, person: FittedPerson, placed: PlacedTrack) -> NDArray[np.float64]:

@@ -25,7 +25,7 @@ from ....solver.body import Body
 from ....solver.rotations import exp
 from ...kinematics.contact_points import SOLES
 from ...kinematics.smoothing import gaussian_smooth
-from ...kinematics.standing import horizontal_line_of_sight
+from ...kinematics.standing import line_of_sight
 from .placement import PlacedTrack
 
 STANDING_M_S = 0.5  # speed of the centre of mass at which the weight of the correction has fallen to 1/e
@@ -108,7 +108,8 @@ def balancing_rotations(
     times = placed.times
     mass = gaussian_smooth(center_of_mass(placed.body, placed.joints), times, CUTOFF_HZ)
     pivot = placed.contact_center(contact)
-    sight = horizontal_line_of_sight(mass - placed.center, up)
+    from_camera = mass - placed.center
+    sight = line_of_sight(from_camera - (from_camera @ up)[:, None] * up)  # along the floor
     height = np.maximum((mass - pivot) @ up, MIN_HEIGHT_M)
     in_contact = contact > 0.5
     certainty = in_contact.any(axis=1) * leg_support(placed.body, placed.joints)

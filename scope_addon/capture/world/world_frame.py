@@ -218,5 +218,4 @@ def _lowest(soles_cam: NDArray[np.floating[Any]], up: NDArray[np.floating[Any]])
 
 
 def _unit(vector: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
-    unit: NDArray[np.float64] = vector / np.linalg.norm(vector)
-    return unit
+    return vector / np.linalg.norm(vector)

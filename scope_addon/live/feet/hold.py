@@ -133,7 +133,8 @@ class FootHold:
         :param T_world_camera: (4, 4) the floor at z = 0.
         :param is_settled: whether size and floor are no longer being estimated.
         """
-        self._set_shape(betas)
+        if self._betas is None or np.abs(betas - self._betas).max(initial=0.0) > SAME_SHAPE:
+            self._betas, self._with_points = betas, with_contact_points(self._body, betas)
         body, pelvis_at_rest = self._with_points, self._with_points.rest_joints(betas)[0]
         R_parts, t_parts = body.forward_kinematics(frame.rotations, frame.root_cam - pelvis_at_rest, betas)
         points = contact_point_positions(body, R_parts, t_parts)
@@ -159,10 +160,6 @@ class FootHold:
         self._shift[:, 2] += _rise((points_world[: len(SOLES), 2].reshape(2, 2) + self._shift[:, 2:]).min(axis=1))
         poses = R_parts[None], t_parts[None]
         return move_feet(body, frame.rotations[None], poses, (self._shift @ R)[None])[0], self._probability
-
-    def _set_shape(self, betas: NDArray[np.floating[Any]]) -> None:
-        if self._betas is None or np.abs(betas - self._betas).max(initial=0.0) > SAME_SHAPE:
-            self._betas, self._with_points = betas, with_contact_points(self._body, betas)
 
     def _contact(self, up: NDArray[np.float64]) -> NDArray[np.floating[Any]]:
         """Return the contact probability (6,) of the newest frame.

@@ -96,13 +96,8 @@ class Footage:
     def _write(self, temporary: Path) -> None:
         height, width = self._size[0] // 2 * 2, self._size[1] // 2 * 2  # as the encoder needs it
         assert self.origin is not None
-        writer = VideoWriter(temporary, self._fps, width, height, self._path)
-        try:
+        with VideoWriter(temporary, self._fps, width, height, self._path) as writer:
             while (picture := self._waiting.get()) is not None and self._is_wanted:
                 writer.write(picture.image_rgb[:height, :width], picture.timestamp_s - self.origin[1])
             if not self._is_wanted:
                 raise OutputError(f"{self._path} is not written, since the capture failed")
-        except BaseException:
-            writer.abandon()
-            raise
-        writer.close()

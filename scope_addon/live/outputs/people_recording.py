@@ -22,7 +22,8 @@ class PeopleRecording:
     """
 
     def __init__(self, paths: Sequence[Path], body: Body, source: Source, *, from_zero: bool = False) -> None:
-        self._recordings = [Recording(path, body, source, from_zero=from_zero) for path in paths]
+        self._recordings = [Recording(path, body, source) for path in paths]
+        self._from_zero = from_zero
         self.origin: tuple[int, float] | None = None  # the frame number and time that become 0, if not the first ones
         self._is_over = False
 
@@ -47,9 +48,7 @@ class PeopleRecording:
         """
         seen = [recording for recording in self._recordings if recording.first is not None]
         origin = self.origin or min((recording.first for recording in seen if recording.first), default=None)
-        for recording in seen:
-            recording.origin = origin
-        return [recording.save() for recording in seen or self._recordings[:1]]
+        return [each.save(origin if self._from_zero else None) for each in seen or self._recordings[:1]]
 
     @property
     def seconds(self) -> float:

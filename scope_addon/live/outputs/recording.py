@@ -38,13 +38,7 @@ from .frame_poses import at_frames, in_last_shape
 class Recording:
     """Keeps every pose, some 3 kB each."""
 
-    def __init__(self, path: Path, body: Body, source: Source, *, from_zero: bool = False) -> None:
-        """Begin a recording without poses.
-
-        :param from_zero: whether frame numbers and times begin with 0, rather than with those of the source.
-        """
-        self._from_zero = from_zero
-        self.origin: tuple[int, float] | None = None  # the frame number and time that become 0, if not the first ones
+    def __init__(self, path: Path, body: Body, source: Source) -> None:
         self._path, self._body, self._source = path, body, source
         self._poses: list[LivePose] = []
         self._session: LiveSession | None = None
@@ -59,9 +53,10 @@ class Recording:
         if pose.presence is Presence.SEEN:
             self._poses.append(pose)
 
-    def save(self) -> Path:
+    def save(self, origin: tuple[int, float] | None = None) -> Path:
         """Write the motion file.
 
+        :param origin: the frame number and time that become 0; None: they are those of the source.
         :raises NoPersonError: nobody was seen.
         :raises OutputError: the file cannot be written.
         """
@@ -71,10 +66,9 @@ class Recording:
                 "in the image"
             )
         motion = self.motion(self._session.camera)
-        if self._from_zero:
-            frame, time_s = self.origin or (motion.frames[0], motion.timestamps[0])
-            motion.frames -= frame
-            motion.timestamps -= time_s
+        if origin is not None:
+            motion.frames -= origin[0]
+            motion.timestamps -= origin[1]
         motion.save(self._path)
         return self._path
 

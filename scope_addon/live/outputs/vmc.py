@@ -67,8 +67,7 @@ def unity_position(position: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
 
 def unity_quaternion(R: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
     """Convert rotations (..., 3, 3) in model axes to quaternions (..., 4) x, y, z, w in Unity's."""
-    quaternion: NDArray[np.float64] = quaternion_from_matrix(R)[..., [1, 2, 3, 0]] * [1.0, -1.0, -1.0, 1.0]
-    return quaternion
+    return quaternion_from_matrix(R)[..., [1, 2, 3, 0]] * [1.0, -1.0, -1.0, 1.0]
 
 
 def parse_address(text: str, people: int = 1) -> tuple[str, int]:

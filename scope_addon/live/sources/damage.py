@@ -37,7 +37,8 @@ class Damage:
         self._waiting = 0  # packets of which no picture has come yet
         # Pictures that the decoder keeps, to put them in order; None before the first one.
         self._delay: int | None = None
-        self._is_broken = self._has_key = False
+        self.is_broken = False  # what is decoded now builds on a damaged picture
+        self._has_key = False
 
     def observe(self, packet: av.Packet[Any]) -> None:
         """Note a packet that is going to be decoded."""
@@ -62,11 +63,6 @@ class Damage:
         return True
 
     @property
-    def is_broken(self) -> bool:
-        """Whether what is decoded now builds on a damaged picture."""
-        return self._is_broken
-
-    @property
     def is_doubtful(self) -> bool:
         """Whether only the next packet tells if the pictures of this one are damaged."""
         return self._until_loss == 1
@@ -88,8 +84,8 @@ class Damage:
         if frame.is_corrupt:
             self._break()
         elif self._has_key and frame.key_frame and frame.pict_type in (PictureType.I, PictureType.NONE):
-            self._is_broken = False
-        return self._is_broken
+            self.is_broken = False
+        return self.is_broken
 
     def _break(self) -> None:
-        self._is_broken, self._has_key = True, False
+        self.is_broken, self._has_key = True, False

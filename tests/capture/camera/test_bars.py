@@ -110,4 +110,5 @@ def test_edges_of_bars_are_neither_lines_nor_corners() -> None:
     edges = find_segments(picture, person, bars=tracker.bars)
     assert not (np.abs(edges.ends_px[:, :, 0].mean(axis=1)[:, None] - [328, 632]) < 4).any()
     angle = np.degrees(np.arctan(6 * 11 / camera.intrinsics[0, 0]))
-    assert tracker.motion(camera).largest_turn_deg == pytest.approx(angle, rel=0.1)
+    motion = tracker.record().motion(camera, camera, (WIDTH, HEIGHT))
+    assert motion.largest_turn_deg == pytest.approx(angle, rel=0.1)

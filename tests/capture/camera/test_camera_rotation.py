@@ -40,7 +40,7 @@ def follow(pictures, people=lambda k: [], assumed=CAMERA):
     tracker = BackgroundTracker(assumed, WIDTH, HEIGHT)
     for k, picture in enumerate(pictures):
         tracker.add(picture, k / FPS, people(k))
-    return tracker.motion(CAMERA)
+    return tracker.record().motion(assumed, CAMERA, (WIDTH, HEIGHT))
 
 
 def test_a_pan_with_tilt_and_roll_is_found(panorama):
@@ -108,7 +108,7 @@ def test_the_narrowest_pictures_are_unknown(width, height):
     tracker = BackgroundTracker(camera, width, height)
     for k in range(3):
         tracker.add(np.full((height, width, 3), 128, np.uint8), k / FPS, [])
-    assert tracker.motion(camera).is_static
+    assert tracker.record().motion(camera, camera, (WIDTH, HEIGHT)).is_static
 
 
 def test_a_short_blackout_is_bridged(panorama):

@@ -69,8 +69,8 @@ def lines_after(
         for stripe in range(left + 10, high[0], 20):
             cv2.line(image, (stripe, int(low[1])), (stripe + 60, int(high[1])), (200, 200, 200), 3)
         tracker.add(image, k / FPS, [person_at(x)], is_cut=k == cut)
-    motion = tracker.motion(CAMERA)
-    return tracker.lines(motion, CAMERA)
+    record = tracker.record()
+    return record.lines(record.motion(CAMERA, CAMERA, (WIDTH, HEIGHT)), CAMERA)
 
 
 def angle_deg(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:

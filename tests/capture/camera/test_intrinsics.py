@@ -40,6 +40,7 @@ def test_a_distorting_lens_and_a_background_without_features():
     background = BackgroundTracker(camera, 320, 240)
     for k, grey in enumerate((0, 0, 128, 128)):
         background.add(np.full((240, 320, 3), grey, np.uint8), k / 10, [np.array([[100.0, 60.0], [160.0, 200.0]])])
-    motion = background.motion(camera)
+    record = background.record()
+    motion = record.motion(camera, camera, (320, 240))
     assert motion.is_static
-    assert len(background.lines(motion, camera).lengths) == 0
+    assert len(record.lines(motion, camera).lengths) == 0

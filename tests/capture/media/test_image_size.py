@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.media import frame_readers
-from scope.scope_addon.capture.media.frame_readers import PyavReader, presented_duration_s
+from scope.scope_addon.capture.media.frame_readers import PyavReader
 from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.perception.person_detector import PersonDetector
 from scope.scope_addon.cli import main
@@ -182,7 +182,6 @@ def test_a_list_of_other_files_is_no_footage(tmp_path: Path, text: str) -> None:
     path.write_text(text)
     with pytest.raises(VideoError, match=r"list\.mp4 is a playlist or other text, not footage"):
         open_video(path)
-    assert presented_duration_s(path) is None
     with pytest.raises(VideoError, match=r"list\.mp4 is not a video or image that can be decoded"):
         PyavReader(path)
 

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.media.video import open_video
+from scope.scope_addon.capture.overlay import overlay_video
 from scope.scope_addon.capture.overlay.overlay_video import (
     body_colors,
     camera_vertices,
@@ -97,12 +98,13 @@ def test_vertices_are_in_the_camera_of_their_row(body):
         np.testing.assert_allclose(camera_vertices(motion, body, row), homogeneous[:, :3], atol=1e-5)
 
 
-def test_the_video_shows_the_body_where_it_is_and_nothing_elsewhere(tmp_path, footage, body):
+def test_the_video_shows_the_body_where_it_is_and_nothing_elsewhere(tmp_path, footage, body, monkeypatch):
+    monkeypatch.setattr(overlay_video, "OPACITY", 0.8)
     seen = []
     out = tmp_path / "overlay.mp4"
     motion = standing(body, [2, 3, 4, 5, 6], x=0.3)
     motion.valid[2] = False
-    write_overlay(out, footage, motion, body, opacity=0.8, progress=lambda done, total: seen.append((done, total)))
+    write_overlay(out, footage, motion, body, progress=lambda done, total: seen.append((done, total)))
     with open_video(out) as video:
         images = [f.image_rgb for f in video]
     assert (video.width, video.height, video.fps, len(images)) == (W, H, 25, 10)
@@ -252,12 +254,13 @@ def test_missing_footage_and_a_wrong_body_are_errors(tmp_path, footage, body):
     assert [p.name for p in tmp_path.iterdir()] == ["footage.mp4"]
 
 
-def test_the_points_of_a_face_are_drawn_where_it_was_seen(tmp_path, footage, body):
+def test_the_points_of_a_face_are_drawn_where_it_was_seen(tmp_path, footage, body, monkeypatch):
+    monkeypatch.setattr(overlay_video, "OPACITY", 0.0)
     motion = standing(body, [0, 1])
     motion.face = made_face(2) | {"face_points": np.full((2, 3, 2), 20.0), "expression_confidence": np.array([0, 1.0])}
     with open_video(footage) as video:
         size = (video.height, video.width)
-    shown = dict(painted_frames(footage, [motion], body, [0, 1], opacity=0.0))
+    shown = dict(painted_frames(footage, [motion], body, [0, 1]))
     assert shown[0].shape[:2] == size
     assert abs(int(shown[0][20, 20].max()) - GREY) < 10
     assert shown[1][20, 20].min() > 200

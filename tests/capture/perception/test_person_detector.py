@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scope.scope_addon.capture.perception import sessions
+from scope.scope_addon.capture.perception.letterbox import fit_in
 from scope.scope_addon.capture.perception.person_detector import (
     PersonDetector,
     decode,
-    letterbox,
     make_anchors,
     merge_overlapping,
     parts,
@@ -59,7 +60,8 @@ def test_overlapping_boxes_become_their_weighted_mean() -> None:
 
 @pytest.mark.parametrize(("height", "width"), [(1080, 1920), (640, 360), (31, 29), (1, 500)])
 def test_letterbox_shows_the_whole_image_centred(height: int, width: int) -> None:
-    square, scale, offset = letterbox(np.full((height, width, 3), 255, np.uint8))
+    fitted, scale = fit_in(np.full((height, width, 3), 255, np.uint8), 224, 224, border=0), 224 / max(height, width)
+    square, offset = fitted.picture_rgb, fitted.offset
     rows, columns = np.flatnonzero(square.any(axis=(1, 2))), np.flatnonzero(square.any(axis=(0, 2)))
     np.testing.assert_allclose([columns[0], rows[0]], offset)
     np.testing.assert_allclose([len(columns), len(rows)], np.maximum(np.array([width, height]) * scale, 1), atol=0.51)
@@ -147,9 +149,10 @@ def test_no_detections_in_a_blank_image(detector: PersonDetector) -> None:
     assert detector.detect(np.full((90, 160, 3), 128, np.uint8)) == []
 
 
-def test_missing_and_damaged_networks_are_named(tmp_path: Path) -> None:
+def test_missing_and_damaged_networks_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sessions, "NETWORKS_FOLDER", tmp_path)
     with pytest.raises(SetupError, match="pose_detection.onnx is missing"):
-        network_path("pose_detection", tmp_path)
+        network_path("pose_detection")
     broken = tmp_path / "broken.onnx"
     broken.write_bytes(b"no network")
     with pytest.raises(ModelFileError, match=r"broken\.onnx"):

@@ -13,12 +13,13 @@ from scope.scope_addon.capture.perception.landmark_network import PoseEstimate
 from scope.scope_addon.capture.perception.person_detector import Detection
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.landmarks import tracking_networks
-from scope.scope_addon.capture.tracking.people import PeopleBuilder, frames_before_flicker
+from scope.scope_addon.capture.tracking.people import frames_before_flicker
 from scope.scope_addon.capture.tracking.track import Track, Tracklet
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker
 
 from ..composites import composite
 from ..fake_people import FakeDetector, FakeLandmarks, Person, pictures
+from ..followed_people import FollowedPeople
 
 RED, BLUE = (200, 40, 40), (40, 60, 200)
 FPS = 30
@@ -33,10 +34,10 @@ def follow(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Track]]:
             tracking_networks, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people, "heavy" in name)
         )
         monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_: FakeDetector(people))
-        tracker, builder = PeopleTracker("fast", 1, wanted), PeopleBuilder()
+        tracker, followed = PeopleTracker("fast", 1, wanted), FollowedPeople()
         for t, image in enumerate(pictures(people, count)):
-            builder.add(t, t / fps, tracker.step(image, time_s=t / fps))
-        return builder.build(wanted or 1)
+            followed.add(t / fps, tracker.step(image, time_s=t / fps))
+        return followed.tracks(wanted or 1)
 
     return run
 
@@ -223,10 +224,10 @@ def test_a_rival_at_the_start_is_searched_for_closely(monkeypatch: pytest.Monkey
     people = [leaves, stays]
     monkeypatch.setattr(tracking_networks, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people))
     monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_: Detector(people))
-    tracker, builder = PeopleTracker("best", 1), PeopleBuilder()
+    tracker, followed = PeopleTracker("best", 1), FollowedPeople()
     for t, image in enumerate(pictures(people, 240)):
-        builder.add(t, t / FPS, tracker.step(image, time_s=t / FPS))
-    (track,) = builder.build(1)
+        followed.add(t / FPS, tracker.step(image, time_s=t / FPS))
+    (track,) = followed.tracks(1)
     assert identities(track, people) == ({1} if comes_s == 0 else {0})
     if comes_s == 0:
         assert track.seen[4:].all()
@@ -372,12 +373,12 @@ def test_tracking_does_not_wait_for_the_reference_network(monkeypatch: pytest.Mo
     networks = {True: SlowNetwork([person], is_reliable=True), False: FakeLandmarks([person])}
     monkeypatch.setattr(tracking_networks, "LandmarkNetwork", lambda name, *_: networks["heavy" in name])
     monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_: FakeDetector([person]))
-    tracker, builder = PeopleTracker("fast", 1), PeopleBuilder()
+    tracker, followed = PeopleTracker("fast", 1), FollowedPeople()
     for t, image in enumerate(pictures([person], 20)):
-        builder.add(t, t / FPS, tracker.step(image))
+        followed.add(t / FPS, tracker.step(image))
     assert networks[True].batches == []
     free.set()
-    (track,) = builder.build(1)
+    (track,) = followed.tracks(1)
     assert track.reference_rows.tolist() == [0]
     np.testing.assert_allclose(track.reference_landmarks[0], person.body(0))
 
@@ -422,16 +423,16 @@ def test_a_real_newcomer_is_found_equally_soon_at_any_rate(shared: Path, every: 
 )
 def test_identities_of_real_people_are_never_switched(shared: Path, cameras: tuple[str, str], crossing: bool) -> None:
     """The same man twice, so that appearance does not help; occluded for a third of a second where the clips cross."""
-    tracker, builder = PeopleTracker("fast", threads=2, people=2), PeopleBuilder()
+    tracker, followed = PeopleTracker("fast", threads=2, people=2), FollowedPeople()
     places, hidden = [], []
     for t, (image, at, is_hidden) in enumerate(composite(shared, cameras, crossing)):
-        builder.add(t, t / 30, tracker.step(image, time_s=t / 30))
+        followed.add(t / 30, tracker.step(image, time_s=t / 30))
         places.append(at)
         hidden.append(is_hidden)
     truth, visible = np.array(places), ~np.array(hidden)
     assert visible.sum() >= 37
     assert crossing == (not visible.all())
-    tracks = builder.build(2)
+    tracks = followed.tracks(2)
     assert len(tracks) == 2
     found = []
     for track in tracks:

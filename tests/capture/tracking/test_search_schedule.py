@@ -18,7 +18,7 @@ RATES = (15, 30, 60)
 def person(side_px: float, seen_s: float = 0.0) -> TrackedTarget:
     region = Region((320.0, 240.0), side_px, 0.0)
     keypoints = np.random.default_rng(1).normal(scale=0.2 * side_px, size=(33, 2)) + 300.0
-    estimate = PoseEstimate(keypoints, np.ones(33), np.ones(33), np.zeros((33, 3)), 0.99, region, region)
+    estimate = PoseEstimate(keypoints, np.ones(33), np.zeros((33, 3)), 0.99, region, region)
     return TrackedTarget(0, estimate, np.zeros(2), seen_s)
 
 

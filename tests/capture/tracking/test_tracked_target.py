@@ -18,7 +18,7 @@ BODY = np.random.default_rng(1).normal(scale=0.2 * SIDE, size=(33, 2))
 def at(x: float, confidence: float = 0.9) -> PoseEstimate:
     region = Region((x, 300.0), SIDE, 0.0)
     sure = np.full(33, confidence)
-    return PoseEstimate(BODY + [x, 300.0], sure, np.ones(33), np.zeros((33, 3)), 0.99, region, region)
+    return PoseEstimate(BODY + [x, 300.0], sure, np.zeros((33, 3)), 0.99, region, region)
 
 
 def walker(frames: int, fps: float, speed_px: float = 12.0) -> TrackedTarget:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from .....solver import Body, Fit
 from .....solver.residuals.image.outline import FLOATS, INTS, pack
 from ....kinematics.added_keypoints import with_keypoints
+from ....kinematics.body_surface import one_per_cell
 from ...camera.intrinsics import Camera
 from ...overlay.rasterizer import fill_silhouette, vertex_normals
 from ...perception.observation import PersonMask
@@ -55,9 +56,12 @@ class OutlineMeasurer:
         names = [body.joint_names[i] for i in part]
         usable = np.array([not any(key in name for key in _LEFT_OUT) for name in names])
         usable &= np.bincount(body.faces.ravel(), minlength=len(part)) > 0
-        self.vertices = _spread(body.v_template, np.flatnonzero(usable))
+        candidates = np.flatnonzero(usable)
+        self.vertices = candidates[one_per_cell(body.v_template[candidates], SPACING_M)]
         self.part = part[self.vertices]
-        self._width = np.array([_width(body.joint_names[i]) for i in self.part])
+        joints = [body.joint_names[i] for i in self.part]
+        widths_m = _WIDTHS_M.items()
+        self._width = np.array([next((w for key, w in widths_m if key in joint), _WIDTH_M) for joint in joints])
         self._triangles = np.ascontiguousarray(body.triangles(), np.int32)
         self._around = self._triangles[np.isin(self._triangles, self.vertices).any(axis=1)]
         self.first = len(body.keypoint_names)
@@ -158,15 +162,3 @@ def _crossings(
     outward /= np.maximum(np.linalg.norm(outward, axis=1), 1e-9)[:, None]
     agree = (outward * normal[rows]).sum(axis=1) > AGREEMENT_COS
     return rows[agree], place[agree], outward[agree]
-
-
-def _spread(points: NDArray[np.float64], candidates: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return one of the candidates of each cube of `SPACING_M`."""
-    cells = np.floor(points[candidates] / SPACING_M).astype(int)
-    first = np.unique(cells, axis=0, return_index=True)[1]
-    chosen: NDArray[np.intp] = candidates[np.sort(first)]
-    return chosen
-
-
-def _width(joint: str) -> float:
-    return next((width for key, width in _WIDTHS_M.items() if key in joint), _WIDTH_M)

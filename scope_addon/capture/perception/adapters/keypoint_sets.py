@@ -98,11 +98,9 @@ def _approximate(name: str, at: dict[str, NDArray[np.float64]]) -> NDArray[np.fl
         return mouth
     if "heel" in name or "foot" in name:
         lower_leg = at[f"{side}_ankle"] - at[f"{side}_knee"]
-        foot: NDArray[np.float64] = at[f"{side}_ankle"] + (0.12 if "heel" in name else 0.2) * lower_leg
-        return foot
+        return at[f"{side}_ankle"] + (0.12 if "heel" in name else 0.2) * lower_leg
     forearm = at[f"{side}_wrist"] - at[f"{side}_elbow"]
-    finger: NDArray[np.float64] = at[f"{side}_wrist"] + 0.3 * forearm
-    return finger
+    return at[f"{side}_wrist"] + 0.3 * forearm
 
 
 KEYPOINT_SETS = {
@@ -110,8 +108,3 @@ KEYPOINT_SETS = {
     "halpe26": KeypointSet("halpe26", 26, _halpe()),
     "wholebody133": KeypointSet("wholebody133", 133, _wholebody()),
 }
-
-
-def keypoint_set_of_count(count: int) -> KeypointSet | None:
-    """Find the set by its number of keypoints; None if there is none."""
-    return next((s for s in KEYPOINT_SETS.values() if s.count == count), None)

@@ -3,14 +3,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .....solver.names import EXPRESSIONS
-from ..execution import Execution
 from ..sessions import network_path, open_session
 
 # The landmarks that the expression network was trained on, in its order.
@@ -33,9 +31,9 @@ class ExpressionNetwork:
     :raises ModelFileError: its file is damaged.
     """
 
-    def __init__(self, folder: Path | None = None, execution: Execution | None = None) -> None:
+    def __init__(self) -> None:
         # It takes a millisecond, which further threads would make longer.
-        self._session = open_session(network_path("face_expression", folder), 1, execution)
+        self._session = open_session(network_path("face_expression"), 1)
 
     def estimate(self, landmarks_px: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
         """Estimate the weights (52,) 0..1 of the expressions in the order of `EXPRESSIONS`; 0 of the tongue.

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -46,8 +45,8 @@ class FaceNetwork:
     :raises ModelFileError: its file is damaged.
     """
 
-    def __init__(self, threads: int, folder: Path | None = None, execution: Execution | None = None) -> None:
-        self._session = open_session(network_path("face_landmark", folder), threads, execution)
+    def __init__(self, threads: int, execution: Execution | None = None) -> None:
+        self._session = open_session(network_path("face_landmark"), threads, execution)
 
     def estimate(self, image_rgb: NDArray[np.uint8], region: Region) -> FaceEstimate:
         """Estimate the face in a region of an (H, W, 3) uint8 RGB image."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..landmark_network import KEYPOINT_NAMES
-from ..region import Region
+from ..region import Region, box_along
 
 HEAD = tuple(range(KEYPOINT_NAMES.index("mouth_right") + 1))  # keypoints of the body: nose, eyes, ears, mouth
 _EYES = [KEYPOINT_NAMES.index(f"{side}_eye") for side in ("left", "right")]
@@ -72,8 +72,6 @@ def region_from_landmarks(landmarks_px: NDArray[np.float64]) -> Region:
     :param landmarks_px: pixels.
     """
     dx, dy = landmarks_px[_OUTER_EYES[1]] - landmarks_px[_OUTER_EYES[0]]
-    upright = Region((0.0, 0.0), 1.0, math.atan2(float(dy), float(dx)))
-    rotated = landmarks_px @ upright.R_image_crop
-    low, high = rotated.min(axis=0), rotated.max(axis=0)
-    x, y = upright.R_image_crop @ ((low + high) / 2)
-    return Region((float(x), float(y)), _SCALE * float((high - low).max()), upright.rotation)
+    rotation = math.atan2(float(dy), float(dx))
+    (x, y), sides = box_along(landmarks_px, rotation)
+    return Region((float(x), float(y)), _SCALE * float(sides.max()), rotation)

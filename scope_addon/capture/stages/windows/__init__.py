@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Long clips, which are observed window by window: by one process in order, or by several at the same time."""
+"""Clips are observed window by window: a short one is one; those of a long one may be observed at the same time."""

@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...camera.background_record import BackgroundRecord, joined_backgrounds
 from ...perception.observation import Observation
@@ -67,7 +66,7 @@ class JoinedWindows:
         before = same_people(self._last, record) if self._last is not None else {}
         numbers: dict[int, int] = {}
         for number, tracklet in record.tracklets.items():
-            own = _own_frames(tracklet, first, base - first)
+            own = tracklet.since(first, base - first)
             if number in before:
                 numbers[number] = self._numbers[before[number]]
                 self._continue(numbers[number], before[number], tracklet, own, first)
@@ -93,7 +92,10 @@ class JoinedWindows:
         return [self.timestamps[row] for row in self._cut_rows]
 
     def largest_people(self, first_row: int) -> Iterator[tuple[float, Observation]]:
-        """Yield the time and the largest person of each frame from a row on in which somebody was seen."""
+        """Yield the time and the largest person of each frame from a row on in which somebody was seen.
+
+        The observations contain what a fit of their frames needs.
+        """
         largest: dict[int, tuple[float, Tracklet, int]] = {}
         for tracklet in self._people:
             for k, (row, side_px) in enumerate(zip(tracklet.rows, tracklet.sides_px, strict=True)):
@@ -101,7 +103,8 @@ class JoinedWindows:
                     largest[row] = side_px, tracklet, k
         for row in sorted(largest):
             _, tracklet, k = largest[row]
-            yield self.timestamps[row], _observation(tracklet.values[k])
+            px, confidence, world = np.split(tracklet.values[k].astype(float), (2, 3), axis=1)
+            yield self.timestamps[row], Observation(px, confidence[:, 0], world, 1.0, _NOWHERE, acquired=True)
 
     def _continue(self, place: int, number: int, tracklet: Tracklet, own: Tracklet, overlap: int) -> None:
         """Append a tracklet's own frames to the one that it continues, and fade it in over the frames before."""
@@ -112,41 +115,4 @@ class JoinedWindows:
         for k, value in faded(last, tracklet, self._last.anchor, overlap).items():
             joined.values[behind + k - skipped] = value
             joined.centers_px[behind + k - skipped] = trunk_px(value[:, :2])
-        _extend(joined, own)
-
-
-def _own_frames(tracklet: Tracklet, first: int, offset: int) -> Tracklet:
-    """Return a tracklet's frames from a row on, as a new tracklet with rows of the clip.
-
-    :param offset: what is added to the rows.
-    """
-    at = int(np.searchsorted(tracklet.rows, first))
-    return Tracklet(
-        [row + offset for row in tracklet.rows[at:]],
-        tracklet.values[at:],
-        tracklet.centers_px[at:],
-        tracklet.sides_px[at:],
-        tracklet.appearance,
-        [(row + offset, call) for row, call in tracklet.references if row >= first],
-        tracklet.hands[at:],
-        [(row + offset, mask) for row, mask in tracklet.masks if row >= first],
-        tracklet.faces[at:],
-    )
-
-
-def _extend(tracklet: Tracklet, later: Tracklet) -> None:
-    tracklet.rows += later.rows
-    tracklet.values += later.values
-    tracklet.centers_px += later.centers_px
-    tracklet.sides_px += later.sides_px
-    tracklet.appearance = tracklet.appearance + later.appearance
-    tracklet.references += later.references
-    tracklet.hands += later.hands
-    tracklet.masks += later.masks
-    tracklet.faces += later.faces
-
-
-def _observation(values: NDArray[np.float32]) -> Observation:
-    """Return the observation of a row (33, 6) of a tracklet, as far as a fit of its frame needs it."""
-    numbers = values.astype(float)
-    return Observation(numbers[:, :2], numbers[:, 2], numbers[:, 3:], 1.0, _NOWHERE, acquired=True)
+        joined.extend(own)

@@ -11,8 +11,8 @@ from ...media.opencv_threads import opencv_in_one_thread
 from ...media.video import open_video
 from ...options import CaptureOptions
 from ..clock import Progress, StageClock
-from .long_clip import LongClip
 from .plan import plan_windows
+from .windowed_clip import WindowedClip
 
 _THREADS = 2  # in which backgrounds are followed
 
@@ -41,4 +41,4 @@ def observe_windows(
         windows = plan_windows(video, options.window_s)
         if not (numbers and 0 <= numbers.start < numbers.stop <= len(windows)):
             raise UsageError(f"{path} has {len(windows)} windows, and none of the numbers {numbers}")
-        return LongClip(video, windows, options, StageClock(), pool).save(numbers, folder, progress)
+        return WindowedClip(video, windows, options, StageClock(), pool).save(numbers, folder, progress)

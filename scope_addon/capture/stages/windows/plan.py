@@ -28,8 +28,8 @@ class Window:
     end_s: float
 
     def has_begun(self, time_s: float) -> bool:
-        """Return whether a frame at this time is not before the window's first one."""
-        return time_s >= self.begin_s - _TOLERANCE_S
+        """Return whether a frame at this time is not before the window's first one, as none of the first window is."""
+        return not self.number or time_s >= self.begin_s - _TOLERANCE_S
 
     def warms_up(self, time_s: float) -> bool:
         """Return whether a frame at this time is not before the one in which the trackers begin."""

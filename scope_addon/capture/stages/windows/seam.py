@@ -90,9 +90,4 @@ def faded(earlier: Tracklet, later: Tracklet, offset: int, overlap: int) -> dict
 
 def _lasting(record: WindowRecord, row: int) -> list[int]:
     """Return the tracklets that were seen in a row."""
-    return [number for number, tracklet in record.tracklets.items() if _is_seen(tracklet, row)]
-
-
-def _is_seen(tracklet: Tracklet, row: int) -> bool:
-    at = int(np.searchsorted(tracklet.rows, row))
-    return at < len(tracklet.rows) and tracklet.rows[at] == row
+    return [number for number, tracklet in record.tracklets.items() if row in tracklet.rows]

@@ -15,35 +15,38 @@ from ...media.exposure import AutoExposure
 from ...media.frame import Frame
 from ...perception.observation import Observation
 from ...perception.region import Region
+from ...tracking.landmarks.mask_schedule import MaskSchedule
+from ...tracking.scene_cuts import SceneCuts
 from ...tracking.track import Tracklet
 from ..clock import StageClock
-from ..frame_observer import BrightenedFrame, FrameObserver, largest_of
+from ..networks import Trackers
 from .plan import Window
-from .window_record import WindowRecord, known_reference
+from .window_record import WindowRecord
 
 
 class WindowRun:
-    """Takes the frames of one window in order, from that in which its trackers begin.
+    """Takes the frames of one window in order, from that in which its trackers begin; none is kept.
 
-    :param observer: with trackers that have seen nothing.
-    :param background: likewise.
-    :param pool: in which the background is followed while the networks run on the next frame.
     :param following: the next window, if there is one.
+    :param trackers: that have seen nothing, as ``masks`` and ``background``.
+    :param pool: in which the background is followed while the networks run on the next frame.
     """
 
     def __init__(
         self,
         window: Window,
         following: Window | None,
-        observer: FrameObserver,
+        trackers: Trackers,
+        masks: MaskSchedule,
         background: BackgroundTracker,
         pool: ThreadPoolExecutor,
         clock: StageClock,
     ) -> None:
         self.window, self._following = window, following
-        self._observer, self._background, self._pool, self._clock = observer, background, pool, clock
+        self._trackers, self._masks, self._cuts = trackers, masks, SceneCuts()
+        self.background, self._pool, self._clock = background, pool, clock
         self._exposure = AutoExposure()
-        self._upcoming: BrightenedFrame | None = None
+        self._upcoming_lit: NDArray[np.uint8] | None = None  # in the brightness that the networks are given
         self._pending: Future[None] | None = None
         self._indices: list[int] = []
         self._times: list[float] = []
@@ -58,12 +61,14 @@ class WindowRun:
 
         :param upcoming: the frame after it, also if that is in the next window; None at the end of the clip.
         """
-        with self._clock.stage("decode"):  # as for a short clip
-            now = self._upcoming or self._brighten(frame)
-            self._upcoming = None if upcoming is None else self._brighten(upcoming)
+        with self._clock.stage("decode"):
+            lit = self._exposure.brighten(frame.image_rgb) if self._upcoming_lit is None else self._upcoming_lit
+            self._upcoming_lit = None if upcoming is None else self._exposure.brighten(upcoming.image_rgb)
         time_s, row = frame.timestamp_s, len(self._times)
         is_own = self.window.has_begun(time_s)
-        observations, is_cut = self._observer.step(now, self._upcoming, with_masks=is_own)
+        with self._clock.stage("networks"):
+            is_cut = self._cuts.is_cut(frame.image_rgb, None if upcoming is None else upcoming.image_rgb)
+        observations = self._observe(lit, time_s, is_cut, is_own)
         if is_cut and is_own:
             self._cut_rows.append(row)
         self._first += not is_own
@@ -79,14 +84,17 @@ class WindowRun:
             self._tracklets.setdefault(number, Tracklet()).add(row, observation)
         people = [observation for _, observation in observations]
         with self._clock.stage("background"):
-            self._follow_background(frame.image_rgb, time_s, people, (is_cut, is_anchor))
-        return largest_of(people)
+            self._wait()
+            points = [observation.keypoints_px for observation in people]
+            self._pending = self._pool.submit(self.background.add, frame.image_rgb, time_s, points, is_cut, is_anchor)
+        return max(people, key=lambda observation: observation.region.side_px, default=None)
 
     def record(self, execution: str = "", warnings: Sequence[str] = ()) -> WindowRecord:
         """Return what was found so far; waits for the background and the reference network."""
         self._wait()
         for tracklet in self._tracklets.values():
-            tracklet.references = [(row, known_reference(call.result())) for row, call in tracklet.references]
+            for _, call in tracklet.references:
+                call.result()
         return WindowRecord(
             self.window,
             np.array(self._indices, np.int64),
@@ -97,20 +105,32 @@ class WindowRun:
             self._tracklets,
             self._anchor_regions,
             list(self._cut_rows),
-            self._background.record(),
+            self.background.record(),
             execution,
             tuple(warnings),
         )
 
-    def _brighten(self, frame: Frame) -> BrightenedFrame:
-        return BrightenedFrame(frame, self._exposure.brighten(frame.image_rgb))
+    def _observe(
+        self, lit: NDArray[np.uint8], time_s: float, is_cut: bool, with_masks: bool
+    ) -> list[tuple[int, Observation]]:
+        """Return tracklet number and observation of each person in a frame (H, W, 3).
 
-    def _follow_background(
-        self, image_rgb: NDArray[np.uint8], time_s: float, people: list[Observation], flags: tuple[bool, bool]
-    ) -> None:
-        self._wait()
-        points = [observation.keypoints_px for observation in people]
-        self._pending = self._pool.submit(self._background.add, image_rgb, time_s, points, *flags)
+        :param with_masks: whether the frame counts in the schedule of the outlines.
+        """
+        if is_cut:
+            self._trackers.people.forget()
+        with self._clock.stage("networks"):
+            due = with_masks and self._masks.upcoming_is_due
+            observations = self._trackers.people.step(lit, self._upcoming_lit, time_s, due)
+            if with_masks:
+                observations = self._masks.add(lit, observations)
+        if self._trackers.hands is not None:
+            with self._clock.stage("hands"):
+                observations = self._trackers.hands.step(lit, observations, time_s)
+        if self._trackers.faces is not None:
+            with self._clock.stage("face"):
+                observations = self._trackers.faces.step(lit, observations, time_s)
+        return observations
 
     def _wait(self) -> None:
         if self._pending is not None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from typing import TypeVar
 
 from ...media.frame import Frame
 from ...perception.observation import Observation
@@ -13,12 +12,11 @@ from ..clock import StageClock
 from .plan import Window
 from .window_run import WindowRun
 
-AnyFrame = TypeVar("AnyFrame")  # also one whose exposure has been corrected
 # Called when a window has ended, with its run and that of the next window; returns the run to go on with.
 Seam = Callable[[WindowRun, WindowRun | None], WindowRun | None]
 
 
-def frame_pairs(frames: Iterator[AnyFrame], clock: StageClock) -> Iterator[tuple[AnyFrame, AnyFrame | None]]:
+def frame_pairs(frames: Iterator[Frame], clock: StageClock) -> Iterator[tuple[Frame, Frame | None]]:
     """Yield every frame with the one after it; each is decoded while the networks run on the previous one."""
     with clock.stage("decode"):
         upcoming = next(frames, None)

@@ -71,11 +71,9 @@ def expression_motion(
 def behind_glasses(
     light: NDArray[np.floating[Any]], seen: NDArray[np.bool_], times: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Return (T,) where the eyes are behind dark glasses, by the median of the light around them over `GLASSES_S`.
+    """Return (T,) where the eyes are behind dark glasses, by the median of the `eye_light` (T,) over `GLASSES_S`.
 
-    :param light: (T,) see `eye_light`.
     :param seen: (T,) where the face was seen.
-    :param times: (T,) seconds.
     """
     rows = np.flatnonzero(seen)
     starts = np.searchsorted(times[rows], times[rows] - GLASSES_S / 2)
@@ -148,5 +146,4 @@ def calmed(
     """
     calm = gaussian_smooth(values, times, CALM_HZ)
     deviation = values - calm
-    kept: NDArray[np.float64] = calm + deviation**3 / (deviation**2 + noise**2)
-    return kept
+    return calm + deviation**3 / (deviation**2 + noise**2)

@@ -7,7 +7,6 @@ import copy
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,17 +45,16 @@ class FaceTracker:
     """Tracks the faces of the people whom `PeopleTracker` tracks; frames are given in order.
 
     :param threads: of the network.
-    :param folder: of the networks; None: the built-in ones.
     :param execution: what the network runs on.
     :raises SetupError: a network is missing.
     :raises ModelFileError: a network is damaged.
     """
 
-    def __init__(self, threads: int, folder: Path | None = None, execution: Execution | None = None) -> None:
+    def __init__(self, threads: int, execution: Execution | None = None) -> None:
         with ThreadPoolExecutor(1) as pool:
             # `with_expressions` may need it: if it is missing or damaged, say so now. Opening takes a core 20 ms.
-            opened = pool.submit(ExpressionNetwork, folder)
-            self._network = FaceNetwork(threads, folder, execution)
+            opened = pool.submit(ExpressionNetwork)
+            self._network = FaceNetwork(threads, execution)
             opened.result()
         self._faces: dict[int, _Face] = {}
 
@@ -105,8 +103,7 @@ class FaceTracker:
         if predicted.side_px < SMALLEST_REGION_PX or not np.isfinite(predicted.side_px):
             return None
         if face.region is not None:
-            x, y = np.asarray(face.region.center_px) + head_px - face.head_px
-            estimate = self._network.estimate(image_rgb, replace(face.region, center_px=(float(x), float(y))))
+            estimate = self._network.estimate(image_rgb, face.region.moved(head_px).moved(-face.head_px))
             if belongs(estimate, predicted):
                 return estimate
         elif not is_search_due(time_s, face.seen_s, face.searched_s):

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from .....solver.rotations import exp
 from ...camera.intrinsics import Camera
 from ...perception.face.face_record import landmarks_of, parts, presence_of
+from ...perception.lifter import camera_towards
 from .expression_fit import load_response
 from .face_alignment import aligned
 
@@ -46,10 +47,7 @@ def across_head(face: NDArray[np.floating[Any]], camera: Camera) -> NDArray[np.f
     turns = aligned(landmarks, response.reference, response.shares).turns
     z = np.concatenate([landmarks[..., :2].mean(axis=1), np.ones((len(turns), 1))], axis=1)
     z = z @ np.linalg.inv(camera.intrinsics).T
-    z /= np.linalg.norm(z, axis=1, keepdims=True)
-    x = np.stack([z[:, 2], np.zeros(len(z)), -z[:, 0]], axis=1)
-    x /= np.linalg.norm(x, axis=1, keepdims=True)
-    R_camera_virtual = np.stack([x, np.cross(z, x), z], axis=2)
+    R_camera_virtual = np.swapaxes(camera_towards(z[:, :2]), 1, 2)
     directions[seen] = (R_camera_virtual @ _Y_DOWN @ exp(turns) @ exp(_HEAD_FROM_REFERENCE))[..., 0]
     return directions
 

@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...perception.hand_landmarks import HandEstimate
 from ...perception.hand_region import ELBOWS, HAND_LENGTH_M, WRISTS
@@ -77,10 +76,13 @@ def assigned(
     """
     sure = person.keypoints_confidence[WRISTS[side]] >= SURE_WRIST
     length = HAND_LENGTH_M * scale
-    distance, other = _wrist_distances(estimate, person, scale)[[side, 1 - side]]
+    wrists, elbow = person.keypoints_px[WRISTS], person.keypoints_px[ELBOWS[side]]
+    distance, other = (np.linalg.norm(estimate.keypoints_px[0] - wrists, axis=1) / length)[[side, 1 - side]]
     probability = estimate.left if side == 0 else 1.0 - estimate.left
-    crossing, most = _may_cross(person, scale), WRIST_DISTANCE if sure else UNSURE_WRIST_DISTANCE
-    if probability >= SURE_SIDE and _is_in_reach(estimate, person, scale, side):
+    crossing = np.linalg.norm(np.subtract(*wrists)) <= CROSSING * length
+    is_in_reach = np.linalg.norm(estimate.keypoints_px[0] - elbow) <= FOREARM * length
+    most = WRIST_DISTANCE if sure else UNSURE_WRIST_DISTANCE
+    if probability >= SURE_SIDE and is_in_reach:
         if crossing and side_of(estimate) == side:
             distance = min(distance, other)
         if same_wrist >= FOLLOWED_WRIST and estimate.presence >= FOLLOWED_PRESENCE:
@@ -107,24 +109,6 @@ def side_of(estimate: HandEstimate) -> int | None:
     if estimate.left >= SURE_SIDE:
         return 0
     return 1 if estimate.left <= 1.0 - SURE_SIDE else None
-
-
-def _may_cross(person: Observation, scale: float) -> bool:
-    """Return whether the body's wrists are so near each other that they may be exchanged."""
-    apart = float(np.linalg.norm(np.subtract(*person.keypoints_px[WRISTS])))
-    return apart <= CROSSING * HAND_LENGTH_M * scale
-
-
-def _is_in_reach(estimate: HandEstimate, person: Observation, scale: float, side: int) -> bool:
-    """Return whether a forearm can reach from the body's elbow to a hand."""
-    reach = float(np.linalg.norm(estimate.keypoints_px[0] - person.keypoints_px[ELBOWS[side]]))
-    return reach <= FOREARM * HAND_LENGTH_M * scale
-
-
-def _wrist_distances(estimate: HandEstimate, person: Observation, scale: float) -> NDArray[np.float64]:
-    """Return the distances (2,) of the hand's wrist from the body's left and right one, in hand lengths."""
-    distances: NDArray[np.float64] = np.linalg.norm(estimate.keypoints_px[0] - person.keypoints_px[WRISTS], axis=1)
-    return distances / (HAND_LENGTH_M * scale)
 
 
 def without_duplicates(

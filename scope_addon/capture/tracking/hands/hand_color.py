@@ -6,6 +6,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..appearance import sample
+
 _KNUCKLES, _MIDDLES = [5, 9, 13, 17], [6, 10, 14, 18]  # keypoints of a hand: bases and middle joints of the fingers
 _ALONG = (1 / 3, 2 / 3)  # places on the palm, from the wrist to the knuckles
 _DARK = 8.0  # added to colours, which say little below it
@@ -21,13 +23,8 @@ def palm_color(image_rgb: NDArray[np.uint8], keypoints_px: NDArray[np.float64]) 
     """
     wrist, knuckles = keypoints_px[0], keypoints_px[_KNUCKLES]
     places = [knuckles, keypoints_px[_MIDDLES], *(wrist + share * (knuckles - wrist) for share in _ALONG)]
-    x, y = np.rint(np.concatenate(places)).astype(int).T
-    height, width = image_rgb.shape[:2]
-    inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
-    if not inside.any():
-        return None
-    color: NDArray[np.float64] = np.median(image_rgb[y[inside], x[inside]].astype(float), axis=0)
-    return color
+    pixels = sample(image_rgb, np.concatenate(places))
+    return np.asarray(np.median(pixels.astype(float), axis=0)) if len(pixels) else None
 
 
 def is_like(color: NDArray[np.float64] | None, before: NDArray[np.float64] | None) -> bool:

@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...perception.hand_landmarks import HAND_POINTS, HandEstimate, HandNetwork
-from ...perception.hand_region import HAND_LENGTH_M, WRISTS
+from ...perception.hand_region import HAND_LENGTH_M, WRISTS, region_from_body
 from ...perception.observation import Observation
 from ...perception.region import Region
 from .hand_assignment import CERTAIN_PRESENCE, SAME_WRIST, Least, assigned, is_same_hand, side_of
@@ -55,8 +56,7 @@ class Sight:
 
     def estimate(self, network: HandNetwork, region: Region) -> HandEstimate:
         """Run the network in a region of the frame."""
-        x, y = np.subtract(region.center_px, self.offset_px).tolist()
-        found = network.estimate(self.image_rgb, replace(region, center_px=(x, y)))
+        found = network.estimate(self.image_rgb, region.moved(-np.array(self.offset_px)))
         return replace(found, keypoints_px=found.keypoints_px + self.offset_px, region=region)
 
     def around_wrist(self) -> Sight:
@@ -83,6 +83,11 @@ class Sight:
     def hand_px(self) -> float:
         """Length of the hand in pixels."""
         return HAND_LENGTH_M * self.scale
+
+    @cached_property
+    def predicted(self) -> Region:
+        """Where the body's arm predicts the hand."""
+        return region_from_body(self.person.keypoints_px, self.scale, self.side)
 
     def judge(
         self, estimate: HandEstimate, sure: Least, tentative: Least, same_wrist: float = SAME_WRIST
@@ -111,8 +116,7 @@ def followed_regions(estimate: HandEstimate, motion_px: NDArray[np.float64], han
     region = estimate.next_region
     if np.linalg.norm(motion_px) < FAR_MOTION * hand_px:
         return [region]
-    x, y = np.asarray(region.center_px) + motion_px
-    return [replace(region, center_px=(float(x), float(y))), region]
+    return [region.moved(motion_px), region]
 
 
 def better(a: Found | None, b: Found | None) -> Found | None:

@@ -8,14 +8,13 @@ import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...perception.execution import Execution
 from ...perception.hand_landmarks import HAND_POINTS, HandEstimate, HandNetwork
-from ...perception.hand_region import SIDES, pixels_per_metre, region_from_body
+from ...perception.hand_region import SIDES, pixels_per_metre
 from ...perception.observation import Observation
 from ...perception.palm_detector import SCORE_THRESHOLD, PalmDetector
 from ...perception.region import Region
@@ -82,7 +81,6 @@ class HandTracker:
     run of these small networks takes twice the processor time.
 
     :param threads: number of hands that are looked for in parallel.
-    :param folder: of the networks; None: the built-in ones.
     :param execution: what the networks run on.
     :param least_px: length of the smallest hands that are looked for, by the body's scale; pixels.
     :raises SetupError: a network is missing.
@@ -91,13 +89,12 @@ class HandTracker:
     def __init__(
         self,
         threads: int,
-        folder: Path | None = None,
         execution: Execution | None = None,
         least_px: float = SMALLEST_HAND_PX,
     ) -> None:
         self._least_px = least_px
-        self._network = HandNetwork(1, folder, execution)
-        self._palms = PalmDetector(1, folder, execution)
+        self._network = HandNetwork(1, execution)
+        self._palms = PalmDetector(1, execution)
         self._pool = ThreadPoolExecutor(threads, "scope-hands")
         self._hands: dict[Key, _Hand] = {}
         self._missed: dict[Key, list[_Missed]] = {}
@@ -122,7 +119,6 @@ class HandTracker:
         :param time_s: when the frame is shown; None: a thirtieth of a second after the one before.
         """
         self._time_s = now = self._time_s + FRAME_S if time_s is None else time_s
-        people = dict(observations)
         sights = {
             (n, side): self._sight(image_rgb, o, (n, side)) for n, o in observations for side in range(len(SIDES))
         }
@@ -135,17 +131,23 @@ class HandTracker:
         for (number, side), sight in sights.items():
             if found[number, side] is None:
                 found[number, side] = _of_other_side(sight, sights[number, 1 - side].opposite)
-        kept = without_duplicates({key: hand and hand.estimate for key, hand in found.items()}, people)
+        kept = without_duplicates({key: hand and hand.estimate for key, hand in found.items()}, dict(observations))
         for key, sight in sights.items():
             if found[key] is not None and kept[key] is None:
-                beside = self._beside(sight, [other for other in kept.values() if other is not None])
+                # Another one was found there: look beside all of them, which this one may touch.
+                others = [other for other in kept.values() if other is not None]
+                beside = self._search(replace(sight, others=others), look_again=False)
                 found[key], kept[key] = beside, beside and beside.estimate
         for key, hand in found.items():
             state = self._hands[key]
             state.found, state.wrist_px = hand, sights[key].wrist_px
             if hand is not None and hand.is_sure:
                 state.seen_s, state.color = now, hand.color
-        rows = {n: _as_array([found[n, s] for s in range(len(SIDES))]) for n, _ in observations}
+        nothing = np.zeros((HAND_POINTS, 6), np.float32)
+        rows = {
+            n: np.array([hand.row if (hand := found[n, side]) else nothing for side in range(len(SIDES))])
+            for n, _ in observations
+        }
         before, self._missed = self._missed, {}
         for key, sight in sights.items():
             hand = found[key]
@@ -158,13 +160,6 @@ class HandTracker:
                 seen = replace(sight.around_wrist(), others=others, opposite=[])
                 self._missed[key] = [*missed, _Missed(now, seen, hand, rows[key[0]][key[1]])][-MAX_MISSED:]
         return [(n, replace(o, hands=rows[n])) for n, o in observations]
-
-    def _beside(self, sight: Sight, others: Sequence[HandEstimate]) -> Found | None:
-        """Look for a hand where another one was found: beside the others, which it may touch."""
-        predicted = region_from_body(sight.person.keypoints_px, sight.scale, sight.side)
-        if sight.hand_px < self._least_px or not _is_in_image(predicted, sight.image_rgb):
-            return None
-        return self._search(replace(sight, others=list(others)), predicted, look_again=False)
 
     def _look_back(self, missed: Sequence[_Missed], hand: Found, sight: Sight, elsewhere: Sequence[_Missed]) -> None:
         """Follow a hand that was surely found back through the frames before in which it was not; see `_Missed`.
@@ -192,7 +187,7 @@ class HandTracker:
         found = self._first_sure(sight, followed, FOLLOWED_BACK, FOLLOWED_WRIST, AGAIN_PRESENCE)
         if found is not None and found.is_sure:
             return found
-        predicted = region_from_body(sight.person.keypoints_px, sight.scale, sight.side)
+        predicted = sight.predicted
         larger = replace(predicted, side_px=LARGER_SCALE * predicted.side_px)
         rough = [(region, SECOND) for region in (predicted, larger)]
         return better(found, self._first_sure(sight, rough, SECOND_TENTATIVE, least_first=AGAIN_PRESENCE))
@@ -213,46 +208,38 @@ class HandTracker:
                 followed = better(followed, sight.judge(estimate, least, TENTATIVE, FOLLOWED_WRIST))
                 if followed is not None and followed.is_sure:
                     return followed
-        if not self._is_search_due(sight, hand):
+        # A lost hand is looked for at most 30 times per second, a hidden one at `PATIENCE_S`: where it is found again,
+        # it is followed back through the frames in between.
+        seen_s = hand.seen_s if sight.wrist_confidence >= HIDDEN_WRIST else -math.inf
+        if not is_search_due(self._time_s, seen_s, hand.searched_s, FRAME_S):
             return followed
         hand.searched_s = self._time_s
-        predicted = region_from_body(sight.person.keypoints_px, sight.scale, sight.side)
-        if sight.hand_px < self._least_px or not _is_in_image(predicted, sight.image_rgb):
-            return followed
-        just_lost = self._time_s - hand.seen_s <= EAGER_S
-        return better(self._search(sight, predicted, look_again=just_lost), followed)
+        return better(self._search(sight, look_again=self._time_s - hand.seen_s <= EAGER_S), followed)
 
-    def _is_search_due(self, sight: Sight, hand: _Hand) -> bool:
-        """Return whether a lost hand is to be looked for: at most 30 times per second, a hidden one at `PATIENCE_S`.
-
-        Where it is found again, it is followed back through the frames in between.
-        """
-        seen_s = hand.seen_s if sight.wrist_confidence >= HIDDEN_WRIST else -math.inf
-        return is_search_due(self._time_s, seen_s, hand.searched_s, FRAME_S)
-
-    def _search(self, sight: Sight, predicted: Region, look_again: bool) -> Found | None:
+    def _search(self, sight: Sight, look_again: bool) -> Found | None:
         """Find the hand whose palm is nearest to the predicted region, or without a palm, any hand in that region.
 
         Where the network is sure of none although the body's wrist is seen, it may look again: for palms in a smaller
         square, in which blurred and small ones score higher, and for a hand in a smaller region.
         """
+        predicted = sight.predicted
+        if sight.hand_px < self._least_px or not _is_in_image(predicted, sight.image_rgb):
+            return None
         around = replace(predicted, side_px=SEARCH_SCALE * predicted.side_px)
-        palms = self._palms_near(sight, predicted, around, SCORE_THRESHOLD)
+        palms = self._palms_near(sight, around, SCORE_THRESHOLD)
         found = self._first_sure(sight, [*((palm, DETECTED) for palm in palms), (predicted, PREDICTED)], TENTATIVE)
         if not look_again or (found is not None and found.is_sure) or sight.wrist_confidence < SURE_WRIST:
             return found
         closer, smaller = (replace(predicted, side_px=k * predicted.side_px) for k in (CLOSER_SCALE, SMALLER_SCALE))
-        palms = self._palms_near(sight, predicted, closer, UNSURE_SCORE)
+        palms = self._palms_near(sight, closer, UNSURE_SCORE)
         again = self._first_sure(sight, [(region, SECOND) for region in (*palms, smaller)], SECOND_TENTATIVE)
         return better(found, again)
 
-    def _palms_near(self, sight: Sight, predicted: Region, square: Region, threshold: float) -> list[Region]:
+    def _palms_near(self, sight: Sight, square: Region, threshold: float) -> list[Region]:
         """Return the hands' regions by the palms in a square that are nearest to the predicted region."""
-        palms = sorted(
-            self._palms.detect(sight.image_rgb, square, threshold),
-            key=lambda palm: float(np.hypot(*np.subtract(palm.region.center_px, predicted.center_px))),
-        )
-        return [palm.region for palm in palms[:MAX_PALMS]]
+        palms = self._palms.detect(sight.image_rgb, square, threshold)
+        palms.sort(key=lambda palm: math.dist(palm.center_px, sight.predicted.center_px))
+        return palms[:MAX_PALMS]
 
     def _first_sure(
         self,
@@ -285,15 +272,6 @@ def _of_other_side(sight: Sight, seen: Sequence[HandEstimate]) -> Found | None:
     for estimate in seen:
         found = better(found, sight.judge(estimate, DETECTED, TENTATIVE))
     return found
-
-
-def _as_array(hands: Sequence[Found | None]) -> NDArray[np.float32]:
-    """Return (2, 21, 6) pixels, confidence and world landmarks of both hands; zeros where one was not found.
-
-    The confidence of a tentative hand is negative.
-    """
-    nothing = np.zeros((HAND_POINTS, 6), np.float32)
-    return np.array([nothing if hand is None else hand.row for hand in hands])
 
 
 def _is_in_image(region: Region, image_rgb: NDArray[np.uint8]) -> bool:

@@ -40,10 +40,7 @@ class MaskSchedule:
     def add(
         self, image_rgb: NDArray[np.uint8], observations: Sequence[tuple[int, Observation]]
     ) -> list[tuple[int, Observation]]:
-        """Return the observations of the next frame with masks, if they are due.
-
-        :param image_rgb: (H, W, 3).
-        """
+        """Return the observations of the next frame (H, W, 3) with masks, if they are due."""
         found, due = list(observations), self._frames % self._stride == 0
         self._frames += bool(found)
         if self._network is None or not found or not due:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...perception.landmark_network import PoseEstimate
 from ...perception.region import Region, bounds, inside
-from ..tracked_target import mean_distance
+from ..left_right import mean_distance
 
 PRESENCE_THRESHOLD = 0.5
 # See PoseEstimate.spread and .disagreement. Hands are detected as people with scores of up to 0.86, and the landmark
@@ -43,7 +43,7 @@ def is_plausible(estimate: PoseEstimate, sure: bool = True) -> bool:
 
 def is_same_body(a: PoseEstimate, b: PoseEstimate) -> bool:
     """Return whether two estimates describe the same body in the image."""
-    return mean_distance(a.keypoints_px, b.keypoints_px) < SAME_BODY * min(a.region.side_px, b.region.side_px)
+    return bool(mean_distance(a.keypoints_px, b.keypoints_px) < SAME_BODY * min(a.region.side_px, b.region.side_px))
 
 
 def share_within(a: PoseEstimate, b: PoseEstimate) -> float:

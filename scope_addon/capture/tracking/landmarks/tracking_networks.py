@@ -51,16 +51,16 @@ def open_networks(
     :raises ModelFileError: one of the user's networks cannot be used.
     """
     people: PersonDetector | BoxDetector = (
-        BoxDetector(detector, threads, execution) if detector else PersonDetector(threads, None, execution)
+        BoxDetector(detector, threads, execution) if detector else PersonDetector(threads, execution)
     )
     name, largest = landmark_network_name(quality), landmark_network_name("best")
     reference: LandmarkNetwork | None = None
     if keypoints:
         own = KeypointNetwork(keypoints, threads, execution)
         with suppress(SetupError):  # without the reference, left and right follow from continuity alone
-            reference = LandmarkNetwork(largest, 1, None, execution, kept)
+            reference = LandmarkNetwork(largest, 1, execution, kept)
         return TrackingNetworks(people, own, None, False, reference, None)
-    landmarks = LandmarkNetwork(name, threads, None, execution, kept)
+    landmarks = LandmarkNetwork(name, threads, execution, kept)
     if name != largest:
-        reference = LandmarkNetwork(largest, 1, None, execution, kept)
+        reference = LandmarkNetwork(largest, 1, execution, kept)
     return TrackingNetworks(people, landmarks, landmarks, reference is None, reference, reference)

@@ -76,7 +76,9 @@ class ClipWindow:
 
         :param steps: the most iterations, fewer than in the finished motion.
         """
-        prepared, frames = self.prepared, self.frames[rows]
+        prepared, frames, stands = self.prepared, self.frames[rows], None
+        if prepared.stance is not None:
+            stands = StandingPoints(prepared.contact_point_indices, prepared.stance.resting[frames])
         return fit_motion(
             prepared.body,
             self._views(rows),
@@ -85,7 +87,7 @@ class ClipWindow:
             priors=prepared.priors,
             options=self._options(steps),
             motion=prior,
-            stands=self._standing_points(frames),
+            stands=stands,
             shape=self.betas,
             covariance=covariance,
             window=np.inf,
@@ -139,16 +141,7 @@ class ClipWindow:
         return replace(self.prepared.priors, shape_mean=None, shape_information=None)
 
     def _options(self, steps: int | None = None) -> Options:
-        stages = clip_stages(self.prepared.weights)
-        if steps is not None:
-            stages = tuple(replace(stage, max_iterations=steps) for stage in stages)
-        return replace(ROBUST, stages=stages)
-
-    def _standing_points(self, frames: NDArray[np.intp]) -> StandingPoints | None:
-        prepared = self.prepared
-        if prepared.stance is None:
-            return None
-        return StandingPoints(prepared.contact_point_indices, prepared.stance.resting[frames])
+        return replace(ROBUST, stages=clip_stages(self.prepared.weights, steps or 50))
 
     def _views(self, rows: slice) -> Sequence[Measurements] | Sequence[Sequence[View]]:
         measured, frames, path = self.measured[rows], self.frames[rows], self.path

@@ -74,6 +74,7 @@ def test_squares_instead_of_a_robust_kernel_exceed_the_limits(
 ) -> None:
     """So the limits tell that contours far from the body count little."""
     monkeypatch.setattr(rim, "OUTSIDE_SIGMA_M", 10.0)
-    monkeypatch.setattr(rim, "_width", lambda _: 10.0)
+    monkeypatch.setattr(rim, "_WIDTHS_M", {})
+    monkeypatch.setattr(rim, "_WIDTH_M", 10.0)
     betas = shape_of(body, None)
     assert added_by(body, betas, garment_of(body, betas, name, 3.0))[1] > MASS_KG[name]

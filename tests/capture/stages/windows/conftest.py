@@ -12,15 +12,15 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from scope.scope_addon.capture.fitting import focal_length
+from scope.scope_addon.capture.camera.intrinsics import assumed_camera
 from scope.scope_addon.capture.media.frame import Frame
 from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.stages.clock import StageClock
 from scope.scope_addon.capture.stages.footage import Listeners
-from scope.scope_addon.capture.stages.windows.long_clip import LongClip
 from scope.scope_addon.capture.stages.windows.plan import plan_windows
 from scope.scope_addon.capture.stages.windows.window_run import WindowRun
+from scope.scope_addon.capture.stages.windows.windowed_clip import WindowedClip
 from scope.scope_addon.capture.tracking.landmarks import tracking_networks
 from scope.scope_addon.capture.tracking.track import Track
 from scope.scope_addon.errors import CancelledError
@@ -51,8 +51,6 @@ def windows_of(monkeypatch: pytest.MonkeyPatch, folder: Path) -> Callable[..., l
     people = [SMALL, LARGE]
     monkeypatch.setattr(tracking_networks, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people, "heavy" in name))
     monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_: FakeDetector(people))
-    # These pictures have hardly any edges; to search them for a focal length takes a quarter of the time.
-    monkeypatch.setattr(focal_length, "focal_from_edges", lambda *_: None)
 
     def observed(
         options: CaptureOptions, parts: Path | None = None, unfinished: Path | None = None, stop_at: float = np.inf
@@ -62,12 +60,12 @@ def windows_of(monkeypatch: pytest.MonkeyPatch, folder: Path) -> Callable[..., l
                 raise CancelledError("cancelled")
 
         with open_video(folder) as video, ThreadPoolExecutor(2) as pool:
-            clip = LongClip(video, plan_windows(video, options.window_s), options, StageClock(), pool, unfinished)
-            background: Any = SimpleNamespace(wait_for_solver=lambda progress: None)
-            fits: Any = SimpleNamespace(is_due=lambda time_s: False)
+            clip = WindowedClip(video, plan_windows(video, options.window_s), options, StageClock(), pool, unfinished)
+            camera = assumed_camera(video.width, video.height, video.width)
+            background: Any = SimpleNamespace(wait_for_solver=lambda progress: None, camera=lambda *_: camera)
             live: Any = None
             listeners = Listeners(progress, lambda *_: None)
-            return clip.observe(background, fits, live, listeners, parts)[1]
+            return clip.observe(background, live, listeners, parts)[1]
 
     return observed
 

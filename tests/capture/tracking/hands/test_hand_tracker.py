@@ -13,16 +13,16 @@ from scope.scope_addon.capture.perception.hand_landmarks import HandEstimate
 from scope.scope_addon.capture.perception.hand_region import HAND_LENGTH_M, pixels_per_metre
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.observation import Observation
-from scope.scope_addon.capture.perception.palm_detector import Palm
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.capture.tracking.hands import hand_tracker
 from scope.scope_addon.capture.tracking.hands.hand_assignment import without_duplicates
 from scope.scope_addon.capture.tracking.hands.hand_tracker import HandTracker
-from scope.scope_addon.capture.tracking.people import PeopleBuilder
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker
 from scope.solver.loaders.body_file import load_body
 from scope.solver.rotations import exp
+
+from ...followed_people import FollowedPeople
 
 SCALE = 500.0  # pixels per metre
 LENGTH = HAND_LENGTH_M * SCALE
@@ -70,7 +70,7 @@ class FakePalms:
     def detect(self, _image, where, threshold):
         self.calls += 1
         near = [h for h in self.hands if np.hypot(*(h.keypoints_px[9] - where.center_px)) < where.side_px / 2]
-        return [Palm(0.9, h.region) for h in near]
+        return [h.region for h in near]
 
 
 @pytest.fixture
@@ -327,7 +327,7 @@ class InFrame(FakeHands):
 
 def test_a_hand_that_is_found_again_is_followed_back_through_the_frames_in_which_it_was_missed(follow):
     """For a third of a second, and in the arrays that were given out for these frames."""
-    hands, people, first = [], PeopleBuilder(), None
+    hands, people, first = [], FollowedPeople(), None
     tracker = follow(hands)
     tracker._network, image = InFrame(hands), numbered_pixels()
     for k in range(25):
@@ -336,9 +336,9 @@ def test_a_hand_that_is_found_again_is_followed_back_through_the_frames_in_which
         observations = tracker.step(image, [(0, person())], k / 30)
         if observations[0][1].hands.any() and first is None:
             first = k
-        people.add(k, k / 30, observations)
+        people.add(k / 30, observations)
     assert first >= 20
-    (track,) = people.build(1)
+    (track,) = people.tracks(1)
     assert list(np.flatnonzero(track.hands[:, 0, 0, 2] > 0)) == list(range(first - 10, 25))
     for row in track.hands[first - 10 :, 0]:
         np.testing.assert_allclose(row[:, :2], hands[0].keypoints_px, atol=1e-3)

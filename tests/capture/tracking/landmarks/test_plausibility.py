@@ -25,7 +25,7 @@ def body(spread: float = 0.6, presence: float = 0.9, confident: int = 33, twist:
     keypoints = np.array(REGION.center_px) + spread * REGION.side_px / (2 * MARGIN) * flat
     confidence = np.where(np.arange(33) < confident, 0.8, 0.1)
     space = shape + twist * rng.normal(size=(33, 3))
-    return PoseEstimate(keypoints, confidence, np.ones(33), space, presence, REGION, REGION)
+    return PoseEstimate(keypoints, confidence, space, presence, REGION, REGION)
 
 
 @pytest.mark.parametrize(

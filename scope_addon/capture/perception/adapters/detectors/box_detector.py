@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from ......solver.errors import ModelFileError
 from ...execution import Execution
+from ...letterbox import fit_in
 from ...person_detector import Detection
 from ..description import Description, description_path, read_description
 from ..graph import Graph
 from . import detections, end_to_end, yolov4, yolov8, yolox
-from .boxes import Boxes, letterbox, suppress
+from .boxes import BORDER, Boxes, suppress
 
 # In the order in which they are matched: YOLOX with one class also has rows of six.
 _ADAPTERS: tuple[ModuleType, ...] = (yolox, yolov8, yolov4, end_to_end, detections)
@@ -53,10 +54,11 @@ class BoxDetector:
         :param closely: unused, see `PersonDetector.detect`.
         :raises ModelFileError: the network fails.
         """
-        fitted = letterbox(
+        fitted = fit_in(
             image_rgb,
             self._graph.width,
             self._graph.height,
+            border=BORDER,
             centered=self._adapter.CENTERED,
             stretched=self._adapter.STRETCHED,
         )
@@ -66,17 +68,11 @@ class BoxDetector:
         return [box_detection(float(s), box) for s, box in zip(kept.scores, corners, strict=True)]
 
     def detect_small(self, image_rgb: NDArray[np.uint8]) -> list[Detection]:
-        """Return nothing: how small people may be is a property of the user's network, see `PersonDetector`.
-
-        :param image_rgb: (H, W, 3) uint8.
-        """
+        """Return nothing for any (H, W, 3) image: how small people may be is a property of the user's network."""
         return []
 
     def detect_in_parts(self, image_rgb: NDArray[np.uint8]) -> list[Detection]:
-        """Return nothing, as `detect_small`.
-
-        :param image_rgb: (H, W, 3) uint8.
-        """
+        """Return nothing for any (H, W, 3) image, as `detect_small`."""
         return []
 
     def _boxes(self, outputs: list[NDArray[Any]]) -> Boxes:

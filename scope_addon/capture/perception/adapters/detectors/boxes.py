@@ -12,10 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...letterbox import Letterbox, fit_in
 from ...non_maximum_suppression import overlap_clusters
 
-_BORDER = 114  # the grey level that the YOLO family is trained with
+BORDER = 114  # the grey level that the YOLO family is trained with
 OVERLAP_THRESHOLD = 0.5
 MAX_BOXES = 5000  # the best ones are compared with each other; a broken network may output millions
 
@@ -26,13 +25,6 @@ class Boxes:
 
     corners: NDArray[np.float64]
     scores: NDArray[np.float64]
-
-
-def letterbox(
-    image_rgb: NDArray[np.uint8], width: int, height: int, *, centered: bool, stretched: bool = False
-) -> Letterbox:
-    """Fit an (H, W, 3) uint8 image into the network's input on the grey of the YOLO family, see `fit_in`."""
-    return fit_in(image_rgb, width, height, border=_BORDER, centered=centered, stretched=stretched)
 
 
 def corners_of(centers_and_sizes: NDArray[np.float64]) -> NDArray[np.float64]:

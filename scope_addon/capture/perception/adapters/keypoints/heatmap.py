@@ -34,11 +34,6 @@ def matches(graph: Graph) -> bool:
     return 8 <= rows <= graph.height and 8 <= columns <= graph.width
 
 
-def keypoint_count(graph: Graph) -> int:
-    """Count the keypoints of the graph."""
-    return graph.shapes[0][1]
-
-
 def decode(
     outputs: list[NDArray[Any]], graph: Graph, *, refinement: str = "dark", udp: bool = False
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from ......solver.errors import ModelFileError
 from ...execution import Execution
 from ...landmark_network import KEYPOINT_NAMES, PoseEstimate
-from ...region import Region
+from ...region import Region, box_along
 from ..description import Description, description_path, read_description
 from ..graph import Graph
-from ..keypoint_sets import COCO_17, KEYPOINT_SETS, KeypointSet, keypoint_set_of_count
+from ..keypoint_sets import COCO_17, KEYPOINT_SETS, KeypointSet
 from . import heatmap, simcc
 
 _ADAPTERS: tuple[ModuleType, ...] = (simcc, heatmap)
@@ -52,7 +52,7 @@ class KeypointNetwork:
         self._graph = Graph(path, description, threads, execution)
         self._adapter = _adapter_for(self._graph, description)
         self.type: str = self._adapter.TYPE
-        self.keypoint_set = _set_for(self._graph, self._adapter, description)
+        self.keypoint_set = _set_for(self._graph, description)
         self._normalization = self._adapter.NORMALIZATION.with_description(description)
         self._threshold = description.score_threshold or SCORE_THRESHOLD
         self._decode: Decode = self._adapter.decode
@@ -79,8 +79,7 @@ class KeypointNetwork:
         in_frame = ((ours >= -0.5) & (ours <= [width - 0.5, height - 0.5])).all(axis=1)
         return PoseEstimate(
             keypoints_px=ours,
-            visibility=confidence,
-            in_frame=in_frame.astype(float),
+            keypoints_confidence=confidence * in_frame,
             world_landmarks=np.zeros((len(KEYPOINT_NAMES), 3)),
             presence=float((confidence[_BODY] >= self._threshold).mean()),
             region=region,
@@ -95,13 +94,10 @@ class KeypointNetwork:
         trunk = points[_SHOULDERS].mean(axis=0) - points[_HIPS].mean(axis=0)
         upright = math.atan2(float(trunk[0]), float(-trunk[1]))
         rotation = upright if seen[[*_SHOULDERS, *_HIPS]].all() else region.rotation
-        axes = Region((0.0, 0.0), 1.0, rotation)
-        along = points[seen] @ axes.R_image_crop  # in the axes of the box
-        low, high = along.min(axis=0), along.max(axis=0)
+        (x, y), sides = box_along(points[seen], rotation)
         shape = np.array([self._graph.width, self._graph.height]) / self._side
-        around = MARGIN * float(((high - low) / shape).max())
+        around = MARGIN * float((sides / shape).max())
         side = max(around, MAX_SHRINK * region.side_px, MIN_STATURE * _stature(points, seen))
-        x, y = axes.R_image_crop @ ((low + high) / 2)
         return Region((float(x), float(y)), side, rotation)
 
 
@@ -124,9 +120,10 @@ def _adapter_for(graph: Graph, description: Description) -> ModuleType:
     return adapter
 
 
-def _set_for(graph: Graph, adapter: ModuleType, description: Description) -> KeypointSet:
-    count = adapter.keypoint_count(graph)
-    found = KEYPOINT_SETS[description.keypoints] if description.keypoints else keypoint_set_of_count(count)
+def _set_for(graph: Graph, description: Description) -> KeypointSet:
+    count = graph.shapes[0][1]
+    of_count = next((s for s in KEYPOINT_SETS.values() if s.count == count), None)
+    found = KEYPOINT_SETS[description.keypoints] if description.keypoints else of_count
     if found is None or found.count > count:
         sets = ", ".join(f"{s.name} ({s.count})" for s in KEYPOINT_SETS.values())
         raise ModelFileError(

@@ -23,11 +23,6 @@ def matches(graph: Graph) -> bool:
     return _axes(graph) is not None
 
 
-def keypoint_count(graph: Graph) -> int:
-    """Count the keypoints of the graph."""
-    return graph.shapes[0][1]
-
-
 def decode(outputs: list[NDArray[Any]], graph: Graph) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Locate the keypoints.
 

@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import numpy as np
-from scope.scope_addon.capture.perception.adapters.detectors.boxes import MAX_BOXES, Boxes, letterbox, suppress
+from scope.scope_addon.capture.perception.adapters.detectors.boxes import BORDER, MAX_BOXES, Boxes, suppress
+from scope.scope_addon.capture.perception.letterbox import fit_in
 
 from .person_in_picture import HEIGHT, WIDTH
 
@@ -13,7 +14,7 @@ def test_the_letterbox_maps_back_to_the_image() -> None:
     image = np.zeros((251, 333, 3), np.uint8)
     image[100:111, 200:211] = 255  # its middle: pixel 105, 205
     for settings in ({"centered": True}, {"centered": False}, {"centered": False, "stretched": True}):
-        look = letterbox(image, WIDTH, HEIGHT, **settings)
+        look = fit_in(image, WIDTH, HEIGHT, border=BORDER, **settings)
         assert look.picture_rgb.shape == (HEIGHT, WIDTH, 3)
         heat = np.where(look.picture_rgb[..., 0] > 114, look.picture_rgb[..., 0] - 114.0, 0)
         inside = heat[2:-2, 2:-2]

@@ -42,7 +42,7 @@ def assert_finds_the_spots(path: Path, region: Region, atol: float) -> None:
     for k, name in enumerate(COCO_17):
         j = KEYPOINT_NAMES.index(name)
         np.testing.assert_allclose(seen.keypoints_px[j], SPOTS[k % 3], atol=atol)
-        assert seen.visibility[j] > 0.4
+        assert seen.keypoints_confidence[j] > 0.4
     assert seen.presence == 1.0
     assert not seen.world_landmarks.any()
     assert seen.disagreement == 0.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Observation of a long clip, window by window.
+"""Observation of a clip, window by window; a short one is a single window.
 
 In one piece, all windows are observed in one pass; a capture that was killed goes on after its last finished window.
 Some or all of them may also have been observed before, by other processes, which each began to decode at their own
@@ -16,15 +16,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
+from ....errors import VideoError
 from ...camera.camera_rotation import BackgroundTracker
-from ...fitting.background_estimators import KERNELS, BackgroundEstimators, camera_of_clip
-from ...fitting.focal_fits import FocalFits
+from ...fitting.background_estimators import KERNELS, BackgroundEstimators
 from ...fitting.live_body import LiveBody
 from ...media.frame import Frame
 from ...media.video import Video
@@ -36,9 +35,8 @@ from ...perception.region import Region
 from ...tracking.landmarks.mask_schedule import MaskSchedule
 from ...tracking.track import Track
 from ..clock import COMPILING, Progress, StageClock
-from ..footage import Footage, Listeners, given_camera, no_frames_error
-from ..frame_observer import FrameObserver, Trackers
-from ..networks import network_threads, open_trackers
+from ..footage import Footage, Listeners, given_camera
+from ..networks import Trackers, network_threads, open_trackers
 from .joined_windows import JoinedWindows
 from .kept_windows import KeptWindows
 from .plan import Window
@@ -47,11 +45,11 @@ from .window_record import WindowRecord
 from .window_run import WindowRun
 from .window_sequence import frame_pairs, run_windows
 
-_FINDING = "finding the person"  # a stage
+FINDING = "finding the person"  # a stage
 
 
-class LongClip:
-    """A clip with several windows.
+class WindowedClip:
+    """A clip and its windows.
 
     :param windows: all of them.
     :param pool: in which the background is followed.
@@ -73,34 +71,32 @@ class LongClip:
         self._kept_windows = KeptWindows(unfinished, options, (video.width, video.height))
         self._camera, self._pool = given_camera(video, options), pool
         self._execution = Execution(options.provider)
-        self._threads = network_threads(options, self._execution)
+        self._threads = network_threads(options.threads, self._execution)
         self._trackers: Trackers | None = None
         self._joined = JoinedWindows()
 
     def observe(
         self,
         background: BackgroundEstimators,
-        fits: FocalFits,
         live: LiveBody,
         listeners: Listeners,
         folder: Path | None = None,
     ) -> tuple[Footage, list[Track]]:
         """Observe all windows, and join them.
 
-        :param background: which loads the solver.
-        :param fits: for the focal length.
+        :param background: which loads the solver, and estimates the focal length.
         :param folder: with the files of windows that were observed before.
         :raises VideoError: there is no frame.
         """
-        if folder is None:
-            self._observe_all(live, listeners)
+        if folder is None or len(self._windows) == 1:
+            self._observe_all(background, live, listeners)
         else:
             self._gather(folder, listeners.progress)
         if not len(self._joined):
-            raise no_frames_error(self._video)
+            raise VideoError(f"{self._video.path} has no frames between the given start and end; change one of them")
         background.wait_for_solver(lambda done: listeners.progress(COMPILING, min(done, KERNELS), KERNELS))
         with self._clock.stage("solver"):
-            return self._footage(fits), self._joined.tracks(most_people(self._options.people))
+            return self._footage(background), self._joined.tracks(most_people(self._options.people))
 
     def save(self, numbers: range, folder: Path, progress: Progress) -> tuple[list[Path], int]:
         """Observe some successive windows, and write each to a file of a folder.
@@ -116,7 +112,7 @@ class LongClip:
             record = self._record(ended)
             frames += len(record) - record.first
             files.append(save_window(folder, record, (self._video.width, self._video.height)))
-            progress(_FINDING, frames, 0)
+            progress(FINDING, frames, 0)
             return following
 
         run_windows(
@@ -124,30 +120,31 @@ class LongClip:
             self._begin,
             frame_pairs(self._frames(windows[0]), self._clock),
             seam,
-            lambda frame, largest: progress(_FINDING, frames, 0),
+            lambda frame, largest: progress(FINDING, frames, 0),
         )
         return files, frames
 
-    def _observe_all(self, live: LiveBody, listeners: Listeners) -> None:
+    def _observe_all(self, background: BackgroundEstimators, live: LiveBody, listeners: Listeners) -> None:
         """Observe all windows in one pass, from the first on that an earlier capture has not finished."""
-        known = self._join_kept()
+        known, is_single = self._join_kept(), len(self._windows) == 1
         done, expected = len(self._joined), self._video.expected_frames
-        listeners.progress(_FINDING, done, max(expected, done))
+        listeners.progress(FINDING, done, max(expected, done))
         if known == len(self._windows):
             return
 
         def seam(ended: WindowRun, following: WindowRun | None) -> WindowRun | None:
             self._add(ended, is_whole=following is not None or ended.window.number + 1 == len(self._windows))
             regions = self._joined.missed(following.record()) if following is not None else []
-            if following is None or not regions:
-                return following
-            return self._warmed_up(following, regions)
+            return self._warmed_up(following, regions) if following is not None and regions else following
 
         def watch(frame: Frame, largest: Observation | None) -> None:
             nonlocal done
             done += 1
+            if is_single:  # then its focal length is estimated meanwhile
+                with self._clock.stage("background"):
+                    background.add(frame.timestamp_s, largest, run.background)
             listeners.watch(frame, largest, live)
-            listeners.progress(_FINDING, done, max(expected, done))
+            listeners.progress(FINDING, done, max(expected, done))
 
         run, pairs = self._first_run(self._windows[known])
         run_windows(
@@ -168,16 +165,14 @@ class LongClip:
         return len(self._windows)
 
     def _add(self, ended: WindowRun, is_whole: bool) -> None:
-        """Join a window, and keep it.
+        """Join a window, and keep it if others follow or came before.
 
         :param is_whole: whether it did not end early with the footage, which may be whole when it is read again.
         """
-        record = ended.record()
+        record = self._record(ended)
         self._joined.add(record)
-        if is_whole:
-            warnings = (*self._execution.warnings, *self._video.warnings)
-            execution = self._execution.describe(self._threads)
-            self._kept_windows.save(replace(record, execution=execution, warnings=warnings))
+        if is_whole and len(self._windows) > 1:
+            self._kept_windows.save(record)
 
     def _first_run(self, window: Window) -> tuple[WindowRun, Iterator[tuple[Frame, Frame | None]]]:
         """Return the run of the first window that is observed, and the frames from its own first one on.
@@ -215,7 +210,7 @@ class LongClip:
                 if not self._joined.accepts(record):
                     record = self._single(window, regions, exact=True)
             self._joined.add(record)
-            progress(_FINDING, len(self._joined), max(self._video.expected_frames, len(self._joined)))
+            progress(FINDING, len(self._joined), max(self._video.expected_frames, len(self._joined)))
 
     def _single(
         self,
@@ -260,7 +255,8 @@ class LongClip:
         return WindowRun(
             window,
             following,
-            FrameObserver(own, masks, self._clock),
+            own,
+            masks,
             BackgroundTracker(self._camera, self._video.width, self._video.height),
             self._pool,
             self._clock,
@@ -270,7 +266,7 @@ class LongClip:
         warnings = self._execution.warnings + self._video.warnings
         return run.record(self._execution.describe(self._threads), warnings)
 
-    def _footage(self, fits: FocalFits) -> Footage:
+    def _footage(self, background: BackgroundEstimators) -> Footage:
         """Return what is known of the joined windows apart from the people."""
         joined, camera, size = self._joined, self._camera, (self._video.width, self._video.height)
         execution = self._execution.describe(self._threads) if self._trackers else joined.execution
@@ -278,7 +274,7 @@ class LongClip:
         warnings += [text for text in joined.warnings if text not in warnings]
         record = joined.background()
         people = joined.largest_people(record.edge_frames[0].row) if record.edge_frames else iter(())
-        found = camera_of_clip(camera, size, record, people, fits)
+        found = background.camera(record, people)
         motion = record.motion(camera, found, size)
         lines = record.lines(motion, found)
         return Footage(np.array(joined.timestamps), found, motion, lines, joined.cuts_s(), execution, warnings)
