@@ -62,8 +62,9 @@ def standing_probability(
         upwards = np.abs(line_of_sight(soles - np.expand_dims(center, -2)) @ up)
         mean_speed = np.sqrt(gaussian_smooth(np.square(speed), times, STILL_CUTOFF_HZ))
         allowed += WRONG_DEPTH_M * upwards * logistic(4 * (1 - mean_speed / STILL_M_S))
-    p = logistic(4 * (1 - speed / CONTACT_SPEED_M_S)) * logistic(4 * (1 - height / allowed))
-    return p * logistic(8 * (1 - _downward_acceleration(velocity, up, times) / FALL_M_S2)) / logistic(8)
+    p: NDArray[np.floating[Any]] = logistic(4 * (1 - speed / CONTACT_SPEED_M_S)) * logistic(4 * (1 - height / allowed))
+    p *= logistic(8 * (1 - _downward_acceleration(velocity, up, times) / FALL_M_S2)) / logistic(8)
+    return p
 
 
 def resting_probability(
