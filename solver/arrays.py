@@ -26,7 +26,7 @@ def as_array(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Arra
     :param value: an array, or lists of numbers, of `shape`; what numpy's masked arrays mask becomes NaN.
     :param shape: the expected one, for instance (None, 3) for (n, 3): None is any length.
     :param name: what the array is, as a message begins.
-    :raises ShapeError: it has another shape, or is no array of numbers.
+    :raises ShapeError: it has another shape, or is not an array of numbers.
     """
     array = np.ascontiguousarray(_numbers(value, shape, name))
     if array.shape == shape and array.ndim:
@@ -39,7 +39,7 @@ def as_array(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Arra
 def as_arrays(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
     """Return `value` as float64 of shape (..., *shape), whatever its leading dimensions.
 
-    :raises ShapeError: it has another shape, or is no array of numbers.
+    :raises ShapeError: it has another shape, or is not an array of numbers.
     """
     array = _numbers(value, (..., *shape), name)
     if array.shape[-len(shape) :] != shape:
@@ -50,7 +50,7 @@ def as_arrays(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
 def as_integers(value: ArrayLike, name: str) -> Array:
     """Return `value` as contiguous int64 (n,).
 
-    :raises ShapeError: it is no list of whole numbers, or a masked array that masks one.
+    :raises ShapeError: it is not a list of whole numbers, or is a masked array that masks one.
     """
     if type(value) is not np.ndarray or value.dtype.kind not in "iu":
         _refuse_unless_numbers(value, "iu", "integers", (None,), name)
@@ -65,7 +65,7 @@ def as_integers(value: ArrayLike, name: str) -> Array:
 def as_table(value: Any, ints: int, floats: int, name: str) -> tuple[Array, Array]:
     """Return the rows of a residual as int64 (n, ints) and float64 (n, floats).
 
-    :raises ShapeError: it is no pair of such arrays.
+    :raises ShapeError: it is not a pair of such arrays.
     """
     if not isinstance(value, (tuple, list)) or len(value) != 2:
         raise ShapeError(f"Tables of {name!r} must be a pair of arrays (ints, floats), but got {described(value)}.")
@@ -107,7 +107,7 @@ def _numbers(value: ArrayLike, shape: _Shape, name: str) -> Array:
 
 
 def _refuse_unless_numbers(value: Any, kinds: str, what: str, shape: _Shape, name: str) -> None:
-    """Raise ShapeError for strings, None, ragged lists and numbers of another kind; an empty list is of any kind."""
+    """Raise ShapeError for strings, None, ragged lists and numbers of another type; an empty list is of any type."""
     try:
         array = np.asarray(value)
         if array.dtype.kind in kinds or (array.size == 0 and array.dtype.kind == "f"):

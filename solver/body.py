@@ -109,7 +109,7 @@ class Body:
         """Return the keypoints of one set, e.g. ``blazepose``: name without the prefix -> index, in file order.
 
         :raises ModelFileError: the body has no keypoints of that name.
-        :raises InvalidValueError: the name is no text.
+        :raises InvalidValueError: the name is not a string.
         """
         if not isinstance(prefix, str):
             raise InvalidValueError(f"prefix must be a name such as 'coco', but is {described(prefix)}.")

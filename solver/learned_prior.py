@@ -32,7 +32,7 @@ class JointPrior:
         """Check the parameters.
 
         :raises ShapeError: they are not (n, SIZE), with one row for each name.
-        :raises InvalidValueError: the names are no list of texts.
+        :raises InvalidValueError: the names are not a list of strings.
         """
         check_list(self.names, "Names of the joint prior", "joint")
         for k, name in enumerate(self.names):
@@ -59,7 +59,8 @@ class JointPrior:
         :param weights: w by joint name, 1 for joints that are missing.
         :param log_det: h, one for the density's maximum, zero for the paper's 1/2 |z|^2.
         :return: (n, INTS) int64 and (n, FLOATS) float64.
-        :raises InvalidValueError: a weight or `log_det` is negative or no number, or there is no list of names.
+        :raises InvalidValueError: a weight or `log_det` is negative or not a number, or `joint_names` is not a list of
+            strings.
         """
         check_list(joint_names, "joint_names", "part")
         check_type(weights, (Mapping, type(None)), "weights")
@@ -76,8 +77,8 @@ class JointPrior:
     def sample(self, joint: str, count: int, rng: np.random.Generator) -> Array:
         """Return states (count, 3, 3) of a joint drawn from its prior.
 
-        :raises InvalidValueError: the prior has no joint of that name, `count` is no whole number of at least 0, or
-            `rng` is no generator of numpy's.
+        :raises InvalidValueError: the prior has no joint of that name, `count` is not a whole number of at least 0,
+            or `rng` is not a numpy `Generator`.
         """
         check_count(count, "count", 0)
         check_type(rng, np.random.Generator, "rng")
@@ -99,7 +100,7 @@ def load_joint_prior(path: str | Path = BUILT_IN) -> JointPrior:
     File: joint_names (n,) str, parameters (n, SIZE) f64, layers and hidden ().
 
     :raises ModelFileError: the file is missing, or no prior that the solver can evaluate.
-    :raises InvalidValueError: `path` is no path.
+    :raises InvalidValueError: `path` is neither a string nor a path.
     """
     return _read(as_path(path, "path, the file of a joint prior,"))
 

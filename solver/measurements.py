@@ -156,7 +156,7 @@ class Measurements:
     def __post_init__(self) -> None:
         """Check what kinds of measurements the fields hold; their arrays are checked against the body by a fit.
 
-        :raises InvalidValueError: a field holds something else, or `tables` holds a residual that has its own field.
+        :raises InvalidValueError: a field holds another type, or `tables` holds a residual that has its own field.
         """
         for name, kind in _KINDS.items():
             value = getattr(self, name)
@@ -174,7 +174,7 @@ class Measurements:
 
         :param points: how many points the body has, joints included.
         :raises ShapeError: an array has another shape, or an index lies outside.
-        :raises InvalidValueError: the intrinsics are no camera matrix.
+        :raises InvalidValueError: the intrinsics are not a camera matrix.
         """
         m = self.keypoints2d
         if m is None:
@@ -232,7 +232,7 @@ class Measurements:
         :param K: how many joints the body has without the root.
         :param points: how many points it has, joints included.
         :raises ShapeError: an array has another shape, or an index lies outside.
-        :raises InvalidValueError: a weight is negative, a rotation is none, or the floor is no plane.
+        :raises InvalidValueError: a weight is negative, a matrix is not a rotation, or the floor is not a plane.
         """
         tables = {}
         if self.pose_priors is not None:

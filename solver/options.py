@@ -92,7 +92,7 @@ class Stage:
     def __post_init__(self) -> None:
         """Check the values.
 
-        :raises InvalidValueError: the tolerance is negative or NaN, or the limit is negative or no whole number.
+        :raises InvalidValueError: the tolerance is negative or NaN, or the limit is negative or not a whole number.
         """
         check_type(self.weights, Weights, "Stage.weights")
         if not as_number(self.tolerance, "Stage.tolerance") >= 0.0:
@@ -184,7 +184,7 @@ class Options:
     def stage_table(self, stages: Sequence[Stage]) -> tuple[Array, Array, Array]:
         """Return (S, 2, weights) of weights and 1/sigma, tolerances (S,) and iteration limits (S,).
 
-        :raises InvalidValueError: an entry of `stages` is no Stage.
+        :raises InvalidValueError: an entry of `stages` is not a `Stage`.
         """
         table = np.zeros((len(stages), 2, COLUMNS))
         sigmas = np.array([self.robust_keypoints2d, self.robust_keypoints3d, self.robust_orientation_field])
@@ -218,7 +218,7 @@ class Priors:
         """Return the tables of joint_prior, joint_limits and joint_flow for a body of K joints.
 
         :raises ShapeError: an array has another shape.
-        :raises InvalidValueError: a mean is no rotation, or a weight is negative; both must be finite.
+        :raises InvalidValueError: a mean is not a rotation, or a weight is negative; both must be finite.
         """
         mean = np.tile(np.eye(3), (K, 1, 1)) if self.joint_mean is None else self.joint_mean
         weights = np.ones(K) if self.joint_weights is None else self.joint_weights
@@ -239,7 +239,7 @@ class Priors:
         """Return the shape prior's mean (P,) and information (P, P).
 
         :raises ShapeError: an array has another shape.
-        :raises InvalidValueError: one is not finite, or the information is no symmetric positive semidefinite matrix.
+        :raises InvalidValueError: one is not finite, or the information is not symmetric positive semidefinite.
         """
         mean = as_array(np.zeros(P) if self.shape_mean is None else self.shape_mean, (P,), "Mean of the shape prior")
         information = np.eye(P) if self.shape_information is None else self.shape_information
@@ -259,7 +259,7 @@ def default_priors(body: object, log_det: float = 0.0) -> Priors:
     :param log_det: 0 for the learned prior's 1/2 |z|^2, as in the paper; 1 for its whole -log p
         (residuals/joint_flow.py).
     :raises ModelFileError: the prior cannot be read.
-    :raises InvalidValueError: `log_det` is negative or no number, or `joint_names` is no list.
+    :raises InvalidValueError: `log_det` is negative or not a number, or `joint_names` is not a list.
     """
     check_weight(log_det, "log_det")
     names = getattr(body, "joint_names", ())

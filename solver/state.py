@@ -40,7 +40,7 @@ class State:
     def rest(cls, K: int, P: int, distance: float = 3.0) -> "State":
         """Return the rest pose of K joints, beta (P,) zero, upright and facing a camera `distance` metres away.
 
-        :raises InvalidValueError: K or P is no whole number of at least 0, or the distance is not positive.
+        :raises InvalidValueError: K or P is not a whole number of at least 0, or the distance is not positive.
         """
         check_count(K, "K", 0)
         check_count(P, "P", 0)
@@ -53,7 +53,7 @@ class State:
         """Return the state for the kernels, with rotations made orthonormal.
 
         :raises ShapeError: an array does not fit the tree.
-        :raises InvalidValueError: R_camera_root, or a matrix of Omega, is no rotation.
+        :raises InvalidValueError: R_camera_root, or a matrix of Omega, is not a rotation.
         """
         check_type(tree, Tree, "tree")
         K, P = len(tree.parents) - 1, tree.shape
@@ -77,7 +77,7 @@ class State:
 def check_state_rotations(R_camera_root: Array, Omega: Array) -> None:
     """Check the rotations of an initial state, (3, 3) and (K, 3, 3).
 
-    :raises InvalidValueError: a matrix is no rotation.
+    :raises InvalidValueError: a matrix is not a rotation.
     """
     check_rotations(R_camera_root[None], "R_camera_root of the initial state")
     check_rotations(Omega, "Omega of the initial state")
@@ -87,7 +87,7 @@ def check_states(init: Sequence[State | None], frames: int, kinds: type | tuple[
     """Check that there is an initial state for each frame.
 
     :param kinds: what an entry may be.
-    :raises InvalidValueError: they are no list, or an entry is of another kind.
+    :raises InvalidValueError: they are not a list, or an entry is of another type.
     :raises ShapeError: there are more or fewer than `frames`.
     """
     check_list(init, "init", "frame")

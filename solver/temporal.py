@@ -40,7 +40,7 @@ def with_previous(measurements: Measurements, previous: State, temporal: Tempora
 
     :param previous: the last frame's state: R_camera_root (3, 3), t_camera_root (3,) in metres, Omega (K, 3, 3).
     :raises ShapeError: an array of the state or of the measurements has another shape.
-    :raises InvalidValueError: a matrix of the state is no rotation, or an argument is of another kind.
+    :raises InvalidValueError: a matrix of the state is not a rotation, or an argument is of another type.
     """
     check_type(measurements, Measurements, "measurements")
     check_type(previous, State, "previous")

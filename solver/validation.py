@@ -33,7 +33,7 @@ _UNITS = "Scope's unit is the metre; divide millimetres by 1000"
 def as_indices(value: ArrayLike, limit: int, name: str) -> Array:
     """Return `value` as int64 indices (n,) in 0..limit-1.
 
-    :raises ShapeError: it is no list of whole numbers, or one of them lies outside.
+    :raises ShapeError: it is not a list of whole numbers, or one of them lies outside.
     """
     array = as_integers(value, name)
     if not all_within(array, 0, limit):
@@ -68,7 +68,7 @@ def check_weight(value: Any, name: str) -> None:
 def check_count(value: Any, name: str, least: int = 1) -> None:
     """Check how many there are of something.
 
-    :raises InvalidValueError: it is no whole number, less than `least`, or too large for an index.
+    :raises InvalidValueError: it is not a whole number, is less than `least`, or is too large for an index.
     """
     if isinstance(value, bool) or not isinstance(value, Integral) or value < least:
         raise InvalidValueError(f"{name} must be a whole number of at least {least}, but is {value!r}.")
@@ -118,7 +118,7 @@ def check_rotations(R: Array, name: str, weights: Array | None = None) -> None:
 
     :param weights: (n,), of measurements: a matrix whose weight is not positive may be anything, and one that is not
         finite leaves the measurement out. None checks all.
-    :raises InvalidValueError: one is no rotation.
+    :raises InvalidValueError: one is not a rotation.
     """
     k = _first_not_rotation(R, _NO_WEIGHTS if weights is None else weights, weights is None)
     if k >= 0:

@@ -24,7 +24,7 @@ MEASURES = {
     "w_mpjpe": "W-MPJPE mm",
     "rte": "RTE %",
     "jitter": "jitter 10 m/s³",
-    "foot_slide": "foot slide mm",
+    "foot_slide": "foot sliding mm",
 }
 IN_CAMERA = ("mpjpe", "pa_mpjpe", "mpvpe", "acceleration")
 IN_WORLD = ("wa_mpjpe", "w_mpjpe", "rte", "jitter", "foot_slide")

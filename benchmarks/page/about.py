@@ -25,15 +25,16 @@ ABOUT = {  # by the name of the benchmark, or of the script
         "bootstrap over people."
     ),
     "renders": (
-        "Random bodies and cameras in clips of up to 1.5 s, which move as in fourteen recordings that the "
-        "lifting network was not trained on; the means leave out the sample clip. Parentheses: 95 % intervals "
-        "by bootstrap over clips. Depth flips: of the fit of the clip, and of every frame fitted alone."
+        "Random bodies, which move as in fourteen recordings that the lifting network was not trained on, "
+        "before random cameras, in clips of up to 1.5 s; the means leave out the sample clip. Parentheses: "
+        "95 % intervals by bootstrap over clips. Depth flips: of the fit of the clip, and of every frame "
+        "fitted alone."
     ),
     "scenes": (
         "Rendered scenes of 1.2 s with one or two people. Choices were based on the development scenes; "
-        "nothing was trained on the new performers. Errors are means over the frames in which a person was "
-        "found. Parentheses: 95 % intervals by bootstrap over people. Depth flips: of the fit of the clip, and "
-        "of every frame fitted alone."
+        "nothing was trained on the new performers, and, with two exceptions, nothing was chosen on them. "
+        "Errors are means over the frames in which a person was found. Parentheses: 95 % intervals by "
+        "bootstrap over people. Depth flips: of the fit of the clip, and of every frame fitted alone."
     ),
     "two_people": (
         "Pose2Sim's man with a computer-generated woman drawn beside him, captured one camera at a time with "
@@ -53,7 +54,7 @@ ABOUT = {  # by the name of the benchmark, or of the script
         "of the largest landmark network, and the shares of each that lie outside the other."
     ),
     "faces": (
-        "Rendered faces with known expressions and gaze, by way of finding them and by condition: mean "
-        "absolute errors of weights from 0 to 1."
+        "Rendered faces with known expressions and gaze, by method and by condition: mean absolute "
+        "errors of weights from 0 to 1."
     ),
 }

@@ -26,7 +26,7 @@ SHOWN = {  # key of the evaluation: heading, target
     "mpjpe_root_flat": ("without depth mm", None),
     "jitter_rel": ("jitter m/s³", 45.0),
     "accel_err_lp": ("accel error mm/frame²", 3.9),
-    "foot_slide_cm": ("foot slide cm", 1.5),
+    "foot_slide_cm": ("foot sliding cm", 1.5),
     "flipped": ("flipped share", 0.01),
     "coverage": ("coverage", 1.0),
 }

@@ -35,7 +35,7 @@ SHOWN = {
     "pa_mpjpe": "PA-MPJPE mm",
     "up_deg": "up off by, degrees",
     "floor_cm": "floor off by, cm",
-    "foot_slide_cm": "foot slide cm",
+    "foot_slide_cm": "foot sliding cm",
     "size": "size / true",
     "height_off": "height off by, %",
     "focal": "focal / true",

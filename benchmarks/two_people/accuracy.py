@@ -42,7 +42,7 @@ SHOWN = {
     "stature_m": "stature m",
     "iou": "outline IoU",
     "area": "area",
-    "foot_slide_cm": "foot slide cm",
+    "foot_slide_cm": "foot sliding cm",
     "exchanged": "exchanged",
     "sole_cm": "lowest sole cm",
     "apart": "distance / true",

@@ -40,7 +40,8 @@ def carry(priors: Priors, fitted: Fit, shape_weight: float) -> Priors:
     `shape_weight` is `Weights.shape` of the fit, over which the information is kept.
 
     :raises ShapeError: the shape's information in `priors` does not fit the shape.
-    :raises InvalidValueError: `priors` or `fitted` is something else, or the weight is negative, infinite or no number.
+    :raises InvalidValueError: `priors` or `fitted` is of another type, or the weight is negative, infinite or not a
+        number.
     """
     check_type(priors, Priors, "priors")
     check_type(fitted, Fit, "fitted")

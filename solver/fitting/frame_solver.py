@@ -70,7 +70,7 @@ class FrameSolver:
         """Check the body and allocate the working memory.
 
         :raises ShapeError: when an array does not fit the others.
-        :raises InvalidValueError: `priors` or `options` is something else.
+        :raises InvalidValueError: `priors` or `options` is of another type.
         """
         announce_compilation(optimize)
         self.tree = body if isinstance(body, Tree) else make_tree(body)

@@ -37,7 +37,7 @@ def check_residual(body: BodyArrays, name: str, ints: Any, floats: Any, *, seed:
         infinite where JᵀJ is missing.
     :raises ShapeError: the rows do not fit the residual or the body.
     :raises InvalidValueError: there is no residual of that name, its kernel does not compile, or its cost is 0 or not
-        finite at that state, where derivatives say nothing; its Jᵀr or JᵀJ is not finite there; or the seed is no
+        finite at that state, where derivatives say nothing; its Jᵀr or JᵀJ is not finite there; or the seed is not a
         whole number of at least 0.
     """
     check_type(name, str, "name")

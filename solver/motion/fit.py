@@ -88,8 +88,8 @@ def fit_motion(
     is filled in.
 
     :param frames: of each frame its measurements, or one `View` for each camera that saw something.
-    :param times: (T,) seconds, increasing; they need not be evenly spaced. Whole numbers are probably those of frames,
-        which `UnitsWarning` says.
+    :param times: (T,) seconds, increasing; they need not be evenly spaced. Whole numbers are probably frame
+        numbers, and give a `UnitsWarning`.
     :param init: each frame's state in the world's axes; without it, the frames are first fitted in order, several
         cameras by points triangulated from their 2D keypoints.
     :param priors: `default_priors(body)` unless given.

@@ -118,7 +118,7 @@ def register_residual(
         R (3, 3), t (3,) of `compiled.part.Part` the pose of part i in the camera frame, metres, Omega (3, 3) the state
         of its joint and beta (P,). Derivatives are central differences: slow, to try an idea.
     :raises InvalidValueError: the name is one of Scope's own, not exactly one of `kernel` and `function` is given, a
-        count is no whole number of at least 1 (`floats`: 0), `indexes` is unknown or "points" with a `function`, or
+        count is not a whole number of at least 1 (`floats`: 0), `indexes` is unknown or "points" with a `function`, or
         too many are registered.
     """
     external = external_residuals()
