@@ -39,6 +39,7 @@ def as_array(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Arra
 def as_arrays(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
     """Return `value` as float64 of shape (..., *shape), whatever its leading dimensions.
 
+    :param value: (...) numbers, whose last dimensions are ``shape``.
     :raises ShapeError: it has another shape, or is not an array of numbers.
     """
     array = _numbers(value, (..., *shape), name)

@@ -99,7 +99,12 @@ def resting_probability(
 def speed_across(
     points: NDArray[np.floating[Any]], times: NDArray[np.float64], center: NDArray[np.floating[Any]] | None
 ) -> NDArray[np.floating[Any]]:
-    """Return the (T, F) speed in m/s; see `velocity_across`."""
+    """Return the (T, F) speed in m/s; see `velocity_across`.
+
+    :param points: (T, F, 3) metres.
+    :param times: (T,) seconds.
+    :param center: (T, 3) or (3,) the camera's centre; None: the whole speed.
+    """
     speed: NDArray[np.floating[Any]] = np.linalg.norm(velocity_across(points, times, center), axis=-1)
     return speed
 

@@ -130,6 +130,8 @@ def fit_in_order(
     """Fit each frame from the one before, carrying the shape's information; a lost person starts afresh.
 
     Frames without measurements hold the last state that was measured, before the first the first.
+
+    :raises InvalidValueError: the weight of the shape in ``options`` is negative, infinite or not a number.
     """
     states: list[State] = []
     last: State | None = None

@@ -179,7 +179,7 @@ def test_the_parser_finds_shapes_and_errors() -> None:
     for text in ("exp(phi)", "(see below)", "(x, y, z)", "f(a, b)"):
         assert not SHAPE.search(text), text
     public = public_functions()
-    assert raised(public["solver/rotations:exp"]) == {"ShapeError"}
+    assert raised(public["solver/arrays:as_arrays"]) == {"ShapeError"}
     assert raised(public["solver/validation:check_weight"]) == {"InvalidValueError"}
     assert raised(public["scope_addon/job/batch:Batch.run"]) == {"UsageError", "OutputError"}
     assert raised(public["scope_addon/cli:main"]) == set()  # it prints what it catches

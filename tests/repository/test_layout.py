@@ -28,6 +28,7 @@ CROSS_CUTTING = {
     "repository/test_layout.py": "names and places of test files",
     "repository/test_rooms.py": "which folder may import which",
     "repository/test_wheel.py": "the wheel, installed",
+    "solver/test_arguments.py": "every public function of the solver, given arguments of the wrong kind",
     "scene/test_made_rigs.py": "captures that tests append, against built ones",
     "fuzz/test_faults.py": "what writes files, on failing system calls",
     "fuzz/test_faults_outputs.py": "exports, outputs of captures and batches, on failing system calls",

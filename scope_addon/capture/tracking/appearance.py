@@ -63,7 +63,11 @@ def distance(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
 
 
 def sample(image_rgb: NDArray[np.uint8], points: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
-    """Return the (N, 3) pixels at those of the points that are inside the image."""
+    """Return the (N, 3) pixels at those of the points that are inside the image.
+
+    :param image_rgb: (H, W, 3).
+    :param points: (P, 2) pixels.
+    """
     height, width = image_rgb.shape[:2]
     x, y = np.round(points).astype(int).T
     inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)

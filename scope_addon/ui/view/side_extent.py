@@ -12,7 +12,6 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ....solver.errors import ScopeError
 from ..captured_person import body_of
 
 _HALF_HEIGHT_M = 1.3  # above and below the pelvis of a person
@@ -41,6 +40,7 @@ def side_extent(
 
 def _pelvis_path(armature: bpy.types.Object, rate: float) -> NDArray[np.float64] | None:
     """Return the scene frame and the world position of the pelvis at every key, (T, 4); None without keys."""
+    from ....solver.errors import ScopeError
     from ...scene.character.keys import read_clip
     from ...scene.character.root_object import clip_as_displayed, parent_transform, root_object
 
