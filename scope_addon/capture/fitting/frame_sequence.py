@@ -19,7 +19,7 @@ from ....solver import Fit, Measurements, Options, State, Status, fit_tree, make
 from ....solver.compiled.tree import with_fixed_shape
 from .hand_measurements import smooth_fingers
 from .prepared_track import PreparedTrack
-from .weights import ROBUST, cold_stages, warm_stages
+from .weights import ROBUST, WEIGHTS, cold_stages, warm_stages
 
 LONGEST_COAST_S = 0.5  # the last pose says little about a person who has not been seen for longer
 _SAME_POSE_RAD = np.radians(10.0)  # by which no joint differs between two poses
@@ -37,6 +37,34 @@ class FittedTrack:
     iterations: float  # mean per frame
     joint_sigma_m: NDArray[np.floating[Any]] | None = None  # (T, K+1, 2) of `joint_sigma`, NaN where not valid
     height_sigma_m: float = float("nan")  # standard deviation of the stature of `betas`
+
+    def with_fingers_at_rest(self, prepared: PreparedTrack) -> FittedTrack:
+        """Return the motion of the whole body; fingers that were not fitted are at rest.
+
+        To the wrist's deviation, theirs adds what wrist and fingers may rotate under the joint prior alone.
+        """
+        own, whole = prepared.body, prepared.whole_body
+        if own is whole:
+            return self
+        at = [whole.joint_names.index(name) for name in own.joint_names]
+        T, parts = len(self.valid), whole.K + 1
+        rotations = np.tile(np.eye(3, dtype=self.rotations.dtype), (T, parts, 1, 1))
+        rotations[:, at] = self.rotations
+        confidence = np.zeros((T, parts))
+        confidence[:, at] = self.joint_confidence
+        sigma = None
+        if self.joint_sigma_m is not None:
+            sigma = np.empty((T, parts, 2), self.joint_sigma_m.dtype)
+            sigma[:, at] = self.joint_sigma_m
+            for part in sorted(set(range(parts)) - set(at)):
+                wrist, variance = part, 0.0
+                while wrist not in at:
+                    wrist = int(whole.parents[wrist])
+                    # A rotation moves a point along two of three axes.
+                    reach_m = np.linalg.norm(whole.J_template[part] - whole.J_template[wrist])
+                    variance += 2.0 / 3.0 * float(reach_m) ** 2 / WEIGHTS.joint_prior
+                sigma[:, part] = np.hypot(sigma[:, wrist], np.sqrt(variance))
+        return replace(self, rotations=rotations, joint_confidence=confidence, joint_sigma_m=sigma)
 
 
 class FrameSequence:

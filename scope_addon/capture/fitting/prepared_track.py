@@ -22,6 +22,7 @@ from .ablation import NO_ABLATION, Ablation
 from .frame_measurements import DEPTH_SIGMA_M, EARS, Measurer
 from .hand_measurements import HandMeasurer, with_finger_limits
 from .keypoint_offsets import with_keypoint_offsets
+from .rigid_fingers import without_fingers
 from .stature import with_population, with_stature, with_unknown_stature
 from .weights import WEIGHTS, joint_weights
 
@@ -57,7 +58,8 @@ class Stance:
 class PreparedTrack:
     """What every pass over a track needs, computed once: undistorted keypoints, the lifter's points, priors."""
 
-    body: Body  # with keypoints where the network places them
+    body: Body  # that is fitted, with keypoints where the network places them
+    whole_body: Body  # the same with fingers, also where no hand is seen and they are not fitted
     track: Track
     measurer: Measurer
     pixels: NDArray[np.floating[Any]]  # (T, J, 2) keypoints without lens distortion
@@ -65,7 +67,7 @@ class PreparedTrack:
     priors: Priors  # with unknown shape
     weights: Weights
     hand_measurer: HandMeasurer | None = None
-    hands: NDArray[np.floating[Any]] | None = None  # (T, 2, 21, 6) as in the track, undistorted; None: not looked for
+    hands: NDArray[np.floating[Any]] | None = None  # (T, 2, 21, 6) as in the track, undistorted; None: not fitted
     head: NDArray[np.floating[Any]] | None = None  # (T, 4) direction across it, certainty; None: no face looked for
     camera: Camera | None = None  # of the masks; None where the track has none
     is_stature_given: bool = False  # by the user
@@ -113,9 +115,11 @@ class PreparedTrack:
         :param stance: in each frame's camera.
         :param betas: (P,) shape coefficients.
         """
-        body, K = with_contact_points(with_arm_points(self.body), betas), self.measurer.intrinsics
+        whole, K = with_contact_points(with_arm_points(self.whole_body), betas), self.measurer.intrinsics
+        body = whole if self.body is self.whole_body else without_fingers(whole)
         hands = None if self.hand_measurer is None else HandMeasurer(body, K)
-        return replace(self, body=body, measurer=Measurer(body, K), hand_measurer=hands, stance=stance)
+        measurer = Measurer(body, K)
+        return replace(self, body=body, whole_body=whole, measurer=measurer, hand_measurer=hands, stance=stance)
 
     def with_height(self, height_m: float, sigma_m: float) -> PreparedTrack:
         """Return the track of an adult of that stature with that standard deviation, both in metres."""
@@ -127,15 +131,24 @@ class PreparedTrack:
 
 
 def prepare_track(
-    body: Body, track: Track, camera: Camera, ablation: Ablation = NO_ABLATION, height_m: float | None = None
+    body: Body,
+    track: Track,
+    camera: Camera,
+    ablation: Ablation = NO_ABLATION,
+    height_m: float | None = None,
+    fingers: bool = True,
 ) -> PreparedTrack:
     """Undistort and lift a track. The lifting network runs only here.
 
     :param height_m: the person's stature, if it is known, metres.
-    :raises UsageError: hands were looked for, but the body has no finger joints.
+    :param fingers: False: they are not fitted, because no hand is seen.
+    :raises UsageError: the track has hands that are to be fitted, but the body has no finger joints.
     """
     if ablation.keypoint_offsets and track.has_depth:  # only BlazePose estimates depth, and the offsets are BlazePose's
         body = with_keypoint_offsets(body)
+    whole_body = body
+    if not fingers:
+        body = without_fingers(body)
     measurer, pixels = Measurer(body, camera.intrinsics), camera.undistort(track.keypoints_px)
     lifted = _lift(measurer, track, pixels, ablation)
     if height_m is not None and height_m < CHILD_BELOW_M:  # the lifting network knows adults alone
@@ -147,12 +160,12 @@ def prepare_track(
         priors = (with_unknown_stature if ablation.stature else with_population)(priors, body)
     weights, is_given = ablation.weights(WEIGHTS), height_m is not None
     prepared = PreparedTrack(
-        body, track, measurer, pixels, lifted, priors, weights, camera=camera, is_stature_given=is_given
+        body, whole_body, track, measurer, pixels, lifted, priors, weights, camera=camera, is_stature_given=is_given
     )
     if track.face is not None:
         across, ears = across_head(track.face, camera), lifted.points[:, EARS[1]] - lifted.points[:, EARS[0]]
         prepared = replace(prepared, head=np.column_stack([across, certainty(track.face, across, ears)]))
-    if track.hands is None:
+    if track.hands is None or not fingers:
         return prepared
     hands = np.concatenate([camera.undistort(track.hands[..., :2]), track.hands[..., 2:]], axis=-1)
     hand_measurer = HandMeasurer(body, camera.intrinsics)

@@ -60,7 +60,7 @@ def solve(shot: Shot, tracks: Iterable[Track], progress: Progress, heights_m: Se
     ]
     prepared, fits = resize_people(shot, prepared, fits, heights_m, progress)
     shot, iterations = replace(shot, path=find_camera_path(shot, prepared[0], fits[0])), fits[0].iterations
-    known = [(each.track, each.body) for each in prepared]
+    known = [(each.track, each.whole_body) for each in prepared]
     if shot.ablation.stance and not shot.is_still:
         prepared, fits = ground_all(shot, prepared, fits)
     return_freed_memory()
@@ -97,10 +97,12 @@ def progress_of_person(progress: Progress, number: int, count: int) -> Progress:
 
 
 def prepare(shot: Shot, tracks: Iterable[Track], heights_m: Sequence[float]) -> list[PreparedTrack]:
-    """Lift every track to 3D and set up its priors."""
+    """Lift every track to 3D and set up its priors. The fingers of people of whom no hand is seen are left out."""
     out = []
     for k, track in enumerate(tracks):
-        each = prepare_track(shot.body, track, shot.camera, shot.ablation, heights_m[k] if k < len(heights_m) else None)
+        height_m = heights_m[k] if k < len(heights_m) else None
+        fingers = track.hands is not None and bool((track.hands[:, :, 0, 2] > 0).any())
+        each = prepare_track(shot.body, track, shot.camera, shot.ablation, height_m, fingers)
         lifted = to_single_precision(each.lifted)
         out.append(to_single_precision(replace(each, track=track.without_depth(), lifted=lifted)))
     return out
@@ -125,7 +127,7 @@ def resize_people(
     prepared, fits, count = list(prepared), list(fits), len(prepared)
     if not 0 < len(heights_m) < count or not shot.ablation.stance or shot.uneven_ground:
         return prepared, fits
-    placed = [place(shot, each.track, fit) for each, fit in zip(prepared, fits, strict=True)]
+    placed = [place(shot, each.track, fit.with_fingers_at_rest(each)) for each, fit in zip(prepared, fits, strict=True)]
     up = find_world(placed, shot.lines).up
     people = [stander(each, up, k < len(heights_m)) for k, each in enumerate(placed)]
     del placed
@@ -142,7 +144,7 @@ def find_camera_path(shot: Shot, first: PreparedTrack, fit: FittedTrack) -> Came
     """Return the camera's path; the travel of a rotating camera is estimated from one person's feet."""
     if shot.path.is_static or shot.is_still:
         return shot.path
-    placed = place(shot, first.track, fit)
+    placed = place(shot, first.track, fit.with_fingers_at_rest(first))
     up = find_world([placed], shot.lines).up
     center = camera_travel(placed.soles, placed.valid, up, placed.times, shot.uneven_ground)
     return replace(shot.path, center=center)
@@ -152,7 +154,7 @@ def ground_all(
     shot: Shot, prepared: Sequence[PreparedTrack], fits: Sequence[FittedTrack]
 ) -> tuple[list[PreparedTrack], list[FittedTrack]]:
     """Add to each person's measurements the distance and lean that follow from floor, feet and balance."""
-    placed = [place(shot, each.track, fit) for each, fit in zip(prepared, fits, strict=True)]
+    placed = [place(shot, each.track, fit.with_fingers_at_rest(each)) for each, fit in zip(prepared, fits, strict=True)]
     world = find_world(placed, shot.lines)
     return_freed_memory()
     grounded, starts = [], []
@@ -171,15 +173,20 @@ def ground_all(
 def refine(
     shot: Shot, prepared: PreparedTrack, start: FittedTrack, progress: Progress
 ) -> tuple[FittedTrack, FittedTrack]:
-    """Return the raw motion, of which every frame is fitted alone, and the finished one, of all frames together."""
+    """Return the raw motion, of which every frame is fitted alone, and the finished one, of all frames together.
+
+    Both are of the whole body.
+    """
     if shot.is_still:
+        start = start.with_fingers_at_rest(prepared)
         return start, start
     finished = fit_clip(prepared, start, shot.path, progress, shot.ablation) if shot.smoothing else start
     del start
     return_freed_memory()
     raw = to_single_precision(fit_each_frame(prepared, finished, progress))
     raw = replace(raw, joint_sigma_m=finished.joint_sigma_m, height_sigma_m=finished.height_sigma_m)
-    return raw, to_single_precision(finished) if shot.smoothing else raw
+    raw = raw.with_fingers_at_rest(prepared)
+    return raw, to_single_precision(finished).with_fingers_at_rest(prepared) if shot.smoothing else raw
 
 
 def finish(shot: Shot, person: FittedPerson, placed: PlacedTrack, world: SharedWorld, number: int) -> Motion:
