@@ -7,12 +7,15 @@ It follows the pelvis of one person, so the others must stay within the view on 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ..captured_person import body_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray  # which takes long to load
 
 _HALF_HEIGHT_M = 1.3  # above and below the pelvis of a person
 _HALF_WIDTH_M = 0.5  # to the left and right of it
