@@ -24,7 +24,9 @@ EAGER_S = 15 * FRAME_S  # for which a lost person is looked for in every frame
 
 
 class SearchSchedule:
-    """Decides for each frame (H, W, 3) whether and how to search, from the people tracked and the lost ones remembered.
+    """Decides for each frame whether and how to search it.
+
+    Its methods are given the frame, (H, W, 3), the people tracked in it, ``live``, and those remembered, ``lost``.
 
     :param clock: of the tracker.
     :param people: how many people are wanted; None: only the most prominent one of the clip.
@@ -43,11 +45,11 @@ class SearchSchedule:
     def is_due(
         self, image_rgb: NDArray[np.uint8], live: Sequence[TrackedTarget], lost: Sequence[TrackedTarget]
     ) -> bool:
-        """Return whether to search this frame (H, W, 3)."""
+        """Return whether to search this frame."""
         return self._clock.has_passed(self._interval_s(image_rgb, live, lost), self._clock.time_s - self._search_s)
 
     def begin(self, image_rgb: NDArray[np.uint8], live: Sequence[TrackedTarget], lost: Sequence[TrackedTarget]) -> bool:
-        """Note a search in this frame (H, W, 3).
+        """Note a search in this frame.
 
         :return: whether to search closely: where somebody small may be, and less often at a low frame rate, because
             it costs more.
@@ -65,7 +67,7 @@ class SearchSchedule:
     def begin_small(
         self, image_rgb: NDArray[np.uint8], live: Sequence[TrackedTarget], lost: Sequence[TrackedTarget]
     ) -> bool:
-        """Return whether to look for small people in this frame (H, W, 3), and if so, note it.
+        """Return whether to look for small people in this frame, and if so, note it.
 
         Only where nobody is tracked, and nobody is remembered whom a plain detection would find again.
         """
