@@ -26,7 +26,7 @@ EAGER_S = 15 * FRAME_S  # for which a lost person is looked for in every frame
 class SearchSchedule:
     """Decides for each frame whether and how to search it.
 
-    Its methods are given the frame, (H, W, 3), the people tracked in it, ``live``, and those remembered, ``lost``.
+    ``live`` are the people tracked in it, and ``lost`` those remembered.
 
     :param clock: of the tracker.
     :param people: how many people are wanted; None: only the most prominent one of the clip.
@@ -45,11 +45,11 @@ class SearchSchedule:
     def is_due(
         self, image_rgb: NDArray[np.uint8], live: Sequence[TrackedTarget], lost: Sequence[TrackedTarget]
     ) -> bool:
-        """Return whether to search this frame."""
+        """Return whether to search this frame (H, W, 3)."""
         return self._clock.has_passed(self._interval_s(image_rgb, live, lost), self._clock.time_s - self._search_s)
 
     def begin(self, image_rgb: NDArray[np.uint8], live: Sequence[TrackedTarget], lost: Sequence[TrackedTarget]) -> bool:
-        """Note a search in this frame.
+        """Note a search in this frame (H, W, 3).
 
         :return: whether to search closely: where somebody small may be, and less often at a low frame rate, because
             it costs more.
@@ -67,7 +67,7 @@ class SearchSchedule:
     def begin_small(
         self, image_rgb: NDArray[np.uint8], live: Sequence[TrackedTarget], lost: Sequence[TrackedTarget]
     ) -> bool:
-        """Return whether to look for small people in this frame, and if so, note it.
+        """Return whether to look for small people in this frame (H, W, 3), and if so, note it.
 
         Only where nobody is tracked, and nobody is remembered whom a plain detection would find again.
         """
