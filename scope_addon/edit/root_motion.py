@@ -54,7 +54,10 @@ def with_trajectory(clip: Clip, positions: NDArray[np.float64], angles: NDArray[
 
 
 def about_z(angles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return rotations (T, 3, 3) about the vertical by angles, radians, T in all."""
+    """Return rotations (T, 3, 3) about the vertical.
+
+    :param angles: of any shape with T entries, radians.
+    """
     c, s = np.cos(angles), np.sin(angles)
     zero, one = np.zeros_like(c), np.ones_like(c)
     rows: NDArray[np.float64] = np.stack([c, -s, zero, s, c, zero, zero, zero, one], axis=-1)

@@ -63,11 +63,10 @@ class BodySurface:
         :param betas: (P,) shape coefficients.
         """
         v, J, normals = body.rest_vertices(betas), body.rest_joints(betas), _vertex_normals(body, betas)
-        strongest = body.skin_joints[np.arange(len(v)), body.skin_weights.argmax(1)]
         sampled = [k for k, name in enumerate(body.joint_names) if name in _TRUNK or name.endswith(_LEGS)]
-        rows = np.flatnonzero(np.isin(strongest, sampled) & normals.any(axis=1))
+        rows = np.flatnonzero(np.isin(body.strongest_joints, sampled) & normals.any(axis=1))
         rows = rows[one_per_cell(v[rows], SPACING_M)]
-        arms = v[np.isin(strongest, _arm_parts(body))]
+        arms = v[np.isin(body.strongest_joints, _arm_parts(body))]
         self._body, self._betas = body, betas
         self._count, self._skin = len(rows), list(_skin(body, rows, v[rows], J, normals[rows]))
         self.indices = _points_on_arms(body) if len(rows) and len(arms) else np.zeros(0, np.intp)

@@ -30,14 +30,14 @@ def with_contact_points(body: Body, betas: NDArray[np.floating[Any]]) -> Body:
     :param betas: (P,) shape coefficients.
     """
     v, J = body.rest_vertices(betas), body.rest_joints(betas)
-    strongest = body.skin_joints[np.arange(len(v)), body.skin_weights.argmax(1)]
     # The palms are on the hands, or on the wrists of a body with fingers.
     kind = "hand" if "left_hand" in body.joint_names else "wrist"
     names = (*FOOT_PARTS, f"left_{kind}", f"right_{kind}")
     parts = np.array([body.joint_names.index(name) for name in names], np.int32)
     local = np.zeros((len(parts), 3))
     for k, part in enumerate(parts):
-        own = v[strongest == part] if (strongest == part).any() else J[part : part + 1]
+        own = v[body.strongest_joints == part]
+        own = own if len(own) else J[part : part + 1]
         lowest = own[own[:, 1] <= own[:, 1].min() + 0.01].mean(0)
         lowest[1] = own[:, 1].min()
         local[k] = lowest - J[part]

@@ -37,11 +37,11 @@ class FootSkin:
         :param betas: (P,) shape coefficients.
         """
         v, J = body.rest_vertices(betas), body.rest_joints(betas)
-        strongest = body.skin_joints[np.arange(len(v)), body.skin_weights.argmax(1)]
         self.parts = [body.joint_names.index(name) for name in FOOT_PARTS]
         self.points: list[NDArray[np.float64]] = []  # of each part, (n, 3) from its joint
         for part in self.parts:
-            own = v[strongest == part] - J[part] if (strongest == part).any() else np.zeros((1, 3))
+            own = v[body.strongest_joints == part] - J[part]
+            own = own if len(own) else np.zeros((1, 3))
             self.points.append(own[np.unique((own @ _directions().T).argmax(axis=0))])
 
     def heights(

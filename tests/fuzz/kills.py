@@ -144,7 +144,9 @@ def _may_be_empty(path: Path) -> bool:
 
 
 def check_command(command: Command, action: str, calls: Iterable[int] | None = None) -> tuple[int, list[str]]:
-    """Run a command with a fault at each of its calls, again after each kill that leaves something else, and at last.
+    """Run a command with a fault at each of its calls, again after each kill that leaves something else.
+
+    At the end, it runs once more without a fault, unless that was the last thing it did.
 
     :param calls: only these; negative ones count from the last.
     :return: how many faults there were, and what was not as it should be.

@@ -48,7 +48,7 @@ def distances_outside(points: np.ndarray, R: np.ndarray, t: np.ndarray) -> np.nd
     The arms' own triangles are left out, and so are the holes that they leave: the shoulders are far from all points.
     """
     v, triangles = BODY.skin(R[0], t[0], BETAS), BODY.triangles()
-    part = BODY.skin_joints[np.arange(len(v)), BODY.skin_weights.argmax(1)]
+    part = BODY.strongest_joints
     arms = [k for k, name in enumerate(BODY.joint_names) if name.endswith(("shoulder", "elbow", "wrist", "hand"))]
     corners = v[triangles[~np.isin(part[triangles], arms).any(axis=1)]]
     a, b, c = (corners[None, :, k] - points[:, None] for k in range(3))
@@ -121,7 +121,7 @@ def test_points_are_where_the_shape_has_them() -> None:
     R, t = child.forward_kinematics(omega, np.zeros(3), betas)
     planes = own.planes(R[None], t[None])
     skin, points = child.skin(R, t, betas), body.keypoints(R, t, betas)[own.indices]
-    part = child.skin_joints[np.arange(len(skin)), child.skin_weights.argmax(1)]
+    part = child.strongest_joints
     names = child.joint_names
     trunk = [k for k, name in enumerate(names) if name.startswith("spine") or name.endswith(("hip", "pelvis"))]
     nearest = np.linalg.norm(points[:, None] - skin[np.isin(part, trunk)], axis=-1).min(axis=1)

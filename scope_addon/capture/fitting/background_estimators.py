@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Estimates made from the background, in threads that run in parallel with tracking.
+"""The focal length, from the background's edges and the largest people, in threads that run in parallel with tracking.
 
-First, everything that the solver needs is loaded: its kernels (compiled on first use) and the lifting network. Then the
-camera rotation is estimated from each frame's background. Once a person has been seen, the focal length is estimated
-from the background's edges and by fitting the body in some frames. The results depend on the frames, not on the speed
-of the threads.
+First, everything that the solver needs is loaded: its kernels (compiled on first use) and the lifting network. Once a
+person has been seen, the focal length is estimated from the edges of that frame, and by fitting the body in some of
+those that follow. The result depends on the frames, not on the speed of the threads.
 """
 
 from __future__ import annotations
@@ -34,7 +33,11 @@ _THREADS = 2  # background and edges; the solver has its own thread, because com
 
 
 class BackgroundEstimators:
-    """A context that takes frames in order; leaving it with an error, such as a cancel, drops work not yet begun."""
+    """A context that estimates the focal length from the largest people, which are added in order.
+
+    Leaving it with an error, such as a cancel, drops work not yet begun. Others may follow the background in its
+    ``pool``.
+    """
 
     def __init__(self, camera: Camera, width: int, height: int, live: LiveBody, fits: FocalFits) -> None:
         self._given_camera, self._size, self._fits = camera, (width, height), fits
@@ -56,11 +59,13 @@ class BackgroundEstimators:
             pool.shutdown(wait=False, cancel_futures=kind is not None)
 
     def add(self, time_s: float, largest: Observation | None, followed: BackgroundTracker | BackgroundRecord) -> None:
-        """Begin with the focal length, or go on, in the frame before this one.
+        """Use the frame before this one for the focal length, once a background was searched for edges.
 
         :param largest: the largest person of the frame.
         :param followed: the background, at least of all frames before.
         """
+        # The background of this very frame may be followed meanwhile. If it finds the first edges, it has set the bars
+        # before, and nobody was seen in the frame before, so they are merely used one frame earlier or later.
         before, self._largest = self._largest, None if largest is None else (time_s, largest)
         if self._given_camera.focal_deviation == 0.0 or not followed.edge_frames:
             return

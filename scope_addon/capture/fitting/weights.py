@@ -50,6 +50,7 @@ _ACCELERATION = 2400.0
 _LANDING = 3.0  # typical accelerations from which on a landing or a hit is likelier than noise
 _CONTACT = 5e4  # of the velocity of points that rest, s/m²
 _RATE_HZ = 60.0
+CLIP_STEPS = 50  # at most, of a fit of all frames of a clip together
 # Joints that no pair of landmarks determines stay closer to rest.
 _STIFF_JOINTS = {"spine": 5.0, "collar": 5.0, "foot": 5.0, "hand": 5.0, "neck": 3.0, "head": 3.0}
 
@@ -91,7 +92,7 @@ def clip_weights(weights: Weights) -> Weights:
     )
 
 
-def clip_stages(weights: Weights, steps: int = 50) -> tuple[Stage, ...]:
+def clip_stages(weights: Weights, steps: int = CLIP_STEPS) -> tuple[Stage, ...]:
     """Return the stages of a fit of all frames of a clip together, of at most so many steps.
 
     A tenth of the tolerance takes twice the steps, and changes errors on Pose2Sim and the sample clip by 0.1 mm.

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 MAX_TIMES = 4  # that are listed in a sentence
+FINDING = "finding the person"  # a stage, in which the footage is decoded and observed
 COMPILING = "compiling the solver"  # a stage of the first capture on a computer for which no machine code is shipped
 # Called with the stage's name, the steps done and the total (0: unknown). May raise CancelledError.
 Progress = Callable[[str, int, int], None]

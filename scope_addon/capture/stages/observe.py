@@ -34,7 +34,7 @@ def observe(
 
     :param unfinished: folder with what an earlier capture that was killed has found, and in which to keep what this one
         finds; None: nothing is kept.
-    :param windows: folder with windows of a long clip that were observed before.
+    :param windows: folder with windows of the clip that were observed before.
     :raises VideoError: there is no frame in the chosen range.
     :raises NoPersonError: nobody was found.
     :raises CancelledError: raised by ``listeners.progress`` itself, passed on.

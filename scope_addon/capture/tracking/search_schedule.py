@@ -24,7 +24,9 @@ EAGER_S = 15 * FRAME_S  # for which a lost person is looked for in every frame
 
 
 class SearchSchedule:
-    """Decides for each frame (H, W, 3) whether and how to search, from the people tracked and the lost ones remembered.
+    """Decides for each frame whether and how to search it.
+
+    ``live`` are the people tracked in it, and ``lost`` those remembered.
 
     :param clock: of the tracker.
     :param people: how many people are wanted; None: only the most prominent one of the clip.

@@ -7,12 +7,12 @@ import time
 from bisect import bisect_right
 from collections.abc import Callable, Mapping
 
-from ...capture.stages.clock import COMPILING
+from ...capture.stages.clock import COMPILING, FINDING
 
 # Share of the total time that each stage of a capture takes, in order; measured on clips of 5 to 10 seconds.
 STAGES = {
     "starting": 0.06,
-    "finding the person": 0.76,
+    FINDING: 0.76,
     "finding the shape": 0.07,
     "solving": 0.02,
     "solving the clip": 0.06,
@@ -25,7 +25,6 @@ STAGES = {
 FIRST_ONLY = (COMPILING,)
 BUILDING = "building the scene"  # after the worker has ended
 
-_FINDING = "finding the person"  # the stage whose speed those after it are estimated by
 _SHAPE = "finding the shape"  # the first stage for each person; of several people it says how many
 _MEASURED_S, _MEASURED_STEPS = 4.0, 12  # of a stage, before its speed is believed
 _STEADY = 1.5  # largest ratio between the speeds of the last two thirds of that time
@@ -62,7 +61,7 @@ class JobProgress:
             self._repeated |= stage in self.seconds and stage in STAGES
             self.stage, self._stage_start, self._stage_first, self._marks = stage, now, done, []
         self.done, self.total = done, total
-        if stage == _FINDING:
+        if stage == FINDING:
             self.frames = total
         elif stage == _SHAPE:
             self._people = max(1, total)
@@ -101,8 +100,8 @@ class JobProgress:
         if self.stage not in STAGES or self.stage == "starting":
             return None
         names = list(STAGES)
-        if self._people > 1 and self.stage != _FINDING:
-            parts = [self._left_of_everybody(name) for name in names[names.index(_FINDING) + 1 :]]
+        if self._people > 1 and self.stage != FINDING:
+            parts = [self._left_of_everybody(name) for name in names[names.index(FINDING) + 1 :]]
             return None if None in parts else sum(filter(None, parts))
         here = self._left_in_stage()
         if here is None or (self._repeated and not self._earlier):
@@ -128,7 +127,7 @@ class JobProgress:
     def _left_in_stage(self) -> float | None:
         if self.total > 0 and (speed := self._steady_speed()) is not None:
             return max(0, self.total - self.done) / speed
-        expected = self._expected(self.stage) if self._earlier and self.stage != _FINDING else None
+        expected = self._expected(self.stage) if self._earlier and self.stage != FINDING else None
         return None if expected is None else max(0.0, expected - (self._clock() - self._stage_start))
 
     def _steady_speed(self) -> float | None:
@@ -151,14 +150,14 @@ class JobProgress:
         """Return how long a stage takes for the whole footage; None if that is not known."""
         if self._earlier:
             return self._earlier.get(stage, 0.0) * self.frames
-        speed = self._steady_speed() if self.stage == _FINDING else None
+        speed = self._steady_speed() if self.stage == FINDING else None
         if speed is not None:
             finding = self.frames / speed
-        elif _FINDING in self.seconds:
-            finding = self.seconds[_FINDING]
+        elif FINDING in self.seconds:
+            finding = self.seconds[FINDING]
         else:
             return None
-        return finding * STAGES[stage] / STAGES[_FINDING]
+        return finding * STAGES[stage] / STAGES[FINDING]
 
     def lines(self, translate: Callable[[str], str] = str) -> list[str]:
         """Return the lines to show: the stage, and speed and remaining time if they are known.

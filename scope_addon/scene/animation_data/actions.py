@@ -21,6 +21,7 @@ from .fcurve_modifiers import read_modifiers, write_modifiers
 
 # Values of Blender's keyframe interpolation enum, which foreach_set takes as integers.
 INTERPOLATION = {"CONSTANT": 0, "LINEAR": 1, "BEZIER": 2}
+_SAME_FRAME = 0.01  # Blender keeps one of two keys that are no farther apart, in frames
 _POINTS = ("co", "handle_left", "handle_right")
 # Properties of a key, by the number of their values and type.
 _KEY = (
@@ -194,14 +195,18 @@ def rewrite_keys(
 def change_keys(curve: bpy.types.FCurve, frames: NDArray[np.float64], values: NDArray[np.float64]) -> None:
     """Change the values of a curve's keys at some frames, and add those that are missing; other keys stay as they are.
 
-    :param frames: (T,) scene frames.
+    As where Blender inserts a key, one within a hundredth of a frame counts as being at the frame.
+
+    :param frames: (T,) scene frames, increasing.
     :param values: (T,) in the unit of the property.
     """
     keys = curve.keyframe_points
     coordinates = read_keys(curve)
     wanted = frames.astype(np.float32)
-    at = np.clip(np.searchsorted(coordinates[:, 0], wanted - 1e-3), 0, len(coordinates) - 1)
-    present = np.abs(coordinates[at, 0] - wanted) < 2e-3
+    after = np.searchsorted(coordinates[:, 0], wanted)
+    around = np.clip(np.stack([after, after - 1]), 0, len(coordinates) - 1)
+    off = np.abs(coordinates[around, 0] - wanted)
+    at, present = np.where(off[0] <= off[1], *around), off.min(axis=0) <= _SAME_FRAME
     coordinates[at[present], 1] = values[present]
     keys.foreach_set("co", coordinates.ravel())
     if not present.all():

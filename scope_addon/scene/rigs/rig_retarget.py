@@ -158,6 +158,7 @@ def common_travel(
 
     :param people_betas: (P,) shape coefficients of each person.
     :raises UsageError: when the rig lacks a mapped bone.
+    :raises InputError: when the map cannot be used.
     """
     bone_map = usable_map(None, body, rig, bone_map)
     with at_rest(rig):

@@ -92,7 +92,9 @@ class SCOPE_OT_retarget(_RigOperator):
             self.report({"WARNING"}, sentence(result.warnings[0]))
             return ""
         return rpt_(
-            "'{rig}' is now animated by the action '{action}', with positions on the floor scaled by {scale:.3f}",
+            "'{rig}' is now animated by the action '{action}'"
+            if settings.root == "in-place"  # where it has no path to scale
+            else "'{rig}' is now animated by the action '{action}', with positions on the floor scaled by {scale:.3f}",
             rig=settings.rig.name,
             action=result.action.name,
             scale=result.travel,

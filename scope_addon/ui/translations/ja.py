@@ -18,6 +18,7 @@ TEXTS = (
         "'{name}' or its motion is linked from {file}, so changes would be lost: make both local (Object > Relations > Make Local > All) or edit them in that file": "'{name}' またはそのモーションは {file} からリンクされているため、変更は失われます。両方をローカル化する（オブジェクト > 関係 > ローカル化 > すべて）か、元のファイルで編集してください",
         "'{rig}' is linked from {file}, so its motion would not be saved in this file: make an override of it (Object > Library Override > Make)": "'{rig}' は {file} からリンクされているため、モーションはこのファイルに保存されません。オーバーライドを作成してください（オブジェクト > ライブラリオーバーライド > 作成）",
         "'{rig}' is not in the scene's view layer: add it to the scene, or enable its collection in the Outliner": "'{rig}' はシーンのビューレイヤーにありません。シーンに追加するか、アウトライナーでコレクションを有効にしてください",
+        "'{rig}' is now animated by the action '{action}'": "'{rig}' はアクション '{action}' で動くようになりました",
         "'{rig}' is now animated by the action '{action}', with positions on the floor scaled by {scale:.3f}": "'{rig}' はアクション '{action}' で動くようになりました（床面上の位置の倍率 {scale:.3f}）",
         "'{strip}' is now a strip of {armature}'s NLA; to edit its keys, enter Tweak Mode (key Tab)": "'{strip}' は {armature} の NLA ストリップになりました。キーの編集にはトウィークモードに入ってください（Tab キー）",
         "0 keeps every frame as captured, 1 is the default of a capture, higher values smooth more": "0 は各フレームをキャプチャのまま保持、1 はキャプチャの標準、大きいほど強くスムージングします",

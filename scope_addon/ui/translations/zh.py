@@ -18,6 +18,7 @@ TEXTS = (
         "'{name}' or its motion is linked from {file}, so changes would be lost: make both local (Object > Relations > Make Local > All) or edit them in that file": "“{name}”或其动作链接自 {file}，更改将会丢失：请将两者都转为本地项（物体 > 关系 > 转为本地项 > 全部），或在该文件中编辑",
         "'{rig}' is linked from {file}, so its motion would not be saved in this file: make an override of it (Object > Library Override > Make)": "“{rig}”链接自 {file}，其动作不会保存在此文件中：请为其创建库重写（物体 > 库重写 > 创建）",
         "'{rig}' is not in the scene's view layer: add it to the scene, or enable its collection in the Outliner": "“{rig}”不在场景的视图层中：请将其添加到场景，或在大纲视图中启用其集合",
+        "'{rig}' is now animated by the action '{action}'": "“{rig}”现由动作“{action}”驱动",
         "'{rig}' is now animated by the action '{action}', with positions on the floor scaled by {scale:.3f}": "“{rig}”现由动作“{action}”驱动，地面位置按 {scale:.3f} 缩放",
         "'{strip}' is now a strip of {armature}'s NLA; to edit its keys, enter Tweak Mode (key Tab)": "“{strip}”现为 {armature} 的 NLA 片段；要编辑其关键帧，请进入调整模式（Tab 键）",
         "0 keeps every frame as captured, 1 is the default of a capture, higher values smooth more": "0 保持每帧的捕捉结果，1 为捕捉默认值，值越大平滑越强",

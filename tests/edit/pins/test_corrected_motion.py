@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from scope.scope_addon.edit.clip import clip_from_motion
+from scope.scope_addon.edit.clip import Clip, clip_from_motion
 from scope.scope_addon.edit.pins.corrected_motion import corrections_of, shot_of, uncorrected, with_corrections
 from scope.scope_addon.edit.pins.corrections import Contact, Exchange, FeetOnFloor, Interpolation, Pin, Upright
 from scope.scope_addon.edit.pins.solve_pins import missed
@@ -60,18 +60,47 @@ def test_joints_in_the_camera_are_those_of_the_corrected_pose():
     np.testing.assert_allclose(motion.joints_cam[45] @ T[:3, :3].T + T[:3, 3], world, atol=1e-4)
 
 
-def test_sides_exchanged_before_smoothing_leave_no_mixed_poses():
-    """A detector swaps the sides of the raw motion, and smoothing mixes them at both ends of the span."""
+def swapped():
+    """A capture whose detector swaps the sides from frame 30 to 50; smoothing mixes them at both ends of the span."""
     wrong = swap_sides(TRUTH, BODY, TRUTH.times[30], TRUTH.times[50])
     poses = log(smooth_rotations(wrong.rotations, wrong.times)).reshape(len(TRUTH), -1)
     raw = log(wrong.rotations).reshape(len(TRUTH), -1)
     trans = TRUTH.root - BODY.rest_joints(np.zeros(BODY.P))[0]
-    captured = made_motion(BODY, poses, trans, RATE, poses_raw=raw)
+    return made_motion(BODY, poses, trans, RATE, poses_raw=raw)
+
+
+def test_sides_exchanged_before_smoothing_leave_no_mixed_poses():
+    captured = swapped()
     fixed = with_corrections(captured, BODY, (Exchange(30, 50),))
     right = smooth_rotations(TRUTH.rotations, TRUTH.times)
     for strength in (1.0, 1.0001):
         assert np.degrees(angle(smoothed(BODY, captured, strength).rotations, right).max()) > 20
         assert np.degrees(angle(smoothed(BODY, fixed, strength).rotations, right).max()) < 1
+
+
+@pytest.mark.parametrize("pin_first", [False, True])
+def test_sides_are_exchanged_before_pins(pin_first):
+    """So a pin is on the limb that has its name in the user's eyes, and at the truth it changes nothing."""
+    captured = swapped()
+    right = Clip(TRUTH.times, smooth_rotations(TRUTH.rotations, TRUTH.times), TRUTH.root).joints(BODY, captured.betas)
+    at = right[40, NAMES.index("left_wrist")]
+    pin = Pin(40, "left_wrist", tuple(shot_of(captured).project(40, at)))
+    exchange = Exchange(30, 50)
+    fixed = with_corrections(captured, BODY, (pin, exchange) if pin_first else (exchange, pin))
+    alone = with_corrections(captured, BODY, (exchange,))
+    for motion in (fixed, alone):
+        joints = clip_from_motion(BODY, motion, raw=False).joints(BODY, motion.betas)
+        assert np.linalg.norm(joints - right, axis=-1).max() < 0.005
+    wrong = clip_from_motion(BODY, captured, raw=False).joints(BODY, captured.betas)
+    assert np.linalg.norm(wrong - right, axis=-1)[40].max() > 0.1
+
+
+def test_sides_exchanged_at_frames_that_the_motion_lacks_are_kept_and_change_nothing():
+    half, exchange = motion_of(TRUTH.rows(slice(40)), noise=0.05), Exchange(80, 85)
+    motion = with_corrections(half, BODY, (exchange,))
+    assert corrections_of(motion) == (exchange,)
+    for name in ("poses", "trans", "poses_raw", "trans_raw", "joints_cam"):
+        np.testing.assert_array_equal(getattr(motion, name), getattr(half, name), err_msg=name)
 
 
 def test_damaged_corrections_are_an_error():

@@ -42,10 +42,9 @@ def test_the_height_is_that_of_the_lowest_vertex_of_the_foot(foot, parts):
     assert foot_height(clip, BODY, MOTION.betas, clip.times[20], foot) == pytest.approx(heights.min(), abs=1e-6)
     trans = clip.root[[20]] - BODY.rest_joints(MOTION.betas)[0]
     R, t = BODY.forward_kinematics(clip.rotations[[20]], trans, MOTION.betas)
-    strongest = BODY.skin_joints[np.arange(len(BODY.skin_joints)), BODY.skin_weights.argmax(1)]
     lowest = []
     for part in (NAMES.index(n) for n in NAMES if n.endswith(("ankle", "foot")) and (foot == LOWER or foot in n)):
-        own = BODY.rest_vertices(MOTION.betas)[strongest == part] - BODY.rest_joints(MOTION.betas)[part]
+        own = BODY.rest_vertices(MOTION.betas)[BODY.strongest_joints == part] - BODY.rest_joints(MOTION.betas)[part]
         lowest.append((own @ R[0, part].T + t[0, part])[:, 2].min())
     assert heights.min() == pytest.approx(min(lowest), abs=1e-3)
 

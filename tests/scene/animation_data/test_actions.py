@@ -91,6 +91,23 @@ def test_cycles_come_before_the_users_own_modifiers_and_keep_them(cube):
         assert [m.mode_before for m in third.modifiers] == ["REPEAT"]
 
 
+@pytest.mark.parametrize("interpolation", ["LINEAR", "BEZIER"])
+@pytest.mark.parametrize("off", [-0.009, -0.003, 0.003, 0.009])
+def test_a_key_within_a_hundredth_of_a_frame_is_changed_as_where_blender_inserts_one(cube, off, interpolation):
+    channels = actions.Channels(cube, bpy.data.actions.new("a"))
+    frames = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 4.012, 5.0, 6.0])
+    new, values = np.array([1.5, 3.0 + off, 4.0115, 5.0 + off, 5.5]), np.arange(20.0, 25.0)
+    curves = [channels.write(path, frames, frames, interpolation)[0] for path in ('["x"]', '["y"]')]
+    actions.change_keys(curves[0], new, values)
+    for frame, value in zip(new.tolist(), values.tolist(), strict=True):
+        curves[1].keyframe_points.insert(frame, value, options={"FAST"})
+    curves[1].update()
+    found = actions.read_keys(curves[0])
+    np.testing.assert_array_equal(found, actions.read_keys(curves[1]))
+    expected = [[0, 0], [1, 1], [1.5, 20], [2, 2], [3, 21], [4, 4], [4.012, 22], [5, 23], [5.5, 24], [6, 6]]
+    np.testing.assert_allclose(found, expected, atol=1e-6)
+
+
 @pytest.mark.parametrize("interpolation", actions.INTERPOLATION)
 def test_keys_that_are_added_are_those_that_blender_inserts(cube, interpolation):
     """Whatever the handles, kinds and selection of the keys around them."""

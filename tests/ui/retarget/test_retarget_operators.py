@@ -51,6 +51,15 @@ def test_travel_scale_multiplies_the_path(rig):
     assert legs == pytest.approx(1.3, abs=0.01)  # the size of this rig
 
 
+@pytest.mark.parametrize("root", ["bone", "object", "in-place"])
+def test_the_scale_of_the_path_is_reported_where_there_is_a_path(rig, capfd, root):
+    bpy.context.scene.scope_retarget.root = root
+    bpy.ops.scope.retarget()
+    said = capfd.readouterr().out
+    assert f"'{rig.name}' is now animated by the action '{rig.animation_data.action.name}'" in said
+    assert ("positions on the floor scaled by 1.3" in said) is (root != "in-place")  # the size of this rig
+
+
 def test_saving_a_bone_map_overwrites_bone_maps_only(rig, tmp_path):
     bpy.ops.scope.guess_bones()
     saved, other, empty = (tmp_path / name for name in ("bones.json", "package.json", "empty.json"))

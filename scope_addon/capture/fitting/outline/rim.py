@@ -52,7 +52,7 @@ class OutlineMeasurer:
     def __init__(self, body: Body, camera: Camera) -> None:
         self._source, self._camera = body, camera
         self._shaped = np.full(body.P, np.nan), body
-        part = np.take_along_axis(body.skin_joints, body.skin_weights.argmax(axis=1)[:, None], axis=1)[:, 0]
+        part = body.strongest_joints
         names = [body.joint_names[i] for i in part]
         usable = np.array([not any(key in name for key in _LEFT_OUT) for name in names])
         usable &= np.bincount(body.faces.ravel(), minlength=len(part)) > 0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the windows of a long clip begin and end.
+"""Where the windows of a clip begin and end.
 
 All tracking starts afresh in each window, so what is observed in it depends on its frames alone. It does so a little
 before the window, for the frames in which people are found and the regions settle; these frames belong to the window

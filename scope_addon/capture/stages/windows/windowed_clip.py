@@ -34,7 +34,7 @@ from ...perception.observation import Observation
 from ...perception.region import Region
 from ...tracking.landmarks.mask_schedule import MaskSchedule
 from ...tracking.track import Track
-from ..clock import COMPILING, Progress, StageClock
+from ..clock import COMPILING, FINDING, Progress, StageClock
 from ..footage import Footage, Listeners, given_camera
 from ..networks import Trackers, network_threads, open_trackers
 from .joined_windows import JoinedWindows
@@ -44,8 +44,6 @@ from .window_file import load_window, save_window
 from .window_record import WindowRecord
 from .window_run import WindowRun
 from .window_sequence import frame_pairs, run_windows
-
-FINDING = "finding the person"  # a stage
 
 
 class WindowedClip:

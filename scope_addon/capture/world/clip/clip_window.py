@@ -30,7 +30,7 @@ from .....solver.compiled.tree import Tree, with_fixed_shape
 from ....kinematics.body_surface import BodySurface
 from ....kinematics.contact_points import contact_point_positions
 from ...fitting.prepared_track import PreparedTrack
-from ...fitting.weights import ROBUST, clip_stages
+from ...fitting.weights import CLIP_STEPS, ROBUST, clip_stages
 from ..camera_path import CameraPath
 from .body_planes import ENTERS_M, with_planes
 from .resting_places import resting_places
@@ -70,11 +70,11 @@ class ClipWindow:
         states: Sequence[State],
         prior: MotionPrior,
         covariance: bool = False,
-        steps: int | None = None,
+        steps: int = CLIP_STEPS,
     ) -> MotionFit:
         """Fit some of the frames together.
 
-        :param steps: the most iterations, fewer than in the finished motion.
+        :param steps: the most iterations; fewer than by default where the motion is not kept.
         """
         prepared, frames, stands = self.prepared, self.frames[rows], None
         if prepared.stance is not None:
@@ -140,8 +140,8 @@ class ClipWindow:
     def _priors(self) -> Priors:
         return replace(self.prepared.priors, shape_mean=None, shape_information=None)
 
-    def _options(self, steps: int | None = None) -> Options:
-        return replace(ROBUST, stages=clip_stages(self.prepared.weights, steps or 50))
+    def _options(self, steps: int = CLIP_STEPS) -> Options:
+        return replace(ROBUST, stages=clip_stages(self.prepared.weights, steps))
 
     def _views(self, rows: slice) -> Sequence[Measurements] | Sequence[Sequence[View]]:
         measured, frames, path = self.measured[rows], self.frames[rows], self.path

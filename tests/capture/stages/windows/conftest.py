@@ -12,10 +12,13 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from scope.scope_addon.capture.camera.intrinsics import assumed_camera
+from scope.scope_addon.capture.camera.intrinsics import Camera, assumed_camera
+from scope.scope_addon.capture.fitting.background_estimators import BackgroundEstimators
+from scope.scope_addon.capture.fitting.focal_fits import FocalFits
 from scope.scope_addon.capture.media.frame import Frame
 from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.options import CaptureOptions
+from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.stages.clock import StageClock
 from scope.scope_addon.capture.stages.footage import Listeners
 from scope.scope_addon.capture.stages.windows.plan import plan_windows
@@ -24,6 +27,7 @@ from scope.scope_addon.capture.stages.windows.windowed_clip import WindowedClip
 from scope.scope_addon.capture.tracking.landmarks import tracking_networks
 from scope.scope_addon.capture.tracking.track import Track
 from scope.scope_addon.errors import CancelledError
+from scope.solver import load_body
 
 from ...fake_people import FakeDetector, FakeLandmarks, Person, pictures
 
@@ -43,7 +47,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def windows_of(monkeypatch: pytest.MonkeyPatch, folder: Path) -> Callable[..., list[Track]]:
+def windows_of(monkeypatch: pytest.MonkeyPatch, folder: Path, fitted: list[Observation]) -> Callable[..., list[Track]]:
     """``windows_of(options, parts=None, unfinished=None, stop_at=inf)``: the tracks of the clip.
 
     They are joined from a folder of windows, or what is found is kept in a folder; cancelled at a frame.
@@ -62,12 +66,29 @@ def windows_of(monkeypatch: pytest.MonkeyPatch, folder: Path) -> Callable[..., l
         with open_video(folder) as video, ThreadPoolExecutor(2) as pool:
             clip = WindowedClip(video, plan_windows(video, options.window_s), options, StageClock(), pool, unfinished)
             camera = assumed_camera(video.width, video.height, video.width)
-            background: Any = SimpleNamespace(wait_for_solver=lambda progress: None, camera=lambda *_: camera)
-            live: Any = None
-            listeners = Listeners(progress, lambda *_: None)
-            return clip.observe(background, live, listeners, parts)[1]
+            live: Any = SimpleNamespace(load=lambda: None)
+            fitted.clear()
+            with BackgroundEstimators(camera, video.width, video.height, live, RecordedFits(fitted)) as background:
+                return clip.observe(background, live, Listeners(progress, lambda *_: None), parts)[1]
 
     return observed
+
+
+class RecordedFits(FocalFits):
+    """Keeps the observations that the focal length is estimated from, and fits nothing."""
+
+    def __init__(self, fitted: list[Observation]) -> None:
+        super().__init__(load_body("scope"))
+        self._fitted = fitted
+
+    def costs(self, observation: Observation, camera: Camera) -> None:
+        self._fitted.append(observation)
+
+
+@pytest.fixture
+def fitted() -> list[Observation]:
+    """The people that the focal length of the last clip was estimated from."""
+    return []
 
 
 @pytest.fixture(scope="package")

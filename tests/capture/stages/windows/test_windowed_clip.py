@@ -4,17 +4,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scope.scope_addon.capture.media.frame import Frame
 from scope.scope_addon.capture.media.video import Video
+from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.stages.windows import joined_windows
 from scope.scope_addon.capture.stages.windows.observe_part import count_windows, observe_windows
 from scope.scope_addon.capture.tracking.track import Track
 
-from .conftest import FRAMES, SMALL, assert_same, options
+from .conftest import FRAMES, LARGE, SMALL, WINDOW_S, assert_same, options
 
 
 def places(track: Track) -> np.ndarray:
@@ -49,6 +51,20 @@ def test_the_same_person_is_followed_across_a_seam_where_somebody_larger_stands(
     monkeypatch.setattr(joined_windows, "missed_people", lambda before, after: False)
     (track,) = windows_of(options())
     assert not track.seen[61:74].any()  # what the rule prevents
+
+
+def test_the_focal_length_is_estimated_from_the_same_people_in_one_window_and_in_several(
+    windows_of: Callable[..., list[Track]], fitted: list[Observation]
+) -> None:
+    """The first one, and others after at least 0.2, 0.4, 0.8, 1.6 and 3.2 seconds; of two people, the larger one."""
+    found = []
+    for window_s in (WINDOW_S, 60.0):
+        windows_of(replace(options(2), window_s=window_s))
+        found.append([person.keypoints_px[[23, 24]].mean(axis=0) for person in fitted])
+    people = {0: SMALL, 6: SMALL, 18: SMALL, 42: LARGE, 90: SMALL, 186: SMALL}
+    truth = [who.place(t) + who.size_px * who.body(t)[[23, 24], :2].mean(axis=0) for t, who in people.items()]
+    np.testing.assert_allclose(found[0], truth, atol=2.0)  # the trackers smooth
+    np.testing.assert_allclose(found[1], found[0], atol=0.01)
 
 
 def test_windows_that_are_missing_or_damaged_are_observed_by_the_process_that_joins(
