@@ -174,8 +174,8 @@ def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) ->
         args, unknown = build_parser().parse_known_args(argv)
         if unknown:
             advice = "; use scope batch for several clips" if not unknown[0].startswith("-") else ""
-            if file := next((each for each in unknown if each.startswith("-") and Path(each).exists()), ""):
-                advice = f"; write ./{file} for the file of that name"
+            if file := next((each for each in unknown if each.startswith("-") and os.path.exists(each)), ""):
+                advice = f"; to capture the file of that name, write ./{file}"
             raise UsageError(f"unknown arguments: {' '.join(unknown)} (see scope {args.command} --help{advice})")
         args.program = list(program)
         given = [*program, *(sys.argv[1:] if argv is None else argv)]

@@ -82,7 +82,7 @@ def internal_error_message(error: Exception) -> str:
 def system_error_message(error: OSError | MemoryError) -> str:
     """Describe an error of the operating system, and what to do."""
     if isinstance(error, PermissionError):
-        advice = "check who may read and write there"
+        advice = "check the permissions of that file or folder, and whether another program has it open"
     elif isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
         advice = "choose a shorter name"
     else:

@@ -150,7 +150,8 @@ class Body:
         """Return the pose of every part.
 
         :param rotations: (..., K+1, 3, 3); row 0 the root's rotation into the target frame, the others Ω_i.
-        :param trans: (..., 3) metres, target frame; the root joint comes to lie at J_0(β) + trans.
+        :param trans: (3,), or one row for each frame (..., 3): metres, target frame; the root joint comes to lie at
+            J_0(β) + trans.
         :param betas: (P,); zeros if None.
         :return: R (..., K+1, 3, 3) and t (..., K+1, 3): part to target frame; t are the joints.
         :raises ShapeError: rotations, trans or betas have another shape.

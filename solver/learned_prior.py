@@ -37,6 +37,7 @@ class JointPrior:
         check_list(self.names, "Names of the joint prior", "joint")
         for k, name in enumerate(self.names):
             check_type(name, str, f"Name {k} of the joint prior")
+        object.__setattr__(self, "names", tuple(self.names))
         shape = len(self.names), joint_flow.SIZE
         object.__setattr__(self, "parameters", as_array(self.parameters, shape, "Parameters of the joint prior"))
 
@@ -46,8 +47,10 @@ class JointPrior:
         :raises InvalidValueError: the prior has no joint of that name.
         """
         if not isinstance(joint, str) or joint not in self.names:
-            what = repr(joint) if isinstance(joint, str) else f"that is {described(joint)}"
-            raise InvalidValueError(f"The prior has no joint {what}; it has {', '.join(self.names)}.")
+            known = ", ".join(self.names)
+            if not isinstance(joint, str):
+                raise InvalidValueError(f"joint must be a name, but is {described(joint)}; the prior has {known}.")
+            raise InvalidValueError(f"The prior has no joint {joint!r}; it has {known}.")
         row: Array = self.parameters[self.names.index(joint)]
         return row
 

@@ -51,7 +51,7 @@ def as_number(value: Any, name: str) -> float:
             raise TypeError
         return float(value)
     except OverflowError:
-        raise InvalidValueError(f"{name} must be a number that fits in 64 bits, but is too large for them.") from None
+        raise InvalidValueError(f"{name} must be a number that fits in 64 bits, but is too large.") from None
     except (TypeError, ValueError):
         raise InvalidValueError(f"{name} must be a number, but is {described(value)}.") from None
 

@@ -94,6 +94,7 @@ def test_unreadable_footage_gives_one_sentence_status_1_and_no_file(tmp_path, ca
         (["capture", "--start", "00:00:00:99", "-o", "{tmp}/a.npz"], 2, "00:00:00:99 does not exist"),
         (["capture", "https://example.com/walk.mp4", "-o", "{tmp}/a.npz"], 1, "download"),
         (["frobnicate"], 2, "frobnicate"),
+        (["capture", "a.mp4", "--unknown=" + 300 * "x"], 2, "unknown arguments: --unknown=xxx"),
         ([], 2, "COMMAND"),
     ],
 )
@@ -111,7 +112,10 @@ def test_a_file_whose_name_begins_with_a_dash_is_given_with_its_folder(tmp_path,
     Path("-walk.mp4").touch()
     status, _, err = run(capsys, "capture", "-walk.mp4")
     assert status == 2
-    assert "unknown arguments: -walk.mp4 (see scope capture --help; write ./-walk.mp4 for the file of that name)" in err
+    assert (
+        "unknown arguments: -walk.mp4 (see scope capture --help; to capture the file of that name, write ./-walk.mp4)"
+        in err
+    )
     status, _, err = run(capsys, "capture", "./-walk.mp4", "-o", "out.npz")
     assert status == 1
     assert "-walk.mp4 is empty" in err

@@ -51,7 +51,7 @@ def test_libraries_that_cannot_be_loaded(tmp_path) -> None:
     ("number", "advice"),
     [
         (errno.ENOSPC, "free disk space or memory and try again"),
-        (errno.EACCES, "check who may read and write there"),
+        (errno.EACCES, "check the permissions of that file or folder, and whether another program has it open"),
         (errno.ENAMETOOLONG, "choose a shorter name"),
     ],
 )

@@ -118,6 +118,8 @@ def run_live(
     execution = Execution(options.provider)
     people = options.people if options.people > 1 else None  # None: the largest one
     tracker = PeopleTracker(options.quality, network_threads(options.threads, execution), people, execution=execution)
+    for warning in execution.warnings:  # fewer cores than threads, or a provider that fell back
+        listeners.say(warning)
     LiveBody(body, assumed_camera(*CAMERA_SIZE, CAMERA_SIZE[0])).load()
     statistics = Statistics()
     reader = NewestFrame(source, clock, options.reconnect_s, listeners.say, listeners.received)

@@ -22,10 +22,14 @@ def in_one_line(cause: Exception) -> str:
 def as_path(value: Any, name: str) -> Path:
     """Return the path of a file.
 
-    :raises InvalidValueError: it is neither a text nor a path.
+    :raises InvalidValueError: it is neither a text nor a path, or contains a null character.
     """
     if not isinstance(value, (str, os.PathLike)) or not isinstance(os.fspath(value), str):
         raise InvalidValueError(f"{name} must be a str or a pathlib.Path, but is {described(value)}.")
+    if "\0" in os.fspath(value):  # what opens files refuses it with a plain ValueError
+        raise InvalidValueError(
+            f"{name} must be the name of a file, but contains a null character: {os.fspath(value)!r}."
+        )
     return Path(value)
 
 

@@ -118,7 +118,7 @@ def fit_motion(
     for f, frame in enumerate(frames):
         views_of(frame, f"frames[{f}]")
     check_type(motion, MotionPrior, "motion")
-    if motion.weighs_by_default:  # weights of their own are given by those who know how far apart their frames are
+    if _weighs_by_default(motion):  # weights of their own are given by those who know how far apart their frames are
         warn_of_frame_numbers(clock)
     check_type(stands, (StandingPoints, type(None)), "stands")
     check_weight(focal_weight, "focal_weight")
@@ -136,6 +136,12 @@ def fit_motion(
         terms = MotionTerms.make(tree, clock, motion, StandingPoints() if stands is None else stands)
         clip = _Clip(tree, frames, terms, init, _Settings(priors, options, focal, focal_weight, covariance), pool)
         return clip.solve(make_tree(body, focal), shape, overlapping(clock, window, overlap))
+
+
+def _weighs_by_default(motion: MotionPrior) -> bool:
+    """Return whether the weights of the root's acceleration are the default ones, those of 60 frames per second."""
+    default = MotionPrior.root_rotation, MotionPrior.root_position
+    return (motion.root_rotation, motion.root_position) == default
 
 
 def _checked_times(times: ArrayLike, frames: int) -> Array:

@@ -49,12 +49,6 @@ class MotionPrior:
         for name in ("robust_root_rotation", "robust_root_position"):
             check_robust(getattr(self, name), f"MotionPrior.{name}")
 
-    @property
-    def weighs_by_default(self) -> bool:
-        """Whether the weights of the root's acceleration are the default ones, those of 60 frames per second."""
-        default = MotionPrior.root_rotation, MotionPrior.root_position
-        return (self.root_rotation, self.root_position) == default
-
     def packed(self, K: int) -> Array:
         """Return (K+2, 2) weights and 1/sigma: the root's rotation, joints 1..K, the root's position.
 

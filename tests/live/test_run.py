@@ -32,6 +32,14 @@ def test_pictures_of_another_shape_are_said_and_begin_new_estimates(body):
     assert said[0].startswith("fake now delivers images of another shape (96 × 160): body, lens and floor are")
 
 
+@pytest.mark.usefixtures("networks")
+def test_more_threads_than_cores_are_said(body):
+    said = []
+    source = FakeSource([0.0], ends=True, images=[WIDE])
+    run_live(source, body, LiveOptions(threads=5000), [], Listeners(say=said.append), FakeClock())
+    assert said[0].startswith("5000 threads were requested, but there are only ")
+
+
 def test_a_recording_ends_where_pictures_of_another_shape_begin(body, tmp_path):
     def people(camera):
         return SimpleNamespace(sessions=[SimpleNamespace(camera=camera)] * 2)

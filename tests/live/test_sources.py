@@ -15,6 +15,7 @@ from scope.scope_addon.live.sources import is_stream, newest_frame, open_source,
 from scope.scope_addon.live.sources.newest_frame import NewestFrame
 from scope.scope_addon.live.sources.stream import DAMAGED_S
 
+from ..capture.media.corner_picture import corner_image, corners
 from ..capture.media.made_video import patch_track_header, write_video
 from .fake_source import FakeClock
 from .mjpeg_server import mjpeg_server
@@ -97,6 +98,14 @@ def test_a_stream_s_rotation_and_pixel_aspect_are_applied(tmp_path):
         rotated = next(open_source(address).pictures(FakeClock())).image_rgb.astype(int)
     assert rotated.shape == (320, 96, 3)
     assert rotated[:, 60:].mean() - rotated[:, :36].mean() > 150
+
+
+def test_a_stream_s_mirroring_is_applied(tmp_path):
+    path = write_video(tmp_path / "a.mp4", [corner_image()] * 4, codec="mjpg")
+    patch_track_header(path, (-65536, 0, 0, 0, 65536, 0, 0, 0, 1 << 30))
+    with served(tmp_path, "a.mp4", path.read_bytes()) as address:
+        mirrored = next(open_source(address).pictures(FakeClock())).image_rgb
+    assert corners(mirrored) == "grwb"
 
 
 def moving(count, size=(160, 96), first=0):

@@ -35,7 +35,7 @@ def estimate_fps(reader: PyavReader) -> Fraction:
     """Estimate the rate from the timestamps of the next 30 frames, for a container that does not report it."""
     times: list[float] = []
     while len(times) < 30 and (decoded := reader.read()) is not None:
-        times.append(decoded[0])
+        times.append(decoded[0] or 0.0)
     steps = np.diff(times)
     steps = steps[steps > 0]
     return (exact_fps(round(1 / float(np.median(steps)), 2)) if len(steps) else None) or DEFAULT_FPS

@@ -46,6 +46,22 @@ def _size(width: float, height: float, aspect: float) -> tuple[int, int]:
     return (round(width * aspect), round(height)) if aspect > 1 else (round(width), round(height / aspect))
 
 
+def next_time(before: float | None, given: float | None, period: float) -> float:
+    """Return the time of a frame in seconds, later than that of the frame before.
+
+    :param before: time of the frame before; None for the first one.
+    :param given: in the container; some repeat one, and some have none.
+    :param period: of the frame rate, in seconds.
+    """
+    if given is None:
+        return 0.0 if before is None else before + period
+    if before is None or given > before:
+        return given
+    # A repeated time must not move the frames after it; where the times stand still, they advance by the frame rate.
+    share = next((step for late, step in ((0.25, 0.5), (0.75, 0.25)) if before - given < late * period), 1.0)
+    return before + share * period
+
+
 def upright(path: Path, image: NDArray[np.uint8], aspect: float, clockwise_deg: int) -> NDArray[np.uint8]:
     """Stretch an image (H, W, 3) of a file or stream until its pixels are square, then rotate it.
 
@@ -100,6 +116,19 @@ def _bt601_rgb(frame: av.VideoFrame) -> NDArray[np.uint8]:
     return cast(NDArray[np.uint8], image)
 
 
+def upright_frame(path: Path, frame: av.VideoFrame, image: NDArray[np.uint8], aspect: float) -> NDArray[np.uint8]:
+    """Mirror and rotate a decoded frame as its display matrix says, and stretch it until its pixels are square.
+
+    :param path: name of the file or stream, for messages.
+    :param image: of the frame, (H, W, 3) uint8 RGB.
+    :param aspect: width of a pixel over its height.
+    :raises VideoError: it is too large or too long (see `image_size`).
+    """
+    if _is_mirrored(frame):  # the matrix is this mirroring, followed by the rotation
+        image = cast(NDArray[np.uint8], cv2.flip(image, 0))
+    return upright(path, image, aspect, -round(frame.rotation))
+
+
 def _is_mirrored(frame: av.VideoFrame) -> bool:
     """Whether a frame's display matrix mirrors it, which PyAV's angle of rotation does not say."""
     matrix = frame.side_data.get("DISPLAYMATRIX")
@@ -149,7 +178,8 @@ class PyavReader:
 
     ``rate``: frames per second, 0 if the container does not say; ``frame_count`` according to the container;
     ``shown_s``: for how many seconds it is shown, None if unknown. A video that was cut without re-encoding holds more
-    frames than it shows.
+    frames than it shows. ``is_mirrored``, ``clockwise_deg``: whether the last frame that was read had to be mirrored,
+    and by how much it was rotated then.
 
     :raises VideoError: PyAV is not installed or cannot open the file, or its images are too large or too long (see
         `image_size`).
@@ -160,8 +190,11 @@ class PyavReader:
         self._failure, container = _open_with_pyav(path)
         stream = None if container is None else _film(container)
         if container is not None and stream is None and container.streams.audio:
-            raise VideoError(f"{path} contains only sound; give the file that contains the images")
+            container.close()
+            raise VideoError(f"{path} contains only audio; choose the file with the video")
         if container is None or stream is None or not stream.codec_context:
+            if container is not None:
+                container.close()
             raise VideoError(
                 f"{path} is not a video or image that can be decoded; copy it again if it may be incomplete, or "
                 "convert it to an H.264 .mp4"
@@ -170,8 +203,13 @@ class PyavReader:
         self._stream.thread_type = "AUTO"
         self._frames: Iterator[av.VideoFrame] = self._decoded()
         self._start = self._stream.start_time or 0  # in units of the stream
+        self.is_mirrored, self.clockwise_deg = False, 0
         self._aspect = float(self._stream.sample_aspect_ratio or 1)
-        check_size(path, *_size(self._stream.width, self._stream.height, self._aspect))
+        try:
+            check_size(path, *_size(self._stream.width, self._stream.height, self._aspect))
+        except VideoError:
+            container.close()
+            raise
         self.rate = float(self._stream.guessed_rate or self._stream.average_rate or 0)
         duration_s = (container.duration or 0) / 1e6
         self.frame_count = float(self._stream.frames or round(duration_s * self.rate))
@@ -198,40 +236,41 @@ class PyavReader:
             except (self._failure, OSError, ValueError):
                 damaged += 1
 
-    def _time(self, frame: av.VideoFrame) -> float:
+    def _time(self, frame: av.VideoFrame) -> float | None:
         base = self._stream.time_base
         if frame.pts is None or not base:
-            return 0.0
+            return None
         milliseconds = (frame.pts - self._start) * (base.numerator / base.denominator) * 1000
         return milliseconds / 1000
 
-    def read(self) -> tuple[float, NDArray[np.uint8]] | None:
+    def read(self) -> tuple[float | None, NDArray[np.uint8]] | None:
         """Decode the next frame.
 
-        :return: time in seconds and the upright image (H, W, 3) uint8 RGB; None at the end, or where decoding fails.
+        :return: time in seconds, None if the container has none, and the upright image (H, W, 3) uint8 RGB; None at the
+            end, or where decoding fails.
         """
         frame = next(self._frames, None)
         if frame is None:
             return None
-        image = _bt601_rgb(frame)
-        if _is_mirrored(frame):  # its matrix is this mirroring, followed by the rotation
-            image = cast(NDArray[np.uint8], cv2.flip(image, 0))
-        return self._time(frame), upright(self._path, image, self._aspect, -round(frame.rotation))
+        self.is_mirrored, self.clockwise_deg = _is_mirrored(frame), -round(frame.rotation) % 360
+        return self._time(frame), upright_frame(self._path, frame, _bt601_rgb(frame), self._aspect)
 
-    def skip_to(self, seconds: float, fps: Fraction) -> int:
+    def skip_to(self, seconds: float, fps: Fraction) -> tuple[int, float | None]:
         """Skip to the first frame at or after a time.
 
         Seeks if the timestamps tell which frame the seek has led to, which saves decoding; else decodes frame by frame.
 
         :param fps: rate by which an index is converted to a time.
-        :return: index of the frame that is read next; the number of frames if the video ends before.
+        :return: index of the frame that is read next, or the number of frames if the video ends before; and the time of
+            the frame before, None if it was not decoded.
         """
         if seconds > _MIN_SEEK_S and self._seek(seconds - _MIN_SEEK_S / 2):
             frame = next(self._frames, None)
-            time = 0.0 if frame is None else self._time(frame)
-            index = round(time * fps)
-            if frame is not None and frame.pts is not None and time < seconds and abs(time - index / fps) < 0.5 / fps:
-                return self._skip(itertools.chain([frame], self._frames), index, seconds, fps)
+            time = None if frame is None else self._time(frame)
+            if frame is not None and time is not None and time < seconds:
+                index = round(time * fps)
+                if abs(time - index / fps) < 0.5 / fps:
+                    return self._skip(itertools.chain([frame], self._frames), index, seconds, fps)
             self._seek(0.0)
         return self._skip(self._frames, 0, seconds, fps)
 
@@ -247,17 +286,19 @@ class PyavReader:
         self._frames = self._decoded()
         return True
 
-    def _skip(self, frames: Iterator[av.VideoFrame], index: int, seconds: float, fps: Fraction) -> int:
-        """Skip frames, the first of which has an index; return the index of the one that is read next."""
-        time = -1.0
+    def _skip(
+        self, frames: Iterator[av.VideoFrame], index: int, seconds: float, fps: Fraction
+    ) -> tuple[int, float | None]:
+        """Skip frames, the first of which has an index; return as `skip_to`."""
+        before: float | None = None
         for frame in frames:
-            stamp = self._time(frame)
-            time = stamp if stamp > time else time + float(1 / fps)
+            time = next_time(before, self._time(frame), float(1 / fps))
             if time >= seconds - 1e-6:
                 self._frames = itertools.chain([frame], frames)
                 break
+            before = time
             index += 1
-        return index
+        return index, before
 
     def close(self) -> None:
         """Close the file."""

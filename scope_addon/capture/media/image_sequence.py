@@ -102,11 +102,11 @@ class SequenceReader:
         self._next += 1
         return time, picture.rgb
 
-    def skip_to(self, seconds: float, fps: Fraction) -> int:
+    def skip_to(self, seconds: float, fps: Fraction) -> tuple[int, None]:
         """Skip to the first picture at or after a time, and return its index."""
         while self._next < len(self._sequence.paths) and self._sequence.time(self._next, fps) < seconds - 1e-6:
             self._next += 1
-        return self._next
+        return self._next, None
 
     def close(self) -> None:
         """Do nothing: no file is open between two pictures."""

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from ...errors import VideoError
 from .frame import Frame
 from .frame_rate import DEFAULT_FPS, estimate_fps, exact_fps
-from .frame_readers import PyavReader
+from .frame_readers import PyavReader, next_time
 from .image_sequence import PictureSequence, SequenceReader, find_sequence
 from .quicktime import focal_35mm
 from .stills.still_images import is_picture, read_picture
@@ -95,7 +95,7 @@ class Video:
 
         Their indices may differ from those of the whole iteration by a constant, where the frame rate varies. Whether
         images and times are the same depends on the file: one that does not mark its keyframes well gives other images
-        at first, and one without times, such as a bare stream, other times. The caller has to compare.
+        at first, and one that repeats times at a keyframe other times there. The caller has to compare.
 
         :param start_s: within the range; it must have no frame rate of its own.
         """
@@ -202,11 +202,17 @@ def _open_moving(path: Path, requested: FootageRange) -> Video:
             raise VideoError(f"{path} can be opened, but none of its frames can be decoded; convert it to H.264 .mp4")
         fps = exact_fps(reader.rate) or estimate_fps(reader)
         count = reader.frame_count
+        flip = ("Y" if reader.clockwise_deg % 180 == 0 else "X") if reader.is_mirrored else ""
     height, width = first[1].shape[:2]
     claimed = reader.shown_s * fps if reader.shown_s else count
     frame_count = max(1, round(claimed)) if 0 < claimed < 1e9 else 1
     wanted = requested.at_rate(fps)
     video = Video(path, width, height, fps, frame_count, focal_35mm(path), wanted=wanted)
+    if flip:
+        video.warnings.append(
+            f"{path.name} is mirrored by its metadata, which Blender ignores; there, switch on Flip {flip} of the "
+            "camera's background image"
+        )
     if wanted.start_s > 0 and count > 0 and wanted.start_s * fps > frame_count + fps:
         raise VideoError(
             f"{path} lasts {frame_count / float(fps):.1f} s, but the start is at {wanted.start_s:g} s; start earlier"
@@ -220,22 +226,6 @@ def _open_moving(path: Path, requested: FootageRange) -> Video:
                 "so each was used once"
             )
     return video
-
-
-def _next_time(time: float, given: float, period: float) -> float:
-    """Return the time of a frame, later than that of the frame before.
-
-    :param time: of the frame before.
-    :param given: in the container; some repeat one, and some have none, which is 0 here.
-    :param period: of the frame rate.
-    """
-    if given > time:
-        return given
-    if given <= 0.0:
-        return time + period
-    # A repeated time must not move the frames after it; where the times stand still, they advance by the frame rate.
-    share = next((step for late, step in ((0.25, 0.5), (0.75, 0.25)) if time - given < late * period), 1.0)
-    return time + share * period
 
 
 class _Decoder:
@@ -285,12 +275,14 @@ class _Decoder:
             self._put(error)
 
     def _decode(self, reader: PyavReader | SequenceReader) -> None:
-        video, index, time = self._video, 0, 0.0
+        video, index = self._video, 0
+        time: float | None = None
         sampler = FrameSampler(video.wanted.fps)
         resized = False
-        first = index = reader.skip_to(video.wanted.start_s, video.source_fps) if video.wanted.start_s > 0 else 0
+        if video.wanted.start_s > 0:
+            index, time = reader.skip_to(video.wanted.start_s, video.source_fps)
         while not self._stop.is_set() and (decoded := reader.read()) is not None:
-            time = decoded[0] if index == first else _next_time(time, decoded[0], float(1 / video.source_fps))
+            time = next_time(time, decoded[0], float(1 / video.source_fps))
             image = decoded[1]
             if time > video.wanted.end_s + 1e-6:
                 break
@@ -306,6 +298,15 @@ class _Decoder:
             return
         if resized:
             self._warn(f"the frame size changes within {video.path.name}; all frames were scaled to the first one's")
+        self._warn_of_end(index, time or 0.0)
+
+    def _warn_of_end(self, index: int, time: float) -> None:
+        """Warn if the file ended early, or was still being written.
+
+        :param index: of the frame that would have come next.
+        :param time: of the last frame, seconds.
+        """
+        video = self._video
         # Both tests: a container that counts frames from its duration is wrong for a variable frame rate.
         missing = video.frame_count - index
         last = min(float((video.frame_count - 1) / video.source_fps), video.wanted.end_s)

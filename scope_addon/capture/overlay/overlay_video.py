@@ -22,7 +22,7 @@ from ....solver.compiled.kernel import cached
 from ....solver.errors import ShapeError
 from ....solver.rotations import exp
 from ...atomic_write import atomic_path, reason
-from ...errors import OutputError
+from ...errors import OutputError, VideoError
 from ...motion import Motion
 from ..camera.intrinsics import scaled_intrinsics
 from ..media.frame import Frame
@@ -295,13 +295,21 @@ class _Painter:
 
 
 def _write_still(path: Path, painter: _Painter, video: Video, index: int) -> None:
-    for frame in video:  # keeps the last one
+    shown: Frame | None = None
+    for frame in video:
+        shown = frame
         if frame.index >= index:
             break
-    ok, data = cv2.imencode(path.suffix, cv2.cvtColor(painter.paint(frame), cv2.COLOR_RGB2BGR))
+    if shown is None:
+        raise _without_frames(video)
+    ok, data = cv2.imencode(path.suffix, cv2.cvtColor(painter.paint(shown), cv2.COLOR_RGB2BGR))
     if not ok:
         raise OutputError(f"cannot encode a {path.suffix} image; choose .png")
     path.write_bytes(data.tobytes())
+
+
+def _without_frames(video: Video) -> VideoError:
+    return VideoError(f"{video.path} has no frames between the given start and end; change one of them")
 
 
 def _shown_s(time_s: float, fps: Fraction, before_s: float) -> float:
@@ -323,3 +331,5 @@ def _write_video(temporary: Path, painter: _Painter, video: Video, path: Path, p
             writer.write(painter.paint(frame), shown_s)
             if progress is not None:
                 progress(frame.index + 1, max(video.frame_count, frame.index + 1))
+        if start_s is None:
+            raise _without_frames(video)

@@ -17,8 +17,9 @@ from ..media.file_names import utf8_name
 if TYPE_CHECKING:
     import av
 
-# Codec, and its options: visually without loss at a size and speed that suit a preview.
-_CODECS = (("libx264", {"preset": "veryfast", "crf": "20"}), ("mpeg4", {"qscale": "4"}))
+# Codec, and its options: visually without loss at a size and speed that suit a preview. No B-frames: MP4 takes its
+# duration from the times of decoding, which B-frames put before those of showing, by seconds at a variable rate.
+_CODECS = (("libx264", {"preset": "veryfast", "crf": "20", "bf": "0"}), ("mpeg4", {"qscale": "4"}))
 _LARGEST = 65535  # of numerator and denominator of MPEG-4's clock
 _TICKS = 60000  # per second, about as many as MPEG-4's clock can have, for images whose times are given
 

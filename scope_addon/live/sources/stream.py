@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ...capture.media.frame_readers import upright
+from ...capture.media.frame_readers import upright_frame
 from ...capture.media.image_size import check_size
 from ...errors import VideoError
 from ..clock import Clock
@@ -135,10 +135,10 @@ class StreamSource:
             ) from error
 
     def _image(self, frame: av.VideoFrame, aspect: float) -> NDArray[np.uint8]:
-        """Return the frame as it is to be shown; phones send what they film upright as rotated."""
+        """Return the frame as it is to be shown; phones send what they film upright as rotated, and may mirror it."""
         check_size(Path(self.name), frame.width, frame.height)
         image = cast(NDArray[np.uint8], frame.to_ndarray(format="rgb24"))
-        return upright(Path(self.name), image, aspect, -round(frame.rotation))
+        return upright_frame(Path(self.name), frame, image, aspect)
 
 
 def _reason(error: Exception) -> str:

@@ -108,7 +108,7 @@ def test_the_narrowest_pictures_are_unknown(width, height):
     tracker = BackgroundTracker(camera, width, height)
     for k in range(3):
         tracker.add(np.full((height, width, 3), 128, np.uint8), k / FPS, [])
-    assert tracker.record().motion(camera, camera, (WIDTH, HEIGHT)).is_static
+    assert tracker.record().motion(camera, camera, (width, height)).is_static
 
 
 def test_a_short_blackout_is_bridged(panorama):

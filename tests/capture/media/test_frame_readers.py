@@ -8,8 +8,10 @@ from contextlib import closing
 from fractions import Fraction
 from pathlib import Path
 
+import av
 import numpy as np
 import pytest
+from scope.scope_addon.capture.media import image_size
 from scope.scope_addon.capture.media.frame_readers import PyavReader, upright
 from scope.scope_addon.errors import VideoError
 
@@ -51,11 +53,53 @@ def test_the_duration_is_that_of_the_time_table(tmp_path, video):
     assert shown_s(slow) == pytest.approx(COUNT * 0.5)
 
 
+def test_the_duration_of_matroska_is_without_what_lies_before_its_first_frame(tmp_path):
+    path = tmp_path / "late.mkv"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("mjpeg", rate=10, width=48, height=32, pix_fmt="yuvj420p")
+        for k in range(5):
+            frame = av.VideoFrame(48, 32, "yuvj420p")
+            for packet in stream.encode(frame):
+                packet.time_base, packet.pts, packet.dts = Fraction(1, 1000), 3000 + 100 * k, 3000 + 100 * k
+                packet.duration = 100
+                container.mux(packet)
+    assert shown_s(path) == pytest.approx(0.5)
+
+
+def test_the_duration_of_a_stream_without_a_container_is_unknown(tmp_path):
+    path = tmp_path / "bare.h264"
+    with av.open(str(path), "w", format="h264") as container:
+        stream = container.add_stream("libx264", rate=10, width=48, height=32, pix_fmt="yuv420p")
+        for _ in range(5):
+            container.mux(stream.encode(av.VideoFrame(48, 32, "yuv420p")))
+        container.mux(stream.encode())
+    assert shown_s(path) is None
+
+
+@pytest.mark.parametrize("reason", ["only audio", "can be read"])
+def test_a_video_that_is_refused_is_closed(tmp_path, monkeypatch, video, reason):
+    path, opened = video, []
+    if reason == "only audio":
+        path = tmp_path / "sound.mp4"
+        with av.open(str(path), "w") as container:
+            stream = container.add_stream("aac", rate=8000)
+            sound = av.AudioFrame.from_ndarray(np.zeros((1, 8000), np.float32), format="fltp", layout="mono")
+            sound.rate = 8000
+            container.mux([*stream.encode(sound), *stream.encode()])
+    monkeypatch.setattr(image_size, "MAX_PIXELS", 100)
+    pyav_open = av.open
+    monkeypatch.setattr(av, "open", lambda *given, **options: opened.append(pyav_open(*given, **options)) or opened[0])
+    with pytest.raises(VideoError, match=reason):
+        PyavReader(path)
+    with pytest.raises(AssertionError, match="not open"):
+        opened[0].seek(0)
+
+
 @pytest.mark.parametrize("index", [0, 7, COUNT - 1])
 def test_the_frame_after_skipping_is_the_one_at_that_time(video, index):
     reader = PyavReader(video)
     try:
-        assert reader.skip_to(index / FPS, Fraction(12)) == index
+        assert reader.skip_to(index / FPS, Fraction(12))[0] == index
         time, image = reader.read()
         assert time == pytest.approx(index / FPS)
         assert abs(float(image.mean()) - 10 * index) < 3  # lossy, and of the range of video
@@ -66,7 +110,7 @@ def test_the_frame_after_skipping_is_the_one_at_that_time(video, index):
 def test_skipping_past_the_end_gives_the_number_of_frames(video):
     reader = PyavReader(video)
     try:
-        assert reader.skip_to(100.0, Fraction(12)) == COUNT
+        assert reader.skip_to(100.0, Fraction(12))[0] == COUNT
         assert reader.read() is None
     finally:
         reader.close()

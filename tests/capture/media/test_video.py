@@ -73,22 +73,51 @@ def test_the_container_rate_is_exact(tmp_path, rate):
     np.testing.assert_allclose([f.timestamp_s for f in video], [float(i / rate) for i in range(10)], atol=1e-6)
 
 
-@pytest.mark.parametrize("again", [1, 2])
-def test_a_repeated_time_does_not_move_what_follows(tmp_path, again):
-    """Each repeated time moved all later frames on by a frame."""
-    shown_ms = np.sort(np.append(np.arange(0, 400, 40), again * [160]))
-    path = tmp_path / "a.mkv"
+def write_times(path: Path, shown_ms: np.ndarray) -> Path:
+    """Write the frames of `ramp` with given times, also repeated ones."""
     with av.open(str(path), "w") as container:
         stream = container.add_stream("mjpeg", rate=25, width=W, height=H, pix_fmt="yuvj420p")
         for time_ms, image in zip(shown_ms, ramp(len(shown_ms)), strict=True):
             for packet in stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")):
                 packet.time_base, packet.pts, packet.dts = Fraction(1, 1000), int(time_ms), int(time_ms)
                 container.mux(packet)
-    with open_video(path) as video:
+    return path
+
+
+@pytest.mark.parametrize("again", [[160], [160, 160], [0], [0, 160]])
+def test_a_repeated_time_does_not_move_what_follows(tmp_path, again):
+    """Each repeated time moved all later frames on by a frame."""
+    shown_ms = np.sort(np.append(np.arange(0, 400, 40), again))
+    with open_video(write_times(tmp_path / "a.mkv", shown_ms)) as video:
         times_ms = np.array([f.timestamp_s for f in video]) * 1000
     is_repeated = np.diff(shown_ms, prepend=-1) == 0
     np.testing.assert_allclose(times_ms[~is_repeated], shown_ms[~is_repeated], atol=1e-6)
     assert (np.diff(times_ms) > 0).all()
+
+
+@pytest.mark.parametrize("start_s", [0.09, 0.1, 0.2, 0.32])
+def test_a_start_is_found_behind_a_repeated_time(tmp_path, start_s):
+    """Each repeated time made it begin a frame early."""
+    path = write_times(tmp_path / "a.mkv", np.array([0, 40, 80, 80, 120, 160, 200, 240, 240, 280, 320, 360]))
+    with open_video(path) as video:
+        whole = [(f.index, f.timestamp_s, f.image_rgb.mean()) for f in video]
+    with open_video(path, VideoRange(start_s=start_s)) as video:
+        part = [(f.index, f.timestamp_s, f.image_rgb.mean()) for f in video]
+    assert part == [frame for frame in whole if frame[1] >= start_s - 1e-6]
+
+
+def test_a_range_of_a_stream_without_times_has_the_times_of_the_whole(tmp_path):
+    path = tmp_path / "bare.h264"
+    with av.open(str(path), "w", format="h264") as container:
+        stream = container.add_stream("libx264", rate=25, width=W, height=H, pix_fmt="yuv420p")
+        for image in ramp(30):
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
+        container.mux(stream.encode())
+    with open_video(path, VideoRange(start_s=0.49, end_s=0.61)) as video:
+        part = list(video)
+    assert [f.index for f in part] == [13, 14, 15]
+    np.testing.assert_allclose([f.timestamp_s for f in part], [0.52, 0.56, 0.6], atol=1e-6)
+    assert [f.image_rgb.mean() for f in part] == pytest.approx([62, 66, 70], abs=3)
 
 
 def test_a_variable_rate_keeps_presentation_times(tmp_path):
@@ -140,7 +169,7 @@ def test_opencvs_ffmpeg_decodes_the_same(tmp_path):
     assert reader.rate == other.get(cv2.CAP_PROP_FPS) == 25
     assert reader.frame_count == other.get(cv2.CAP_PROP_FRAME_COUNT) == 20
     frames = [other.read()[1] for _ in range(20)]
-    assert reader.skip_to(0.2, Fraction(25)) == 5
+    assert reader.skip_to(0.2, Fraction(25))[0] == 5
     for k in range(5, 20):
         time, image = reader.read()
         assert time == pytest.approx(0.04 * k)
@@ -265,8 +294,8 @@ def sound_track(path: Path, cover: bool = False) -> None:
         ("folder.mp4", lambda p: p.mkdir(), "is a folder"),
         ("text.mp4", lambda p: p.write_text("not a film at all\n" * 50), "not a video or image"),
         ("sound.wav", silence, "not a video or image"),
-        ("sound.mp4", sound_track, "contains only sound; give the file that contains the images"),
-        ("cover.mp4", lambda p: sound_track(p, cover=True), "contains only sound"),
+        ("sound.mp4", sound_track, "contains only audio; choose the file with the video"),
+        ("cover.mp4", lambda p: sound_track(p, cover=True), "contains only audio"),
         ("noise.mp4", lambda p: p.write_bytes(np.random.default_rng(0).bytes(20000)), "not a video or image"),
         ("half.png", lambda p: p.write_bytes(encode(".png", corner_image())[:40]), "cannot be decoded"),
         ("cut.mp4", lambda p: p.write_bytes(write_video(p, ramp(9)).read_bytes()[:700]), "not a video or image"),

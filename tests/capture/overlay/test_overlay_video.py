@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.media.video import open_video
+from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.overlay import overlay_video
 from scope.scope_addon.capture.overlay.overlay_video import (
     body_colors,
@@ -242,6 +243,13 @@ def test_cancelling_leaves_no_file_and_keeps_an_existing_one(tmp_path, footage, 
         write_overlay(tmp_path / "overlay.mp4", footage, standing(body, [0]), body, progress=cancel)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["footage.mp4", "overlay.mp4"]
     assert (tmp_path / "overlay.mp4").read_bytes() == b"the last one"
+
+
+@pytest.mark.parametrize("name", ["overlay.mp4", "overlay.png"])
+def test_a_range_without_frames_is_an_error_and_leaves_no_file(tmp_path, footage, body, name):
+    with pytest.raises(VideoError, match=r"footage\.mp4 has no frames between the given start and end"):
+        write_overlay(tmp_path / name, footage, standing(body, [0]), body, wanted=VideoRange(start_s=1.0))
+    assert [p.name for p in tmp_path.iterdir()] == ["footage.mp4"]
 
 
 def test_missing_footage_and_a_wrong_body_are_errors(tmp_path, footage, body):
