@@ -414,20 +414,16 @@ def test_bodies_that_cannot_be_used_are_refused(given, error, message):
         fit(given, SEEN, priors=Priors(), options=SHORT)
 
 
-QUICK = {"priors": Priors(), "options": SHORT}
-
-
 @pytest.mark.parametrize("times", [np.arange(5), np.arange(10.0, 15.0), np.array([0, 33, 67, 100, 133])])
 def test_frame_numbers_or_milliseconds_for_seconds_bring_a_warning_and_a_motion(times):
     with pytest.warns(UnitsWarning, match="times are whole numbers, .* divide frame numbers by the frame rate"):
-        assert len(fit_motion(BODY, [SEEN] * 5, times, **QUICK).states) == 5
+        assert len(fit_motion(BODY, [SEEN] * 5, times, priors=Priors(), options=SHORT).states) == 5
 
 
 def test_seconds_bring_no_warning():
-    fit_motion(BODY, [SEEN] * 5, np.arange(5) / 30.0, **QUICK)
-    fit_motion(BODY, [SEEN] * 3, np.arange(3), **QUICK)  # too few to tell
-    slow = MotionPrior(root_rotation=1.0 / 3600, root_position=30.0 / 3600)  # for frames that are a second apart
-    fit_motion(BODY, [SEEN] * 5, np.arange(5), motion=slow, **QUICK)
+    usual, slow = MotionPrior(), MotionPrior(root_rotation=1 / 3600, root_position=30 / 3600)  # slow: a second apart
+    for times, motion in ((np.arange(5) / 30, usual), (np.arange(3), usual), (np.arange(5), slow)):  # three: too few
+        fit_motion(BODY, [SEEN] * len(times), times, motion=motion, priors=Priors(), options=SHORT)
 
 
 def test_lengths_in_millimetres_bring_a_warning_and_a_fit():
