@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
+import ctypes
 import errno
 import io
 import os
 import re
 import sys
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, nullcontext, redirect_stderr, redirect_stdout
+from contextlib import ExitStack, contextmanager, nullcontext, redirect_stderr, redirect_stdout, suppress
 from pathlib import Path
 from typing import Any
 
@@ -243,9 +244,16 @@ def _discarded(number: int) -> Iterator[None]:
     finally:
         if stream is not None:
             stream.flush()
+        _flush_c_streams()
         os.dup2(keep, number)
         os.close(keep)
         os.close(devnull)
+
+
+def _flush_c_streams() -> None:
+    """Write what C++ code has printed: without a terminal, it stays in the buffers of C until the program ends."""
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL("ucrtbase" if os.name == "nt" else None).fflush(None)
 
 
 def enable_addon(module: str) -> None:

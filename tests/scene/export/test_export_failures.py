@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Exports that fail: one sentence, no half-written file, and no earlier result lost."""
 
+import ctypes
 import os
 import tempfile
 from pathlib import Path
@@ -159,3 +160,13 @@ def test_exporters_are_quiet_without_standard_streams(monkeypatch):
     monkeypatch.setattr("sys.stderr", None)
     with formats.quiet():
         os.write(1, b"to nobody")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="C's streams have another library there")
+def test_what_c_code_prints_while_it_is_quiet_is_not_printed_later(capfd):
+    """Without a terminal, it stays in C's buffers, from where it was written behind the program's own output."""
+    c = ctypes.CDLL(None)
+    with formats.quiet():
+        c.puts(b"said by an exporter")
+    c.fflush(None)
+    assert capfd.readouterr() == ("", "")
