@@ -11,8 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ....solver import Body
-from ..perception.hand_region import SIDES
+from .....solver import Body
+from ...perception.hand_region import SIDES
 from .hand_measurements import FINGERS
 
 
