@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ...solver.rotations import shortest_turn
+from ..kinematics.axes import UP
 from ..kinematics.smoothing import gaussian_smooth
 from ..kinematics.standing import standing_probability
 from .clip import Clip
 
-UP = np.array([0.0, 0.0, 1.0])
 _MAX_TILT = np.radians(20.0)  # a plane through the soles that is steeper is not the floor
 _MIN_SPREAD_M = 0.3  # the slope of the floor is unobservable from soles closer together than this
 _LIFT_CUTOFF_HZ = 3.0

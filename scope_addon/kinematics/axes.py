@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+UP = np.array([0.0, 0.0, 1.0])  # in the world
 # Model y up becomes world z up, (x, y, z) -> (x, -z, y): the person faces world −y, into Blender's front view.
 R_WORLD_MODEL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 # A level OpenCV camera in the world: x right stays, y down is −z, z forward is +y.

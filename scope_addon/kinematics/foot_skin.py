@@ -16,6 +16,7 @@ from ...solver.body import Body
 from ...solver.rotations import exp
 from ..motion import Motion
 from .added_keypoints import with_points_on_parts
+from .axes import UP
 from .contact_points import FOOT_PARTS
 from .frame_blocks import by_blocks
 from .runs import runs
@@ -77,11 +78,11 @@ def foot_heights(motion: Motion, body: Body, raw: bool = False) -> NDArray[np.fl
     :param raw: of the motion before smoothing and contact.
     """
     betas = np.asarray(motion.betas, float)
-    skin, up = FootSkin(body, betas), np.array([0.0, 0.0, 1.0])
+    skin = FootSkin(body, betas)
 
     def heights(poses: NDArray[np.floating[Any]], trans: NDArray[np.floating[Any]]) -> tuple[NDArray[np.float64]]:
         rotations = exp(poses.reshape(len(poses), -1, 3).astype(float))
-        return (skin.heights(*body.forward_kinematics(rotations, trans.astype(float), betas), up),)
+        return (skin.heights(*body.forward_kinematics(rotations, trans.astype(float), betas), UP),)
 
     chosen = (motion.poses_raw, motion.trans_raw) if raw else (motion.poses, motion.trans)
     return by_blocks(heights, *chosen)[0]

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.rotations import exp, shortest_turn
+from ..kinematics.axes import UP
 from .bone_map import FINGERS
 from .skeleton import Skeleton
 
-_UP = np.array([0.0, 0.0, 1.0])
 _NEXT = {"hip": "knee", "knee": "ankle", "shoulder": "elbow", "elbow": "wrist", "wrist": "hand"}
 # The fourth does not exist in any body: the last phalanx has no end joint.
 _NEXT |= {f"{finger}{k}": f"{finger}{k + 1}" for finger in FINGERS for k in (1, 2, 3)}
@@ -74,7 +74,7 @@ def _heading_turn(along: NDArray[np.float64], wanted: NDArray[np.float64]) -> ND
     if np.linalg.norm(flat) <= 0.3 * np.linalg.norm(along):
         return np.eye(3)
     angle = np.arctan2(goal[1], goal[0]) - np.arctan2(flat[1], flat[0])
-    turn: NDArray[np.float64] = exp(_UP * ((angle + np.pi) % (2 * np.pi) - np.pi))
+    turn: NDArray[np.float64] = exp(UP * ((angle + np.pi) % (2 * np.pi) - np.pi))
     return turn
 
 

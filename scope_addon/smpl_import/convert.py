@@ -19,9 +19,8 @@ from ...solver.loaders.archive import npz_keys
 from ...solver.loaders.body_file import BUILT_IN, load_body
 from ...solver.rotations import exp, log
 from ..edit.clip import Clip
-from ..edit.floor import UP
 from ..errors import MotionFileError, UsageError
-from ..kinematics.axes import R_WORLD_LEVELCAMERA, R_WORLD_MODEL, transform_points
+from ..kinematics.axes import R_WORLD_LEVELCAMERA, R_WORLD_MODEL, UP, transform_points
 from ..kinematics.contact_points import SOLES
 from ..kinematics.frame_blocks import by_blocks
 from ..kinematics.standing import standing_probability

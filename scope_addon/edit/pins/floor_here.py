@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ...errors import UsageError
+from ...kinematics.axes import UP
 from ...kinematics.foot_skin import FootSkin
 from ..clip import Clip, sample
-from ..floor import UP
 
 LOWER = "lower"
 _PARTS = {LOWER: slice(0, 4), "left": slice(0, 2), "right": slice(2, 4)}

@@ -25,10 +25,10 @@ from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ....solver.rotations import exp, log
+from ...kinematics.axes import UP
 from ...kinematics.contact_points import FOOT_PARTS
 from ...kinematics.standing import standing_probability
 from ..clip import Clip, sample
-from ..floor import UP
 from .corrections import Contact, Pin
 from .fade import faded
 from .pose_refit import FLOOR_M, HELD, PINNED, PINNED_2D, STANDING, Points, PoseRefit, limb_of

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from ....solver.body import Body
 from ....solver.rotations import shortest_turn
 from ...errors import UsageError
+from ...kinematics.axes import UP
 from ...kinematics.standing import standing_probability
 from ...motion import Motion
 from ..clip import clip_from_motion
-from ..floor import UP
 from .corrected_motion import shot_of
 
 _LARGEST = np.radians(40.0)

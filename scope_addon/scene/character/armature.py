@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.body import Body
-from ...kinematics.axes import R_WORLD_MODEL
+from ...kinematics.axes import R_WORLD_MODEL, UP
 
 SHORTEST_BONE = 0.02  # metres; Blender deletes bones of zero length
-_UP, _FRONT = np.array([0.0, 0.0, 1.0]), np.array([0.0, -1.0, 0.0])
+_FRONT = np.array([0.0, -1.0, 0.0])
 
 
 @dataclass(frozen=True)
@@ -44,9 +44,9 @@ def _bone_tails(body: Body, joints: NDArray[np.float64], vertices: NDArray[np.fl
     """Return the tails (K+1, 3) for display: at a child joint, or at the end of the surface that the bone moves."""
     tails = joints.copy()
     for i, parent in enumerate(body.parents):
-        incoming = joints[i] - joints[parent] if parent >= 0 else _UP
+        incoming = joints[i] - joints[parent] if parent >= 0 else UP
         length = float(np.linalg.norm(incoming))
-        incoming = incoming / length if length > 1e-6 else _UP
+        incoming = incoming / length if length > 1e-6 else UP
         children = np.flatnonzero(body.parents == i)
         offsets = joints[children] - joints[i]
         lengths = np.linalg.norm(offsets, axis=1)
@@ -82,7 +82,7 @@ def build_armature(name: str, body: Body, rest: RestPose, collection: bpy.types.
             bone.head, bone.tail = rest.joints[i], rest.tails[i]
             along = rest.tails[i] - rest.joints[i]
             points_forward = abs(along @ _FRONT) > 0.8 * np.linalg.norm(along)
-            bone.align_roll(_UP if points_forward else _FRONT)
+            bone.align_roll(UP if points_forward else _FRONT)
             bone.use_connect = False
             if body.parents[i] >= 0:
                 bone.parent = data.edit_bones[body.joint_names[body.parents[i]]]
