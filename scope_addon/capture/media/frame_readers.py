@@ -62,14 +62,19 @@ def next_time(before: float | None, given: float | None, period: float) -> float
     return before + share * period
 
 
-def upright(path: Path, image: NDArray[np.uint8], aspect: float, clockwise_deg: int) -> NDArray[np.uint8]:
-    """Stretch an image (H, W, 3) of a file or stream until its pixels are square, then rotate it.
+def upright(
+    path: Path, image: NDArray[np.uint8], aspect: float, clockwise_deg: int, is_mirrored: bool = False
+) -> NDArray[np.uint8]:
+    """Stretch an image (H, W, 3) of a file or stream until its pixels are square; mirror it before and rotate it after.
 
     :param path: its name, for messages.
     :param aspect: width of a pixel over its height.
     :param clockwise_deg: a multiple of 90; others do not rotate.
+    :param is_mirrored: whether top and bottom are exchanged before the rotation, of which every mirroring consists.
     :raises VideoError: it is too large or too long (see `image_size`).
     """
+    if is_mirrored:
+        image = cast(NDArray[np.uint8], cv2.flip(image, 0))
     height, width = image.shape[:2]
     size = _size(width, height, aspect)
     check_size(path, *size)
@@ -103,11 +108,32 @@ def _open_with_pyav(path: Path) -> tuple[type[Exception], InputContainer | None]
     return av.error.FFmpegError, container
 
 
-def _film(container: InputContainer) -> av.VideoStream | None:
-    """Return the first stream of images that is not the picture of a cover, as files of music have."""
+def _film(path: Path, container: InputContainer) -> av.VideoStream:
+    """Return the first stream of images that is not the picture of a cover, as files of music have.
+
+    :raises VideoError: there is none that can be decoded, or its images are too large or too long.
+    """
     from av.stream import Disposition
 
-    return next((s for s in container.streams.video if not s.disposition & Disposition.attached_pic), None)
+    film = next((s for s in container.streams.video if not s.disposition & Disposition.attached_pic), None)
+    if film is None and container.streams.audio:
+        raise VideoError(f"{path} contains only audio; choose the file with the video")
+    if film is None or not film.codec_context:
+        raise _undecodable(path)
+    check_size(path, *_size(film.width, film.height, _aspect(film)))
+    return film
+
+
+def _aspect(stream: av.VideoStream) -> float:
+    """Return the width of a stream's pixels over their height."""
+    return float(stream.sample_aspect_ratio or 1)
+
+
+def _undecodable(path: Path) -> VideoError:
+    return VideoError(
+        f"{path} is not a video or image that can be decoded; copy it again if it may be incomplete, or convert it to "
+        "an H.264 .mp4"
+    )
 
 
 def _bt601_rgb(frame: av.VideoFrame) -> NDArray[np.uint8]:
@@ -116,17 +142,9 @@ def _bt601_rgb(frame: av.VideoFrame) -> NDArray[np.uint8]:
     return cast(NDArray[np.uint8], image)
 
 
-def upright_frame(path: Path, frame: av.VideoFrame, image: NDArray[np.uint8], aspect: float) -> NDArray[np.uint8]:
-    """Mirror and rotate a decoded frame as its display matrix says, and stretch it until its pixels are square.
-
-    :param path: name of the file or stream, for messages.
-    :param image: of the frame, (H, W, 3) uint8 RGB.
-    :param aspect: width of a pixel over its height.
-    :raises VideoError: it is too large or too long (see `image_size`).
-    """
-    if _is_mirrored(frame):  # the matrix is this mirroring, followed by the rotation
-        image = cast(NDArray[np.uint8], cv2.flip(image, 0))
-    return upright(path, image, aspect, -round(frame.rotation))
+def orientation(frame: av.VideoFrame) -> tuple[int, bool]:
+    """Return by how many degrees clockwise, and whether mirrored, a decoded frame's display matrix shows it."""
+    return -round(frame.rotation) % 360, _is_mirrored(frame)
 
 
 def _is_mirrored(frame: av.VideoFrame) -> bool:
@@ -188,28 +206,19 @@ class PyavReader:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._failure, container = _open_with_pyav(path)
-        stream = None if container is None else _film(container)
-        if container is not None and stream is None and container.streams.audio:
+        if container is None:
+            raise _undecodable(path)
+        try:
+            self._stream = _film(path, container)
+        except VideoError:
             container.close()
-            raise VideoError(f"{path} contains only audio; choose the file with the video")
-        if container is None or stream is None or not stream.codec_context:
-            if container is not None:
-                container.close()
-            raise VideoError(
-                f"{path} is not a video or image that can be decoded; copy it again if it may be incomplete, or "
-                "convert it to an H.264 .mp4"
-            )
-        self._container, self._stream = container, stream
+            raise
+        self._container = container
         self._stream.thread_type = "AUTO"
         self._frames: Iterator[av.VideoFrame] = self._decoded()
         self._start = self._stream.start_time or 0  # in units of the stream
         self.is_mirrored, self.clockwise_deg = False, 0
-        self._aspect = float(self._stream.sample_aspect_ratio or 1)
-        try:
-            check_size(path, *_size(self._stream.width, self._stream.height, self._aspect))
-        except VideoError:
-            container.close()
-            raise
+        self._aspect = _aspect(self._stream)
         self.rate = float(self._stream.guessed_rate or self._stream.average_rate or 0)
         duration_s = (container.duration or 0) / 1e6
         self.frame_count = float(self._stream.frames or round(duration_s * self.rate))
@@ -252,8 +261,8 @@ class PyavReader:
         frame = next(self._frames, None)
         if frame is None:
             return None
-        self.is_mirrored, self.clockwise_deg = _is_mirrored(frame), -round(frame.rotation) % 360
-        return self._time(frame), upright_frame(self._path, frame, _bt601_rgb(frame), self._aspect)
+        self.clockwise_deg, self.is_mirrored = shown = orientation(frame)
+        return self._time(frame), upright(self._path, _bt601_rgb(frame), self._aspect, *shown)
 
     def skip_to(self, seconds: float, fps: Fraction) -> tuple[int, float | None]:
         """Skip to the first frame at or after a time.

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ...capture.media.frame_readers import upright_frame
+from ...capture.media.frame_readers import orientation, upright
 from ...capture.media.image_size import check_size
 from ...errors import VideoError
 from ..clock import Clock
@@ -138,7 +138,7 @@ class StreamSource:
         """Return the frame as it is to be shown; phones send what they film upright as rotated, and may mirror it."""
         check_size(Path(self.name), frame.width, frame.height)
         image = cast(NDArray[np.uint8], frame.to_ndarray(format="rgb24"))
-        return upright_frame(Path(self.name), frame, image, aspect)
+        return upright(Path(self.name), image, aspect, *orientation(frame))
 
 
 def _reason(error: Exception) -> str:
