@@ -113,6 +113,12 @@ def place(shot: Shot, track: Track, fit: FittedTrack, smoothing: bool = True) ->
     return place_track(shot.body, track, fit, smoothing, shot.path, shot.uneven_ground)
 
 
+def place_each(shot: Shot, prepared: Sequence[PreparedTrack], fits: Sequence[FittedTrack]) -> list[PlacedTrack]:
+    """Place the fit of each person; see `place`."""
+    pairs = zip(prepared, fits, strict=True)
+    return [place(shot, each.track, fit.with_fingers_at_rest(each)) for each, fit in pairs]
+
+
 def resize_people(
     shot: Shot,
     prepared: Sequence[PreparedTrack],
@@ -127,7 +133,7 @@ def resize_people(
     prepared, fits, count = list(prepared), list(fits), len(prepared)
     if not 0 < len(heights_m) < count or not shot.ablation.stance or shot.uneven_ground:
         return prepared, fits
-    placed = [place(shot, each.track, fit.with_fingers_at_rest(each)) for each, fit in zip(prepared, fits, strict=True)]
+    placed = place_each(shot, prepared, fits)
     up = find_world(placed, shot.lines).up
     people = [stander(each, up, k < len(heights_m)) for k, each in enumerate(placed)]
     del placed
@@ -144,7 +150,7 @@ def find_camera_path(shot: Shot, first: PreparedTrack, fit: FittedTrack) -> Came
     """Return the camera's path; the travel of a rotating camera is estimated from one person's feet."""
     if shot.path.is_static or shot.is_still:
         return shot.path
-    placed = place(shot, first.track, fit.with_fingers_at_rest(first))
+    [placed] = place_each(shot, [first], [fit])
     up = find_world([placed], shot.lines).up
     center = camera_travel(placed.soles, placed.valid, up, placed.times, shot.uneven_ground)
     return replace(shot.path, center=center)
@@ -154,7 +160,7 @@ def ground_all(
     shot: Shot, prepared: Sequence[PreparedTrack], fits: Sequence[FittedTrack]
 ) -> tuple[list[PreparedTrack], list[FittedTrack]]:
     """Add to each person's measurements the distance and lean that follow from floor, feet and balance."""
-    placed = [place(shot, each.track, fit.with_fingers_at_rest(each)) for each, fit in zip(prepared, fits, strict=True)]
+    placed = place_each(shot, prepared, fits)
     world = find_world(placed, shot.lines)
     return_freed_memory()
     grounded, starts = [], []

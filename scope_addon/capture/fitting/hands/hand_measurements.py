@@ -40,12 +40,17 @@ _MIDDLE_KNUCKLE = HAND_NAMES.index("middle_finger_mcp")
 SHORT_GAP_S, LONG_GAP_S = 0.3, 1.0  # unseen fingers begin to return to rest after the first, and rest after the second
 
 
+def finger_names(side: str) -> list[str]:
+    """Return the names of the 15 joints of a hand's fingers, from the index finger to the thumb."""
+    return [f"{side}_{finger}{k}" for finger in FINGERS for k in (1, 2, 3)]
+
+
 def finger_joints(body: Body, side: str) -> list[int]:
     """Return the indices of the 15 joints of a hand's fingers, from the index finger to the thumb.
 
     :raises UsageError: the body has no fingers.
     """
-    names = [f"{side}_{finger}{k}" for finger in FINGERS for k in (1, 2, 3)]
+    names = finger_names(side)
     keypoints = {f"hand/{side}_{name}" for name in HAND_NAMES}
     if not set(names) <= set(body.joint_names) or not keypoints <= set(body.keypoint_names):
         raise UsageError(

@@ -13,7 +13,7 @@ import numpy as np
 
 from .....solver import Body
 from ...perception.hand_region import SIDES
-from .hand_measurements import FINGERS
+from .hand_measurements import finger_names
 
 
 def without_fingers(body: Body) -> Body:
@@ -21,7 +21,7 @@ def without_fingers(body: Body) -> Body:
 
     Keypoints, vertices and their numbers stay as they are.
     """
-    fingers = {f"{side}_{finger}{k}" for side in SIDES for finger in FINGERS for k in (1, 2, 3)}
+    fingers = {name for side in SIDES for name in finger_names(side)}
     kept = [k for k, name in enumerate(body.joint_names) if name not in fingers]
     if len(kept) == len(body.joint_names):
         return body
