@@ -46,10 +46,10 @@ class JointPrior:
 
         :raises InvalidValueError: the prior has no joint of that name.
         """
-        if not isinstance(joint, str) or joint not in self.names:
-            known = ", ".join(self.names)
-            if not isinstance(joint, str):
-                raise InvalidValueError(f"joint must be a name, but is {described(joint)}; the prior has {known}.")
+        known = ", ".join(self.names)
+        if not isinstance(joint, str):
+            raise InvalidValueError(f"joint must be a name, but is {described(joint)}; the prior has {known}.")
+        if joint not in self.names:
             raise InvalidValueError(f"The prior has no joint {joint!r}; it has {known}.")
         row: Array = self.parameters[self.names.index(joint)]
         return row
