@@ -38,14 +38,10 @@ from scope.solver import (
 from scope.solver.custom_residuals import external
 from scope.solver.learned_prior import BUILT_IN
 
-from .synthetic import INTRINSICS, forward, project, random_body, random_state
+from .small_problem import BODY, KEYPOINTS, POINTS, SEEN, K, M, P
+from .synthetic import INTRINSICS, project
 
-K, P, M = 4, 3, 12
 NAN = float("nan")
-BODY = random_body(np.random.default_rng(1), K, P, M)
-POINTS = forward(BODY, *random_state(np.random.default_rng(2), K, P))[2]
-KEYPOINTS = Keypoints3D(np.arange(M), POINTS, np.ones(M))
-SEEN = Measurements(keypoints3d=KEYPOINTS)
 SHORT = Options(stages=[Stage(max_iterations=1)])
 PRIORS = Priors()
 UP = np.array([0.0, -1.0, 0.0])

@@ -40,9 +40,9 @@ from scope.solver import (
     with_previous,
 )
 
-from .synthetic import INTRINSICS, forward, random_body, random_state
+from .small_problem import BODY, KEYPOINTS, POINTS, SEEN, K, M, P
+from .synthetic import INTRINSICS
 
-K, P, M = 4, 3, 12
 UPRIGHT = np.eye(3)
 SHORT = Options(stages=[Stage(max_iterations=2)])
 NAN, INF = np.nan, np.inf
@@ -54,13 +54,7 @@ def untyped(value: object) -> Any:
 
 
 def body(**fields):
-    return replace(random_body(np.random.default_rng(1), K, P, M), **fields)
-
-
-BODY = body()
-POINTS = forward(BODY, *random_state(np.random.default_rng(2), K, P))[2]
-KEYPOINTS = Keypoints3D(np.arange(M), POINTS, np.ones(M))
-SEEN = Measurements(keypoints3d=KEYPOINTS)
+    return replace(BODY, **fields)
 
 
 def state(**fields):

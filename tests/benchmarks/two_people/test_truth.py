@@ -35,7 +35,7 @@ def _cameras() -> dict[str, Camera]:
 
 
 def _joints() -> NDArray[np.float64]:
-    """Return keypoints (3, 33, 3), metres, of a person who stands at the origin for three frames."""
+    """Return keypoints (3, 33, 3), metres, of a person standing at the origin in all three frames."""
     joints = np.random.default_rng(0).uniform([-0.3, -0.8, -0.3], [0.3, 0.8, 0.3], (3, 33, 3))
     joints[:, [11, 12], 1], joints[:, [23, 24], 1] = -0.5, 0.0
     return joints

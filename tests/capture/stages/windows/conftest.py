@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,7 +17,7 @@ from scope.scope_addon.capture.camera.intrinsics import Camera, assumed_camera
 from scope.scope_addon.capture.fitting.background_estimators import BackgroundEstimators
 from scope.scope_addon.capture.fitting.focal_fits import FocalFits
 from scope.scope_addon.capture.media.frame import Frame
-from scope.scope_addon.capture.media.video import open_video
+from scope.scope_addon.capture.media.video import Video, open_video
 from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.stages.clock import StageClock
@@ -36,6 +37,22 @@ FPS, FRAMES, WINDOW_S = 30, 210, 2.0  # three windows: frames 0 to 59, 60 to 119
 SMALL = Person(lambda t: (150 + 0.5 * t, 130), RED, size_px=45)
 # Present when the second window's trackers begin, and so large that they would not care about the other one.
 LARGE = Person(lambda t: (430, 130) if 20 <= t < 75 else None, BLUE, size_px=115)
+
+
+@contextmanager
+def frames_from(change: Callable[[int, Frame], Frame]) -> Iterator[None]:
+    """Let a decoder that begins within a clip give other frames.
+
+    :param change: from a frame's number, counted from where it begins, and the frame to the one that it gives.
+    """
+    sought = Video.frames_from
+
+    def changed(video: Video, start_s: float) -> Iterator[Frame]:
+        return (change(k, frame) for k, frame in enumerate(sought(video, start_s)))
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Video, "frames_from", changed)
+        yield
 
 
 @pytest.fixture(scope="package")

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from scope.scope_addon.capture.stages.windows import kept_windows
 from scope.scope_addon.capture.tracking.track import Track
 from scope.scope_addon.errors import CancelledError
 
-from .conftest import FPS, FRAMES, assert_same, options
+from .conftest import FPS, FRAMES, assert_same, frames_from, options
 
 
 def stop(windows_of: Callable[..., list[Track]], given: CaptureOptions, unfinished: Path, frame: int) -> None:
@@ -120,19 +120,15 @@ def test_a_stopped_clip_whose_middle_is_decoded_to_other_images_goes_on_from_its
     undisturbed: Callable[..., list[Track]],
     observed_times: list[float],
     tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The frames before are decoded, but not observed."""
-    sought = Video.frames_from
 
-    def damaged(video: Video, start_s: float) -> Iterator[Frame]:
-        for k, frame in enumerate(sought(video, start_s)):
-            yield Frame(frame.index + 5, frame.timestamp_s, np.full_like(frame.image_rgb, 90)) if k < 40 else frame
+    def damaged(k: int, frame: Frame) -> Frame:
+        return Frame(frame.index + 5, frame.timestamp_s, np.full_like(frame.image_rgb, 90)) if k < 40 else frame
 
     stop(windows_of, options(), tmp_path, 75)
     whole = undisturbed()
-    with monkeypatch.context() as patch:
-        patch.setattr(Video, "frames_from", damaged)
+    with frames_from(damaged):
         observed_times.clear()
         assert_same(windows_of(options(), None, tmp_path), whole)
     assert min(observed_times) == pytest.approx(1.0)

@@ -3,20 +3,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scope.scope_addon.capture.media.frame import Frame
-from scope.scope_addon.capture.media.video import Video
 from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.stages.windows import joined_windows
 from scope.scope_addon.capture.stages.windows.observe_part import count_windows, observe_windows
 from scope.scope_addon.capture.tracking.track import Track
 
-from .conftest import FRAMES, LARGE, SMALL, WINDOW_S, assert_same, options
+from .conftest import FRAMES, LARGE, SMALL, WINDOW_S, assert_same, frames_from, options
 
 
 def places(track: Track) -> np.ndarray:
@@ -82,20 +81,16 @@ def test_a_window_that_was_decoded_to_other_images_is_observed_again(
     undisturbed: Callable[..., list[Track]],
     folder: Path,
     tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """As of a file that does not mark its keyframes well: a decoder that begins in its middle gives a grey image."""
-    sought = Video.frames_from
 
-    def damaged(video: Video, start_s: float) -> Iterator[Frame]:
-        for k, frame in enumerate(sought(video, start_s)):
-            lost = np.full_like(frame.image_rgb, 90)
-            lost[0, 0] = frame.image_rgb[0, 0]
-            yield Frame(frame.index + 5, frame.timestamp_s, lost) if k < 8 else frame
+    def damaged(k: int, frame: Frame) -> Frame:
+        lost = np.full_like(frame.image_rgb, 90)
+        lost[0, 0] = frame.image_rgb[0, 0]
+        return Frame(frame.index + 5, frame.timestamp_s, lost) if k < 8 else frame
 
     whole = undisturbed()
-    with monkeypatch.context() as patch:
-        patch.setattr(Video, "frames_from", damaged)
+    with frames_from(damaged):
         observe_windows(folder, options(), range(1, 2), tmp_path)
         assert_same(windows_of(options(), tmp_path), whole)
 
@@ -105,16 +100,9 @@ def test_indices_that_a_decoder_counts_from_elsewhere_are_those_of_the_clip(
     undisturbed: Callable[..., list[Track]],
     folder: Path,
     tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """As where the frame rate varies, and the index of a frame can only be estimated from its time."""
-    sought = Video.frames_from
-
-    def shifted(video: Video, start_s: float) -> Iterator[Frame]:
-        return (Frame(frame.index + 5, frame.timestamp_s, frame.image_rgb) for frame in sought(video, start_s))
-
     whole = undisturbed()
-    with monkeypatch.context() as patch:
-        patch.setattr(Video, "frames_from", shifted)
+    with frames_from(lambda _, frame: Frame(frame.index + 5, frame.timestamp_s, frame.image_rgb)):
         observe_windows(folder, options(), range(1, 3), tmp_path)
         assert_same(windows_of(options(), tmp_path), whole)

@@ -1,0 +1,13 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A small body, and 3D keypoints of it in some pose, for tests of arguments."""
+
+import numpy as np
+from scope.solver import Keypoints3D, Measurements
+
+from .synthetic import forward, random_body, random_state
+
+K, P, M = 4, 3, 12
+BODY = random_body(np.random.default_rng(1), K, P, M)
+POINTS = forward(BODY, *random_state(np.random.default_rng(2), K, P))[2]
+KEYPOINTS = Keypoints3D(np.arange(M), POINTS, np.ones(M))
+SEEN = Measurements(keypoints3d=KEYPOINTS)
