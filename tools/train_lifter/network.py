@@ -9,7 +9,7 @@ from torch import Tensor, nn
 from ...scope_addon.capture.perception.lifter import INPUT_SIZE, KEYPOINT_COUNT
 from ...scope_addon.capture.perception.lifter_window import WINDOW
 
-WIDTH, BLOCKS = 512, 2
+WIDTH, BLOCKS = 512, 6
 MERGES = 2  # 9 moments, 3, 1
 assert 3**MERGES == WINDOW
 DIRECTION_WEIGHT = 0.5
