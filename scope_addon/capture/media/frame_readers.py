@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The decoder of video files: frames in order, upright and with square pixels.
+"""The decoder of video files: frames in order, upright, with square pixels and in SDR.
 
 PyAV decodes all of them. OpenCV's packages contain further copies of FFmpeg, which are older, lack decoders and differ
 from platform to platform; none of them is given a file to read.
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ...errors import VideoError
 from ...footage import MAX_PIXELS
+from .conversion.hdr import hdr_rgb
 from .file_names import utf8_name
 from .image_size import check_size
 
@@ -136,10 +137,22 @@ def _undecodable(path: Path) -> VideoError:
     )
 
 
-def _bt601_rgb(frame: av.VideoFrame) -> NDArray[np.uint8]:
-    """Convert a frame by ITU-R BT.601, also where it states another matrix, so that a tag alone changes no result."""
+def _rgb(frame: av.VideoFrame) -> NDArray[np.uint8]:
+    """Convert a frame to RGB (H, W, 3) of SDR.
+
+    SDR is converted by ITU-R BT.601, also where it states another matrix, so that such a tag alone changes no result.
+    """
+    tone_mapped = hdr_rgb(frame)
+    if tone_mapped is not None:
+        return tone_mapped
     image = frame.to_ndarray(format="rgb24", src_colorspace="ITU601", dst_colorspace="ITU601")
     return cast(NDArray[np.uint8], image)
+
+
+def stated_rgb(frame: av.VideoFrame) -> NDArray[np.uint8]:
+    """Convert a frame of a picture or of a live source to RGB (H, W, 3) of SDR, by the matrix that it states."""
+    tone_mapped = hdr_rgb(frame)
+    return cast(NDArray[np.uint8], frame.to_ndarray(format="rgb24")) if tone_mapped is None else tone_mapped
 
 
 def orientation(frame: av.VideoFrame) -> tuple[int, bool]:
@@ -183,7 +196,7 @@ def decode_items(path: Path, numbers: Collection[int], max_pixels: int) -> dict[
                     if pixels_left < 0:
                         return {}
                     if packet.stream.id not in pictures:
-                        pictures[packet.stream.id] = cast(NDArray[np.uint8], frame.to_ndarray(format="rgb24"))
+                        pictures[packet.stream.id] = stated_rgb(frame)
                 if len(pictures) == len(streams):
                     break
         except (failure, OSError, ValueError):
@@ -262,7 +275,7 @@ class PyavReader:
         if frame is None:
             return None
         self.clockwise_deg, self.is_mirrored = shown = orientation(frame)
-        return self._time(frame), upright(self._path, _bt601_rgb(frame), self._aspect, *shown)
+        return self._time(frame), upright(self._path, _rgb(frame), self._aspect, *shown)
 
     def skip_to(self, seconds: float, fps: Fraction) -> tuple[int, float | None]:
         """Skip to the first frame at or after a time.
