@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames in HDR, and files of them, made with PyAV."""
+"""Frames in HDR and of two fields, and files of them, made with PyAV."""
 
 from __future__ import annotations
 
@@ -45,3 +45,30 @@ def write_frames(path: Path, frames: Iterable, codec: str, pixels: str, rate: in
             container.mux(stream.encode(frame))
         container.mux(stream.encode(None))
     return path
+
+
+def with_fields(pictures: list[np.ndarray], order: str = "tff", pixels: str = "yuv420p") -> list:
+    """Make frames marked as interlaced, each of two successive pictures (H, W, 3) uint8.
+
+    :param order: "tff", if the even lines are filmed first, or "bff".
+    """
+    frames = []
+    for first, second in zip(pictures[::2], pictures[1::2], strict=True):
+        woven = second.copy()
+        start = 0 if order == "tff" else 1
+        woven[start::2] = first[start::2]
+        frames.append(av.VideoFrame.from_ndarray(woven, format="rgb24").reformat(format=pixels))
+    return marked(frames, order)
+
+
+def marked(frames: list, order: str) -> list:
+    """Return copies of frames that say "tff", "bff" or "prog"; frame k is shown at k / 25 s."""
+    graph = av.filter.Graph()
+    buffer = graph.add_buffer(template=frames[0], time_base=Fraction(1, 25))
+    graph.link_nodes(buffer, graph.add("setfield", order), graph.add("buffersink")).configure()
+    result = []
+    for k, frame in enumerate(frames):
+        frame.pts, frame.time_base = k, Fraction(1, 25)
+        graph.vpush(frame)
+        result.append(graph.vpull())
+    return result
