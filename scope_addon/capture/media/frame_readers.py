@@ -261,6 +261,8 @@ class PyavReader:
                 damaged = 0
             except EOFError:  # the decoder has given its last frame
                 return
+            except IndexError:  # PyAV's, at a stream that begins later, in a recording of television for instance
+                packets, damaged = self._container.demux(self._stream), damaged + 1
             except (self._failure, OSError, ValueError):
                 damaged += 1
 
