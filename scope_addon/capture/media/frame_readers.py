@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The decoder of video files: frames in order, upright and with square pixels.
+"""The decoder of video files: frames in order, upright, with square pixels, in SDR and not interlaced.
 
 PyAV decodes all of them. OpenCV's packages contain further copies of FFmpeg, which are older, lack decoders and differ
 from platform to platform; none of them is given a file to read.
@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 
 from ...errors import VideoError
 from ...footage import MAX_PIXELS
+from .conversion.deinterlace import FIELD_CODECS, deinterlaced
+from .conversion.hdr import hdr_rgb
 from .file_names import utf8_name
 from .image_size import check_size
 
@@ -136,10 +138,22 @@ def _undecodable(path: Path) -> VideoError:
     )
 
 
-def _bt601_rgb(frame: av.VideoFrame) -> NDArray[np.uint8]:
-    """Convert a frame by ITU-R BT.601, also where it states another matrix, so that a tag alone changes no result."""
+def _rgb(frame: av.VideoFrame) -> NDArray[np.uint8]:
+    """Convert a frame to RGB (H, W, 3) of SDR.
+
+    SDR is converted by ITU-R BT.601, also where it states another matrix, so that such a tag alone changes no result.
+    """
+    tone_mapped = hdr_rgb(frame)
+    if tone_mapped is not None:
+        return tone_mapped
     image = frame.to_ndarray(format="rgb24", src_colorspace="ITU601", dst_colorspace="ITU601")
     return cast(NDArray[np.uint8], image)
+
+
+def stated_rgb(frame: av.VideoFrame) -> NDArray[np.uint8]:
+    """Convert a frame of a picture or of a live source to RGB (H, W, 3) of SDR, by the matrix that it states."""
+    tone_mapped = hdr_rgb(frame)
+    return cast(NDArray[np.uint8], frame.to_ndarray(format="rgb24")) if tone_mapped is None else tone_mapped
 
 
 def orientation(frame: av.VideoFrame) -> tuple[int, bool]:
@@ -183,7 +197,7 @@ def decode_items(path: Path, numbers: Collection[int], max_pixels: int) -> dict[
                     if pixels_left < 0:
                         return {}
                     if packet.stream.id not in pictures:
-                        pictures[packet.stream.id] = cast(NDArray[np.uint8], frame.to_ndarray(format="rgb24"))
+                        pictures[packet.stream.id] = stated_rgb(frame)
                 if len(pictures) == len(streams):
                     break
         except (failure, OSError, ValueError):
@@ -215,7 +229,8 @@ class PyavReader:
             raise
         self._container = container
         self._stream.thread_type = "AUTO"
-        self._frames: Iterator[av.VideoFrame] = self._decoded()
+        self._decoded = self._decode()
+        self._frames = self._whole(self._decoded)
         self._start = self._stream.start_time or 0  # in units of the stream
         self.is_mirrored, self.clockwise_deg = False, 0
         self._aspect = _aspect(self._stream)
@@ -229,7 +244,11 @@ class PyavReader:
             length_s = ((container.duration or 0) - late) / 1e6
             self.shown_s = length_s if length_s > 0 else None
 
-    def _decoded(self) -> Iterator[av.VideoFrame]:
+    def _whole(self, frames: Iterator[av.VideoFrame], before: av.VideoFrame | None = None) -> Iterator[av.VideoFrame]:
+        """Iterate over frames as whole images; ``before``: the frame before them, by which fields are completed."""
+        return frames if self._stream.codec_context.name in FIELD_CODECS else deinterlaced(frames, before)
+
+    def _decode(self) -> Iterator[av.VideoFrame]:
         """Decode from where the container is; what is damaged is left out."""
         damaged = 0
         packets = self._container.demux(self._stream)
@@ -242,6 +261,8 @@ class PyavReader:
                 damaged = 0
             except EOFError:  # the decoder has given its last frame
                 return
+            except IndexError:  # PyAV's, at a stream that begins later, in a recording of television for instance
+                packets, damaged = self._container.demux(self._stream), damaged + 1
             except (self._failure, OSError, ValueError):
                 damaged += 1
 
@@ -262,26 +283,27 @@ class PyavReader:
         if frame is None:
             return None
         self.clockwise_deg, self.is_mirrored = shown = orientation(frame)
-        return self._time(frame), upright(self._path, _bt601_rgb(frame), self._aspect, *shown)
+        return self._time(frame), upright(self._path, _rgb(frame), self._aspect, *shown)
 
     def skip_to(self, seconds: float, fps: Fraction) -> tuple[int, float | None]:
         """Skip to the first frame at or after a time.
 
         Seeks if the timestamps tell which frame the seek has led to, which saves decoding; else decodes frame by frame.
+        It has to be called before the first frame is read.
 
         :param fps: rate by which an index is converted to a time.
         :return: index of the frame that is read next, or the number of frames if the video ends before; and the time of
             the frame before, None if it was not decoded.
         """
         if seconds > _MIN_SEEK_S and self._seek(seconds - _MIN_SEEK_S / 2):
-            frame = next(self._frames, None)
+            frame = next(self._decoded, None)
             time = None if frame is None else self._time(frame)
             if frame is not None and time is not None and time < seconds:
                 index = round(time * fps)
                 if abs(time - index / fps) < 0.5 / fps:
-                    return self._skip(itertools.chain([frame], self._frames), index, seconds, fps)
+                    return self._skip(itertools.chain([frame], self._decoded), index, seconds, fps)
             self._seek(0.0)
-        return self._skip(self._frames, 0, seconds, fps)
+        return self._skip(self._decoded, 0, seconds, fps)
 
     def _seek(self, seconds: float) -> bool:
         """Go to a keyframe before a time; return whether that was possible."""
@@ -292,22 +314,24 @@ class PyavReader:
             self._container.seek(int(seconds / base) + self._start, stream=self._stream)
         except (self._failure, OSError, ValueError):
             return False
-        self._frames = self._decoded()
+        self._decoded = self._decode()
+        self._frames = self._whole(self._decoded)
         return True
 
     def _skip(
         self, frames: Iterator[av.VideoFrame], index: int, seconds: float, fps: Fraction
     ) -> tuple[int, float | None]:
         """Skip frames, the first of which has an index; return as `skip_to`."""
-        before: float | None = None
+        before: av.VideoFrame | None = None
+        before_s: float | None = None
         for frame in frames:
-            time = next_time(before, self._time(frame), float(1 / fps))
+            time = next_time(before_s, self._time(frame), float(1 / fps))
             if time >= seconds - 1e-6:
-                self._frames = itertools.chain([frame], frames)
+                self._frames = self._whole(itertools.chain([frame], frames), before)
                 break
-            before = time
+            before, before_s = frame, time
             index += 1
-        return index, before
+        return index, before_s
 
     def close(self) -> None:
         """Close the file."""

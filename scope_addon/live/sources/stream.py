@@ -7,12 +7,12 @@ import re
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...capture.media.frame_readers import orientation, upright
+from ...capture.media.frame_readers import orientation, stated_rgb, upright
 from ...capture.media.image_size import check_size
 from ...errors import VideoError
 from ..clock import Clock
@@ -137,8 +137,7 @@ class StreamSource:
     def _image(self, frame: av.VideoFrame, aspect: float) -> NDArray[np.uint8]:
         """Return the frame as it is to be shown; phones send what they film upright as rotated, and may mirror it."""
         check_size(Path(self.name), frame.width, frame.height)
-        image = cast(NDArray[np.uint8], frame.to_ndarray(format="rgb24"))
-        return upright(Path(self.name), image, aspect, *orientation(frame))
+        return upright(Path(self.name), stated_rgb(frame), aspect, *orientation(frame))
 
 
 def _reason(error: Exception) -> str:

@@ -120,3 +120,26 @@ def test_without_the_decoder_a_video_is_refused(video, monkeypatch):
     monkeypatch.setitem(sys.modules, "av", None)
     with pytest.raises(VideoError, match=r"grey\.mp4 is a video.*package 'av' that is not installed"):
         PyavReader(video)
+
+
+def test_a_stream_that_begins_later_does_not_end_the_video(tmp_path):
+    path, size = tmp_path / "recorded.ts", 188  # bytes of a packet
+    with av.open(str(path), "w", format="mpegts") as container:
+        stream = container.add_stream("mpeg2video", rate=25, width=64, height=48, pix_fmt="yuv420p")
+        for k in range(60):
+            noise = np.random.default_rng(k).integers(0, 255, (48, 64, 3), np.uint8)
+            frame = av.VideoFrame.from_ndarray(noise, format="rgb24")
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
+    data = path.read_bytes()
+    packets = [data[at : at + size] for at in range(0, len(data), size)]
+    begins = [k for k, packet in enumerate(packets) if packet[1:3] == b"\x41\x00"]  # a picture, of the stream 0x100
+    assert len(begins) == 60
+    middle = begins[40]
+    other = packets[middle][:2] + b"\xc8" + packets[middle][3:]
+    path.write_bytes(b"".join([*packets[:middle], other, *packets[middle:]]))
+    with av.open(str(path)) as container:
+        assert len(container.streams) == 1  # the other has not been seen yet
+    with closing(PyavReader(path)) as reader:
+        images = [image for _, image in iter(reader.read, None)]
+    assert len(images) == 60

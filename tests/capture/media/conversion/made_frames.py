@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Frames in HDR and of two fields, and files of them, made with PyAV."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+
+from ....required import package
+
+av = package("av")
+PQ, HLG, BT709 = 16, 18, 1  # transfer characteristics of ITU-T H.273
+BT2020 = 9  # primaries, and matrix of YUV
+
+
+def coded_frame(code: np.ndarray, transfer: int, bits: int = 10, matrix: int = BT2020, primaries: int = BT2020):
+    """Make a frame 4:4:4 from R'G'B' codes (H, W, 3) from 0 to 1, by the equations of ITU-R BT.2020, video range."""
+    y = code @ np.array([0.2627, 0.6780, 0.0593])
+    planes = (219 * y + 16, 224 * (code[..., 2] - y) / 1.8814 + 128, 224 * (code[..., 0] - y) / 1.4746 + 128)
+    frame = av.VideoFrame(code.shape[1], code.shape[0], "yuv444p10le" if bits == 10 else "yuv444p")
+    for plane, values in zip(frame.planes, planes, strict=True):
+        kind = np.uint16 if bits == 10 else np.uint8
+        rows = np.zeros((plane.height, plane.line_size // kind().itemsize), kind)
+        rows[:, : plane.width] = np.rint(values * 2 ** (bits - 8))
+        plane.update(rows.tobytes())
+    frame.color_trc, frame.color_primaries, frame.colorspace, frame.color_range = transfer, primaries, matrix, 1
+    return frame
+
+
+def write_frames(path: Path, frames: Iterable, codec: str, pixels: str, rate: int = 25, **options: str) -> Path:
+    """Encode frames with the tags of the first one; frame k is shown at k / rate."""
+    frames = [frame.reformat(format=pixels) for frame in frames]
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream(codec, rate=rate, options={k.replace("_", "-"): v for k, v in options.items()})
+        stream.width, stream.height, stream.pix_fmt = frames[0].width, frames[0].height, pixels
+        context, first = stream.codec_context, frames[0]
+        context.thread_count = 1
+        context.color_trc, context.color_primaries = first.color_trc, first.color_primaries
+        context.colorspace, context.color_range = first.colorspace, first.color_range
+        for k, frame in enumerate(frames):
+            frame.pts, frame.time_base = k, Fraction(1, rate)
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
+    return path
+
+
+def with_fields(pictures: list[np.ndarray], order: str = "tff", pixels: str = "yuv420p") -> list:
+    """Make frames marked as interlaced, each of two successive pictures (H, W, 3) uint8.
+
+    :param order: "tff", if the even lines are filmed first, or "bff".
+    """
+    frames = []
+    for first, second in zip(pictures[::2], pictures[1::2], strict=True):
+        woven = second.copy()
+        start = 0 if order == "tff" else 1
+        woven[start::2] = first[start::2]
+        frames.append(av.VideoFrame.from_ndarray(woven, format="rgb24").reformat(format=pixels))
+    return marked(frames, order)
+
+
+def marked(frames: list, order: str) -> list:
+    """Return copies of frames that say "tff", "bff" or "prog"; frame k is shown at k / 25 s."""
+    graph = av.filter.Graph()
+    buffer = graph.add_buffer(template=frames[0], time_base=Fraction(1, 25))
+    graph.link_nodes(buffer, graph.add("setfield", order), graph.add("buffersink")).configure()
+    result = []
+    for k, frame in enumerate(frames):
+        frame.pts, frame.time_base = k, Fraction(1, 25)
+        graph.vpush(frame)
+        result.append(graph.vpull())
+    return result

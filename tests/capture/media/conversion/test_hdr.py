@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""HDR to SDR: values of the standards' tables, tags, and files as phones write them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from scope.scope_addon.capture.media.conversion.hdr import compress, hdr_rgb, hlg_light, pq_code, pq_light
+from scope.scope_addon.capture.media.frame_readers import stated_rgb
+from scope.scope_addon.capture.media.video import open_video
+
+from ..made_video import patch_track_header, with_time_table
+from .made_frames import BT709, BT2020, HLG, PQ, av, coded_frame, write_frames
+
+# Codes for light in cd/m² on a screen of 1000 cd/m², from tables of ITU-R BT.2408 and BT.2100.
+LEVELS = {
+    PQ: {0.0: 0.0, 26.0: 0.38, 203.0: 0.58, 1000.0: 0.7518},
+    HLG: {0.0: 0.0, 26.0: 0.38, 203.0: 0.75, 1000.0: 1.0},
+}
+
+
+def converted(frame) -> np.ndarray:
+    image = hdr_rgb(frame)
+    assert image is not None
+    return image
+
+
+def grey(code: float, transfer: int, **tags: int):
+    return coded_frame(np.full((8, 8, 3), code), transfer, **tags)
+
+
+def test_the_curves_are_those_of_the_standards() -> None:
+    light = np.array([0.0, 100.0, 1000.0, 10000.0])
+    np.testing.assert_allclose(pq_code(light), [7.3e-7, 0.508078, 0.751827, 1.0], atol=1e-6)
+    np.testing.assert_allclose(pq_light(pq_code(light)), light, atol=1e-6)
+    np.testing.assert_allclose(hlg_light(np.array([0.0, 0.5, 1.0])), [0.0, 1 / 12, 1.0], atol=1e-6)
+    np.testing.assert_allclose(compress(np.array([0.0, 50.0, 1000.0, 9000.0])), [0.0, 50.0, 203.0, 203.0], atol=1e-6)
+    slope = np.diff(compress(np.linspace(0, 1000, 2001)))
+    assert (slope > 0).all()  # highlights stay distinct
+    assert np.abs(np.diff(slope)).max() < 0.02  # the knee is no edge
+
+
+@pytest.mark.parametrize("bits", [8, 10])
+@pytest.mark.parametrize("transfer", [PQ, HLG])
+def test_greys_have_the_light_that_they_stand_for(transfer: int, bits: int) -> None:
+    shown = {light: converted(grey(code, transfer, bits=bits)) for light, code in LEVELS[transfer].items()}
+    for image in shown.values():
+        assert image.dtype == np.uint8
+        assert np.ptp(image) <= 1  # grey, and even
+    assert shown[0.0].max() == 0
+    assert shown[26.0].mean() == pytest.approx(255 * (26 / 203) ** (1 / 2.4), abs=3)  # under the knee
+    assert 225 < shown[203.0].mean() < 240  # leaves room for highlights
+    assert shown[1000.0].min() >= 254
+
+
+def test_what_is_brighter_than_the_peak_is_white() -> None:
+    assert converted(grey(1.0, PQ)).min() == 255
+
+
+# Codes of SDR: skins, grass, jeans, and BT.709's red, which BT.2020 holds well inside.
+COLOURS = np.array([[217, 158, 128], [140, 89, 64], [76, 46, 31], [96, 120, 70], [60, 80, 120], [200, 30, 30]]) / 255
+TO_2020 = np.array([[0.6274, 0.3293, 0.0433], [0.0691, 0.9195, 0.0114], [0.0164, 0.0880, 0.8956]])  # ITU-R BT.2087
+
+
+def as_hdr(sdr: np.ndarray, transfer: int) -> np.ndarray:
+    """Calculate the codes that show SDR colours with white at 203 cd/m²: inverses of what is tested, in full."""
+    light = 203 * sdr**2.4 @ TO_2020.T
+    if transfer == PQ:
+        power = (light / 1e4) ** 0.1593017578125
+        return ((0.8359375 + 18.8515625 * power) / (1 + 18.6875 * power)) ** 78.84375
+    screen = light / 1000
+    luminance = screen @ np.array([0.2627, 0.6780, 0.0593])
+    scene = screen * np.maximum(luminance, 1e-9)[..., None] ** (1 / 1.2 - 1)
+    logarithm = 0.17883277 * np.log(np.maximum(12 * scene - 0.28466892, 1e-9)) + 0.55991073
+    return np.where(scene <= 1 / 12, np.sqrt(3 * scene), logarithm)
+
+
+@pytest.mark.parametrize("transfer", [PQ, HLG])
+def test_colours_come_back(transfer: int) -> None:
+    patches = np.repeat(as_hdr(COLOURS, transfer), 8, 0)[None].repeat(4, 0)
+    error = converted(coded_frame(patches, transfer))[2, 4::8] - 255 * COLOURS
+    assert np.abs(error[:-1]).max() < 9, error.round()
+    assert np.abs(error[-1]).max() < 40, error.round()
+
+
+@pytest.mark.parametrize("transfer", [0, 1, 2, 3, 4, 13, 14, 15, 17, 255])
+def test_other_frames_are_sdr(transfer: int) -> None:
+    frame = grey(0.5, transfer)
+    assert hdr_rgb(frame) is None
+    assert np.array_equal(stated_rgb(frame), frame.to_ndarray(format="rgb24"))
+
+
+@pytest.mark.parametrize("matrix", [0, 2, 3, 5, 8, 10, 14, 15, 200])
+@pytest.mark.parametrize("primaries", [0, BT709, 200])
+def test_damaged_tags_leave_greys_alone(matrix: int, primaries: int) -> None:
+    frame, right = grey(0.5, HLG, matrix=matrix, primaries=primaries), converted(grey(0.5, HLG))
+    np.testing.assert_allclose(converted(frame).astype(int), right.astype(int), atol=1)
+
+
+def test_primaries_of_sdr_are_kept() -> None:
+    red = np.tile([0.6, 0.2, 0.2], (4, 4, 1))
+    wide, narrow = (converted(coded_frame(red, PQ, primaries=p))[0, 0].astype(int) for p in (BT2020, BT709))
+    assert wide[0] - wide[1] > narrow[0] - narrow[1] + 10, (wide, narrow)
+
+
+def picture() -> np.ndarray:
+    """Codes of SDR: dark at the left, light at the right, and a light corner, so that every rotation differs."""
+    ramp = np.tile(np.linspace(0.1, 0.7, 64)[:, None], (48, 1, 3))
+    ramp[:16, :24] = 0.8, 0.6, 0.5
+    return ramp
+
+
+FILES = {
+    "phone.mp4": ("libx265", "yuv420p10le", {"x265_params": "log-level=none:lossless=1"}),
+    "eight bits.mp4": ("libx264", "yuv420p", {"crf": "5"}),
+    "tags of the container.webm": ("libvpx-vp9", "yuv420p", {"crf": "5", "deadline": "realtime"}),
+    "editor.mov": ("prores_ks", "yuv422p10le", {}),
+}
+
+
+@pytest.mark.parametrize("transfer", [PQ, HLG])
+@pytest.mark.parametrize("name", FILES)
+def test_files_show_what_was_filmed(tmp_path: Path, name: str, transfer: int) -> None:
+    codec, pixels, options = FILES[name]
+    try:
+        path = write_frames(
+            tmp_path / name, [coded_frame(as_hdr(picture(), transfer), transfer)] * 3, codec, pixels, 25, **options
+        )
+    except (ValueError, av.error.FFmpegError):
+        pytest.skip("this build of PyAV cannot write such a file")
+    with open_video(path) as video:
+        frames = list(video)
+    assert [f.timestamp_s for f in frames] == pytest.approx([0, 0.04, 0.08], abs=1e-3)
+    error = np.abs(frames[1].image_rgb - 255 * picture())
+    assert np.median(error) < 5, np.median(error)  # swscale rounds down, as it does for SDR
+    assert np.percentile(error, 95) < 12, np.percentile(error, 95)
+
+
+def test_rotated_footage_of_uneven_rate_is_as_its_sdr_version(tmp_path: Path) -> None:
+    sdr = [av.VideoFrame.from_ndarray(np.rint(255 * picture()).astype(np.uint8), format="rgb24")] * 6
+    sdr[0].color_trc = BT709
+    write_frames(tmp_path / "sdr.mp4", sdr, "libx264", "yuv420p", crf="5", bf="0")
+    hdr = [coded_frame(as_hdr(picture(), HLG), HLG)] * 6
+    write_frames(tmp_path / "hdr.mp4", hdr, "libx264", "yuv420p10le", crf="5", bf="0")
+    found = []
+    for name in ("sdr.mp4", "hdr.mp4"):
+        with_time_table(tmp_path / name, 600, [(1, 20), (2, 25), (1, 90), (2, 20)])
+        patch_track_header(tmp_path / name, (0, 1 << 16, 0, -(1 << 16), 0, 0, 0, 0, 1 << 30))
+        with open_video(tmp_path / name) as video:
+            assert (video.width, video.height) == (48, 64)
+            found.append((video.fps, list(video)))
+    (fps, plain), (hdr_fps, toned) = found
+    assert fps == hdr_fps
+    assert [f.timestamp_s for f in toned] == [f.timestamp_s for f in plain]
+    assert np.diff([f.timestamp_s for f in toned]).max() == pytest.approx(0.15)
+    for a, b in zip(plain, toned, strict=True):
+        assert np.percentile(np.abs(a.image_rgb.astype(int) - b.image_rgb), 95) < 12
+    upright = cv2.rotate(np.rint(255 * picture()).astype(np.uint8), cv2.ROTATE_90_CLOCKWISE)
+    assert np.median(np.abs(toned[0].image_rgb - upright.astype(int))) < 4
+
+
+def test_pictures_in_hdr_are_converted_too(tmp_path: Path) -> None:
+    frame = coded_frame(as_hdr(picture(), PQ), PQ)
+    try:
+        path = write_frames(tmp_path / "a.avif", [frame], "libsvtav1", "yuv420p10le", crf="10", preset="10")
+    except (ValueError, av.error.FFmpegError):
+        pytest.skip("this build of PyAV cannot write such a file")
+    with open_video(path) as video:
+        image = next(iter(video)).image_rgb
+    assert np.median(np.abs(image - 255 * picture())) < 5
