@@ -8,6 +8,8 @@ t' = t + R_0 R_0,beforeᵀ (t_after − t_before). Keys that the correction does
 
 from __future__ import annotations
 
+import math
+
 import bpy
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +30,7 @@ from .edited_keys import KeyEdits, begin_with_edits, meet_floor
 from .uncorrected_keys import UncorrectedKeys, changed_rows, differ, keyed_values, restore
 
 _SAME_FRAME = 2e-3
+_WHOLE = 1e-3  # frames; timestamps are rounded
 _SAME_S = 1e-4  # keys' frames are single precision
 _MISSED_PX, _MISSED_M = 1.0, 0.005
 
@@ -163,12 +166,31 @@ def source_frame(armature: bpy.types.Object, motion: Motion, frame: float, rate:
 
     :raises UsageError: the motion has none there.
     """
+    first, last = whole_span(armature, motion, rate)
+    if not first <= frame <= last:
+        raise UsageError(
+            f"frame {frame:g} is outside of the captured motion of '{armature.name}', which has frames {first} to "
+            f"{last}; go to one of these"
+        )
     time = frame / rate - _start(armature, rate)
     row = int(np.abs(motion.timestamps - time).argmin())
     spacing = float(np.median(np.diff(motion.timestamps))) if len(motion) > 1 else 1.0 / rate
     if abs(motion.timestamps[row] - time) > max(spacing, 1.0 / rate):
-        raise UsageError(f"frame {frame:g} is outside of the captured motion; go to a frame within it")
+        raise UsageError(
+            f"frame {frame:g} is in a gap of the captured motion of '{armature.name}', where the footage has no "
+            "frames; go to a frame beside it"
+        )
     return int(motion.frames[row])
+
+
+def whole_span(armature: bpy.types.Object, motion: Motion, rate: float) -> tuple[int, int]:
+    """Return the first and the last scene frame of a motion, rounded outwards to whole frames.
+
+    :param rate: scene frames per second.
+    """
+    start = _start(armature, rate)
+    first, last = ((motion.timestamps[row] + start) * rate for row in (0, -1))
+    return math.floor(first + _WHOLE), math.ceil(last - _WHOLE)
 
 
 def scene_frame(armature: bpy.types.Object, motion: Motion, frame: int, rate: float) -> float:
