@@ -19,6 +19,7 @@ from ..motion import Motion
 from .animation_data import timing
 from .animation_data.actions import fcurves, frame_range
 from .animation_data.retime import Retiming, retime_keys, retime_strips
+from .animation_data.stored_values import start_frame
 from .camera import same_camera, show_footage_again
 from .character.confidence_curves import MARKER_NAMES
 from .character.correction_list import store_corrections
@@ -45,7 +46,7 @@ def change_rate(
     :raises UsageError: when Blender cannot store the rate.
     """
     timing.blender_rate(rate)
-    moves = {p: Retiming(_start(p), rate / timing.keyed_rate(p, scene)) for p in people}
+    moves = {p: Retiming(start_frame(p), rate / timing.keyed_rate(p, scene)) for p in people}
     own = {p: frame_range([p]) for p in people}
     played = _played(scene, people)
     done: set[bpy.types.Action] = set()
@@ -79,12 +80,8 @@ def change_rate(
 
 def retimed_spans(spans: str, person: bpy.types.Object, rate: float, former: float) -> str:
     """Move the frames of a result's spans, such as ``12-18,40``."""
-    move = Retiming(_start(person), rate / former)
-    return re.sub(r"(?<!\d)-?\d+", lambda found: str(round(move.frame(int(found.group())))), spans)
-
-
-def _start(person: bpy.types.Object) -> float:
-    return float(person.get("scope_start", 0.0))
+    move = Retiming(start_frame(person), rate / former)
+    return re.sub(r"(?<!\d)-?\d{1,7}(?!\d)", lambda found: str(round(move.frame(int(found.group())))), spans)
 
 
 def _played(scene: bpy.types.Scene, people: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
@@ -156,7 +153,7 @@ def _show_footage(scene: bpy.types.Scene, people: dict[bpy.types.Object, Motion 
             if motion is None or person.name not in collection.objects or any(same_camera(motion, m) for m in seen):
                 continue
             if len(seen) < len(cameras):
-                frames = timing.key_frames(motion.timestamps, rate, _start(person))
+                frames = timing.key_frames(motion.timestamps, rate, start_frame(person))
                 warnings += show_footage_again(cameras[len(seen)], motion, frames)
             seen.append(motion)
     return warnings

@@ -167,12 +167,13 @@ class SCOPE_OT_footage_to_sequencer(ReportingOperator):
 
     def work(self, context: bpy.types.Context) -> str:
         """Add the strips."""
+        from ...scene.animation_data.stored_values import start_frame
         from ...scene.animation_data.timing import scene_rate
         from ...scene.footage_strip import add_footage_strips, strips_of
 
         scene, result = context.scene, context.scene.scope.result
         armatures = (o for o in result.collection.all_objects if "scope_start" in o)
-        start = next((float(o["scope_start"]) for o in armatures), 0.0)
+        start = next((start_frame(o) for o in armatures), 0.0)
         known = set(strips_of(scene.sequence_editor)) if scene.sequence_editor else set()
         strips = add_footage_strips(scene, bpy.path.abspath(result.footage), start)
         rate = getattr(strips[-1], "fps", 0.0)

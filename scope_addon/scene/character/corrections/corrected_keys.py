@@ -24,6 +24,7 @@ from ....edit.pins.solve_pins import missed, resolve
 from ....edit.smooth import smoothed
 from ....errors import UsageError
 from ....motion import Motion
+from ...animation_data.stored_values import smoothing_of, start_frame
 from ..keys import channel_curves, read_clip, write_keys
 from ..root_object import clip_with_root_motion, root_object
 from .edited_keys import KeyEdits, begin_with_edits, meet_floor
@@ -56,14 +57,14 @@ def rewrite_changed_keys(
     :return: the keys that are now different from those without corrections.
     :raises UsageError: when a bone or its keys are missing.
     """
-    start, (before, after) = float(armature.get("scope_start", 0.0)), motions
+    start, (before, after) = start_frame(armature), motions
     known = UncorrectedKeys.from_bytes(stored, len(channel_curves(armature, body)))
     restored = restore(armature, body, start, rate, known)
     on_floor = feet_on_floor(corrections_of(after)) is not None  # would undo a rise before it
     if rise and not on_floor:
         _raise_keys(armature, body, rate, rise)
     clip, frames = read_clip(armature, body, rate)
-    strength = float(armature.get("scope_smoothing", 1.0))
+    strength = smoothing_of(armature)
     free, old, new = (
         _at(smoothed(body, m, strength), clip.times, _start(armature, rate))
         for m in (uncorrected(before), before, after)
@@ -143,7 +144,7 @@ def heights_of_foot(
     :param place: frame of the footage, and the foot as in `foot_height`.
     """
     frame, foot = place
-    captured = smoothed(body, motion, float(armature.get("scope_smoothing", 1.0)))
+    captured = smoothed(body, motion, smoothing_of(armature))
     clip, frames = read_clip(armature, body, rate)
     shown = clip_with_root_motion(armature, clip, frames), _start(armature, rate)
     return (
@@ -195,12 +196,12 @@ def whole_span(armature: bpy.types.Object, motion: Motion, rate: float) -> tuple
 
 def scene_frame(armature: bpy.types.Object, motion: Motion, frame: int, rate: float) -> float:
     """Return the scene frame at which a frame of the footage is shown."""
-    return float(np.interp(frame, motion.frames, motion.timestamps) * rate + armature.get("scope_start", 0.0))
+    return float(np.interp(frame, motion.frames, motion.timestamps) * rate + start_frame(armature))
 
 
 def _start(armature: bpy.types.Object, rate: float) -> float:
     """Return the scene's time in seconds at the footage's time 0."""
-    return float(armature.get("scope_start", 0.0)) / rate
+    return start_frame(armature) / rate
 
 
 def _at(clip: Clip, times: NDArray[np.float64], start: float) -> Clip:
