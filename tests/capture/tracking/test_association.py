@@ -48,6 +48,18 @@ def test_a_crossing_is_resolved_by_motion() -> None:
     assert sorted(link(tracklets, times)) == [[0, 2], [1, 3]]
 
 
+@pytest.mark.parametrize(("others", "people"), [(RED, [[0, 3], [1, 2]]), (BLUE, [[0, 2], [1, 3]])])
+def test_clothes_tell_people_who_turn_back_from_people_who_pass_each_other(
+    others: np.ndarray, people: list[list[int]]
+) -> None:
+    """They come towards each other and leave again; nobody is seen between frames 50 and 60."""
+    times = (np.arange(120) / RATE).tolist()
+    right, left = (0.0, 8.0), (880.0, -8.0)
+    before = [tracklet(0, 50, *right, RED), tracklet(0, 50, *left, others)]
+    after = [tracklet(60, 120, *left, RED), tracklet(60, 120, *right, others)]
+    assert sorted(link(before + after, times)) == people
+
+
 @pytest.mark.parametrize(("returns", "people"), [(RED, [[0, 1]]), (BLUE, [[0], [1]])])
 def test_after_a_long_time_the_appearance_decides(returns: np.ndarray, people: list[list[int]]) -> None:
     times = (np.arange(240) / RATE).tolist()

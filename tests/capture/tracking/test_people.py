@@ -72,6 +72,23 @@ def test_identities_survive_a_crossing(follow: Callable[..., list[Track]], color
     assert tracks[1].seen.sum() >= 120 - hidden - 22  # not while the two bodies are indistinguishable
 
 
+@pytest.mark.parametrize("turns", [False, True], ids=["pass", "turn back"])
+@pytest.mark.parametrize("colors", [(RED, BLUE), (RED, RED)], ids=["different clothes", "same clothes"])
+def test_identities_after_both_people_were_hidden(
+    follow: Callable[..., list[Track]], colors: tuple, turns: bool
+) -> None:
+    """Behind a pillar, where they pass each other or turn back; only clothes can tell which."""
+    hidden = range(50, 70)
+    way = (lambda t: min(t, 120 - t)) if turns else (lambda t: t)
+    left = Person(lambda t: (200 + 6.0 * way(t), 200), colors[0], hidden=hidden)
+    right = Person(lambda t: (920 - 6.0 * way(t), 205), colors[1], size_px=110, hidden=hidden)
+    tracks = follow([left, right], 120, wanted=2)
+    assert [track.seen[hidden].any() for track in tracks] == [False, False]
+    assert all(track.seen[80:].all() for track in tracks)
+    switched = turns and colors[0] == colors[1]  # taken for people who pass each other, which is all that is to be seen
+    assert [identities(track, [left, right]) for track in tracks] == ([{0, 1}] * 2 if switched else [{1}, {0}])
+
+
 @pytest.mark.parametrize("count", [2, 8])
 @pytest.mark.parametrize("fps", [1, 2])
 def test_a_person_who_is_elsewhere_in_each_frame_is_tracked_at_a_low_rate(
