@@ -13,7 +13,7 @@ from scope.scope_addon.capture.perception.landmark_network import PoseEstimate
 from scope.scope_addon.capture.perception.person_detector import Detection
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.landmarks import tracking_networks
-from scope.scope_addon.capture.tracking.people import frames_before_flicker
+from scope.scope_addon.capture.tracking.people import build_tracks, frames_before_flicker, frames_before_merger
 from scope.scope_addon.capture.tracking.track import Track, Tracklet
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker
 
@@ -414,6 +414,35 @@ def test_tracking_does_not_wait_for_the_reference_network(monkeypatch: pytest.Mo
 def test_a_short_reappearance_is_cut_off(rows: list[int], kept: int) -> None:
     tracklet = Tracklet(rows=list(rows), values=[np.zeros((33, 6), np.float32)] * len(rows))
     assert frames_before_flicker(tracklet, (np.arange(60) / FPS).tolist()) == kept
+
+
+def seen_at(xs: list[float], first: int = 0) -> Tracklet:
+    """A tracklet of a body that moves with the hips at these places, one in each frame."""
+    body = np.random.default_rng(1).normal(scale=40.0, size=(33, 2))
+    values = [np.pad(body + [x, 200.0], ((0, 0), (0, 4))).astype(np.float32) for x in xs]
+    rows = list(range(first, first + len(xs)))
+    return Tracklet(rows, values, [np.array([x, 200.0]) for x in xs], [200.0] * len(xs))
+
+
+@pytest.mark.parametrize(
+    ("drifting", "goes_on", "kept"),
+    [
+        (6, 30, 24),
+        (11, 30, 19),  # as long as a merger lasts
+        (20, 30, 30 - 12),  # whatever was seen before was no drift
+        (0, 30, 30),
+        (6, 0, 30),  # the other one is not seen after the end, so it is not in front
+    ],
+)
+def test_frames_in_which_a_target_drifts_onto_another_one_are_cut_off(drifting: int, goes_on: int, kept: int) -> None:
+    """The place from which the target is followed later is the last one of the person who went behind another."""
+    passes = [500.0 - 4.0 * t for t in range(30 + goes_on)]
+    walks = [200.0 + 2.0 * t for t in range(30 - drifting)] + passes[30 - drifting : 30]
+    times = (np.arange(60) / FPS).tolist()
+    tracklets = [seen_at(walks), seen_at(passes)]
+    assert frames_before_merger(tracklets[0], tracklets, times) == kept
+    (track, *_) = build_tracks(list(range(60)), times, [seen_at(walks), seen_at(passes)], 2)[::-1]
+    assert track.seen.sum() == kept
 
 
 @pytest.mark.usefixtures("networks")
