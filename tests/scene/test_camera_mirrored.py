@@ -34,7 +34,8 @@ def shown_by_blender(path) -> np.ndarray:
 def rendered(scene, tmp_path, size) -> np.ndarray:
     """Return what the scene renders in its first frame, (H, W, 3) uint8."""
     render = scene.render
-    render.resolution_x, render.resolution_y, render.resolution_percentage = *size, 100
+    render.resolution_x, render.resolution_y = size
+    render.resolution_percentage = 100
     render.filepath, render.image_settings.file_format = str(tmp_path / "rendered.png"), "PNG"
     scene.view_settings.view_transform = "Standard"
     scene.frame_set(1)
