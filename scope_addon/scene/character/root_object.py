@@ -21,7 +21,7 @@ from ...errors import UsageError
 from ..animation_data.actions import Channels, fcurves, read_keys
 from ..animation_data.removal import remove_blocks
 from ..animation_data.retime import Retiming
-from ..animation_data.stored_values import stored_numbers, stored_text
+from ..animation_data.stored_values import stored_numbers
 from .keys import read_clip, write_clip
 
 ROOT_TAG = "scope_root"  # custom property of the empty
@@ -89,9 +89,8 @@ def parent_to_root_object(
     top.parent, top.parent_type = empty, "OBJECT"
     top.matrix_parent_inverse.identity()
     if former is not None:
-        name = f"{stored_text(former, ROOT_TAG) or armature.name}_root"
         _remove(former)
-        empty.name = name
+        empty.name = f"{armature.name}_root"  # the take may have been renamed since
     return empty
 
 
