@@ -26,6 +26,7 @@ from .character.correction_list import store_corrections
 from .character.expression_keys import has_expression_keys
 from .character.root_object import retime_unused_trajectory, root_object
 from .character.shape_keys import shape_key_name
+from .datablock_names import holds
 from .rigs.rig_action import is_retargeted, retime_written_keys
 
 _MARKER = re.compile(rf"((?:person \d+ )?(?:{'|'.join(MARKER_NAMES.values())})) (-?\d+)(?:-(-?\d+))?")
@@ -58,7 +59,7 @@ def change_rate(
     for rig, person in rigs:
         _retime_rig(rig, moves[person], done)
     for collection in scene.collection.children_recursive:
-        here = [person for person in people if person.name in collection.all_objects]
+        here = [person for person in people if holds(collection, person)]
         for camera in [obj for obj in collection.objects if obj.type == "CAMERA"] if here else ():
             _retime(camera, moves[here[0]], done)
     _retime_markers(scene, own, moves)
@@ -87,7 +88,7 @@ def retimed_spans(spans: str, person: bpy.types.Object, rate: float, former: flo
 def _played(scene: bpy.types.Scene, people: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
     """Return the people of the capture whose keys the scene's frame range spans; none if it is another range."""
     people = list(people)
-    for together in [people, *([p for p in people if p.name in c.all_objects] for c in scene.collection.children)]:
+    for together in [people, *([p for p in people if holds(c, p)] for c in scene.collection.children)]:
         span = frame_range(together)
         if span and (math.floor(span[0]), math.ceil(span[1])) == (scene.frame_start, scene.frame_end):
             return together
@@ -148,9 +149,10 @@ def _show_footage(scene: bpy.types.Scene, people: dict[bpy.types.Object, Motion 
     warnings: list[str] = []
     for collection in scene.collection.children_recursive:
         seen: list[Motion] = []
-        cameras = [obj for obj in collection.objects if obj.type == "CAMERA"]
+        own = list(collection.objects)
+        cameras = [obj for obj in own if obj.type == "CAMERA"]
         for person, motion in people.items():
-            if motion is None or person.name not in collection.objects or any(same_camera(motion, m) for m in seen):
+            if motion is None or person not in own or any(same_camera(motion, m) for m in seen):
                 continue
             if len(seen) < len(cameras):
                 frames = timing.key_frames(motion.timestamps, rate, start_frame(person))
@@ -163,8 +165,8 @@ def other_animation(
     scene: bpy.types.Scene, people: Iterable[bpy.types.Object], rigs: Iterable[tuple[bpy.types.Object, object]]
 ) -> bool:
     """Return whether anything else in the scene has keys, which keep their frames at another rate."""
-    moved = {obj.name for person in people for c in person.users_collection for obj in c.objects}
-    moved |= {rig.name for rig, _ in rigs}
-    others = [obj for obj in scene.objects if obj.name not in moved]
+    moved = {obj for person in people for c in person.users_collection for obj in c.objects}
+    moved |= {rig for rig, _ in rigs}
+    others = [obj for obj in scene.objects if obj not in moved]
     blocks = (block for obj in others for block in (obj, obj.data) if getattr(block, "animation_data", None))
     return any(map(fcurves, blocks))

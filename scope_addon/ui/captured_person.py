@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import bpy
 
+from ..scene.datablock_names import holds
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -34,7 +36,7 @@ def captured_armature(context: bpy.types.Context) -> bpy.types.Object | None:
         obj = obj.parent
     collection = context.scene.scope.capture
     found = captured_people(context)
-    last = [o for o in found if o.name in collection.all_objects] if collection else []
+    last = [o for o in found if holds(collection, o)] if collection else []
     return last[0] if len(last) == 1 else found[0] if len(found) == 1 else None
 
 

@@ -16,6 +16,7 @@ from scope.scope_addon.scene.character.root_object import root_object
 from scope.scope_addon.scene.match_rate import retimed_spans
 from scope.scope_addon.ui.capture.capture_panel import first_frame
 from scope.scope_addon.ui.capture.frame_rate_operators import keyed_for
+from scope.scope_addon.ui.captured_person import captured_armature
 
 from ..edit.walking import NAMES, motion_of, walk
 from ..scene import made_rigs
@@ -178,6 +179,19 @@ def test_a_changed_rate_is_the_scenes(rig):
     for value in VALUES.values():
         rig["scope_rate"] = value
         assert keyed_rate(rig, scene) == (7.0 if value == 7 else 30.0)
+
+
+@pytest.mark.parametrize("value", VALUES.values(), ids=VALUES)
+def test_a_changed_person_of_a_rig_is_none(rig, tmp_path, value):
+    own, _ = made_rigs.build_rig("unreal")
+    bpy.context.scene.scope_retarget.rig = own
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.scope.retarget()
+    own["scope_person"] = value
+    assert bpy.ops.scope.export(filepath=str(tmp_path / "a.fbx"), format="FBX", which="RIG") == {"FINISHED"}
+    bpy.context.view_layer.objects.active = own
+    assert captured_armature(bpy.context) == rig  # the only person of the scene
+    assert tried(bpy.ops.scope.match_frame_rate) == ""
 
 
 def test_changed_spans_have_no_button(rig):

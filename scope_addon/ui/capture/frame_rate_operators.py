@@ -134,10 +134,11 @@ def _update_results(
     scene: bpy.types.Scene, rate: float, keyed: dict[bpy.types.Object, float], warnings: list[str]
 ) -> None:
     """Move the frames that results name, and replace the warnings about the frame rate."""
+    from ...scene.datablock_names import holds
     from ...scene.match_rate import retimed_spans
 
     for collection in scene.collection.children_recursive:
-        result, person = collection.scope_result, next((p for p in keyed if p.name in collection.all_objects), None)
+        result, person = collection.scope_result, next((p for p in keyed if holds(collection, p)), None)
         if person is None:
             continue
         shown = result.warnings
