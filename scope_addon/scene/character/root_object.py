@@ -121,9 +121,11 @@ def move_root_motion_to_object(
     :param rate: scene frames per second.
     :param in_place: do not animate the object: the person stays where the motion begins.
     :param heading: include the rotation about the vertical.
-    :raises UsageError: when a bone or its keys are missing.
+    :raises UsageError: when a bone or its keys are missing, or the armature's scale is 0.
     """
     clip, frames = read_clip(armature, body, rate)
+    if not armature.matrix_basis.median_scale:
+        raise UsageError(f"'{armature.name}' has the scale 0, so its motion cannot be moved; give it another one first")
     clip, former = clip_with_root_motion(armature, clip, frames), root_object(armature)
     if former is None:  # the armature's own transform becomes part of the trajectory
         bpy.context.view_layer.update()

@@ -4,6 +4,7 @@
 import bpy
 import numpy as np
 import pytest
+from scope.scope_addon.scene.character.root_object import root_object
 
 from ...edit.walking import NAMES, motion_of, walk
 from ...scene import made_rigs
@@ -55,3 +56,12 @@ def test_a_take_with_a_long_name_can_be_renamed_again(rig):
         assert name.startswith(take)
         assert sorted(obj.name.removeprefix(take) for obj in objects) == before
         assert rig.animation_data.action.name == take
+
+
+def test_an_armature_without_size_keeps_its_root_motion(rig):
+    rig["scope_body_file"] = "scope"
+    rig.scale = (0, 0, 0)
+    for mode in ("OBJECT", "IN_PLACE"):
+        with pytest.raises(RuntimeError, match="'walk' has the scale 0"):
+            bpy.ops.scope.root_motion(mode=mode)
+    assert root_object(rig) is None
