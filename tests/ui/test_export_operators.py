@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the export operator writes where a capture is linked from another file under the same names."""
 
+import os
+import sys
+
 import bpy
 import pytest
 from scope.scope_addon.ui.captured_person import captured_armature
@@ -38,3 +41,14 @@ def test_the_person_of_the_selected_capture_is_found(both, which):
     bpy.context.view_layer.objects.active = None
     bpy.context.scene.scope.capture = both[which].users_collection[0]
     assert captured_armature(bpy.context) == both[which]
+
+
+@pytest.mark.skipif(os.name == "nt" or sys.platform == "darwin", reason="names there are Unicode")
+def test_a_file_whose_name_is_not_utf8_is_written_and_reported(tmp_path, capfd):
+    rig = captured(motion := motion_of(walk(1.0)))
+    motion.save(tmp_path / "person1.npz")
+    rig["scope_motion"] = str(tmp_path / "person1.npz")
+    name = os.fsdecode(b"l\xe4ufer.npz")
+    assert bpy.ops.scope.export(filepath=str(tmp_path / name), format="NPZ") == {"FINISHED"}
+    assert (tmp_path / name).is_file()
+    assert "Wrote l\ufffdufer.npz" in capfd.readouterr().out
