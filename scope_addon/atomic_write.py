@@ -13,7 +13,6 @@ import glob
 import io
 import os
 import stat
-import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -44,13 +43,16 @@ def atomic_path(path: Path) -> Iterator[Path]:
     target = resolve_link(path)
     start, suffix = _temporary_name(path)
     _remove_abandoned(target.parent, start)
-    handle, name = tempfile.mkstemp(prefix=f"{start}{owner()}-", suffix=suffix, dir=target.parent)
-    temporary = Path(name)
+    temporary = target.parent / f"{start}{owner()}-{os.urandom(4).hex()}{suffix}"
+    # The system decides on the permissions of a new file, by the process's umask or the folder's list. To read the
+    # umask, one has to change it for a moment, in which other threads' files would be writable for everybody.
+    handle = os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666)
     _temporary_files.add(temporary)
     try:
+        mode = stat.S_IMODE(os.fstat(handle).st_mode)
         os.close(handle)
         yield temporary
-        os.chmod(temporary, 0o666 & ~_umask())
+        os.chmod(temporary, mode)  # a library may have replaced the file by one of its own
         os.replace(temporary, target)
     finally:
         _remove_with_drafts(temporary)
@@ -176,9 +178,3 @@ def _remove_with_drafts(temporary: Path) -> None:
     own = start + separator + rest.partition(".")[0]  # without the suffix
     for path in temporary.parent.glob(f"{glob.escape(own)}*"):
         path.unlink(missing_ok=True)
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

@@ -60,6 +60,7 @@ from .errors import (
 )
 from .footage import json_text
 from .installed import CAPTURE, check_installed
+from .job.clips.finished import FINISHED_FILE, write_finished
 from .job.clips.task import SHOWN_COMMAND, STOP_WITH_STDIN, Extras
 from .job.parent import stop_with_parent
 from .job.private_folder import lasting_folder
@@ -133,6 +134,7 @@ def _add_capture_files(capture: argparse.ArgumentParser) -> None:
     # Passed by a batch to its processes.
     capture.add_argument(STOP_WITH_STDIN, action="store_true", help=argparse.SUPPRESS)
     capture.add_argument(SHOWN_COMMAND, default="", help=argparse.SUPPRESS)
+    capture.add_argument(FINISHED_FILE, type=Path, help=argparse.SUPPRESS)
     add_window_arguments(capture)
 
 
@@ -179,7 +181,8 @@ def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) ->
             raise UsageError(f"unknown arguments: {' '.join(unknown)} (see scope {args.command} --help{advice})")
         args.program = list(program)
         given = [*program, *(sys.argv[1:] if argv is None else argv)]
-        shown = shlex.join([each for each in given if each != STOP_WITH_STDIN])
+        internal = STOP_WITH_STDIN, f"{FINISHED_FILE}="
+        shown = shlex.join([each for each in given if not each.startswith(internal)])
         args.command_text = getattr(args, "shown_command", "") or shown
         with stopped_by_signals(), stdout_for_report() as stdout:
             if getattr(args, "stop_with_stdin", False):
@@ -265,7 +268,9 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
                 clip = CapturedClip(video, result.motions, body, result.report, args.command_text, options.wanted)
                 write_capture_page(args.report, clip, lambda i, n: progress("report", i, n))
                 written.append(args.report)
-    report = dict(result.report, outputs=[str(p) for p in written])
+            report = dict(result.report, outputs=[str(p) for p in written])
+            if args.finished_file:
+                write_finished(args.finished_file, report)
     for warning in report["warnings"]:
         print_message(f"warning: {warning}")
     if not args.json:

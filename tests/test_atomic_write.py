@@ -73,6 +73,26 @@ def test_a_failure_leaves_no_draft_either(tmp_path):
     assert os.listdir(tmp_path) == []
 
 
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no such permissions")
+@pytest.mark.parametrize("mask", [0o022, 0o077, 0o002])
+@pytest.mark.parametrize("replaces", [False, True])
+def test_a_file_has_the_permissions_of_any_new_one_and_the_umask_is_left_alone(tmp_path, monkeypatch, mask, replaces):
+    """Every change of the umask affects the files that other threads create meanwhile."""
+    before, changes = os.umask(mask), []
+    try:
+        with monkeypatch.context() as patch:
+            patch.setattr(os, "umask", changes.append)
+            with atomic_path(tmp_path / "walk.npz") as temporary:
+                if replaces:  # as exporters do
+                    temporary.unlink()
+                    os.close(os.open(temporary, os.O_CREAT | os.O_WRONLY, 0o600))
+        (tmp_path / "other.npz").write_text("")
+    finally:
+        os.umask(before)
+    assert (tmp_path / "walk.npz").stat().st_mode == (tmp_path / "other.npz").stat().st_mode
+    assert not changes
+
+
 def test_other_hidden_files_of_that_name_stay(tmp_path):
     (tmp_path / ".walk.settings").write_text("kept")
     write(tmp_path / "walk")

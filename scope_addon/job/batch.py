@@ -2,7 +2,8 @@
 """Capture a folder of footage, one process per clip: a clip that fails affects no other, finished clips are skipped.
 
 ``scope-batch.json`` in the output folder is rewritten as clips finish, so that an interrupted batch can continue. A
-clip is finished if its content (SHA-256), the options and the program are unchanged and its result files exist.
+clip is finished if its content (SHA-256), the options and the program are unchanged and its result files exist. Clips
+whose results were complete when a batch was killed, before it has written the report, are known by `clips.finished`.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from ..atomic_write import atomic_path
 from ..errors import NO_PERSON, OutputError, UsageError
 from ..footage import FOOTAGE_SUFFIXES, json_text
 from .clips.find import find_clips
+from .clips.finished import remove_finished
 from .clips.runner import LocalRunner, Runner
 from .clips.task import FINISHED, NO_EXTRAS, CaptureSettings, ClipTask, Entry, Extras
 from .request import program_version
@@ -58,6 +60,7 @@ class Batch:
         self._program = list(program)
         self._basis = self.settings.basis(program_version(ROOT))
         self._next_report = 0.0
+        self._reported: set[str] = set()  # clips of this run that the written report contains
 
     def clips(self, recursive: bool) -> dict[str, Path]:
         """Return the clips by the name of their results; see `find_clips`."""
@@ -102,7 +105,7 @@ class Batch:
         runner = runner or LocalRunner(self._program, jobs)
         try:
             # The tasks are made within the try, because a signal can arrive as soon as the first clip has begun.
-            for finished in runner.outcomes(self._tasks(clips, previous)):
+            for finished in runner.outcomes(self._tasks(clips, previous, again)):
                 for name, entry in finished.items():
                     entries[name] = entry
                     _print_outcome(entry, f"{len(entries)}/{len(clips)}", say)
@@ -117,12 +120,12 @@ class Batch:
             raise
         return self._write_report(_in_order(entries, clips), previous, runner, last=True)
 
-    def _tasks(self, clips: dict[str, Path], previous: dict[str, Entry]) -> Iterator[ClipTask]:
+    def _tasks(self, clips: dict[str, Path], previous: dict[str, Entry], again: bool) -> Iterator[ClipTask]:
         """Yield the task of each clip."""
         for name, path in clips.items():
             file, entry = path.relative_to(self.folder).as_posix(), previous.get(name)
             known = entry if entry and self._is_finished(entry) else None
-            yield ClipTask(name, file, str(path), str(self.out), self._basis, self.settings, known)
+            yield ClipTask(name, file, str(path), str(self.out), self._basis, self.settings, known, again=again)
 
     def _is_finished(self, entry: Entry) -> bool:
         """Return whether an entry of the previous report is of a finished clip whose files still exist."""
@@ -167,6 +170,10 @@ class Batch:
         except OSError as error:
             raise OutputError(f"cannot write {self.report_file}: {error.strerror}; free some space") from error
         runner.report_written(self.report_file)
+        written = {name for name, entry in entries.items() if entry["status"] in FINISHED}
+        for name in written - self._reported:
+            remove_finished(self.out, name)
+        self._reported |= written
         taken = time.monotonic() - start
         self._next_report = 0.0 if taken < _QUICK_S else start + taken / _WRITING_SHARE
         return report

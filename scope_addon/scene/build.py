@@ -25,6 +25,7 @@ from .animation_data.transaction import all_or_nothing
 from .character import animation, armature, body_mesh, bone_display, confidence_curves, expression_keys, shape_keys
 from .character.correction_list import store_corrections
 from .character.keys import bake_whole_frames
+from .datablock_names import short_name
 from .local_scene import check_local
 
 CAPTURE_TAG = "scope_capture"  # custom property that marks a capture's collection, for exporters
@@ -123,7 +124,7 @@ def _build(
     options: BuildOptions,
     report: Progress,
 ) -> BuildResult:
-    name = options.name or display_text(Path(str(footage or motions[0].source or "capture")).stem)
+    name = short_name(options.name or display_text(Path(str(footage or motions[0].source or "capture")).stem))
     warnings = _face_warnings(motions, body)
     if options.frame_rate == "set":
         timing.set_scene_rate(scene, motions[0].mocap_framerate)

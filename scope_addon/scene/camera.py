@@ -28,6 +28,7 @@ from ..errors import VideoError
 from ..footage import LAST_NUMBER, PICTURE_SUFFIXES, numbered_from
 from ..motion import Motion
 from .animation_data.actions import Channels, fcurves_of
+from .animation_data.stored_values import stored_numbers
 from .axes import blender_brown_distortion, blender_camera_matrix
 from .character.animation import on_one_hemisphere, quaternion_from_matrix
 
@@ -54,9 +55,10 @@ def store_resolution(collection: bpy.types.Collection, motion: Motion) -> None:
 
 def set_resolution(scene: bpy.types.Scene, collection: bpy.types.Collection) -> None:
     """Set the scene's resolution and pixel aspect to those of the footage, if the collection stores them."""
-    if _PICTURE not in collection:
+    picture = stored_numbers(collection, _PICTURE)
+    if len(picture) != 4 or min(picture) <= 0:
         return
-    width, height, aspect_x, aspect_y = collection[_PICTURE]
+    width, height, aspect_x, aspect_y = picture
     scene.render.resolution_x, scene.render.resolution_y = int(width), int(height)
     scene.render.resolution_percentage = 100
     scene.render.pixel_aspect_x, scene.render.pixel_aspect_y = aspect_x, aspect_y

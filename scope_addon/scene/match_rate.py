@@ -19,12 +19,14 @@ from ..motion import Motion
 from .animation_data import timing
 from .animation_data.actions import fcurves, frame_range
 from .animation_data.retime import Retiming, retime_keys, retime_strips
+from .animation_data.stored_values import start_frame
 from .camera import same_camera, show_footage_again
 from .character.confidence_curves import MARKER_NAMES
 from .character.correction_list import store_corrections
 from .character.expression_keys import has_expression_keys
 from .character.root_object import retime_unused_trajectory, root_object
 from .character.shape_keys import shape_key_name
+from .datablock_names import holds
 from .rigs.rig_action import is_retargeted, retime_written_keys
 
 _MARKER = re.compile(rf"((?:person \d+ )?(?:{'|'.join(MARKER_NAMES.values())})) (-?\d+)(?:-(-?\d+))?")
@@ -45,7 +47,7 @@ def change_rate(
     :raises UsageError: when Blender cannot store the rate.
     """
     timing.blender_rate(rate)
-    moves = {p: Retiming(_start(p), rate / timing.keyed_rate(p, scene)) for p in people}
+    moves = {p: Retiming(start_frame(p), rate / timing.keyed_rate(p, scene)) for p in people}
     own = {p: frame_range([p]) for p in people}
     played = _played(scene, people)
     done: set[bpy.types.Action] = set()
@@ -57,7 +59,7 @@ def change_rate(
     for rig, person in rigs:
         _retime_rig(rig, moves[person], done)
     for collection in scene.collection.children_recursive:
-        here = [person for person in people if person.name in collection.all_objects]
+        here = [person for person in people if holds(collection, person)]
         for camera in [obj for obj in collection.objects if obj.type == "CAMERA"] if here else ():
             _retime(camera, moves[here[0]], done)
     _retime_markers(scene, own, moves)
@@ -79,18 +81,14 @@ def change_rate(
 
 def retimed_spans(spans: str, person: bpy.types.Object, rate: float, former: float) -> str:
     """Move the frames of a result's spans, such as ``12-18,40``."""
-    move = Retiming(_start(person), rate / former)
-    return re.sub(r"(?<!\d)-?\d+", lambda found: str(round(move.frame(int(found.group())))), spans)
-
-
-def _start(person: bpy.types.Object) -> float:
-    return float(person.get("scope_start", 0.0))
+    move = Retiming(start_frame(person), rate / former)
+    return re.sub(r"(?<!\d)-?\d{1,7}(?!\d)", lambda found: str(round(move.frame(int(found.group())))), spans)
 
 
 def _played(scene: bpy.types.Scene, people: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
     """Return the people of the capture whose keys the scene's frame range spans; none if it is another range."""
     people = list(people)
-    for together in [people, *([p for p in people if p.name in c.all_objects] for c in scene.collection.children)]:
+    for together in [people, *([p for p in people if holds(c, p)] for c in scene.collection.children)]:
         span = frame_range(together)
         if span and (math.floor(span[0]), math.ceil(span[1])) == (scene.frame_start, scene.frame_end):
             return together
@@ -151,12 +149,13 @@ def _show_footage(scene: bpy.types.Scene, people: dict[bpy.types.Object, Motion 
     warnings: list[str] = []
     for collection in scene.collection.children_recursive:
         seen: list[Motion] = []
-        cameras = [obj for obj in collection.objects if obj.type == "CAMERA"]
+        own = list(collection.objects)
+        cameras = [obj for obj in own if obj.type == "CAMERA"]
         for person, motion in people.items():
-            if motion is None or person.name not in collection.objects or any(same_camera(motion, m) for m in seen):
+            if motion is None or person not in own or any(same_camera(motion, m) for m in seen):
                 continue
             if len(seen) < len(cameras):
-                frames = timing.key_frames(motion.timestamps, rate, _start(person))
+                frames = timing.key_frames(motion.timestamps, rate, start_frame(person))
                 warnings += show_footage_again(cameras[len(seen)], motion, frames)
             seen.append(motion)
     return warnings
@@ -166,8 +165,8 @@ def other_animation(
     scene: bpy.types.Scene, people: Iterable[bpy.types.Object], rigs: Iterable[tuple[bpy.types.Object, object]]
 ) -> bool:
     """Return whether anything else in the scene has keys, which keep their frames at another rate."""
-    moved = {obj.name for person in people for c in person.users_collection for obj in c.objects}
-    moved |= {rig.name for rig, _ in rigs}
-    others = [obj for obj in scene.objects if obj.name not in moved]
+    moved = {obj for person in people for c in person.users_collection for obj in c.objects}
+    moved |= {rig for rig, _ in rigs}
+    others = [obj for obj in scene.objects if obj not in moved]
     blocks = (block for obj in others for block in (obj, obj.data) if getattr(block, "animation_data", None))
     return any(map(fcurves, blocks))

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import bpy
 
+from ..scene.datablock_names import holds
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -34,7 +36,7 @@ def captured_armature(context: bpy.types.Context) -> bpy.types.Object | None:
         obj = obj.parent
     collection = context.scene.scope.capture
     found = captured_people(context)
-    last = [o for o in found if o.name in collection.all_objects] if collection else []
+    last = [o for o in found if holds(collection, o)] if collection else []
     return last[0] if len(last) == 1 else found[0] if len(found) == 1 else None
 
 
@@ -80,10 +82,16 @@ def body_of(armature: bpy.types.Object) -> Body:
     """Return the body that the person was captured with.
 
     :raises ModelFileError: the body's file no longer exists or cannot be read.
+    :raises UsageError: the armature does not store which body it is.
     """
     from ...solver.loaders.body_file import load_body
+    from ..errors import UsageError
+    from ..scene.animation_data.stored_values import stored_text
 
-    return load_body(armature.get("scope_body_file") or armature["scope_body"])
+    which = stored_text(armature, "scope_body_file") or stored_text(armature, "scope_body")
+    if not which:
+        raise UsageError(f"'{armature.name}' does not store which body it is; undo what changed it, or capture again")
+    return load_body(which)
 
 
 def betas_of(armature: bpy.types.Object, body: Body) -> NDArray[np.float64]:
@@ -94,8 +102,9 @@ def betas_of(armature: bpy.types.Object, body: Body) -> NDArray[np.float64]:
     import numpy as np
 
     from ..errors import UsageError
+    from ..scene.animation_data.stored_values import stored_numbers
 
-    betas = np.array(list(armature.get("scope_betas", ())), float)
+    betas = np.array(stored_numbers(armature, "scope_betas"))
     if betas.shape != (body.P,):
         raise UsageError(f"'{armature.name}' has no stored body shape; capture again")
     return betas

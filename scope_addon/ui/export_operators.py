@@ -11,6 +11,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ..options import Place
+from ..scene.datablock_names import holds
 from .capture.captures import captures_of, shown_capture
 from .captured_person import PERSON, motion_of
 from .declared_properties import with_options
@@ -136,7 +137,7 @@ class SCOPE_OT_export(ReportingOperator):
             collections = [c for c in collections if c == shown_capture(context.scene)]
         if self.which == "ACTIVE":
             active = context.view_layer.objects.active
-            collections = [c for c in collections if active and active.name in c.all_objects]
+            collections = [c for c in collections if active and holds(c, active)]
             if not collections:
                 raise UsageError("the active object belongs to no capture; select one of a capture's objects")
         if self.format == "NPZ":
@@ -157,8 +158,9 @@ def is_available(kind: str) -> bool:
 def _take_of(rig: bpy.types.Object, collections: list[bpy.types.Collection]) -> str:
     """Return the name of the capture whose motion a rig has; empty if it is unknown."""
     person = rig.get(PERSON)  # an object, or its name in older .blend files; None if it was deleted
-    name = person if isinstance(person, str) else person.name if person else ""
-    return next((c.name for c in collections if name in c.all_objects), "")
+    if isinstance(person, bpy.types.Object):
+        return next((c.name for c in collections if holds(c, person)), "")
+    return next((c.name for c in collections if isinstance(person, str) and person in c.all_objects), "")
 
 
 CLASSES = (SCOPE_OT_export,)

@@ -62,5 +62,5 @@ class ReportingOperator(bpy.types.Operator):
             self.report({"ERROR"}, sentence(error))
             return {"CANCELLED"}
         if message:
-            self.report({"INFO"}, message)
+            self.report({"INFO"}, display_text(message))
         return {"FINISHED"}

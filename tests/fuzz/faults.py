@@ -18,7 +18,7 @@ from scope.solver.errors import ScopeError
 
 _CALLS = (
     *((os, name) for name in ("open", "replace", "rename", "mkdir", "chmod", "close")),
-    *((tempfile, name) for name in ("mkstemp", "mkdtemp")),
+    (tempfile, "mkdtemp"),
     *((module, "open") for module in (builtins, io)),
 )
 

@@ -284,6 +284,50 @@ def test_overlays_and_pages_of_a_batch_lie_next_to_the_results(folder, tmp_path)
     assert args["c.png"].report == tmp_path / "out" / "c.report.html"
 
 
+KILLS_THE_BATCH = """
+import os, sys
+from scope.scope_addon import cli
+cli._print_report = lambda *_: os.kill(os.getppid(), 9)
+cli.run()
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGKILL")
+def test_a_clip_that_was_finished_when_the_batch_was_killed_is_not_captured_again(tmp_path, capfd):
+    clips, out = tmp_path / "clips", tmp_path / "out"
+    clips.mkdir()
+    shutil.copy(SAMPLE, clips / "a.mp4")
+    (tmp_path / "clip.py").write_text(KILLS_THE_BATCH)
+    argv = ["batch", str(clips), "--out", str(out), "--formats", "npz", "--quality", "fast", "--end", "1"]
+    program = [sys.executable, str(tmp_path / "clip.py")]
+    code = f"import sys\nfrom scope.scope_addon.cli import main\nmain({argv}, program={program})\n"
+    killed = subprocess.run([sys.executable, "-c", code], check=False, stderr=subprocess.DEVNULL)
+    assert killed.returncode == -signal.SIGKILL
+    assert not (out / REPORT_NAME).exists()
+    kept = shutil.copytree(out, tmp_path / "kept")
+    refuses = [sys.executable, "-c", "raise SystemExit('captured again')"]
+
+    assert main(argv, program=refuses) == 0
+    (entry,) = json.loads((out / REPORT_NAME).read_text("utf-8"))["files"]
+    assert (entry["status"], entry["outputs"], entry["report"]["frames"]) == ("skipped", ["a.npz"], FRAMES)
+    assert sorted(os.listdir(out)) == ["a.npz", REPORT_NAME]
+    assert main(argv, program=refuses) == 0
+
+    for change in ("again", "options", "footage", "results"):
+        shutil.rmtree(out)
+        shutil.copytree(kept, out)  # with its times
+        arguments = [*argv, "--again"] if change == "again" else argv
+        if change == "options":
+            arguments = [*argv, "--fov", "50"]
+        elif change == "footage":
+            (clips / "a.mp4").write_bytes(SAMPLE.read_bytes() + b"x")
+        elif change == "results":
+            (clips / "a.mp4").write_bytes(SAMPLE.read_bytes())
+            (out / "a.npz").touch()
+        assert main(arguments, program=refuses) == 1, change
+        assert "captured again" in capfd.readouterr().err
+
+
 @pytest.mark.skipif(os.name == "nt", reason="looks at /proc")
 @pytest.mark.parametrize("at", ["finding the person", "overlay"])
 def test_the_clips_of_a_killed_batch_end_and_leave_no_partial_file(tmp_path, at):
@@ -320,7 +364,8 @@ def test_the_clips_of_a_killed_batch_end_and_leave_no_partial_file(tmp_path, at)
     pids = [int(p.read_text("utf-8")) for p in clips.glob("*.pid")]
     wait_for(lambda: not any(runs(pid) for pid in pids))
     # Some of them, where a clip ended before it noticed that its parent is gone.
-    assert {p.name for p in out.iterdir()} <= {"a.npz", "b.npz", "a.overlay.mp4", "b.overlay.mp4"}
+    results = {p.name for p in out.iterdir() if ".finished-" not in p.name}
+    assert results <= {"a.npz", "b.npz", "a.overlay.mp4", "b.overlay.mp4"}
     for path in out.glob("*.npz"):
         assert len(Motion.load(path)) == FRAMES
     for path in out.glob("*.mp4"):

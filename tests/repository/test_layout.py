@@ -30,6 +30,7 @@ CROSS_CUTTING = {
     "repository/test_wheel.py": "the wheel, installed",
     "solver/test_arguments.py": "every public function of the solver, given arguments of the wrong kind",
     "scene/test_made_rigs.py": "captures that tests append, against built ones",
+    "ui/test_changed_properties.py": "custom properties that were changed by hand, in operators and panels",
     "fuzz/test_faults.py": "what writes files, on failing system calls",
     "fuzz/test_faults_outputs.py": "exports, outputs of captures and batches, on failing system calls",
     "fuzz/test_findings.py": "what once broke under attack, from outside",

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 from ...errors import NO_PERSON, system_error_message
 from ...footage import PICTURE_SUFFIXES
 from .find import OVERLAY
+from .finished import FINISHED_FILE, finished_file, read_finished, remove_finished
 
 SHOWN_COMMAND, STOP_WITH_STDIN = "--shown-command", "--stop-with-stdin"  # options that only a batch passes
 WINDOWS, WINDOWS_FOLDER = "--windows", "--windows-folder"  # likewise, only on a cluster
@@ -79,6 +80,7 @@ class ClipTask(NamedTuple):
     :param windows: `COUNT`, or a range ``FIRST:END`` of windows that are to be observed; empty: the clip is captured.
     :param windows_folder: of a clip that is captured, with windows that were observed before.
     :param key: of the clip, if it is known.
+    :param again: capture the clip even if its results are there.
     """
 
     name: str
@@ -92,6 +94,7 @@ class ClipTask(NamedTuple):
     windows: str = ""
     windows_folder: str = ""
     key: str = ""
+    again: bool = False
 
 
 def capture_clip(
@@ -113,12 +116,17 @@ def capture_clip(
         entry["key"] = task.key or _key(task.basis, footage)
     except OSError as error:
         return failure(task, f"{footage} cannot be read: {error.strerror}")
-    if task.previous and task.previous.get("key") == entry["key"]:
-        return task.previous | {"file": task.file, "status": task.previous["status"].replace("done", "skipped")}
+    leaves_record = not task.final and not task.windows  # on a cluster, results are moved when they are finished
+    record = finished_file(out, task.name, entry["key"])
+    if (finished := _finished_before(task, entry, record if leaves_record else None)) is not None:
+        return finished
     target = out / task.name
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         arguments = [*program, *_arguments(footage, target, task.settings, threads), *_window_arguments(task)]
+        if leaves_record:
+            remove_finished(out, task.name)
+            arguments.append(f"{FINISHED_FILE}={record}")
         if task.final:  # a page about the capture shows its command
             shown = _arguments(footage, Path(task.final) / task.name, task.settings, threads)
             arguments += [SHOWN_COMMAND, shlex.join([*program, *(each for each in shown if each != STOP_WITH_STDIN)])]
@@ -132,6 +140,18 @@ def capture_clip(
     if status == NO_PERSON:
         return entry | {"status": "no_person", "outputs": [], "message": _error_message(stderr)}
     return entry | failure(task, _error_message(stderr) or f"the process ended with status {status}")
+
+
+def _finished_before(task: ClipTask, entry: Entry, record: Path | None) -> Entry | None:
+    """Return the entry of a clip that an earlier batch has finished; None if there is no such clip.
+
+    :param entry: begun, with the clip's key.
+    :param record: see `finished`; None if no process leaves one.
+    """
+    if task.previous and task.previous.get("key") == entry["key"]:
+        return task.previous | {"file": task.file, "status": task.previous["status"].replace("done", "skipped")}
+    report = read_finished(record, Path(task.out)) if record and not task.again else None
+    return None if report is None else entry | _outcome(report, Path(task.out)) | {"status": "skipped"}
 
 
 def failure(task: ClipTask, message: str) -> Entry:

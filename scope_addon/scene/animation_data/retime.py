@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import bpy
 import numpy as np
@@ -26,7 +27,7 @@ class Retiming:
         """Return where a frame is moved to."""
         return self.origin + self.factor * (frame - self.origin)
 
-    def frames(self, frames: NDArray[np.float32]) -> NDArray[np.float64]:
+    def frames(self, frames: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
         """Return where keys (T,) are moved to; those within their precision of a whole frame are put on it."""
         moved = self.origin + self.factor * (frames.astype(float) - self.origin)
         whole = np.round(moved)

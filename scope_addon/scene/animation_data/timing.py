@@ -9,6 +9,7 @@ keeps its timing; keys then lie between whole frames.
 from __future__ import annotations
 
 import math
+import re
 from fractions import Fraction
 
 import bpy
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from ...errors import MotionFileError, UsageError
 from .retime import Retiming
+from .stored_values import LAST_FRAME, stored_number, stored_text
 
 # Rates within this tolerance (frames per second) of a standard one are taken to be it: 23.98 is 24 / 1.001.
 TOLERANCE = 0.005
@@ -92,8 +94,7 @@ def store_rate(armature: bpy.types.Object, rate: float) -> None:
 
 def keyed_rate(armature: bpy.types.Object, scene: bpy.types.Scene) -> float:
     """Return the frame rate for which an armature's keys were written; older files do not say, and have the scene's."""
-    rate = armature.get(_RATE)
-    return float(rate) if isinstance(rate, float | int) and 0.01 <= rate <= 32767 else scene_rate(scene)
+    return stored_number(armature, _RATE, scene_rate(scene), 0.01, 32767)
 
 
 def set_frame_range(scene: bpy.types.Scene, first: float, last: float) -> None:
@@ -135,5 +136,8 @@ def restore_scene_range(scene: bpy.types.Scene, armature: bpy.types.Object) -> N
 
 def _stored_ranges(armature: bpy.types.Object) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Return the frame range of the cycle and the one before it; both are empty without a cycle."""
-    frames = tuple(int(frame) for frame in armature.get(_CYCLE, "").split())
+    found = re.fullmatch(r"(-?\d{1,7}) (-?\d{1,7}) (-?\d{1,7}) (-?\d{1,7})", stored_text(armature, _CYCLE), re.ASCII)
+    frames = tuple(int(frame) for frame in found.groups()) if found else ()
+    if not frames or max(map(abs, frames)) > LAST_FRAME or frames[0] > frames[1] or frames[2] > frames[3]:
+        return (), ()
     return frames[:2], frames[2:]

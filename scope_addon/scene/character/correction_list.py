@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import bpy
 
+from ..animation_data.stored_values import LAST_FRAME
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -39,7 +41,9 @@ def listed_corrections(armature: bpy.types.Object) -> list[dict[str, Any]]:
 
 
 def _is_entry(value: object) -> bool:
-    return isinstance(value, dict) and all(type(value.get(name)) is kind for name, kind in _ENTRY.items())
+    if not isinstance(value, dict) or not all(type(value.get(name)) is kind for name, kind in _ENTRY.items()):
+        return False
+    return all(-LAST_FRAME <= int(value[name]) <= LAST_FRAME for name in ("first", "last"))
 
 
 def store_corrections(

@@ -21,10 +21,12 @@ from ...errors import UsageError
 from ..animation_data.actions import Channels, fcurves, read_keys
 from ..animation_data.removal import remove_blocks
 from ..animation_data.retime import Retiming
+from ..animation_data.stored_values import stored_numbers
 from .keys import read_clip, write_clip
 
 ROOT_TAG = "scope_root"  # custom property of the empty
 _UNUSED_TRAJECTORY = "scope_path"  # of an empty whose armature stays in place: the trajectory it does not follow
+_RIGID = 1e-3  # by how much the determinant of a rigid transform may differ from 1
 _PLACE = "scope_place"  # the armature's transform before it became part of the trajectory: a rigid matrix by rows
 
 
@@ -87,9 +89,8 @@ def parent_to_root_object(
     top.parent, top.parent_type = empty, "OBJECT"
     top.matrix_parent_inverse.identity()
     if former is not None:
-        name = former[ROOT_TAG] + "_root"
         _remove(former)
-        empty.name = name
+        empty.name = f"{armature.name}_root"  # the take may have been renamed since
     return empty
 
 
@@ -120,9 +121,11 @@ def move_root_motion_to_object(
     :param rate: scene frames per second.
     :param in_place: do not animate the object: the person stays where the motion begins.
     :param heading: include the rotation about the vertical.
-    :raises UsageError: when a bone or its keys are missing.
+    :raises UsageError: when a bone or its keys are missing, or the armature's scale is 0.
     """
     clip, frames = read_clip(armature, body, rate)
+    if not armature.matrix_basis.median_scale:
+        raise UsageError(f"'{armature.name}' has the scale 0, so its motion cannot be moved; give it another one first")
     clip, former = clip_with_root_motion(armature, clip, frames), root_object(armature)
     if former is None:  # the armature's own transform becomes part of the trajectory
         bpy.context.view_layer.update()
@@ -159,6 +162,7 @@ def clip_with_root_motion(armature: bpy.types.Object, clip: Clip, frames: NDArra
     """Return the clip including the trajectory stored in its root object, in use or not, in the armature's own space.
 
     :param frames: (T,) scene frames of the clip's keys.
+    :raises UsageError: the stored trajectory was changed.
     """
     whole, empty = with_trajectory(clip, *removed_root_motion(armature, frames)), root_object(armature)
     if empty is None:
@@ -173,13 +177,19 @@ def removed_root_motion(
 
     :param frames: (T,) scene frames.
     :return: positions (T, 3) in the armature's units; angles (T,) about the vertical, radians.
+    :raises UsageError: the stored trajectory was changed.
     """
     empty = root_object(armature)
     if empty is None:
         return np.zeros((len(frames), 3)), np.zeros(len(frames))
     if _UNUSED_TRAJECTORY not in empty:
         return _keyed_path(armature, empty, frames)
-    rows = np.array(list(empty[_UNUSED_TRAJECTORY])).reshape(-1, 4)
+    rows = _unused_trajectory(empty)
+    if rows is None:
+        raise UsageError(
+            f"the trajectory that '{empty.name}' stores in {_UNUSED_TRAJECTORY} was changed; undo that, or smooth the "
+            "motion, which restores it as captured"
+        )
     x, y, angle = (np.interp(frames, rows[:, 0], rows[:, k]) for k in (1, 2, 3))
     positions = np.stack([x, y, np.full(len(x), empty.location.z)], axis=1)
     return positions / armature.matrix_basis.median_scale, angle
@@ -187,10 +197,16 @@ def removed_root_motion(
 
 def retime_unused_trajectory(empty: bpy.types.Object, retiming: Retiming) -> None:
     """Move a trajectory in time that is stored but not in use."""
-    if _UNUSED_TRAJECTORY in empty:
-        rows = np.array(list(empty[_UNUSED_TRAJECTORY])).reshape(-1, 4)
+    if (rows := _unused_trajectory(empty)) is not None:
         rows[:, 0] = retiming.frames(rows[:, 0])
         empty[_UNUSED_TRAJECTORY] = rows.ravel().tolist()
+
+
+def _unused_trajectory(empty: bpy.types.Object) -> NDArray[np.float64] | None:
+    """Return frame, x, y and angle of a trajectory that is stored but not in use, (T, 4); None if there is none."""
+    numbers = stored_numbers(empty, _UNUSED_TRAJECTORY)
+    rows = np.array(numbers[: len(numbers) // 4 * 4]).reshape(-1, 4)
+    return rows if 4 * len(rows) == len(numbers) > 0 and (np.diff(rows[:, 0]) > 0).all() else None
 
 
 def clip_as_displayed(armature: bpy.types.Object, clip: Clip, frames: NDArray[np.float64]) -> Clip:
@@ -217,8 +233,9 @@ def _keyed_path(
 
 def _place(empty: bpy.types.Object) -> Matrix:
     """Return the armature's rigid transform before its root motion was moved."""
-    numbers = list(empty.get(_PLACE, ()))
-    return Matrix([numbers[k : k + 4] for k in (0, 4, 8, 12)]) if numbers else Matrix()
+    numbers = stored_numbers(empty, _PLACE)
+    place = Matrix([numbers[k : k + 4] for k in (0, 4, 8, 12)]) if len(numbers) == 16 else Matrix()
+    return place if abs(place.determinant() - 1.0) < _RIGID else Matrix()
 
 
 def _moved(clip: Clip, place: Matrix, size: float) -> Clip:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import bpy
 
+from ...errors import UsageError
 from ..animation_data.removal import remove_blocks
 
 KINDS = ("objects", "meshes", "armatures", "collections", "materials")
@@ -21,6 +22,17 @@ def found(kind: str, name: str, uid: int) -> bpy.types.ID | None:
     if block is not None and block.session_uid == uid:
         return block
     return next((block for block in blocks if block.session_uid == uid), None)
+
+
+def scene_of(uid: int) -> bpy.types.Scene:
+    """Return the scene with a session's identifier.
+
+    :raises UsageError: it was removed.
+    """
+    scene = found("scenes", "", uid)
+    if scene is None:
+        raise UsageError("the scene was removed during the live capture; start in another scene")
+    return scene
 
 
 def remove(blocks: set[tuple[str, int]]) -> None:

@@ -26,7 +26,7 @@ from ...kinematics.axes import R_WORLD_MODEL
 from ..animation_data.removal import NewDatablocks
 from ..character import armature, body_mesh, bone_display, shape_keys
 from ..character.animation import quaternion_from_matrix, quaternion_product
-from .datablocks import KINDS, found, remove
+from .datablocks import KINDS, found, remove, scene_of
 
 _Q_MODEL_WORLD = quaternion_from_matrix(R_WORLD_MODEL.T)
 _MIN_CHANGE = 0.01  # of a shape coefficient that changes the mesh: less than half a millimetre
@@ -59,6 +59,7 @@ class LiveBody:
         :param rotations: (K+1, 4) w, x, y, z; the root relative to the world, the others to their parents.
         :param pelvis: (3,) metres, world.
         :param betas: (P,) shape coefficients, of which Blender can show ±10.
+        :raises UsageError: it has to be created, and its scene was removed.
         """
         betas = np.clip(np.asarray(betas, float), -shape_keys.SLIDER_LIMIT, shape_keys.SLIDER_LIMIT)
         rig, mesh = self.armature, found("objects", *self._mesh)
@@ -81,7 +82,10 @@ class LiveBody:
         return created
 
     def rest_at_shape(self) -> None:
-        """Give the armature the rest pose of the shape that is shown, as a capture has it. The pose stays the same."""
+        """Give the armature the rest pose of the shape that is shown, as a capture has it. The pose stays the same.
+
+        :raises UsageError: its scene was removed.
+        """
         rig = self.armature
         if rig is None:
             return
@@ -100,10 +104,12 @@ class LiveBody:
         bone_display.remove_if_unused()
 
     def _create(self, betas: NDArray[np.float64]) -> tuple[bpy.types.Object, bpy.types.Object]:
-        """Create the objects, in place of what is left of former ones."""
-        body, new = self._body, NewDatablocks(KINDS)
+        """Create the objects, in place of what is left of former ones.
+
+        :raises UsageError: the scene was removed.
+        """
+        scene, body, new = scene_of(self._scene_uid), self._body, NewDatablocks(KINDS)
         remove(self._blocks)
-        scene = next(scene for scene in bpy.data.scenes if scene.session_uid == self._scene_uid)
         collection = bpy.data.collections.new(self._name)
         scene.collection.children.link(collection)
         rest, layer = armature.rest_pose(body, betas), bpy.context.view_layer

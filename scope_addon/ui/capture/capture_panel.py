@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -270,12 +271,14 @@ def _draw_warning(context: bpy.types.Context, box: bpy.types.UILayout, warning: 
     if warning.spans:
         grid = box.grid_flow(columns=4, even_columns=True, align=True, row_major=True)
         for span in warning.spans.split(","):
-            grid.operator("scope.go_to_frame", text=span).frame = first_frame(span)
+            if (frame := first_frame(span)) is not None:
+                grid.operator("scope.go_to_frame", text=span).frame = frame
 
 
-def first_frame(span: str) -> int:
-    """Return the first frame of a span: 12 of ``12-18``, -3 of ``-3-4``."""
-    return int(span[0] + span[1:].split("-", 1)[0])
+def first_frame(span: str) -> int | None:
+    """Return the first frame of a span: 12 of ``12-18``, -3 of ``-3-4``; None if the text is none."""
+    found = re.fullmatch(r"(-?\d{1,7})(--?\d{1,7})?", span, re.ASCII)
+    return int(found.group(1)) if found else None
 
 
 def _split(layout: bpy.types.UILayout) -> bpy.types.UILayout:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import bpy
 
+from ...scene.animation_data.stored_values import stored_number
 from ..captured_person import PERSON, body_of, captured_people, library_of, motion_of
 from ..reporting import ReportingOperator, rpt_, sentence, tip_
 from .captures import people_of, shown_capture
@@ -51,7 +52,7 @@ def keyed_for(scene: bpy.types.Scene) -> float:
     """
     now = scene.render.fps / scene.render.fps_base
     capture = shown_capture(scene)
-    rates = [float(person.get("scope_rate", now)) for person in people_of(capture)] if capture else []
+    rates = [stored_number(person, "scope_rate", now, 0.01, 32767) for person in people_of(capture)] if capture else []
     return next((rate for rate in rates if abs(rate - now) > _SAME), 0.0)
 
 
@@ -133,10 +134,11 @@ def _update_results(
     scene: bpy.types.Scene, rate: float, keyed: dict[bpy.types.Object, float], warnings: list[str]
 ) -> None:
     """Move the frames that results name, and replace the warnings about the frame rate."""
+    from ...scene.datablock_names import holds
     from ...scene.match_rate import retimed_spans
 
     for collection in scene.collection.children_recursive:
-        result, person = collection.scope_result, next((p for p in keyed if p.name in collection.all_objects), None)
+        result, person = collection.scope_result, next((p for p in keyed if holds(collection, p)), None)
         if person is None:
             continue
         shown = result.warnings

@@ -101,10 +101,11 @@ class SCOPE_OT_rename_take(ReportingOperator):
         :raises UsageError: the name is empty.
         """
         from ...errors import UsageError
+        from ...scene.datablock_names import short_name
 
         if not self.name.strip():
             raise UsageError("the take has no name; enter one")
-        _rename(context.scene.scope.result.collection, self.name.strip())
+        _rename(context.scene.scope.result.collection, short_name(self.name.strip()))
         return ""
 
 

@@ -74,6 +74,7 @@ class SCOPE_OT_mark_asset(ActionOperator):
         """Return the scene frame of the picture, within the action."""
         from ....solver.errors import ScopeError
         from ...scene.action_asset import first_reliable_frame
+        from ...scene.animation_data.stored_values import start_frame
         from ...scene.animation_data.timing import keyed_rate
 
         first, last = armature.animation_data.action.frame_range
@@ -83,7 +84,7 @@ class SCOPE_OT_mark_asset(ActionOperator):
             try:
                 motion = motion_of(person)
                 seconds = float(motion.timestamps[first_reliable_frame(motion)])
-                frame = float(person.get("scope_start", 0.0)) + seconds * keyed_rate(person, context.scene)
+                frame = start_frame(person) + seconds * keyed_rate(person, context.scene)
             except ScopeError:
                 pass  # the motion is lost, but the keys are not
         return float(min(max(frame, first), last))
@@ -97,9 +98,11 @@ def _captured(armature: bpy.types.Object) -> bpy.types.Object:
 
 def _described(context: bpy.types.Context, armature: bpy.types.Object) -> str:
     """Return the description of an asset that the user has given none."""
+    from ...scene.animation_data.stored_values import stored_text
+
     first, last = armature.animation_data.action.frame_range
     seconds = (last - first) * context.scene.render.fps_base / context.scene.render.fps
-    source = _captured(armature).get("scope_source") or armature.name
+    source = stored_text(_captured(armature), "scope_source") or armature.name
     return rpt_("Captured from {source}, {seconds:.1f} s", source=source, seconds=seconds)
 
 

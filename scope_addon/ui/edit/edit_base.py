@@ -95,6 +95,17 @@ class SpanOperator(EditOperator):
         outcome: set[str] = context.window_manager.invoke_props_dialog(self)
         return outcome
 
+    def work(self, context: bpy.types.Context) -> str:
+        """Edit the keys within the span.
+
+        :raises UsageError: the span ends before it begins.
+        """
+        from ...errors import UsageError
+
+        if self.end < self.start:
+            raise UsageError(f"the span ends in frame {self.end}, before it begins in frame {self.start}; swap them")
+        return super().work(context)
+
     def default_span(self, scene: bpy.types.Scene) -> tuple[int, int]:
         """Return the span to suggest without a preview range: around the current frame."""
         return scene.frame_current - 2, scene.frame_current + 2

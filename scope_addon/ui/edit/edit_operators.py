@@ -40,6 +40,7 @@ class SCOPE_OT_smooth(EditOperator):
         from ...edit.pins.corrected_motion import uncorrected
         from ...edit.smooth import smoothed
         from ...scene.animation_data.actions import remove_cycles
+        from ...scene.animation_data.stored_values import start_frame
         from ...scene.animation_data.timing import key_frames, restore_scene_range, store_rate
         from ...scene.character.corrections.uncorrected_keys import write_both
         from ...scene.character.keys import bake_whole_frames, write_clip
@@ -48,7 +49,7 @@ class SCOPE_OT_smooth(EditOperator):
         motion = motion_of(armature)
         if motion.corrections:  # which are solved again
             compiled_solver.load()
-        frames = key_frames(motion.timestamps, rate, float(armature.get("scope_start", 0.0)))
+        frames = key_frames(motion.timestamps, rate, start_frame(armature))
         clip = smoothed(body, motion, self.strength)
         if motion.corrections:
             clips = smoothed(body, uncorrected(motion), self.strength), clip

@@ -28,6 +28,7 @@ from ...job.live.request import LiveRequest
 from ...job.process import START_SCRIPT
 from ...options import Place, options_at
 from ...options.body_choice import chosen_body
+from ...scene.live.datablocks import scene_of
 from ...scene.live.live_body import LiveBody
 from ...scene.live.live_rig import LiveRig
 from ...scene.live.scene_before import SceneBefore, select_only
@@ -159,9 +160,7 @@ class LiveJob:
 
     def _step(self) -> bool:
         self.created = False
-        scene = next((s for s in bpy.data.scenes if s.session_uid == self._scene_uid), None)
-        if scene is None:
-            raise UsageError("the scene was removed during the live capture; start in another scene")
+        scene = scene_of(self._scene_uid)
         if self.finishing and not self.recording:
             self._leave_pose(scene)
             return False

@@ -120,10 +120,14 @@ class CorrectSpanOperator(CorrectionOperator, SpanOperator):
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
         """Add the correction and change the keys."""
         from ...edit.pins.corrections import added
-        from ...scene.character.corrections.corrected_keys import source_frame
+        from ...scene.character.corrections.corrected_keys import source_frame, whole_span
 
         motion = motion_of(armature)
-        first, last = (source_frame(armature, motion, frame, rate) for frame in (self.start, self.end))
+        begins, ends = whole_span(armature, motion, rate)
+        span = self.start, self.end
+        if begins <= self.end and self.start <= ends:  # the part of it in which there is a motion
+            span = max(self.start, begins), min(self.end, ends)
+        first, last = (source_frame(armature, motion, frame, rate) for frame in span)
         new = self.correction(first, last)
         change_corrections(armature, body, rate, lambda present: added(present, new), new)
         if warning := floor_warning(armature, body):

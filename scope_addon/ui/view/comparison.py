@@ -12,6 +12,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Quaternion, Vector
 
+from ...scene.datablock_names import holds
 from ..capture.captures import captures_of
 from ..captured_person import captured_armature
 from .frame_fit import fit_frame, unfit_frame
@@ -99,8 +100,8 @@ def _compares_another(scene: bpy.types.Scene, space: bpy.types.SpaceView3D, show
     camera = space.camera
     if not space.local_view or space.region_3d.view_perspective != "CAMERA" or camera is None:
         return False
-    has_capture = any(camera.name in each.all_objects for each in captures_of(scene))
-    return has_capture and camera.name not in shown.all_objects
+    has_capture = any(holds(each, camera) for each in captures_of(scene))
+    return has_capture and not holds(shown, camera)
 
 
 def side_area(screen: bpy.types.Screen) -> bpy.types.Area | None:

@@ -40,13 +40,14 @@ def frame_selected(context: bpy.types.Context) -> None:
 
 def show_new_capture(context: bpy.types.Context) -> None:
     """Show the capture that was just added: the viewports leave the comparison of an earlier one."""
+    from ...scene.datablock_names import holds
     from ...scene.visibility import hide_again
 
     hide_startup_cube(context)
     shown = context.scene.scope.result.collection
     if shown is not None:
         comparison.end_others(context.scene, shown)
-        for other in [obj for obj in captured_people(context) if obj.name not in shown.all_objects]:
+        for other in [obj for obj in captured_people(context) if not holds(shown, obj)]:
             hide_again(other, context.view_layer)  # it was shown for the comparison alone
     frame_selected(context)
 
@@ -79,6 +80,7 @@ class SCOPE_OT_look_through(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Set the scene's camera and resolution, and the viewport's view."""
         from ...scene.camera import set_resolution
+        from ...scene.datablock_names import holds
         from ...scene.visibility import hide_again
 
         scene, camera = context.scene, camera_of(context.scene)
@@ -95,9 +97,7 @@ class SCOPE_OT_look_through(bpy.types.Operator):
         camera.hide_viewport = False  # a hidden camera shows no footage
         camera.hide_set(False, view_layer=context.view_layer)
         set_resolution(scene, scene.scope.result.collection)
-        for other in [
-            obj for obj in captured_people(context) if obj.name not in scene.scope.result.collection.all_objects
-        ]:
+        for other in [obj for obj in captured_people(context) if not holds(scene.scope.result.collection, obj)]:
             hide_again(other, context.view_layer)  # it was compared before
         if not bpy.app.background and context.area and context.area.type == "VIEW_3D":
             comparison.begin(context, context.area, scene.scope.result.collection)
@@ -167,12 +167,13 @@ class SCOPE_OT_footage_to_sequencer(ReportingOperator):
 
     def work(self, context: bpy.types.Context) -> str:
         """Add the strips."""
+        from ...scene.animation_data.stored_values import start_frame
         from ...scene.animation_data.timing import scene_rate
         from ...scene.footage_strip import add_footage_strips, strips_of
 
         scene, result = context.scene, context.scene.scope.result
         armatures = (o for o in result.collection.all_objects if "scope_start" in o)
-        start = next((float(o["scope_start"]) for o in armatures), 0.0)
+        start = next((start_frame(o) for o in armatures), 0.0)
         known = set(strips_of(scene.sequence_editor)) if scene.sequence_editor else set()
         strips = add_footage_strips(scene, bpy.path.abspath(result.footage), start)
         rate = getattr(strips[-1], "fps", 0.0)

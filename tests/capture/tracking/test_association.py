@@ -32,12 +32,14 @@ def test_links_that_cost_too_much_are_left_out() -> None:
     assert cheapest_links(cost, 0.5) == {}
 
 
-def tracklet(first: int, last: int, start_px: float, speed_px: float, appearance: np.ndarray) -> Tracklet:
+def tracklet(
+    first: int, last: int, start_px: float, speed_px: float, appearance: np.ndarray, side_px: float = 200.0
+) -> Tracklet:
     """A person who moves horizontally at ``speed_px`` per frame, and would be at ``start_px`` in frame 0."""
     rows = list(range(first, last))
     centers = [np.array([start_px + speed_px * row, 200.0]) for row in rows]
     values = [np.zeros((33, 6), np.float32)] * len(rows)
-    return Tracklet(rows=rows, values=values, centers_px=centers, sides_px=[200.0] * len(rows), appearance=appearance)
+    return Tracklet(rows=rows, values=values, centers_px=centers, sides_px=[side_px] * len(rows), appearance=appearance)
 
 
 def test_a_crossing_is_resolved_by_motion() -> None:
@@ -46,6 +48,30 @@ def test_a_crossing_is_resolved_by_motion() -> None:
     right, left = (0.0, 8.0), (880.0, -8.0)
     tracklets = [tracklet(*rows, *motion, RED) for rows in ((0, 50), (60, 120)) for motion in (right, left)]
     assert sorted(link(tracklets, times)) == [[0, 2], [1, 3]]
+
+
+@pytest.mark.parametrize(("others", "people"), [(RED, [[0, 3], [1, 2]]), (BLUE, [[0, 2], [1, 3]])])
+def test_clothes_tell_people_who_turn_back_from_people_who_pass_each_other(
+    others: np.ndarray, people: list[list[int]]
+) -> None:
+    """They come towards each other and leave again; nobody is seen between frames 50 and 60."""
+    times = (np.arange(120) / RATE).tolist()
+    right, left = (0.0, 8.0), (880.0, -8.0)
+    before = [tracklet(0, 50, *right, RED), tracklet(0, 50, *left, others)]
+    after = [tracklet(60, 120, *left, RED), tracklet(60, 120, *right, others)]
+    assert sorted(link(before + after, times)) == people
+
+
+@pytest.mark.parametrize(("apart_px", "people"), [(20.0, [[0, 2], [1, 3]]), (120.0, [[0, 3], [1, 2]])])
+def test_a_child_and_an_adult_in_the_same_place_are_told_apart_by_size(
+    apart_px: float, people: list[list[int]]
+) -> None:
+    """Where they are apart, somebody of another size in the same place bends over or stands up."""
+    times = (np.arange(120) / RATE).tolist()
+    here, there = 400.0, 400.0 + apart_px
+    before = [tracklet(0, 50, here, 0.0, RED, 200.0), tracklet(0, 50, there, 0.0, RED, 100.0)]
+    after = [tracklet(60, 120, there, 0.0, RED, 200.0), tracklet(60, 120, here, 0.0, RED, 100.0)]
+    assert sorted(link(before + after, times)) == people
 
 
 @pytest.mark.parametrize(("returns", "people"), [(RED, [[0, 1]]), (BLUE, [[0], [1]])])

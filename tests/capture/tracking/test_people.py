@@ -13,7 +13,7 @@ from scope.scope_addon.capture.perception.landmark_network import PoseEstimate
 from scope.scope_addon.capture.perception.person_detector import Detection
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.landmarks import tracking_networks
-from scope.scope_addon.capture.tracking.people import frames_before_flicker
+from scope.scope_addon.capture.tracking.people import build_tracks, frames_before_flicker, frames_before_merger
 from scope.scope_addon.capture.tracking.track import Track, Tracklet
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker
 
@@ -70,6 +70,23 @@ def test_identities_survive_a_crossing(follow: Callable[..., list[Track]], color
     assert [identities(track, [back, front]) for track in tracks] == [{1}, {0}]
     assert tracks[0].seen.mean() >= 0.98
     assert tracks[1].seen.sum() >= 120 - hidden - 22  # not while the two bodies are indistinguishable
+
+
+@pytest.mark.parametrize("turns", [False, True], ids=["pass", "turn back"])
+@pytest.mark.parametrize("colors", [(RED, BLUE), (RED, RED)], ids=["different clothes", "same clothes"])
+def test_identities_after_both_people_were_hidden(
+    follow: Callable[..., list[Track]], colors: tuple, turns: bool
+) -> None:
+    """Behind a pillar, where they pass each other or turn back; only clothes can tell which."""
+    hidden = range(50, 70)
+    way = (lambda t: min(t, 120 - t)) if turns else (lambda t: t)
+    left = Person(lambda t: (200 + 6.0 * way(t), 200), colors[0], hidden=hidden)
+    right = Person(lambda t: (920 - 6.0 * way(t), 205), colors[1], size_px=110, hidden=hidden)
+    tracks = follow([left, right], 120, wanted=2)
+    assert [track.seen[hidden].any() for track in tracks] == [False, False]
+    assert all(track.seen[80:].all() for track in tracks)
+    switched = turns and colors[0] == colors[1]  # taken for people who pass each other, which is all that is to be seen
+    assert [identities(track, [left, right]) for track in tracks] == ([{0, 1}] * 2 if switched else [{1}, {0}])
 
 
 @pytest.mark.parametrize("count", [2, 8])
@@ -397,6 +414,35 @@ def test_tracking_does_not_wait_for_the_reference_network(monkeypatch: pytest.Mo
 def test_a_short_reappearance_is_cut_off(rows: list[int], kept: int) -> None:
     tracklet = Tracklet(rows=list(rows), values=[np.zeros((33, 6), np.float32)] * len(rows))
     assert frames_before_flicker(tracklet, (np.arange(60) / FPS).tolist()) == kept
+
+
+def seen_at(xs: list[float], first: int = 0) -> Tracklet:
+    """A tracklet of a body that moves with the hips at these places, one in each frame."""
+    body = np.random.default_rng(1).normal(scale=40.0, size=(33, 2))
+    values = [np.pad(body + [x, 200.0], ((0, 0), (0, 4))).astype(np.float32) for x in xs]
+    rows = list(range(first, first + len(xs)))
+    return Tracklet(rows, values, [np.array([x, 200.0]) for x in xs], [200.0] * len(xs))
+
+
+@pytest.mark.parametrize(
+    ("drifting", "goes_on", "kept"),
+    [
+        (6, 30, 24),
+        (11, 30, 19),  # as long as a merger lasts
+        (20, 30, 30 - 12),  # whatever was seen before was no drift
+        (0, 30, 30),
+        (6, 0, 30),  # the other one is not seen after the end, so it is not in front
+    ],
+)
+def test_frames_in_which_a_target_drifts_onto_another_one_are_cut_off(drifting: int, goes_on: int, kept: int) -> None:
+    """The place from which the target is followed later is the last one of the person who went behind another."""
+    passes = [500.0 - 4.0 * t for t in range(30 + goes_on)]
+    walks = [200.0 + 2.0 * t for t in range(30 - drifting)] + passes[30 - drifting : 30]
+    times = (np.arange(60) / FPS).tolist()
+    tracklets = [seen_at(walks), seen_at(passes)]
+    assert frames_before_merger(tracklets[0], tracklets, times) == kept
+    (track, *_) = build_tracks(list(range(60)), times, [seen_at(walks), seen_at(passes)], 2)[::-1]
+    assert track.seen.sum() == kept
 
 
 @pytest.mark.usefixtures("networks")

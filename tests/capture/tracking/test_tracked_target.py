@@ -43,6 +43,28 @@ def test_a_person_with_low_confidence_throughout_is_not_occluded() -> None:
     assert not target.becomes_occluded(at(60.0, 0.38))
 
 
+def test_a_person_is_predicted_at_constant_velocity() -> None:
+    target = walker(30, 30)  # last seen at 348 px
+    assert target.prefetch_region.center_px == pytest.approx((360.0, 300.0))
+    for lost, x in ((0, 348.0), (1, 360.0), (5, 408.0)):
+        target.frames_lost = lost
+        assert target.predicted_region.center_px == pytest.approx((x, 300.0))
+        assert target.innovation(at(max(x, 360.0))) == pytest.approx(0.0, abs=1e-9)
+        assert target.innovation(at(max(x, 360.0) + 40.0)) == pytest.approx(40.0 / SIDE)
+
+
+def test_an_occluder_is_looked_for_where_the_person_was_and_where_they_walk_to() -> None:
+    target = walker(30, 30, speed_px=24.0)
+    target.is_occluded, target.frames_lost = True, 20
+    last, now = 29 * 24.0, 49 * 24.0
+    assert [target.is_occluded_by(at(x, 0.4)) for x in (last, now, now + 0.6 * SIDE, last - 0.6 * SIDE)] == [
+        True,
+        True,
+        False,
+        False,
+    ]
+
+
 @pytest.mark.parametrize("fps", [5, 30, 120])
 def test_recent_confidences_cover_half_a_second(fps: int) -> None:
     target = walker(3 * fps, fps)

@@ -24,9 +24,12 @@ def patient(monkeypatch):
 
 @cache
 def walking(count=COUNT):
-    """Grainy pictures of a bar that moves, of which an encoder predicts much, but not everything, from those before."""
+    """Grainy pictures of a bar that moves, of which an encoder predicts much, but not everything, from those before.
+
+    Their sides are multiples of 16: with 120 rows, x264 encoded the same pictures otherwise once in a hundred times.
+    """
     random = np.random.default_rng(1)
-    grain, pictures = random.integers(0, 60, (120, 176, 3)), []
+    grain, pictures = random.integers(0, 60, (128, 176, 3)), []
     for k in range(count):
         picture = grain + random.integers(0, 60, grain.shape)
         picture[20:100, 4 * k : 4 * k + 24] += 120

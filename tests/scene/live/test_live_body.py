@@ -4,6 +4,7 @@
 import bpy
 import numpy as np
 import pytest
+from scope.scope_addon.errors import UsageError
 from scope.scope_addon.scene.live.live_body import LiveBody
 from scope.solver.rotations import exp, quaternion_from_matrix
 
@@ -61,6 +62,22 @@ def test_the_rest_pose_becomes_that_of_the_last_shape(live, body):
     for bone in list(live.armature.pose.bones)[1:]:
         assert bone.location.length < 1e-6
     np.testing.assert_allclose(shown(live), truth(body, rotations, pelvis, betas), atol=1e-4)
+
+
+@pytest.mark.parametrize("change", ["show", "rest"])
+def test_a_body_without_its_scene_is_an_error_that_keeps_what_is_there(live, body, change):
+    """The body is also in another scene, and its mesh was deleted, so that it has to be created again."""
+    (rotations, pelvis), betas = pose(2), np.zeros(body.P)
+    live.show(quaternion_from_matrix(rotations), pelvis, betas)
+    mine, other = bpy.context.scene, bpy.data.scenes.new("other")
+    other.collection.children.link(live.armature.users_collection[0])
+    bpy.data.scenes.remove(mine)
+    if change == "show":
+        bpy.data.objects.remove(next(child for child in live.armature.children if child.type == "MESH"))
+    before = blocks()
+    with pytest.raises(UsageError, match="the scene was removed during the live capture"):
+        live.rest_at_shape() if change == "rest" else live.show(quaternion_from_matrix(rotations), pelvis, betas)
+    assert blocks() == before
 
 
 def test_a_removed_body_is_created_again_and_cancelling_leaves_nothing(live, body):

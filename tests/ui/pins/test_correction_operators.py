@@ -264,11 +264,45 @@ def test_a_foot_that_stands_is_at_rest(rig):
     assert np.ptp(seen(rig, range(46, 54))[:, left], axis=0).max() < 0.2 * moved
 
 
+def outside(frame):
+    return f"Frame {frame} is outside of the captured motion of 'walk', which has frames 1 to 91; go to one of these"
+
+
+def test_the_last_frame_can_be_pinned_and_the_frame_after_it_moves_nothing(rig):
+    last = seen(rig, [91])[0]
+    bpy.ops.scope.add_pin(joint="left_wrist", frame=91, location=last[WRIST] + [0.1, 0.0, 0.1])
+    assert np.linalg.norm(seen(rig, [91])[0, WRIST] - last[WRIST] - [0.1, 0.0, 0.1]) < 0.01
+    bpy.context.scene.render.fps = 60  # frames of the scene between those of the motion, and half a frame after it
+    bpy.context.scene.frame_set(182)
+    with pytest.raises(RuntimeError, match="Frame 182 is outside .* frames 1 to 181"):
+        bpy.ops.scope.add_pin(joint="left_wrist", location=(0, 0, 1))
+
+
+@pytest.mark.parametrize(("start", "end"), [(86, 120), (88, 92)])
+def test_a_span_is_corrected_as_far_as_there_is_a_motion(rig, start, end):
+    bpy.ops.scope.foot_stands(start=start, end=end, foot="left")
+    (entry,) = listed_corrections(rig)
+    assert (entry["first"], entry["last"]) == (start, 91)
+
+
+@pytest.mark.parametrize("operator", ["foot_stands", "exchange_sides", "interpolate_span", "swap_sides", "loop"])
+def test_a_span_the_wrong_way_round_is_said_with_the_frames_of_the_scene(rig, operator):
+    with pytest.raises(RuntimeError, match="The span ends in frame 30, before it begins in frame 40; swap them"):
+        getattr(bpy.ops.scope, operator)(start=40, end=30)
+
+
+def test_a_span_outside_of_the_motion_is_refused(rig):
+    before = keys(rig)
+    with pytest.raises(RuntimeError, match=outside(92)):
+        bpy.ops.scope.foot_stands(start=92, end=95, foot="left")
+    assert_same_keys(keys(rig), before)
+
+
 def test_a_failure_changes_nothing(rig, monkeypatch):
     before, path = keys(rig), rig["scope_motion"]
     for arguments, message in (
         ({"joint": "left_paw"}, "no joint 'left_paw'"),
-        ({"joint": "head", "frame": 500}, "outside of the captured motion"),
+        *(({"joint": "head", "frame": frame}, outside(frame)) for frame in (500, 92, 0, -3)),
     ):
         with pytest.raises(RuntimeError, match=message):
             bpy.ops.scope.add_pin(location=(0, 0, 1), **arguments)

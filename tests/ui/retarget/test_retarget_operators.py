@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The retarget operators as a user runs them."""
 
+import re
+
 import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.retarget.bone_map import PARTS
+from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.character.root_object import root_object
 from scope.scope_addon.scene.visibility import hide_again, show
 from scope.scope_addon.ui.captured_person import captured_armature
 from scope.scope_addon.ui.retarget.retarget_properties import offered_parts
 
-from ...edit.walking import RATE, motion_of, walk
+from ...edit.walking import BODY, RATE, motion_of, walk
 from ...scene.exported import read_back
 from ...scene.made_rigs import build_rig, captured, seen
 
@@ -49,6 +52,61 @@ def test_travel_scale_multiplies_the_path(rig):
     np.testing.assert_allclose(np.ptp(paths[1.0], axis=0), 2.0 * np.ptp(paths[0.5], axis=0), atol=0.01)
     legs = np.ptp(paths[0.0][:, 1]) / np.ptp(paths[1.0][:, 1])
     assert legs == pytest.approx(1.3, abs=0.01)  # the size of this rig
+
+
+def two_people_who_meet():
+    """Return the armatures of two people who come towards each other, and their rigs of different sizes and kinds."""
+    apart, clips = ([1.4, 0.3, 0.0], [0.0, 0.0, 0.0]), (walk(2.0), walk(2.0, speed=0.8))
+    for clip, place in zip(clips, apart, strict=True):
+        clip.root += place
+    clips[0].root[:, 0] -= np.linspace(0.0, 1.0, len(clips[0]))
+    motions = [motion_of(clip) for clip in clips]
+    bpy.context.scene.render.fps = int(RATE)
+    people = [p.armature for p in build_scene(motions, BODY, None, BuildOptions(start_frame=1.0)).people]
+    rigs = [build_rig(scheme, size)[0] for scheme, size in (("unreal", 1.5), ("mixamo", 0.8))]
+    for person in people:
+        person["scope_body_file"] = "scope"
+    return people, rigs
+
+
+@pytest.mark.parametrize("root", ["bone", "object"])
+@pytest.mark.parametrize("travel", [1.0, 0.8])
+def test_rigs_of_two_people_meet_where_these_met_with_one_travel_scale(travel, root):
+    people, rigs = two_people_who_meet()
+    settings = bpy.context.scene.scope_retarget
+    settings.travel, settings.root = travel, root
+    for person, rig in zip(people, rigs, strict=True):
+        bpy.context.view_layer.objects.active = person
+        settings.rig = rig
+        settings.pairs.clear()
+        bpy.ops.scope.retarget()
+    true = [seen(person, ["pelvis"])[:, 0, :2] for person in people]
+    found = [seen(rig, [hips])[:, 0, :2] for rig, hips in zip(rigs, ("pelvis", "mixamorig:Hips"), strict=True)]
+    between = found[0] - found[1]
+    np.testing.assert_allclose(between, travel * (true[0] - true[1]), atol=0.02)
+    assert [captured_armature_of(rig) for rig in rigs] == people
+
+
+def test_each_rigs_own_scale_parts_two_people(capfd):
+    """Which the message of the second Retarget gives the number to avoid for."""
+    people, rigs = two_people_who_meet()
+    settings = bpy.context.scene.scope_retarget
+    for person, rig in zip(people, rigs, strict=True):
+        bpy.context.view_layer.objects.active = person
+        settings.rig = rig
+        settings.pairs.clear()
+        bpy.ops.scope.retarget()
+    said = capfd.readouterr().out
+    scales = [float(number) for number in re.findall(r"floor scaled by ([\d.]+)", said)]
+    assert scales == pytest.approx([1.5, 0.8], abs=0.02)
+    true = [seen(person, ["pelvis"])[:, 0, :2] for person in people]
+    for rig, hips, scale, path in zip(rigs, ("pelvis", "mixamorig:Hips"), scales, true, strict=True):
+        np.testing.assert_allclose(seen(rig, [hips])[:, 0, :2], scale * path, atol=0.03)
+
+
+def captured_armature_of(rig):
+    bpy.context.view_layer.objects.active = rig
+    return captured_armature(bpy.context)
 
 
 @pytest.mark.parametrize("root", ["bone", "object", "in-place"])

@@ -8,6 +8,8 @@ t' = t + R_0 R_0,beforeᵀ (t_after − t_before). Keys that the correction does
 
 from __future__ import annotations
 
+import math
+
 import bpy
 import numpy as np
 from numpy.typing import NDArray
@@ -22,12 +24,14 @@ from ....edit.pins.solve_pins import missed, resolve
 from ....edit.smooth import smoothed
 from ....errors import UsageError
 from ....motion import Motion
+from ...animation_data.stored_values import smoothing_of, start_frame
 from ..keys import channel_curves, read_clip, write_keys
 from ..root_object import clip_with_root_motion, root_object
 from .edited_keys import KeyEdits, begin_with_edits, meet_floor
 from .uncorrected_keys import UncorrectedKeys, changed_rows, differ, keyed_values, restore
 
 _SAME_FRAME = 2e-3
+_WHOLE = 1e-3  # frames; timestamps are rounded
 _SAME_S = 1e-4  # keys' frames are single precision
 _MISSED_PX, _MISSED_M = 1.0, 0.005
 
@@ -53,14 +57,14 @@ def rewrite_changed_keys(
     :return: the keys that are now different from those without corrections.
     :raises UsageError: when a bone or its keys are missing.
     """
-    start, (before, after) = float(armature.get("scope_start", 0.0)), motions
+    start, (before, after) = start_frame(armature), motions
     known = UncorrectedKeys.from_bytes(stored, len(channel_curves(armature, body)))
     restored = restore(armature, body, start, rate, known)
     on_floor = feet_on_floor(corrections_of(after)) is not None  # would undo a rise before it
     if rise and not on_floor:
         _raise_keys(armature, body, rate, rise)
     clip, frames = read_clip(armature, body, rate)
-    strength = float(armature.get("scope_smoothing", 1.0))
+    strength = smoothing_of(armature)
     free, old, new = (
         _at(smoothed(body, m, strength), clip.times, _start(armature, rate))
         for m in (uncorrected(before), before, after)
@@ -140,7 +144,7 @@ def heights_of_foot(
     :param place: frame of the footage, and the foot as in `foot_height`.
     """
     frame, foot = place
-    captured = smoothed(body, motion, float(armature.get("scope_smoothing", 1.0)))
+    captured = smoothed(body, motion, smoothing_of(armature))
     clip, frames = read_clip(armature, body, rate)
     shown = clip_with_root_motion(armature, clip, frames), _start(armature, rate)
     return (
@@ -163,22 +167,41 @@ def source_frame(armature: bpy.types.Object, motion: Motion, frame: float, rate:
 
     :raises UsageError: the motion has none there.
     """
+    first, last = whole_span(armature, motion, rate)
+    if not first <= frame <= last:
+        raise UsageError(
+            f"frame {frame:g} is outside of the captured motion of '{armature.name}', which has frames {first} to "
+            f"{last}; go to one of these"
+        )
     time = frame / rate - _start(armature, rate)
     row = int(np.abs(motion.timestamps - time).argmin())
     spacing = float(np.median(np.diff(motion.timestamps))) if len(motion) > 1 else 1.0 / rate
     if abs(motion.timestamps[row] - time) > max(spacing, 1.0 / rate):
-        raise UsageError(f"frame {frame:g} is outside of the captured motion; go to a frame within it")
+        raise UsageError(
+            f"frame {frame:g} is in a gap of the captured motion of '{armature.name}', where the footage has no "
+            "frames; go to a frame beside it"
+        )
     return int(motion.frames[row])
+
+
+def whole_span(armature: bpy.types.Object, motion: Motion, rate: float) -> tuple[int, int]:
+    """Return the first and the last scene frame of a motion, rounded outwards to whole frames.
+
+    :param rate: scene frames per second.
+    """
+    start = _start(armature, rate)
+    first, last = ((motion.timestamps[row] + start) * rate for row in (0, -1))
+    return math.floor(first + _WHOLE), math.ceil(last - _WHOLE)
 
 
 def scene_frame(armature: bpy.types.Object, motion: Motion, frame: int, rate: float) -> float:
     """Return the scene frame at which a frame of the footage is shown."""
-    return float(np.interp(frame, motion.frames, motion.timestamps) * rate + armature.get("scope_start", 0.0))
+    return float(np.interp(frame, motion.frames, motion.timestamps) * rate + start_frame(armature))
 
 
 def _start(armature: bpy.types.Object, rate: float) -> float:
     """Return the scene's time in seconds at the footage's time 0."""
-    return float(armature.get("scope_start", 0.0)) / rate
+    return start_frame(armature) / rate
 
 
 def _at(clip: Clip, times: NDArray[np.float64], start: float) -> Clip:

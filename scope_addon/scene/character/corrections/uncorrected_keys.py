@@ -21,6 +21,7 @@ from .....solver.loaders.npz import read_npz
 from ....edit.clip import Clip
 from ....errors import MotionFileError
 from ...animation_data.actions import read_keys
+from ...animation_data.stored_values import start_frame
 from ..keys import channel_curves, write_clip
 
 _SAME = 2e-3  # frames; keys are single precision
@@ -109,7 +110,7 @@ def write_both(
     for clip in clips:
         write_clip(armature, body, clip, frames)
         values.append(keyed_values(armature, body, frames.astype(np.float32)))
-    start, rows = float(armature.get("scope_start", 0.0)), differ(free, corrected)
+    start, rows = start_frame(armature), differ(free, corrected)
     return changed_rows(frames.astype(np.float32), rows, (values[0], values[1]), start, rate)
 
 

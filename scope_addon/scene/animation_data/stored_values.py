@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Custom properties of a .blend file, which anybody may have changed: any type, any length, any number.
+
+What is not as this extension writes it is read as if it were not there.
+"""
+
+from __future__ import annotations
+
+import bpy
+
+LAST_FRAME = 1_048_574  # of Blender's timeline; the first one is its negative
+_LARGEST = 1e9  # of numbers in a list
+
+
+def stored_number(block: bpy.types.ID, name: str, default: float, lowest: float, highest: float) -> float:
+    """Return a number between two others; the default if the property is missing or something else."""
+    value = block.get(name)
+    return float(value) if isinstance(value, int | float) and lowest <= value <= highest else default
+
+
+def stored_numbers(block: bpy.types.ID, name: str) -> list[float]:
+    """Return a list of finite numbers; empty if the property is missing or something else."""
+    value = block.get(name)
+    values = value.to_list() if hasattr(value, "to_list") else value  # Blender's own type for lists of numbers
+    if not isinstance(values, list) or not all(isinstance(x, int | float) and abs(x) < _LARGEST for x in values):
+        return []
+    return [float(x) for x in values]
+
+
+def stored_text(block: bpy.types.ID, name: str) -> str:
+    """Return a text; empty if the property is missing or something else."""
+    value = block.get(name)
+    return value if isinstance(value, str) else ""
+
+
+def start_frame(armature: bpy.types.Object) -> float:
+    """Return the scene frame of a captured armature's timestamp 0."""
+    return stored_number(armature, "scope_start", 0.0, -LAST_FRAME, LAST_FRAME)
+
+
+def smoothing_of(armature: bpy.types.Object) -> float:
+    """Return the strength with which a captured armature's motion was smoothed last."""
+    return stored_number(armature, "scope_smoothing", 1.0, 0.0, 20.0)

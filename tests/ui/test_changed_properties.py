@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Custom properties that were changed by hand give a message or nothing, in the operators and in the panel."""
+
+import json
+import math
+from contextlib import suppress
+
+import bpy
+import numpy as np
+import pytest
+from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
+from scope.scope_addon.scene.animation_data.timing import keyed_rate
+from scope.scope_addon.scene.camera import set_resolution
+from scope.scope_addon.scene.character.correction_list import listed_corrections
+from scope.scope_addon.scene.character.root_object import root_object
+from scope.scope_addon.scene.match_rate import retimed_spans
+from scope.scope_addon.ui.capture.capture_panel import first_frame
+from scope.scope_addon.ui.capture.frame_rate_operators import keyed_for
+from scope.scope_addon.ui.captured_person import captured_armature
+
+from ..edit.walking import NAMES, motion_of, walk
+from ..scene import made_rigs
+from ..scene.made_rigs import captured
+
+VALUES = {
+    "text": "abc",
+    "empty": "",
+    "list": [1.0, math.nan],
+    "group": {"a": 1},
+    "bytes": b"\xff",
+    "nan": math.nan,
+    "huge": 1e300,
+    "number": 7,
+    "frames": "1 2",
+    "many": "9999999999 9999999999 -9999999999 99999999999999999999999",
+}
+PROPERTIES = (
+    "scope_start",
+    "scope_rate",
+    "scope_cycle",
+    "scope_smoothing",
+    "scope_betas",
+    "scope_source",
+    "scope_corrections",
+    "scope_resampled",
+    "scope_hidden",
+    "scope_uneven_ground",
+    "scope_motion",
+)
+
+
+@pytest.fixture
+def rig(tmp_path):
+    armature = captured(motion := motion_of(walk(1.0)))
+    motion.save(tmp_path / "person1.npz")
+    armature["scope_motion"], armature["scope_body_file"] = str(tmp_path / "person1.npz"), "scope"
+    bpy.context.scene.scope.result.footage_rate = 25.0
+    bpy.context.scene.frame_set(10)
+    return armature
+
+
+def tried(operator, **arguments):
+    """Return what an operator reports; a traceback is a failure of the test."""
+    said = ""
+    try:
+        operator(**arguments)
+    except RuntimeError as error:
+        said = str(error)
+    assert "Traceback" not in said
+    return said
+
+
+def try_all():
+    ops = bpy.ops.scope
+    tried(ops.smooth, strength=1.5)
+    tried(ops.loop)
+    tried(ops.smooth, strength=1.0)
+    tried(ops.add_pin, joint="left_wrist", location=(0.3, 0.1, 1.0))
+    tried(ops.remove_correction)
+    tried(ops.root_motion, mode="IN_PLACE")
+    tried(ops.root_motion, mode="BONES")
+    tried(ops.refloor)
+    with suppress(AttributeError):  # in the background, there is nothing to draw the preview with
+        tried(ops.mark_asset)
+    tried(ops.match_frame_rate)
+    keyed_for(bpy.context.scene)
+    listed_corrections(bpy.context.object)
+
+
+@pytest.mark.parametrize("value", VALUES.values(), ids=VALUES)
+def test_no_operator_fails_with_a_traceback(rig, value):
+    for name in PROPERTIES:
+        before = rig.get(name)
+        kept = before.to_list() if hasattr(before, "to_list") else before
+        rig[name] = value
+        if name in ("scope_start", "scope_cycle"):
+            try_all()
+        else:
+            tried(bpy.ops.scope.smooth)
+            tried(bpy.ops.scope.refloor)
+            keyed_for(bpy.context.scene)
+            listed_corrections(rig)
+            tried(bpy.ops.scope.match_frame_rate)
+        rig.pop(name, None)
+        if kept is not None:
+            rig[name] = kept
+
+
+@pytest.mark.parametrize("value", VALUES.values(), ids=VALUES)
+def test_a_changed_start_is_that_of_a_capture_at_frame_0(rig, value):
+    rig["scope_start"] = value
+    bpy.ops.scope.smooth(strength=1.0)
+    keys = next(read_keys(c) for c in fcurves(rig) if c.data_path == 'pose.bones["pelvis"].location')
+    assert keys[0, 0] == pytest.approx(7.0 if value == 7 else 0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("value", VALUES.values(), ids=VALUES)
+def test_a_changed_cycle_leaves_the_frame_range(rig, value):
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 3, 20
+    rig["scope_cycle"] = value
+    bpy.ops.scope.smooth(strength=1.0)
+    assert (scene.frame_start, scene.frame_end) == (3, 20)
+
+
+def test_a_person_without_a_body_is_said(rig):
+    del rig["scope_body_file"]
+    for value in (5, [1.0, 2.0]):
+        rig["scope_body"] = value
+        assert "does not store which body it is" in tried(bpy.ops.scope.smooth)
+    del rig["scope_body"]
+    assert "does not store which body it is" in tried(bpy.ops.scope.smooth)
+
+
+@pytest.mark.parametrize("value", [*VALUES.values(), [1.0, 2.0, 3.0], [5.0, 0.0, 0.0, 0.0, 4.0, 0.0, 0.0, 0.0]])
+def test_a_changed_trajectory_is_said_and_smoothing_restores_the_motion(rig, value):
+    before = made_rigs.seen(rig, NAMES, [5, 20])
+    bpy.ops.scope.root_motion(mode="IN_PLACE")
+    empty = root_object(rig)
+    empty["scope_path"] = value
+    assert "smooth the motion" in tried(bpy.ops.scope.root_motion, mode="BONES")
+    bpy.ops.scope.match_frame_rate()  # which has nothing to move there
+    bpy.ops.scope.smooth(strength=1.0)
+    bpy.context.scene.render.fps = 30
+    bpy.ops.scope.smooth(strength=1.0)
+    np.testing.assert_allclose(made_rigs.seen(rig, NAMES, [5, 20]), before, atol=1e-4)
+
+
+@pytest.mark.parametrize("value", [*VALUES.values(), [0.0] * 16, [1.0] * 15, [3.0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]])
+@pytest.mark.parametrize("name", ["scope_place", "scope_root"])
+def test_a_changed_root_object_goes_with_smoothing(rig, name, value):
+    before = made_rigs.seen(rig, NAMES, [5, 20])
+    bpy.ops.scope.root_motion(mode="OBJECT")
+    root_object(rig)[name] = value
+    bpy.ops.scope.root_motion(mode="OBJECT", heading=False)
+    bpy.ops.scope.smooth(strength=1.0)
+    assert root_object(rig) is None
+    np.testing.assert_allclose(made_rigs.seen(rig, NAMES, [5, 20]), before, atol=1e-4)
+
+
+@pytest.mark.parametrize("value", [*VALUES.values(), [1920.0, 0.0, 1.0, 1.0], [1e300] * 4])
+def test_a_changed_picture_leaves_the_resolution(rig, value):
+    scene, collection = bpy.context.scene, rig.users_collection[0]
+    scene.render.resolution_x = 123
+    collection["scope_picture"] = value
+    set_resolution(scene, collection)
+    assert scene.render.resolution_x == 123
+
+
+def test_listed_frames_that_no_scene_has_are_left_out(rig):
+    entry = {"kind": "PIN", "text": "Left Wrist", "joint": "left_wrist", "first": 5, "last": 5}
+    listed = [entry, entry | {"first": 1 << 40}, entry | {"last": -(10**400)}]
+    rig["scope_corrections"] = json.dumps(listed)
+    assert [each["first"] for each in listed_corrections(rig)] == [5]
+
+
+def test_a_changed_rate_is_the_scenes(rig):
+    scene = bpy.context.scene
+    for value in VALUES.values():
+        rig["scope_rate"] = value
+        assert keyed_rate(rig, scene) == (7.0 if value == 7 else 30.0)
+
+
+@pytest.mark.parametrize("value", VALUES.values(), ids=VALUES)
+def test_a_changed_person_of_a_rig_is_none(rig, tmp_path, value):
+    own, _ = made_rigs.build_rig("unreal")
+    bpy.context.scene.scope_retarget.rig = own
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.scope.retarget()
+    own["scope_person"] = value
+    assert bpy.ops.scope.export(filepath=str(tmp_path / "a.fbx"), format="FBX", which="RIG") == {"FINISHED"}
+    bpy.context.view_layer.objects.active = own
+    assert captured_armature(bpy.context) == rig  # the only person of the scene
+    assert tried(bpy.ops.scope.match_frame_rate) == ""
+
+
+def test_changed_spans_have_no_button(rig):
+    texts = ("", "a", "-", "12-", "1-2-3", "9" * 20, "٣", "12-18", "-3--1")
+    assert [first_frame(text) for text in texts] == [None] * 7 + [12, -3]
+    assert retimed_spans(f"a,{'9' * 500},1-11", rig, 60.0, 30.0).endswith(",1-21")

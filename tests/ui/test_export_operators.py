@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the export operator writes where a capture is linked from another file under the same names."""
+
+import os
+import sys
+
+import bpy
+import pytest
+from scope.scope_addon.ui.captured_person import captured_armature
+
+from ..edit.walking import motion_of, walk
+from ..scene.made_rigs import captured
+
+
+@pytest.fixture
+def both(tmp_path):
+    """The armatures of a capture of this file, and of the same one linked from another file."""
+    own = captured(motion := motion_of(walk(1.0)))
+    motion.save(tmp_path / "person1.npz")
+    own["scope_motion"], own["scope_body_file"] = str(tmp_path / "person1.npz"), "scope"
+    collection = own.users_collection[0]
+    bpy.data.libraries.write(str(tmp_path / "läuferin.blend"), {collection})
+    with bpy.data.libraries.load(str(tmp_path / "läuferin.blend"), link=True) as (_, there):
+        there.collections = [collection.name]
+    bpy.context.scene.collection.children.link(there.collections[0])
+    linked = next(obj for obj in there.collections[0].objects if obj.type == "ARMATURE")
+    assert linked.name == own.name
+    return own, linked
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_only_the_active_capture_is_written(both, tmp_path, which):
+    bpy.context.view_layer.objects.active = both[which]
+    (tmp_path / "out").mkdir()
+    bpy.ops.scope.export(filepath=str(tmp_path / "out" / "é ☃.npz"), format="NPZ", which="ACTIVE")
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["é ☃.npz"]
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_the_person_of_the_selected_capture_is_found(both, which):
+    bpy.context.view_layer.objects.active = None
+    bpy.context.scene.scope.capture = both[which].users_collection[0]
+    assert captured_armature(bpy.context) == both[which]
+
+
+@pytest.mark.skipif(os.name == "nt" or sys.platform == "darwin", reason="names there are Unicode")
+def test_a_file_whose_name_is_not_utf8_is_written_and_reported(tmp_path, capfd):
+    rig = captured(motion := motion_of(walk(1.0)))
+    motion.save(tmp_path / "person1.npz")
+    rig["scope_motion"] = str(tmp_path / "person1.npz")
+    name = os.fsdecode(b"l\xe4ufer.npz")
+    assert bpy.ops.scope.export(filepath=str(tmp_path / name), format="NPZ") == {"FINISHED"}
+    assert (tmp_path / name).is_file()
+    assert "Wrote l\ufffdufer.npz" in capfd.readouterr().out
