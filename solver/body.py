@@ -219,5 +219,5 @@ class Body:
         f = self.faces
         if f.shape[1] == 3:
             return f
-        halves: NDArray[np.int32] = np.concatenate([f[:, [0, 1, 2]], f[:, [0, 2, 3]]]).astype(np.int32)
+        halves: NDArray[np.int32] = np.concatenate([f[:, [0, 1, 2]], f[:, [0, 2, 3]]]).astype(np.int32, order="C")
         return halves

@@ -112,15 +112,26 @@ def hat(phi: ArrayLike) -> Array:
     return out - np.swapaxes(out, -1, -2)
 
 
-def _coefficients(phi: Array) -> tuple[Array, ...]:
-    """Return sin(th)/th, (1 - cos(th))/th^2, (th - sin(th))/th^3, each (..., 1, 1)."""
+def _squares_and_angles(phi: Array) -> tuple[Array, Array, Array]:
+    """Return th^2, whether it is small, and th, or 1 where it is; each (..., 1, 1)."""
     s = np.sum(phi * phi, axis=-1)[..., None, None]
     small = s < 1e-2
-    th = np.sqrt(np.where(small, 1.0, s))
-    a = np.where(small, 1.0 - s / 6.0 * (1.0 - s / 20.0 * (1.0 - s / 42.0)), np.sin(th) / th)
-    b = np.where(small, 0.5 - s / 24.0 * (1.0 - s / 30.0 * (1.0 - s / 56.0)), 2.0 * (np.sin(0.5 * th) / th) ** 2)
-    c = np.where(small, 1 / 6.0 - s / 120.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0)), (th - np.sin(th)) / th**3)
-    return a, b, c
+    return s, small, np.sqrt(np.where(small, 1.0, s))
+
+
+def _sine(s: Array, small: Array, th: Array) -> Array:
+    """Return sin(th)/th."""
+    return np.where(small, 1.0 - s / 6.0 * (1.0 - s / 20.0 * (1.0 - s / 42.0)), np.sin(th) / th)
+
+
+def _versine(s: Array, small: Array, th: Array) -> Array:
+    """Return (1 - cos(th))/th^2."""
+    return np.where(small, 0.5 - s / 24.0 * (1.0 - s / 30.0 * (1.0 - s / 56.0)), 2.0 * (np.sin(0.5 * th) / th) ** 2)
+
+
+def _lag(s: Array, small: Array, th: Array) -> Array:
+    """Return (th - sin(th))/th^3."""
+    return np.where(small, 1 / 6.0 - s / 120.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0)), (th - np.sin(th)) / th**3)
 
 
 def exp(phi: ArrayLike) -> Array:
@@ -129,9 +140,8 @@ def exp(phi: ArrayLike) -> Array:
     :raises ShapeError: the vectors have another shape.
     """
     phi = as_arrays(phi, (3,), "A rotation vector")
-    a, b, _ = _coefficients(phi)
-    cross = hat(phi)
-    return np.eye(3) + a * cross + b * (cross @ cross)
+    angles, cross = _squares_and_angles(phi), hat(phi)
+    return np.eye(3) + _sine(*angles) * cross + _versine(*angles) * (cross @ cross)
 
 
 def log(rotation: ArrayLike) -> Array:
@@ -154,9 +164,8 @@ def left_jacobian(phi: ArrayLike) -> Array:
     :raises ShapeError: the vectors have another shape.
     """
     phi = as_arrays(phi, (3,), "A rotation vector")
-    _, b, c = _coefficients(phi)
-    cross = hat(phi)
-    return np.eye(3) + b * cross + c * (cross @ cross)
+    angles, cross = _squares_and_angles(phi), hat(phi)
+    return np.eye(3) + _versine(*angles) * cross + _lag(*angles) * (cross @ cross)
 
 
 def left_jacobian_inverse(phi: ArrayLike) -> Array:

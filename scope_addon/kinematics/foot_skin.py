@@ -43,7 +43,7 @@ class FootSkin:
         for part in self.parts:
             own = v[body.strongest_joints == part] - J[part]
             own = own if len(own) else np.zeros((1, 3))
-            self.points.append(own[np.unique((own @ _directions().T).argmax(axis=0))])
+            self.points.append(own[np.unique((_directions() @ own.T).argmax(axis=1))])
 
     def heights(
         self, R: NDArray[np.floating[Any]], t: NDArray[np.floating[Any]], up: NDArray[np.floating[Any]]

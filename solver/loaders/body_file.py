@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -62,11 +63,14 @@ def load_body(which: str | Path = "scope") -> Body:
     choice = f"give one of {', '.join(BUILT_IN)}, or a body's .npz or .pkl file"
     if not os.path.isfile(path):  # unlike Path.is_file also of names that are too long for the system
         raise ModelFileError(f"body '{which}' was not found: {choice}")
-    if is_user_model(path):
+    if str(which) in BUILT_IN:
+        data = _read_once(path)
+    elif is_user_model(path):
         return load_model(path)
-    if is_motion(path):
+    elif is_motion(path):
         raise ModelFileError(f"{path} is a motion file, which holds how a body moves, not the body itself: {choice}")
-    data = read_npz(path, ModelFileError, "body file")
+    else:
+        data = read_npz(path, ModelFileError, "body file")
     missing = [k for k in REQUIRED if k not in data]
     if missing:
         raise ModelFileError(f"{path} lacks {', '.join(missing)}: it is not a Scope body file")
@@ -105,9 +109,20 @@ def load_body(which: str | Path = "scope") -> Body:
     return body
 
 
+def _read_once(path: Path) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a file of ours, which stays in memory: in the panel, every change of a capture needs it."""
+    return {key: value.copy() for key, value in _kept(path, path.stat().st_mtime_ns).items()}
+
+
+@lru_cache(maxsize=4)
+def _kept(path: Path, changed_ns: int) -> dict[str, NDArray[Any]]:
+    del changed_ns  # another file of that name is read anew
+    return read_npz(path, ModelFileError, "body file")
+
+
 def _with_growth(data: dict[str, NDArray[Any]], which: str) -> dict[str, NDArray[Any]]:
     """Return the name and the shape derivatives of a body of all ages, from the arrays of the adult's."""
-    columns = read_npz(GROWTH, ModelFileError, "file of children's growth")
+    columns = _read_once(GROWTH)
     changed = {"name": np.array(which)}
     for key in ("shapedirs", "J_shapedirs", "keypoint_shapedirs"):
         column = columns.get(f"{CHILDREN[which]}/{key}", np.zeros(0))

@@ -5,31 +5,36 @@ import json
 import socket
 
 import pytest
-from scope.scope_addon.cluster import connection
-from scope.scope_addon.cluster.connection import connect
 from scope.scope_addon.errors import ClusterError, UsageError
 from scope.solver.errors import InputError
 
 from ..required import package
 
-package("distributed")
+
+@pytest.fixture(scope="module")
+def connection():
+    """The module, without whose import, which takes a while, every process of a run collects this file."""
+    package("distributed")
+    from scope.scope_addon.cluster import connection
+
+    return connection
 
 
 @pytest.mark.parametrize("text", ["", "localhost:8786", "http://host:8786", "inproc://host", "tcp://", "nowhere.json"])
-def test_what_is_no_address_and_no_file_is_refused(text):
+def test_what_is_no_address_and_no_file_is_refused(connection, text):
     with pytest.raises(UsageError, match="--scheduler must be an address"):
-        connect(text)
+        connection.connect(text)
 
 
 @pytest.mark.parametrize("content", ["", "[]", "{}", '{"address": 3}', '{"address": "inproc://a"}'])
-def test_a_file_that_is_no_scheduler_file_is_refused(tmp_path, content):
+def test_a_file_that_is_no_scheduler_file_is_refused(connection, tmp_path, content):
     (tmp_path / "scheduler.json").write_text(content)
     with pytest.raises(InputError, match=r"scheduler\.json is not a scheduler file"):
-        connect(str(tmp_path / "scheduler.json"))
+        connection.connect(str(tmp_path / "scheduler.json"))
 
 
 @pytest.mark.parametrize("as_file", [False, True])
-def test_a_scheduler_that_does_not_answer_is_a_sentence(tmp_path, monkeypatch, as_file):
+def test_a_scheduler_that_does_not_answer_is_a_sentence(connection, tmp_path, monkeypatch, as_file):
     monkeypatch.setattr(connection, "_TIMEOUT_S", 0.2)
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
@@ -38,6 +43,6 @@ def test_a_scheduler_that_does_not_answer_is_a_sentence(tmp_path, monkeypatch, a
         (tmp_path / "scheduler.json").write_text(json.dumps({"address": address}))
         address = str(tmp_path / "scheduler.json")
     with pytest.raises(ClusterError, match="cannot be reached") as caught:
-        connect(address)
+        connection.connect(address)
     assert address in str(caught.value)
     assert "\n" not in str(caught.value)

@@ -17,10 +17,8 @@ from scope.scope_addon.cluster.division import MAX_WINDOWS, Divisions, window_ra
 from scope.scope_addon.job.clips.task import CaptureSettings, ClipTask
 
 from ..job.processes import runs, wait_for
-from ..required import package
 from .test_runner import calls, files, run, started
 
-distributed = package("distributed")
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="sends signals to worker processes")
 
 # Replaces the capture. A clip has as many windows as its text says, each of three frames. The first process of the

@@ -16,7 +16,6 @@ from scope.scope_addon.job.batch import REPORT_NAME
 from ..job.processes import runs, wait_for
 from ..required import package
 
-distributed = package("distributed")
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="sends signals to worker processes")
 
 # Replaces the capture. The clip's text decides the outcome; every call is logged beside the clip. The first process of
@@ -45,7 +44,7 @@ print(json.dumps({"frames": 3, "outputs": outputs, "warnings": []}))
 @contextmanager
 def started(**options):
     defaults = {"threads_per_worker": 1, "dashboard_address": ":0", "silence_logs": 60}
-    with distributed.LocalCluster(**defaults | options) as cluster:
+    with package("distributed").LocalCluster(**defaults | options) as cluster:
         yield cluster
 
 
@@ -92,7 +91,7 @@ def is_json(file):
 
 def workers(cluster):
     """Process ids of the workers."""
-    with distributed.Client(cluster.scheduler_address, set_as_default=False) as client:
+    with package("distributed").Client(cluster.scheduler_address, set_as_default=False) as client:
         return client.run(os.getpid)
 
 
@@ -228,7 +227,7 @@ def test_footage_and_results_may_be_at_urls(cluster, folder, capsys):
 
 
 def test_a_lost_scheduler_is_a_sentence_and_finished_clips_are_kept(folder, tmp_path, monkeypatch, capsys):
-    class Impatient(distributed.Client):
+    class Impatient(package("distributed").Client):
         """Gives up a scheduler that is lost after two seconds; connecting to it may take longer."""
 
         async def _reconnect(self):

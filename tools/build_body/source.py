@@ -149,6 +149,8 @@ def _read_mirror(text: str, count: int) -> NDArray[np.intp]:
 
 def parse_target(content: bytes) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
     """Return the vertices that a target moves, and their displacements (n, 3) in metres."""
-    rows = [line for line in content.decode().splitlines() if line and not line.startswith("#")]
-    table = np.fromstring(" ".join(rows), sep=" ").reshape(-1, 4)
+    text = content.decode() + "\n"
+    start = text.find("\n", text.rfind("#")) + 1 if "#" in text else 0  # nearly all comments are at the beginning
+    rows = [line for line in text[:start].splitlines() if not line.startswith("#")]
+    table = np.fromstring(" ".join([*rows, text[start:]]).strip(), sep=" ").reshape(-1, 4)
     return table[:, 0].astype(np.int64), table[:, 1:] * METRES_PER_UNIT

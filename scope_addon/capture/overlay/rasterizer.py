@@ -76,7 +76,8 @@ def rasterize(
     corners = np.ascontiguousarray(triangles, np.int32)
     if shading is None:
         shading = shade(vertices, vertex_normals(vertices, corners))
-    colors = np.broadcast_to(np.asarray(face_colors, np.float32), (len(corners), 3))
+    colors = np.empty((len(corners), 3), np.float32)  # a broadcast view would be another type, and compiled again
+    colors[:] = face_colors
     lens = np.zeros(5)
     if dist is not None:
         coefficients = np.ravel(dist)[:5]

@@ -52,7 +52,7 @@ def test_a_sphere_has_the_depth_and_outline_of_ray_casting():
 
 def test_a_silhouette_covers_the_pixels_that_opencv_fills_but_for_their_edge():
     vertices, triangles = sphere((0.55, -0.1, 3.0), 0.7)  # beyond the right edge
-    screen = (vertices / vertices[:, 2:] @ K.T)[:, :2]
+    screen = np.ascontiguousarray((vertices / vertices[:, 2:] @ K.T)[:, :2])
     coverage = np.zeros((HEIGHT, WIDTH), np.bool_)
     fill_silhouette(coverage, screen, triangles)
     drawn = np.zeros((HEIGHT, WIDTH), np.uint8)

