@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Write the network as ONNX, and read it again.
 
-Matrices are in half precision, followed by a Cast, the rest in single precision.
+Matrices are 8-bit integers times a scale per row, W ≈ s q with s = max |W| / 127, which the runtime multiplies once when
+it opens the network; the rest is in single precision.
 """
 
 from __future__ import annotations
@@ -38,8 +39,9 @@ class _Graph:
         return output
 
     def linear(self, x: str, name: str, weight: NDArray[np.float32], bias: NDArray[np.float32]) -> str:
-        half = self.constant(f"{name}.weight", weight.astype(np.float16))
-        single = self.add("Cast", [half], f"{name}.weight32", to=TensorProto.FLOAT)
+        rounded, scale = quantized(weight)
+        whole = self.add("Cast", [self.constant(f"{name}.weight", rounded)], f"{name}.whole", to=TensorProto.FLOAT)
+        single = self.add("Mul", [whole, self.constant(f"{name}.scale", scale)], f"{name}.weight32")
         return self.add("Gemm", [x, single, self.constant(f"{name}.bias", bias)], name, transB=1)
 
     def reshape(self, x: str, name: str, *shape: int) -> str:
@@ -48,6 +50,12 @@ class _Graph:
     def norm(self, x: str, name: str, layer: torch.nn.LayerNorm) -> str:
         scale, bias = (self.constant(f"{name}.{k}", getattr(layer, k).detach().numpy()) for k in ("weight", "bias"))
         return self.add("LayerNormalization", [x, scale, bias], name, axis=-1, epsilon=layer.eps)
+
+
+def quantized(weight: NDArray[np.float32]) -> tuple[NDArray[np.int8], NDArray[np.float32]]:
+    """Return the matrix (n, m) as whole numbers -127..127 and the scale (n, 1) of each row."""
+    scale = np.maximum(np.abs(weight).max(axis=1, keepdims=True), 1e-12) / 127
+    return np.round(weight / scale).astype(np.int8), scale.astype(np.float32)
 
 
 def export(network: LiftingNetwork, path: Path) -> None:
@@ -111,6 +119,11 @@ def read_exported(path: Path) -> LiftingNetwork:
     :raises KeyError: it is not such a network.
     """
     found = {w.name: np.array(numpy_helper.to_array(w)) for w in onnx.load(str(path)).graph.initializer}
+    found |= {
+        name: found[name] * found[name.removesuffix("weight") + "scale"]
+        for name in found
+        if found[name].dtype == np.int8
+    }
     blocks = sum(name.startswith("first") and name.endswith(".weight") for name in found)
     network = LiftingNetwork(len(found["enter.bias"]), blocks)
     names = {f"merges.{k}.{part}": f"merge_{part}{k}" for k in range(MERGES) for part in ("norm", "first", "second")}
