@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Write the network as ONNX, and read it again.
 
-Matrices are 8-bit integers times a scale per row, W ≈ s q with s = max |W| / 127, which the runtime multiplies once when
-it opens the network; the rest is in single precision.
+Matrices are 8-bit integers times a scale per row, W ≈ s q with s = max |W| / 127, multiplied once, when the network is
+opened; the rest is in single precision.
 """
 
 from __future__ import annotations
