@@ -126,7 +126,7 @@ def test_a_mirrored_pose_has_mirrored_keypoints(body, plain, motions):
 
 
 def as_recorded(Omega, motions, sampler):
-    """(n,) bool: whether all joints but the root of poses (n, 24, 3, 3) are those of one frame or of its mirror image."""
+    """(n,) bool: whether all joints but the root of (n, 24, 3, 3) are those of one frame or of its mirror image."""
     frames = torch.tensor(motions.Omega)
     candidates = torch.cat([frames, sampler.mirror(frames)])[:, 1:].flatten(1)
     return (torch.cdist(Omega[:, 1:].flatten(1), candidates).amin(1) < 1e-2).numpy()
@@ -383,7 +383,8 @@ def test_the_rate_rises_and_falls_to_zero():
 
 @pytest.fixture
 def small(monkeypatch):
-    """Trainings of a few small batches."""
+    """Trainings of a small network with a few small batches."""
+    monkeypatch.setattr(train, "LiftingNetwork", lambda: LiftingNetwork(width=64, blocks=1))
     monkeypatch.setattr(train, "COUNT", 64)
     monkeypatch.setattr(train, "NORMALIZATION_COUNT", 256)
     return train.Settings(Variety(natural_share=0.6, segment_spread=0.03), steps=4, batch=32)
@@ -393,7 +394,7 @@ def test_training_reduces_the_error_of_held_out_windows(body, small, monkeypatch
     monkeypatch.setattr(train, "WARM_UP", 5)
     recorded = made_motions(body, 200, 20)
     held_out = measure.held_out_batches(body, recorded, "cpu", 256)["augmented"]
-    trainer = train.Trainer(body, recorded, replace(small, steps=60, batch=64), None, "cpu")
+    trainer = train.Trainer(body, recorded, replace(small, steps=60, batch=64, rate=1e-2), None, "cpu")
     before = measure.measure(trainer.network, held_out)["with_world_mm"]
     for step in range(60):
         trainer.step(step)

@@ -105,9 +105,8 @@ class PoseSampler:
         Omega = torch.where(mirrored[:, None, :, None, None], Omega * self._mirror_signs, Omega)
         turned = ~natural & ~self._chance(n, UNTURNED_SHARE)
         strength = (self._normal(n).abs() * turned)[:, None, None]
-        Omega = (
-            Omega @ rotation_matrices(self._normal(n, self.joint_count, 3) * self._noise[:, None] * strength)[:, None]
-        )
+        turn = self._normal(n, self.joint_count, 3) * self._noise[:, None] * strength
+        Omega = Omega @ rotation_matrices(turn)[:, None]
         root = self._placement(natural)[:, None] @ Omega[:, :, 0]
         return torch.cat([root[:, :, None], Omega[:, :, 1:]], 2)
 

@@ -79,8 +79,8 @@ class LiftingNetwork(nn.Module):
 def loss(points: Tensor, log_sigma: Tensor, truth: Tensor) -> Tensor:
     """Return the mean −log of the Laplace density of the error e of a coordinate, and of bones' 1 − cos.
 
-    −log p(e) = √2 |e| / σ + log σ (+ const), with one σ for both coordinates across the line of sight. Bones' directions
-    have the weight DIRECTION_WEIGHT.
+    −log p(e) = √2 |e| / σ + log σ (+ const), with one σ for both coordinates across the line of sight.
+    Bones' directions have the weight DIRECTION_WEIGHT.
     """
     log_sigma = torch.cat([log_sigma[..., :1], log_sigma], -1)
     likelihood = (2**0.5 * (points - truth).abs() * torch.exp(-log_sigma) + log_sigma).mean()
