@@ -185,7 +185,7 @@ def train(
         trainer.step(step)
         since += 1
         if since == report_every or step + 1 == settings.steps:
-            row = {"step": step + 1, "s": round(time.perf_counter() - began)}
+            row: dict[str, Any] = {"step": step + 1, "s": round(time.perf_counter() - began)}
             row["loss"] = round(trainer.take_loss() / since, 4)
             log.append(row | measure_all(trainer.mean, held_out))
             print(json.dumps(log[-1]), flush=True)
