@@ -32,6 +32,7 @@ from scope.tools.train_lifter.network import BONES, LiftingNetwork, loss
 
 @pytest.fixture(autouse=True)
 def _seed():
+    torch.set_num_threads(1)  # with more, small batches wait for other processes' threads
     torch.manual_seed(0)
 
 
