@@ -1,57 +1,56 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Training batches: the body moving in front of a random camera, as the detector would report it.
-
-A batch depends only on its seed, so that any number of processes can make batches in any order.
-"""
+"""Training batches: the body moving in front of a random camera, as the detector would report it, in PyTorch."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
-from numpy.typing import NDArray
+import torch
+from torch import Tensor
 
-from ...scope_addon.capture.perception.lifter import HIPS, KEYPOINT_COUNT, network_input, person_size, virtual_camera
 from ...scope_addon.capture.perception.lifter_window import MIDDLE, OFFSETS_S, WINDOW
 from ...solver.body import Body
 from . import detector_noise
-from .augment import Motions, PoseSampler, small_rotations
-from .detector_noise import Persistence
+from .augment import PoseSampler, rotation_matrices
+from .detector_noise import Persistence, chance, normal, uniform
+from .motions import Motions
+from .network_input import hip_center, network_input, person_size, virtual_camera
 
 FARTHEST_M = 12.0
-PITCH_LEVEL, PITCH_SPREAD = np.radians(8.0), np.radians(9.0)
-PITCH_LOWEST, PITCH_HIGHEST = np.radians(-15.0), np.radians(45.0)
+PITCH_LIMITS = (math.radians(-15.0), math.radians(45.0))
 # Most cameras are hand-held or on a stand: their pitch towards a person follows from height and distance.
 HELD_SHARE, HELD_HEIGHT_M, HELD_SPREAD_M, LOWEST_M = 0.7, 1.3, 0.4, 0.1
 HEIGHTS_M = (0.3, 3.0)  # see `Variety.any_height_share`
-ROLL_SPREAD = np.radians(3.0)
+ROLL_SPREAD, ROLLED_SPREAD = math.radians(3.0), math.radians(15.0)
 DRIFT_PER_S = (0.1, 0.03, 0.08)  # one standard deviation, of x/z, y/z and the logarithm of the distance
-# Windows truncated at a clip's start or end, and windows of still images.
-CUT_SHORT_SHARE, STILL_SHARE = 0.06, 0.06
+CUT_SHORT_SHARE = 0.06  # of the windows, those truncated at a clip's start, and as many at its end
+NEAREST_DEPTH_M = 0.3  # of a keypoint, to divide by
 
 
 @dataclass(frozen=True)
 class Variety:
     """In what the people and cameras of a training may differ.
 
-    ``nearest_m``: distance of the nearest person. ``field``: largest |x/z| and |y/z| of the person's position in the
-    image. ``any_height_share``: of the hand-held cameras, those at any height in HEIGHTS_M instead of a person's.
-    ``focal_spread``: standard deviation of the logarithm of assumed over true focal length. ``hanging_share``: of the
-    samples, those whose arms hang. ``mean_offsets``: see `detector_noise.placements`.
+    ``natural_share``: of the samples, those whose joints are as recorded, see `augment`. ``segment_spread``: standard
+    deviation of the logarithm by which trunk, arms and legs vary in length. ``random_offsets``: whether each person has
+    a share of the landmark network's keypoint offsets, see `detector_noise.placements`. ``nearest_m``: distance of the
+    nearest person. ``field``: largest |x/z| and |y/z| of the person's position in the image. ``any_height_share``: of
+    the hand-held cameras, those at any height in HEIGHTS_M instead of a person's. ``rolled_share``: of the cameras,
+    those with a roll of ROLLED_SPREAD. ``focal_spread``: standard deviation of the logarithm of assumed over true focal
+    length. ``still_share``: of the windows, those of still images.
     """
 
+    natural_share: float = 0.0
+    segment_spread: float = 0.0
+    random_offsets: bool = False
     nearest_m: float = 1.8
     field: tuple[float, float] = (0.5, 0.4)
     any_height_share: float = 0.0
+    rolled_share: float = 0.0
     focal_spread: float = 0.1
-    hanging_share: float = 0.0
-    mean_offsets: bool = True
-
-
-USUAL = Variety()
-# Wide-angle lenses, near and off-centre people, cameras at any height, focal lengths as uncertain as those of captures.
-WIDE = Variety(1.2, (0.75, 0.5), 0.5, 0.35, 0.25)
+    still_share: float = 0.06
 
 
 @dataclass(frozen=True)
@@ -62,8 +61,8 @@ class Batch:
     axes.
     """
 
-    input: NDArray[np.float32]
-    points: NDArray[np.float32]
+    input: Tensor
+    points: Tensor
 
 
 @dataclass(frozen=True)
@@ -74,139 +73,117 @@ class Scene:
     camera axes; ``focal_ratio`` (n,) assumed over true focal length.
     """
 
-    points: NDArray[np.float32]
-    seen: NDArray[np.float32]
-    focal_ratio: NDArray[np.float32]
+    points: Tensor
+    seen: Tensor
+    focal_ratio: Tensor
 
 
 class Dataset:
-    """Draws batches for one body from motions."""
+    """Draws batches for one body from motions, on one device."""
 
-    def __init__(self, body: Body, motions: Motions, variety: Variety = USUAL) -> None:
-        self.body, self.variety = body, variety
-        self.sampler = PoseSampler(body, motions, variety.hanging_share)
-        self.part = body.keypoint_part[list(body.keypoint_set("blazepose").values())].astype(np.int64)
-        self._parents = np.asarray(body.parents, np.int64)
+    def __init__(self, body: Body, motions: Motions, variety: Variety | None = None, device: str = "cpu") -> None:
+        self.variety, self.device = variety or Variety(), device
+        self.sampler = PoseSampler(body, motions, self.variety.natural_share, self.variety.segment_spread, device)
+        self._part = _indices(body.keypoint_part[list(body.keypoint_set("blazepose").values())], device)
+        parents = np.asarray(body.parents)
+        depth = np.zeros(len(parents), int)
+        for k, parent in enumerate(parents[1:], 1):
+            depth[k] = depth[parent] + 1
+        levels = [np.flatnonzero(depth == level) for level in range(1, depth.max() + 1)]
+        self._levels = [(_indices(joints, device), _indices(parents[joints], device)) for joints in levels]
+        self._offsets_s = torch.as_tensor(OFFSETS_S, dtype=torch.float32, device=device)
+        self._moments = torch.arange(WINDOW, device=device)
+        self._placement, self._mean_offsets = (
+            torch.as_tensor(values, dtype=torch.float32, device=device)
+            for values in (detector_noise.PLACEMENT, detector_noise.MEAN_OFFSETS)
+        )
 
-    def keypoints(
-        self,
-        Omega: NDArray[np.float32],
-        bones: NDArray[np.float32],
-        local: NDArray[np.float32],
-        displaced: NDArray[np.float32],
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def keypoints(self, Omega: Tensor, bones: Tensor, local: Tensor, displaced: Tensor) -> tuple[Tensor, Tensor]:
         """Return BlazePose keypoints of windows of poses, and the same displaced in the axes of their parts.
 
+        R_k = R_p Ω_k, t_k = t_p + R_p l_k with p the parent, one level of the tree after another.
+
         :param Omega: (n, W, 24, 3, 3);  bones: (n, 24, 3), local: (n, 33, 3) as of `PoseSampler.proportions`;
-            displaced: (n, 33, 3) metres.  All f32.
+            displaced: (n, 33, 3) metres.
         :return: (n, W, 33, 3) twice, in the axes of the root's parent, root joint at 0.
         """
-        points, seen = (np.empty((*Omega.shape[:2], KEYPOINT_COUNT, 3), np.float32) for _ in range(2))
-        K = Omega.shape[2]
-        R, t = np.empty((K, 3, 3), np.float32), np.empty((K, 3), np.float32)
-        _forward(Omega, bones, local, displaced, self._parents, self.part, R, t, points, seen)
-        return points, seen
+        R, t = torch.empty_like(Omega), torch.zeros_like(Omega[..., 0])
+        R[:, :, 0] = Omega[:, :, 0]
+        for joints, parents in self._levels:
+            R_parent = R[:, :, parents]
+            R[:, :, joints] = R_parent @ Omega[:, :, joints]
+            t[:, :, joints] = t[:, :, parents] + _turned(R_parent, bones[:, joints])
+        R_part = R[:, :, self._part]
+        points = t[:, :, self._part] + _turned(R_part, local)
+        return points, points + _turned(R_part, displaced)
 
-    def scene(self, rng: np.random.Generator, n: int) -> Scene:
+    def scene(self, n: int) -> Scene:
         """Draw n people of random motion, shape and position."""
-        Omega = self.sampler.motion_windows(rng, n)
-        bones, local = self.sampler.proportions(rng, n)
-        displaced = detector_noise.placements(rng, n, self.variety.mean_offsets)
-        points, seen = self.keypoints(Omega, bones, local, displaced)
-        middle = points[:, :, HIPS].mean(axis=2, keepdims=True)
-        x, y = rng.uniform(-1, 1, (2, n)) * np.array(self.variety.field)[:, None]
-        distance = np.exp(rng.uniform(np.log(self.variety.nearest_m), np.log(FARTHEST_M), n))
-        above_floor = middle[:, MIDDLE, 0, 1] - points[:, MIDDLE, :, 1].min(axis=1)
-        down = lines_of_sight(rng, above_floor, distance, self.variety.any_height_share)
-        into = np.swapaxes(cameras(rng, n, down - np.arctan2(y, np.hypot(x, 1))), 1, 2)[:, None]
-        drift = [OFFSETS_S * (speed * rng.standard_normal((n, 1))) for speed in DRIFT_PER_S]
-        ray = np.stack([x[:, None] + drift[0], y[:, None] + drift[1], np.ones((n, WINDOW))], axis=-1)
-        away = (distance[:, None] * np.exp(drift[2]))[..., None]
-        place = (ray / np.linalg.norm(ray, axis=-1, keepdims=True) * away).astype(np.float32)[:, :, None]
-        focal_ratio = np.exp(self.variety.focal_spread * rng.standard_normal(n)).astype(np.float32)
-        return Scene((points - middle) @ into + place, (seen - middle) @ into + place, focal_ratio)
+        Omega = self.sampler.motion_windows(n)
+        bones, local = self.sampler.proportions(n)
+        mean = self._mean_offsets if self.variety.random_offsets else None
+        points, seen = self.keypoints(Omega, bones, local, detector_noise.placements(n, self._placement, mean))
+        return self._before_camera(points, seen)
 
-    def batch(self, seed: tuple[int, ...], n: int) -> Batch:
-        """Draw n samples that depend on the seed only."""
-        rng = np.random.default_rng(seed)
-        scene = self.scene(rng, n)
-        persistence = Persistence.draw(rng, n)
-        rays = scene.seen[..., :2] / np.maximum(scene.seen[..., 2:], 0.3)
-        flat = (n * WINDOW, KEYPOINT_COUNT)
-        size = person_size(rays.reshape(*flat, 2)).reshape(n, WINDOW, 1, 1)
-        errors, confidence = detector_noise.image_errors(rng, persistence)
-        relative = scene.seen - scene.seen[:, :, HIPS].mean(axis=2, keepdims=True)
+    def _before_camera(self, points: Tensor, seen: Tensor) -> Scene:
+        """Place people (n, WINDOW, 33, 3), y up, before random cameras."""
+        v, n, middle = self.variety, len(points), hip_center(points)
+        x, y = (uniform(points, (-limit, limit), n) for limit in v.field)
+        distance = torch.exp(uniform(points, (math.log(v.nearest_m), math.log(FARTHEST_M)), n))
+        above_floor = middle[:, MIDDLE, 0, 1] - points[:, MIDDLE, :, 1].amin(1)
+        down = lines_of_sight(above_floor, distance, v.any_height_share)
+        pitch = down - torch.atan2(y, torch.hypot(x, torch.ones_like(x)))
+        R_world_camera = cameras(pitch, v.rolled_share).transpose(1, 2)[:, None]
+        across, up, away = (self._offsets_s * (speed * normal(points, n, 1)) for speed in DRIFT_PER_S)
+        ray = torch.stack([x[:, None] + across, y[:, None] + up, torch.ones_like(across)], -1)
+        ray = ray / ray.norm(dim=-1, keepdim=True)
+        place = (ray * (distance[:, None] * torch.exp(away))[..., None])[:, :, None]
+        focal_ratio = torch.exp(v.focal_spread * normal(points, n))
+        return Scene((points - middle) @ R_world_camera + place, (seen - middle) @ R_world_camera + place, focal_ratio)
+
+    def batch(self, n: int) -> Batch:
+        """Draw n samples."""
+        scene, persistence = self.scene(n), Persistence.draw(n, self.device)
+        rays = scene.seen[..., :2] / scene.seen[..., 2:].clamp(min=NEAREST_DEPTH_M)
+        errors, confidence = detector_noise.image_errors(persistence)
         # Landmark networks see a crop, as of a camera that points at the person.
-        straight = np.swapaxes(virtual_camera(rays.reshape(*flat, 2)), 1, 2).reshape(n, WINDOW, 3, 3)
-        relative = (relative @ straight.astype(np.float32)).astype(np.float32)
-        world = detector_noise.world_landmarks(rng, relative, persistence)
-        rays = (rays + errors * size).astype(np.float32)
-        detector_noise.cut_by_edge(rng, rays, confidence, persistence)
-        detector_noise.swap_sides(rng, rays)
-        rays = rays / scene.focal_ratio[:, None, None, None]
-        known = np.repeat(rng.random(n) >= detector_noise.UNKNOWN_SHARE, WINDOW)
-        x, R = network_input(
-            rays.reshape(*flat, 2), confidence.reshape(flat).astype(np.float32), world.reshape(*flat, 3), known
-        )
-        x = cut_short(rng, x.reshape(n, WINDOW, -1))
-        points = scene.points[:, MIDDLE]
-        R = R.reshape(n, WINDOW, 3, 3)[:, MIDDLE]
-        points = (points - points[:, HIPS].mean(axis=1, keepdims=True)) @ np.swapaxes(R, 1, 2)
-        return Batch(x.astype(np.float32), points.astype(np.float32))
+        relative = (scene.seen - hip_center(scene.seen)) @ virtual_camera(rays).transpose(-1, -2)
+        world = detector_noise.world_landmarks(relative, persistence)
+        rays = rays + errors * person_size(rays)[..., None, None]
+        rays, confidence = detector_noise.cut_by_edge(rays, confidence, persistence)
+        rays = detector_noise.swap_sides(rays) / scene.focal_ratio[:, None, None, None]
+        known = (~chance(rays, detector_noise.UNKNOWN_SHARE, n, 1)).float().expand(-1, WINDOW)
+        x, R = network_input(rays, confidence, world, known)
+        middle = scene.points[:, MIDDLE]
+        points = (middle - hip_center(middle)) @ R[:, MIDDLE].transpose(1, 2)
+        return Batch(cut_short(x, self._moments, self.variety.still_share), points)
 
 
-def cut_short(rng: np.random.Generator, x: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Truncate some windows (n, WINDOW, ...), so that moments repeat as at a clip's ends or in a still image."""
+def _indices(values: object, device: str) -> Tensor:
+    return torch.as_tensor(np.asarray(values), dtype=torch.long, device=device)
+
+
+def _turned(R: Tensor, vectors: Tensor) -> Tensor:
+    """Return R v (n, W, m, 3) of rotations (n, W, m, 3, 3) and vectors (n, m, 3)."""
+    return (R @ vectors[:, None, ..., None])[..., 0]
+
+
+def cut_short(x: Tensor, moments: Tensor, still_share: float) -> Tensor:
+    """Truncate some windows (n, WINDOW, C), so that moments repeat as at a clip's ends or in a still image.
+
+    :param moments: 0 to WINDOW − 1, on the device of ``x``;  still_share: of the windows, those of still images.
+    """
     n = len(x)
-    first = np.where(rng.random(n) < CUT_SHORT_SHARE, rng.integers(0, MIDDLE + 1, n), 0)
-    last = np.where(rng.random(n) < CUT_SHORT_SHARE, rng.integers(MIDDLE, WINDOW, n), WINDOW - 1)
-    still = rng.random(n) < STILL_SHARE
-    first[still] = last[still] = MIDDLE
-    return x[np.arange(n)[:, None], np.clip(np.arange(WINDOW), first[:, None], last[:, None])]
+    start, end = (uniform(x, (0.0, 1.0), n) for _ in range(2))
+    first = torch.where(chance(x, CUT_SHORT_SHARE, n), (start * (MIDDLE + 1)).long(), 0)
+    last = torch.where(chance(x, CUT_SHORT_SHARE, n), MIDDLE + (end * (WINDOW - MIDDLE)).long(), WINDOW - 1)
+    still = chance(x, still_share, n)
+    first, last = torch.where(still, MIDDLE, first), torch.where(still, MIDDLE, last)
+    rows = torch.minimum(torch.maximum(moments[None], first[:, None]), last[:, None])
+    return x.gather(1, rows[..., None].expand(-1, -1, x.shape[-1]))
 
 
-@njit(fastmath=True)
-def _forward(
-    Omega: NDArray[np.float32],
-    bones: NDArray[np.float32],
-    local: NDArray[np.float32],
-    displaced: NDArray[np.float32],
-    parents: NDArray[np.int64],
-    part: NDArray[np.int64],
-    R: NDArray[np.float32],
-    t: NDArray[np.float32],
-    points: NDArray[np.float32],
-    seen: NDArray[np.float32],
-) -> None:
-    """Compute `Dataset.keypoints`; ``R`` (24, 3, 3) and ``t`` (24, 3) are work arrays."""
-    for a in range(Omega.shape[0]):
-        for w in range(Omega.shape[1]):
-            for i in range(3):  # element by element: numba compiles assignments of whole rows for seconds
-                t[0, i] = 0.0
-                for j in range(3):
-                    R[0, i, j] = Omega[a, w, 0, i, j]
-            for k in range(1, len(parents)):
-                p = parents[k]
-                for i in range(3):
-                    x, y, z = R[p, i, 0], R[p, i, 1], R[p, i, 2]
-                    t[k, i] = t[p, i] + x * bones[a, k, 0] + y * bones[a, k, 1] + z * bones[a, k, 2]
-                    for j in range(3):
-                        R[k, i, j] = x * Omega[a, w, k, 0, j] + y * Omega[a, w, k, 1, j] + z * Omega[a, w, k, 2, j]
-            for j in range(local.shape[1]):
-                p = part[j]
-                for i in range(3):
-                    x, y, z = R[p, i, 0], R[p, i, 1], R[p, i, 2]
-                    point = t[p, i] + x * local[a, j, 0] + y * local[a, j, 1] + z * local[a, j, 2]
-                    points[a, w, j, i] = point
-                    seen[a, w, j, i] = point + x * displaced[a, j, 0] + y * displaced[a, j, 1] + z * displaced[a, j, 2]
-
-
-def lines_of_sight(
-    rng: np.random.Generator,
-    above_floor: NDArray[np.float32],
-    distance: NDArray[np.float32],
-    any_height_share: float = 0.0,
-) -> NDArray[np.float32]:
+def lines_of_sight(above_floor: Tensor, distance: Tensor, any_height_share: float = 0.0) -> Tensor:
     """Draw the angles (n,) in radians by which the line from the camera to the hips points down.
 
     sin⁻¹((camera's height − hips' height) / distance) for hand-held cameras, any angle for the others.
@@ -214,23 +191,20 @@ def lines_of_sight(
     :param above_floor: (n,) metres, of the hips;  distance: (n,) metres;  any_height_share: see `Variety`.
     """
     n = len(distance)
-    height = np.maximum(HELD_HEIGHT_M + HELD_SPREAD_M * rng.standard_normal(n), LOWEST_M)
-    if any_height_share:
-        height = np.where(rng.random(n) < any_height_share, rng.uniform(*HEIGHTS_M, n), height)
-    held = np.arcsin(np.clip((height - above_floor) / distance, -0.7, 0.7))
-    return np.where(rng.random(n) < HELD_SHARE, held, rng.uniform(PITCH_LOWEST, PITCH_HIGHEST, n))
+    height = (HELD_HEIGHT_M + HELD_SPREAD_M * normal(distance, n)).clamp(min=LOWEST_M)
+    height = torch.where(chance(distance, any_height_share, n), uniform(distance, HEIGHTS_M, n), height)
+    held = torch.asin(((height - above_floor) / distance).clamp(-0.7, 0.7))
+    return torch.where(chance(distance, HELD_SHARE, n), held, uniform(distance, PITCH_LIMITS, n))
 
 
-def pitches(rng: np.random.Generator, n: int) -> NDArray[np.float32]:
-    """Draw the pitches (n,), radians, of cameras that point at the person: many nearly level, others of any pitch."""
-    common = rng.random(n) < 0.6
-    level = PITCH_LEVEL + PITCH_SPREAD * rng.standard_normal(n)
-    return np.where(common, level, rng.uniform(PITCH_LOWEST, PITCH_HIGHEST, n))
+def cameras(pitch: Tensor, rolled_share: float = 0.0) -> Tensor:
+    """Draw R_camera_world (n, 3, 3): looking along −z of a world with y up, pitched (positive: down) and rolled.
 
-
-def cameras(rng: np.random.Generator, n: int, pitch: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Draw R_camera_world (n, 3, 3) f32: looking along −z of a world with y up, pitched (positive: down) and rolled."""
-    zero = np.zeros(n)
-    tilted = small_rotations(np.stack([pitch, zero, zero], axis=1).astype(np.float32))
-    rolled = small_rotations(np.stack([zero, zero, ROLL_SPREAD * rng.standard_normal(n)], axis=1).astype(np.float32))
-    return rolled @ tilted @ np.diag([1.0, -1.0, -1.0]).astype(np.float32)
+    :param pitch: (n,) radians;  rolled_share: see `Variety`.
+    """
+    n, zero = len(pitch), torch.zeros_like(pitch)
+    roll = torch.where(chance(pitch, rolled_share, n), ROLLED_SPREAD, ROLL_SPREAD) * normal(pitch, n)
+    turned = rotation_matrices(torch.stack([zero, zero, roll], 1)) @ rotation_matrices(
+        torch.stack([pitch, zero, zero], 1)
+    )
+    return torch.cat([turned[..., :1], -turned[..., 1:]], -1)  # times diag(1, −1, −1)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Simulated detector errors: displaced and uncertain 2D keypoints, distorted world landmarks.
 
-The detector's keypoints differ from the body's: each has a constant offset in its body part, that of
-`keypoint_offsets` and one specific to the person (people differ in build and clothes). Image errors are added and, in
-the world landmarks, a tilt, scale and flattening of the whole, errors in the depth of limbs, and sometimes a limb
-mirrored in depth.
+The detector's keypoints differ from the body's: each has a constant offset in its body part, specific to the person
+(people differ in build and clothes), on request around a share of that of `keypoint_offsets`. Image errors are added
+and, in the world landmarks, a tilt, scale and flattening of the whole, errors in the depth of limbs, and sometimes a
+limb mirrored in depth.
 
 Errors are correlated in time. The autocorrelation of errors in the depth of bones, of `pose_landmark_heavy` on footage
 and renders with ground truth, is 0.8, 0.65, 0.5 and 0.5 after 0.1, 0.2, 0.4 and 0.8 seconds: half of the variance is
@@ -13,30 +13,35 @@ constant within the window, most of the rest changes within a few tenths of a se
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+import torch
+from torch import Tensor
 
 from ...scope_addon.capture.fitting.keypoint_offsets import offset
 from ...scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
-from ...scope_addon.capture.perception.lifter_window import WINDOW
-from .augment import small_rotations
+from ...scope_addon.capture.perception.lifter_window import MIDDLE, WINDOW
+from .augment import rotation_matrices
+from .network_input import hip_center
 
 # Metres, one standard deviation per coordinate, of a person's keypoint offsets.
 PLACEMENT = np.full(33, 0.012)
 PLACEMENT[[11, 12]], PLACEMENT[[23, 24]], PLACEMENT[25:33] = 0.02, 0.025, 0.015
+MEAN_OFFSETS = np.array([offset(name) for name in KEYPOINT_NAMES])
+OFFSETS_FACTOR = (-0.5, 1.5)  # per person, on MEAN_OFFSETS, where they are used
 IMAGE_NOISE = 0.03  # of the person's size s (see lifter.py), times a factor per sample of exp(N(0, 0.5))
 CONFIDENT_SHARE = 0.8
 UNSURE_FACTOR = 3.5  # on the image noise of a keypoint with no confidence
 SWAP_SHARE = 0.01  # samples in which the arms, or the legs, have left and right swapped
 CUT_SHARE = 0.12  # samples in which part of the body is outside the image
+CUT_UP_TO = (0.5, 0.6, 0.8)  # sums of their shares: cut below, at the right, above, and the rest at the left
 SWAP_LASTS = 0.7  # of the window's moments
 CONFIDENCE_LASTS = 0.7  # of the keypoints keep their confidence through the window
 # World landmarks. Depth is mostly too small: on renders by a factor of 0.3 for arms, 0.6 for trunk and legs.
 UNKNOWN_SHARE = 0.3
-TILT, TURN = np.radians(10.0), np.radians(9.0)
+TILT, TURN = math.radians(10.0), math.radians(9.0)
 SCALE_SPREAD = 0.07
 ARM_GAIN, LEG_GAIN, TRUNK_GAIN, SHOULDER_GAIN = (0.2, 1.1), (0.5, 1.1), (0.4, 1.1), (0.6, 1.1)
 LIMB_DEPTH = 0.25  # error of a bone's slope in depth, over its length
@@ -53,9 +58,7 @@ LIMBS = (
     ((23, 25), (25, 27), (27, 29), (27, 31)),
     ((24, 26), (26, 28), (28, 30), (28, 32)),
 )
-MIRROR_PARTNER = np.array([0, 4, 5, 6, 1, 2, 3, 8, 7, 10, 9, *(i + 1 - 2 * (i % 2 == 0) for i in range(11, 33))])
-_ARMS = np.arange(11, 23)
-_LEGS = np.arange(23, 33)
+_ARMS, _LEGS = (11, 23), (23, 33)  # first keypoint and one past the last, left and right in turn
 
 
 @dataclass(frozen=True)
@@ -67,126 +70,141 @@ class Persistence:
     with c and w_t independent; ``constant`` (n,) is ρ, ``kept`` (n,) is a.
     """
 
-    constant: NDArray[np.float32]
-    kept: NDArray[np.float32]
+    constant: Tensor
+    kept: Tensor
 
     @staticmethod
-    def draw(rng: np.random.Generator, n: int) -> Persistence:
+    def draw(n: int, device: str) -> Persistence:
         """Draw, for n people, the constant share of errors and the correlation from one moment to the next."""
-        return Persistence(*(rng.uniform(*limits, n).astype(np.float32) for limits in (CONSTANT_SHARE, KEPT)))
+        like = torch.empty(n, device=device)
+        return Persistence(uniform(like, CONSTANT_SHARE, n), uniform(like, KEPT, n))
 
-    def of(self, rows: NDArray[Any]) -> Persistence:
-        """Return the persistence of some of the people."""
-        return Persistence(self.constant[rows], self.kept[rows])
-
-    def mix(self, constant: NDArray[np.float32], white: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return e_t of c (n, 1, ...) and w_t (n, WINDOW, ...); overwrites the latter."""
+    def mix(self, constant: Tensor, white: Tensor) -> Tensor:
+        """Return e_t of c (n, 1, ...) and w_t (n, WINDOW, ...)."""
         a = self.kept.reshape(-1, *[1] * (white.ndim - 2))
-        b = np.sqrt(1 - a * a)
+        b = torch.sqrt(1 - a * a)
+        z = [white[:, 0]]
         for t in range(1, white.shape[1]):
-            white[:, t] = a * white[:, t - 1] + b * white[:, t]
+            z.append(a * z[-1] + b * white[:, t])
         rho = self.constant.reshape(-1, *[1] * (white.ndim - 1))
-        return np.sqrt(rho) * constant + np.sqrt(1 - rho) * white
+        return torch.sqrt(rho) * constant + torch.sqrt(1 - rho) * torch.stack(z, 1)
 
-    def normal(self, rng: np.random.Generator, *shape: int) -> NDArray[np.float32]:
+    def normal(self, *shape: int) -> Tensor:
         """Draw e_t, (n, WINDOW, *shape)."""
         n = len(self.constant)
-        constant = rng.standard_normal((n, 1, *shape), np.float32)
-        return self.mix(constant, rng.standard_normal((n, WINDOW, *shape), np.float32))
+        return self.mix(normal(self.constant, n, 1, *shape), normal(self.constant, n, WINDOW, *shape))
 
 
-def placements(rng: np.random.Generator, n: int, mean_offsets: bool = True) -> NDArray[np.float32]:
-    """Draw keypoint offsets (n, 33, 3) f32, metres, of n people, in the axes of their parts.
+def normal(like: Tensor, *shape: int) -> Tensor:
+    """Draw standard normal numbers on the device of a tensor."""
+    return torch.randn(*shape, device=like.device)
 
-    :param mean_offsets: around those of `keypoint_offsets`; otherwise around zero.
+
+def uniform(like: Tensor, limits: tuple[float, float], *shape: int) -> Tensor:
+    """Draw evenly distributed numbers on the device of a tensor."""
+    return limits[0] + (limits[1] - limits[0]) * torch.rand(*shape, device=like.device)
+
+
+def chance(like: Tensor, share: float, *shape: int) -> Tensor:
+    """Draw bools on the device of a tensor, a share of which is true."""
+    return torch.rand(*shape, device=like.device) < share
+
+
+def placements(n: int, deviation: Tensor, mean: Tensor | None = None) -> Tensor:
+    """Draw keypoint offsets (n, 33, 3), metres, of n people, in the axes of their parts.
+
+    :param deviation: (33,) metres, `PLACEMENT` on the device;  mean: (33, 3) metres, `MEAN_OFFSETS` on the device, of
+        which each person has a share of `OFFSETS_FACTOR`; None: offsets around zero.
     """
-    own = PLACEMENT[:, None] * rng.standard_normal((n, len(PLACEMENT), 3))
-    mean = np.array([offset(name) for name in KEYPOINT_NAMES]) if mean_offsets else 0.0
-    return (mean + own).astype(np.float32)
+    own = deviation[:, None] * normal(deviation, n, 33, 3)
+    return own if mean is None else own + mean * uniform(deviation, OFFSETS_FACTOR, n, 1, 1)
 
 
-def image_errors(rng: np.random.Generator, persistence: Persistence) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def image_errors(persistence: Persistence) -> tuple[Tensor, Tensor]:
     """Draw errors (n, WINDOW, 33, 2) of 2D keypoints, in units of the person's size s, and confidences."""
-    n = len(persistence.constant)
-    constant, lasting = moment_errors(rng, n)
-    white, passing = (x.reshape(n, WINDOW, *x.shape[1:]) for x in moment_errors(rng, n * WINDOW))
-    errors = persistence.mix(constant[:, None], white)
-    confidence = np.where(rng.random((n, 1, 33)) < CONFIDENCE_LASTS, lasting[:, None], passing)
-    return errors, confidence
+    like, n = persistence.constant, len(persistence.constant)
+    (constant, lasting), (white, passing) = moment_errors(like, n), moment_errors(like, n, WINDOW)
+    keeps = chance(like, CONFIDENCE_LASTS, n, 1, 33)
+    return persistence.mix(constant[:, None], white), torch.where(keeps, lasting[:, None], passing)
 
 
-def moment_errors(rng: np.random.Generator, n: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Draw errors of 2D keypoints (n, 33, 2) in units of the person's size s, and confidences (n, 33)."""
-    unsure = rng.random((n, 33)) > CONFIDENT_SHARE + 0.18 * rng.random((n, 1))
-    confidence = np.where(unsure, rng.random((n, 33)) ** 0.7, 1 - 0.1 * rng.random((n, 33)) ** 2)
+def moment_errors(like: Tensor, *n: int) -> tuple[Tensor, Tensor]:
+    """Draw errors of 2D keypoints (*n, 33, 2) in units of the person's size s, and confidences (*n, 33)."""
+    one = (0.0, 1.0)
+    unsure = uniform(like, one, *n, 33) > CONFIDENT_SHARE + 0.18 * uniform(like, one, *n, 1)
+    doubtful, sure = uniform(like, one, *n, 33) ** 0.7, 1 - 0.1 * uniform(like, one, *n, 33) ** 2
+    confidence = torch.where(unsure, doubtful, sure)
     # Half of the error of a hand or foot is that of the joint before it.
-    own = rng.standard_normal((n, 33, 2), np.float32)
+    own = normal(like, *n, 33, 2)
     for limb in LIMBS:
         for parent, child in limb:
             if parent not in (11, 12, 23, 24):
-                own[:, child] = 0.7 * own[:, parent] + 0.7 * own[:, child]
-    own[:, 1:11] = 0.8 * own[:, :1] + 0.4 * own[:, 1:11]
-    level = IMAGE_NOISE * np.exp(0.5 * rng.standard_normal((n, 1, 1), np.float32))
+                own[..., child, :] = 0.7 * own[..., parent, :] + 0.7 * own[..., child, :]
+    own[..., 1:11, :] = 0.8 * own[..., :1, :] + 0.4 * own[..., 1:11, :]
+    level = IMAGE_NOISE * torch.exp(0.5 * normal(like, *n, 1, 1))
     return own * level * (1 + (UNSURE_FACTOR - 1) * (1 - confidence[..., None])), confidence
 
 
-def cut_by_edge(
-    rng: np.random.Generator, rays: NDArray[np.float32], confidence: NDArray[np.float32], persistence: Persistence
-) -> None:
-    """Cut some people at the image border, in place: beyond it, the network guesses with low confidence."""
-    cut = np.flatnonzero(rng.random(len(rays)) < CUT_SHARE)
-    angle = rng.choice(4, len(cut), p=[0.5, 0.1, 0.2, 0.2]) * np.pi / 2
-    normal = np.stack([np.sin(angle), np.cos(angle)], axis=1)
-    height = np.einsum("nwjd,nd->nwj", rays[cut], normal)
-    low, high = height[:, WINDOW // 2].min(axis=1), height[:, WINDOW // 2].max(axis=1)
-    edge = low + rng.uniform(0.35, 1.0, len(cut)) * (high - low)
-    beyond = np.maximum(height - edge[:, None, None], 0.0)
-    pulled = rng.uniform(0.0, 0.7, (len(cut), 1, 1)) * beyond
-    guess = persistence.of(cut).normal(rng, 33, 2) * (0.5 * beyond[..., None])
-    rays[cut] += (guess - pulled[..., None] * normal[:, None, None]).astype(rays.dtype)
-    confidence[cut] *= np.where(beyond > 0, rng.uniform(0, 0.3, (len(cut), WINDOW, 33)), 1.0)
+def cut_by_edge(rays: Tensor, confidence: Tensor, persistence: Persistence) -> tuple[Tensor, Tensor]:
+    """Cut some people (n, WINDOW, 33, 2) at the image border: beyond it, the network guesses with low confidence.
 
-
-def swap_sides(rng: np.random.Generator, rays: NDArray[np.float32]) -> None:
-    """Swap left and right of the arms or the legs of some people (n, WINDOW, 33, 2), in place."""
+    :return: the same, and confidences (n, WINDOW, 33).
+    """
     n = len(rays)
-    for group in (_ARMS, _LEGS):
-        people, moments = np.nonzero((rng.random(n) < SWAP_SHARE)[:, None] & (rng.random((n, WINDOW)) < SWAP_LASTS))
-        rays[people[:, None], moments[:, None], group] = rays[people[:, None], moments[:, None], MIRROR_PARTNER[group]]
+    drawn = uniform(rays, (0.0, 1.0), n)
+    angle = 0.5 * math.pi * sum((drawn >= share).float() for share in CUT_UP_TO)
+    outwards = torch.stack([torch.sin(angle), torch.cos(angle)], 1)[:, None, None]  # y down
+    height = (rays * outwards).sum(-1)
+    low, high = height[:, MIDDLE].amin(1), height[:, MIDDLE].amax(1)
+    edge = low + uniform(rays, (0.35, 1.0), n) * (high - low)
+    beyond = (height - edge[:, None, None]).clamp(min=0) * chance(rays, CUT_SHARE, n)[:, None, None]
+    guess = persistence.normal(33, 2) * (0.5 * beyond[..., None])
+    pulled = uniform(rays, (0.0, 0.7), n, 1, 1) * beyond
+    low_confidence = torch.where(beyond > 0, uniform(rays, (0.0, 0.3), n, WINDOW, 33), 1.0)
+    return rays + guess - pulled[..., None] * outwards, confidence * low_confidence
 
 
-def world_landmarks(
-    rng: np.random.Generator, points: NDArray[np.float32], persistence: Persistence
-) -> NDArray[np.float32]:
+def swap_sides(rays: Tensor) -> Tensor:
+    """Swap left and right of the arms or the legs of some people (n, WINDOW, 33, 2)."""
+    n, parts = len(rays), [rays[:, :, : _ARMS[0]]]
+    for first, end in (_ARMS, _LEGS):
+        swapped = chance(rays, SWAP_SHARE, n, 1) & chance(rays, SWAP_LASTS, n, WINDOW)
+        group = rays[:, :, first:end]
+        other = group.unflatten(2, (-1, 2)).flip(3).flatten(2, 3)
+        parts.append(torch.where(swapped[..., None, None], other, group))
+    return torch.cat(parts, 2)
+
+
+def world_landmarks(points: Tensor, persistence: Persistence) -> Tensor:
     """Distort true keypoints (n, WINDOW, 33, 3), metres, in the axes of a camera that points at the person."""
-    n, W = points.shape[:2]
-
-    def normal(*shape: int) -> NDArray[np.float32]:
-        return rng.standard_normal((n, 1, *shape), np.float32)
-
-    def lasting(*shape: int) -> NDArray[np.float32]:
-        return persistence.normal(rng, *shape)
-
-    strength = np.exp(0.4 * normal(1, 1))
-    out = points.copy()
-    # The trunk tilts in depth as one; shoulders turn too little.
-    hips = points[:, :, [23, 24]].mean(axis=2, keepdims=True)
-    upper = points[:, :, :23] - hips
-    middle = upper[:, :, [11, 12]].mean(axis=2)[..., 2:]
-    shoulders, trunk = (rng.uniform(*gain, (n, 1, 1)) for gain in (SHOULDER_GAIN, TRUNK_GAIN))
-    depth = (upper[..., 2] - middle) * shoulders + middle * trunk
-    out[:, :, :23, 2] = hips[..., 2] + depth + 0.1 * lasting(1) * upper[..., 1]
+    n = len(points)
+    strength = torch.exp(0.4 * normal(points, n, 1, 1))
+    out = _flattened_trunk(points, persistence)
+    bend = persistence.normal(sum(map(len, LIMBS)), 3)
+    bend = strength[..., None] * torch.cat([LIMB_ACROSS * bend[..., :2], LIMB_DEPTH * bend[..., 2:]], -1)
+    bends = iter(bend.unbind(2))
     for number, limb in enumerate(LIMBS):
-        flipped = (rng.random((n, 1)) < FLIP_SHARE) & (rng.random((n, W)) < FLIP_LASTS)
-        gain = rng.uniform(*(ARM_GAIN if number < 2 else LEG_GAIN), (n, 1)) * np.where(flipped, -1.0, 1.0)
-        scale = np.stack([np.ones((n, W)), np.ones((n, W)), gain], axis=-1).astype(np.float32)
+        flipped = chance(points, FLIP_SHARE, n, 1) & chance(points, FLIP_LASTS, n, WINDOW)
+        gain = uniform(points, ARM_GAIN if number < 2 else LEG_GAIN, n, 1) * torch.where(flipped, -1.0, 1.0)
+        scale = torch.stack([torch.ones_like(gain), torch.ones_like(gain), gain], -1)
         for parent, child in limb:
             bone = points[:, :, child] - points[:, :, parent]
-            length = np.linalg.norm(bone, axis=-1, keepdims=True)
-            error = lasting(3) * np.array([LIMB_ACROSS, LIMB_ACROSS, LIMB_DEPTH], np.float32) * strength[..., 0]
-            out[:, :, child] = out[:, :, parent] + bone * scale + error * length
-    turn = np.stack([TILT * lasting(), TURN * lasting(), 0.3 * TURN * lasting()], axis=-1)
-    out = out @ small_rotations(turn.astype(np.float32))
-    out *= np.exp(SCALE_SPREAD * normal(1, 1))
-    out += WORLD_NOISE_M * lasting(33, 3)
-    return (out - out[:, :, [23, 24]].mean(axis=2, keepdims=True)).astype(np.float32)
+            error = next(bends) * bone.norm(dim=-1, keepdim=True)
+            out[child] = out[parent] + bone * scale + error
+    tilt, turn, roll = persistence.normal(3).unbind(-1)
+    turned = torch.stack(out, 2) @ rotation_matrices(torch.stack([TILT * tilt, TURN * turn, 0.3 * TURN * roll], -1))
+    scaled = turned * torch.exp(SCALE_SPREAD * normal(points, n, 1, 1, 1))
+    found = scaled + WORLD_NOISE_M * persistence.normal(33, 3)
+    return found - hip_center(found)
+
+
+def _flattened_trunk(points: Tensor, persistence: Persistence) -> list[Tensor]:
+    """Return each keypoint (n, WINDOW, 3) after the trunk has tilted in depth as one; shoulders turn too little."""
+    n, hips = len(points), hip_center(points)
+    upper = points[:, :, :23] - hips
+    middle = upper[:, :, 11:13, 2].mean(2, keepdim=True)
+    shoulders, trunk = uniform(points, SHOULDER_GAIN, n, 1, 1), uniform(points, TRUNK_GAIN, n, 1, 1)
+    depth = (upper[..., 2] - middle) * shoulders + middle * trunk
+    z = hips[..., 2] + depth + 0.1 * persistence.normal(1) * upper[..., 1]
+    upper_points = torch.cat([points[:, :, :23, :2], z[..., None]], -1)
+    return list(torch.cat([upper_points, points[:, :, 23:]], 2).unbind(2))

@@ -12,10 +12,11 @@ from ...scope_addon.capture.perception.lifter_window import WINDOW
 WIDTH, BLOCKS = 512, 6
 MERGES = 2  # 9 moments, 3, 1
 assert 3**MERGES == WINDOW
-DIRECTION_WEIGHT = 0.5
+DIRECTION_WEIGHT = 2.0
 LOG_SIGMA_RANGE = (-5.5, 0.5)  # 4 mm .. 1.6 m
 _ARMS, _LEGS = [(11, 13), (13, 15), (12, 14), (14, 16)], [(23, 25), (25, 27), (24, 26), (26, 28)]
-BONES = torch.tensor([*_ARMS, *_LEGS, (11, 12), (23, 24), (11, 23), (12, 24)])
+BONES = (*_ARMS, *_LEGS, (11, 12), (23, 24), (11, 23), (12, 24))  # start and end
+LIMB_BONES, TRUNK_BONES = slice(0, 8), slice(10, 12)  # of BONES
 
 
 class Block(nn.Module):
@@ -76,16 +77,20 @@ class LiftingNetwork(nn.Module):
 
 
 def loss(points: Tensor, log_sigma: Tensor, truth: Tensor) -> Tensor:
-    """Return the mean over samples of the Laplace density's −log, summed over coordinates, and bones' 1 − cos.
+    """Return the mean −log of the Laplace density of the error e of a coordinate, and of bones' 1 − cos.
 
     −log p(e) = √2 |e| / σ + log σ (+ const), with one σ for both coordinates across the line of sight.
+    Bones' directions have the weight DIRECTION_WEIGHT.
     """
-    log_sigma = log_sigma[..., [0, 0, 1]]
+    log_sigma = torch.cat([log_sigma[..., :1], log_sigma], -1)
     likelihood = (2**0.5 * (points - truth).abs() * torch.exp(-log_sigma) + log_sigma).mean()
     direction = nn.functional.cosine_similarity(bones(points), bones(truth), dim=-1)
     return likelihood + DIRECTION_WEIGHT * (1 - direction).mean()
 
 
 def bones(points: Tensor) -> Tensor:
-    """Return the vectors (n, 12, 3) of bones from start to end, of points (n, 33, 3)."""
-    return points[:, BONES[:, 1]] - points[:, BONES[:, 0]]
+    """Return the vectors (n, 12, 3) of bones from start to end, of points (n, 33, 3).
+
+    Slices, since an index tensor would have to be copied to the device, which a CUDA graph cannot record.
+    """
+    return torch.stack([points[:, end] - points[:, start] for start, end in BONES], 1)

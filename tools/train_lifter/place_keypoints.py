@@ -17,10 +17,10 @@ from ...scope_addon.capture.fitting.ablation import Ablation
 from ...scope_addon.capture.options import CaptureOptions
 from ...scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from ...scope_addon.capture.pipeline import capture
+from ...scope_addon.capture.tracking.left_right import MIRROR_PARTNER
 from ...scope_addon.motion import Motion
 from ...solver import Body, load_body
 from ...solver.rotations import exp
-from .detector_noise import MIRROR_PARTNER
 
 CLIPS = ("walk_side_static", "run_moving_camera", "squats_5fps", "gesture_square", "two_people_portrait")
 MIN_FRAMES = 20  # of a person who is included

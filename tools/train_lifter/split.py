@@ -6,21 +6,29 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .augment import Motions
+from ..train_prior.data import TEST
+from .motions import Motions
 
 HELD_OUT_EVERY = 10
 
 
 def is_held_out(take: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Return whether the takes with these numbers are held out."""
+    """Return whether the takes with these numbers are held out regardless of who performs: every tenth.
+
+    The renders and scenes with held-out motions show these.
+    """
     return take % HELD_OUT_EVERY == HELD_OUT_EVERY - 1
 
 
 def training_frames(motions: Motions) -> Motions:
-    """Return the frames of all takes except every tenth."""
-    return motions.select(~is_held_out(motions.take))
+    """Return the frames of all takes except every tenth and those of the joint prior's test performers."""
+    return motions.select(~_held_out(motions))
 
 
 def held_out_frames(motions: Motions) -> Motions:
-    """Return the frames of every tenth take."""
-    return motions.select(is_held_out(motions.take))
+    """Return the frames of every tenth take and of all takes of the joint prior's test performers."""
+    return motions.select(_held_out(motions))
+
+
+def _held_out(motions: Motions) -> NDArray[np.bool_]:
+    return is_held_out(motions.take) | np.isin(motions.performers, TEST)

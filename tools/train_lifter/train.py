@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Train the lifting network: ``python -m scope.tools.train_lifter.train MOTIONS PAIRS -o assets/lifter``.
+"""Train the lifting network: ``python -m scope.tools.train_lifter.train MOTIONS -o assets/lifter``.
 
-AdamW with a cosine schedule in bfloat16; the exponential mean of the weights is exported. Every tenth take is held out,
-to evaluate and to calibrate the uncertainties; the landmark network's renders only evaluate. The weights are kept next
-to the exported network, from which another training can continue (``--start``), as from an exported network itself.
+AdamW with a cosine schedule in bfloat16; the exponential mean of the weights is exported. Batches are drawn on the
+device of the training; on a GPU, drawing and training run as two CUDA graphs. Every tenth take and all takes of the
+joint prior's test performers are held out, to evaluate and to calibrate the uncertainties. The weights are kept next to
+the exported network, from which another training can continue (``--start``), as from an exported network itself.
+
+On the same kind of device, the same arguments give the same batches.
 """
 
 from __future__ import annotations
@@ -13,198 +16,238 @@ import copy
 import json
 import math
 import time
-from collections import deque
-from collections.abc import Iterator
-from dataclasses import asdict, replace
-from multiprocessing import get_context
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import torch
 
-from ...scope_addon.capture.perception.lifter import HIPS, network_input
-from ...scope_addon.capture.perception.lifter_window import MIDDLE, WINDOW
+from ...scope_addon.atomic_write import atomic_path
+from ...scope_addon.capture.perception.lifter_window import MIDDLE
+from ...scope_addon.errors import MotionFileError
+from ...solver.body import Body
 from ...solver.loaders.body_file import load_body
-from .augment import load_motions
-from .dataset import USUAL, WIDE, Batch, Dataset, Variety
+from .dataset import Dataset, Variety
 from .export import export, read_exported
+from .measure import COUNT, calibrate, held_out_batches, measure_all
+from .motions import Motions, load_motions
 from .network import LiftingNetwork, loss
-from .pairs import load_pairs
-from .split import held_out_frames, training_frames
+from .split import training_frames
 
-BATCH = 1024
-PEAK_RATE, WARM_UP, DECAY = 1e-3, 200, 0.01
-MEAN_DECAY = 0.997
-CHECKPOINT = "lifter.pt"
-AHEAD = 16  # batches made before they are needed
-_TRAINING, _VALIDATION = 0, 1  # first number of a batch's seed
-
-_dataset: Dataset | None = None
+BATCH = 4096
+PEAK_RATE, WARM_UP, DECAY = 1e-3, 300, 0.01
+BETAS, LARGEST_GRADIENT = (0.9, 0.98), 1.0
+MEAN_DECAY = 0.9995
+CHECKPOINT, NETWORK, LOG = "lifter.pt", "lifter.onnx", "log.json"
+NORMALIZATION_COUNT = 8192  # windows from which the input's mean and spread are taken
+GRAPH_WARM_UP = 3  # runs before a CUDA graph is recorded, in which libraries allocate their memory
 
 
-def _start(motions: Path, variety: Variety) -> None:
-    global _dataset
-    _dataset = Dataset(load_body("scope"), training_frames(load_motions(motions)), variety)
+@dataclass(frozen=True)
+class Settings:
+    """A training: ``steps`` batches of ``batch`` windows of ``variety``, drawn from ``seed``; highest rate ``rate``."""
+
+    variety: Variety
+    steps: int
+    seed: int = 1
+    rate: float = PEAK_RATE
+    batch: int = BATCH
 
 
-def _make(seed: tuple[int, ...]) -> Batch:
-    assert _dataset is not None
-    return _dataset.batch(seed, BATCH)
+class Trainer:
+    """A network in training, and its batches.
+
+    Everything that a step reads or writes is an attribute: CUDA graphs work on fixed addresses, so these tensors must
+    live as long as the graphs.
+    """
+
+    def __init__(self, body: Body, motions: Motions, settings: Settings, start: Path | None, device: str) -> None:
+        torch.manual_seed(settings.seed)
+        self.settings, self.device = settings, device
+        self.dataset = Dataset(body, training_frames(motions), settings.variety, device)
+        self.network = LiftingNetwork() if start is None else read_weights(start)
+        self.network.to(device)
+        if start is None:
+            x = self.dataset.batch(NORMALIZATION_COUNT).input[:, MIDDLE]
+            self.network.mean.copy_(x.mean(0))
+            self.network.spread.copy_(x.std(0) + 1e-3)
+        self.network.sigma_offset.zero_()
+        self.mean = copy.deepcopy(self.network)
+        self.parameters, self.mean_parameters = list(self.network.parameters()), list(self.mean.parameters())
+        self.rate, self.mean_share, self.total_loss = (torch.zeros((), device=device) for _ in range(3))
+        self.optimizer = self._optimizer()
+        batch = self.dataset.batch(settings.batch)
+        self.input, self.points = batch.input, batch.points
+        self._draw, self._step = graphed(self._draw_batch, device), graphed(self._train_batch, device)
+        self._forget_warm_up()
+
+    def _optimizer(self) -> torch.optim.Optimizer:
+        matrices = {"params": [p for p in self.parameters if p.ndim > 1], "weight_decay": DECAY}
+        others = {"params": [p for p in self.parameters if p.ndim == 1], "weight_decay": 0.0}
+        on_gpu = self.device == "cuda"
+        options = {"fused": True, "capturable": True} if on_gpu else {"foreach": False}
+        optimizer = torch.optim.AdamW([matrices, others], self.rate, BETAS, **options)
+        for group in optimizer.param_groups:
+            group["lr"] = self.rate
+        return optimizer
+
+    def _forget_warm_up(self) -> None:
+        """Set back what `graphed` changed; with the rate and the mean's share at 0, the weights have not changed."""
+        for state in self.optimizer.state.values():
+            for value in state.values():
+                value.zero_()
+        self.total_loss.zero_()
+
+    def _draw_batch(self) -> None:
+        batch = self.dataset.batch(self.settings.batch)
+        self.input.copy_(batch.input)
+        self.points.copy_(batch.points)
+
+    def _train_batch(self) -> None:
+        # Without the cache, whose casts of the weights would not be repeated when a graph is replayed.
+        with torch.autocast(self.device, torch.bfloat16, cache_enabled=False):
+            points, log_sigma = self.network(self.input)
+        value = loss(points, log_sigma, self.points)
+        value.backward()
+        torch.nn.utils.clip_grad_norm_(self.parameters, LARGEST_GRADIENT)
+        self.optimizer.step()
+        self.optimizer.zero_grad(set_to_none=False)
+        with torch.no_grad():
+            for mean, parameter in zip(self.mean_parameters, self.parameters, strict=True):
+                mean.add_((parameter - mean) * self.mean_share)
+            self.total_loss += value.detach()
+
+    def step(self, number: int) -> None:
+        """Draw a batch and train on it, as step ``number`` of the training, from 0."""
+        self.rate.fill_(self.settings.rate * schedule(number, self.settings.steps))
+        self.mean_share.fill_(1 - min(MEAN_DECAY, (number + 1) / (number + 10)))
+        self._draw()
+        self._step()
+
+    def take_loss(self) -> float:
+        """Return the sum of the losses since the last call."""
+        value = self.total_loss.item()
+        self.total_loss.zero_()
+        return value
 
 
-def batches(motions: Path, variety: Variety, seed: int, steps: int, workers: int) -> Iterator[Batch]:
-    """Yield the batches of a training, in an order that does not depend on the number of processes."""
-    with get_context("spawn").Pool(workers, _start, (motions, variety)) as pool:
-        waiting = deque(pool.apply_async(_make, ((_TRAINING, seed, k),)) for k in range(min(AHEAD, steps)))
-        for k in range(len(waiting), steps + len(waiting)):
-            yield waiting.popleft().get()
-            if k < steps:
-                waiting.append(pool.apply_async(_make, ((_TRAINING, seed, k),)))
+def schedule(step: int, steps: int) -> float:
+    """Return the factor on the highest rate: it rises over `WARM_UP` steps, and falls as ½ + ½ cos(π step / steps)."""
+    return min((step + 1) / WARM_UP, 0.5 + 0.5 * math.cos(math.pi * step / steps))
 
 
-def held_out_batch(motions: Path, variety: Variety, n: int = 8192) -> Batch:
-    """Return samples of the held-out takes."""
-    return Dataset(load_body("scope"), held_out_frames(load_motions(motions)), variety).batch((_VALIDATION, 0), n)
+def graphed(work: Callable[[], None], device: str) -> Callable[[], Any]:
+    """Return what does the same work as a CUDA graph, on other devices the work itself."""
+    if device != "cuda":
+        return work
+    stream = torch.cuda.Stream()
+    stream.wait_stream(torch.cuda.current_stream())
+    with torch.cuda.stream(stream):
+        for _ in range(GRAPH_WARM_UP):
+            work()
+    torch.cuda.current_stream().wait_stream(stream)
+    torch.cuda.synchronize()
+    graph = torch.cuda.CUDAGraph()
+    with torch.cuda.graph(graph):
+        work()
+    return graph.replay
 
 
-def renders(pairs: Path) -> Batch:
-    """Return the landmark network's output on rendered stills of the default body, with known world landmarks."""
-    points, rays, confidence, world = load_pairs(pairs)
-    x, R = network_input(rays, confidence, world, np.ones(len(rays)))
-    relative = points - points[:, HIPS].mean(axis=1, keepdims=True)
-    windows = np.repeat(x.astype(np.float32)[:, None], WINDOW, axis=1)
-    return Batch(windows, (relative @ np.swapaxes(R, 1, 2)).astype(np.float32))
+def read_weights(path: Path) -> LiftingNetwork:
+    """Read a network from the weights of a training (`CHECKPOINT`), or from its export.
 
-
-@torch.no_grad()
-def measure(network: LiftingNetwork, batch: Batch) -> dict[str, Any]:
-    """Return errors in mm, and the standard deviation of error over σ across and along the line of sight."""
-    points, log_sigma = network(torch.from_numpy(batch.input))
-    error = (points - torch.from_numpy(batch.points)).numpy()
-    z = error / np.exp(log_sigma.numpy())[..., [0, 0, 1]]
-    limbs = np.linalg.norm(error, axis=-1)[:, [11, 12, 13, 14, 15, 16, 25, 26, 27, 28]]
-    known = batch.input[:, MIDDLE, -2] > 0.5
-    result = {
-        "mpjpe_with_world_mm": float(1000 * limbs[known].mean()),
-        "depth_rms_mm": float(1000 * np.sqrt(np.square(error[..., 2]).mean())),
-        "deviation_across": float(z[..., :2].std()),
-        "deviation_along": float(z[..., 2].std()),
-    }
-    if not known.all():
-        result["mpjpe_without_world_mm"] = float(1000 * limbs[~known].mean())
-    return result
-
-
-@torch.no_grad()
-def calibrate(network: LiftingNetwork, batch: Batch) -> None:
-    """Shift each keypoint's log σ so that its errors over σ have unit variance (of 99 % of them) on the batch."""
-    network.sigma_offset.zero_()
-    points, log_sigma = network(torch.from_numpy(batch.input))
-    error = (points - torch.from_numpy(batch.points)).numpy()
-    z = np.abs(error / np.exp(log_sigma.numpy())[..., [0, 0, 1]])
-    for k, axes in enumerate(([0, 1], [2])):
-        part = np.moveaxis(z[..., axes], 1, 0).reshape(z.shape[1], -1)
-        part = np.minimum(part, np.quantile(part, 0.99, axis=1, keepdims=True))
-        network.sigma_offset[:, k] = torch.from_numpy(np.log(np.sqrt(np.square(part).mean(axis=1))).astype(np.float32))
-
-
-def _weights(path: Path) -> dict[str, Any]:
-    """Read the weights of a training (`CHECKPOINT`), or of an exported network."""
+    :raises KeyError: a file that ends in .onnx is no lifting network.
+    :raises RuntimeError: the weights are those of another network.
+    """
     if path.suffix == ".onnx":
-        return read_exported(path).state_dict()
-    weights: dict[str, Any] = torch.load(path, weights_only=True)
-    return weights
+        return read_exported(path)
+    network = LiftingNetwork()
+    network.load_state_dict(torch.load(path, map_location="cpu", weights_only=True))
+    return network
 
 
 def train(
-    motions: Path,
-    pairs: Path,
-    folder: Path,
-    seed: int,
-    steps: int,
-    workers: int,
-    minutes: float,
-    rate: float = PEAK_RATE,
-    start_from: Path | None = None,
-    variety: Variety = USUAL,
+    motions: Motions, folder: Path, settings: Settings, start: Path | None, device: str, report_every: int = 500
 ) -> None:
-    """Train and export. The schedule follows the steps or the time, ``minutes``, whichever ends first.
+    """Train, and write weights, network and log into the folder.
 
-    :param rate: the highest learning rate;  start_from: weights of an earlier training (`CHECKPOINT`), or its export;
-        variety: of the training and the held-out data.
+    :param start: weights of an earlier training to go on from, or its export;  report_every: steps between two rows of
+        the log.
     """
-    torch.manual_seed(seed)
-    torch.set_num_threads(1)
-    validation = held_out_batch(motions, variety)
-    rendered = renders(pairs)
-    network = LiftingNetwork()
-    x = torch.from_numpy(validation.input[:, MIDDLE])
-    network.mean.copy_(x.mean(0))
-    network.spread.copy_(x.std(0) + 1e-3)
-    if start_from:
-        network.load_state_dict(_weights(start_from))
-        network.sigma_offset.zero_()
-    mean = copy.deepcopy(network)
-    matrices = {"params": [p for p in network.parameters() if p.ndim > 1], "weight_decay": DECAY}
-    others = {"params": [p for p in network.parameters() if p.ndim == 1], "weight_decay": 0.0}
-    optimizer = torch.optim.AdamW([matrices, others], rate, (0.9, 0.98))
+    torch.backends.cuda.matmul.allow_tf32 = True
+    body = load_body("scope")
+    held_out = held_out_batches(body, motions, device, COUNT)
+    trainer = Trainer(body, motions, settings, start, device)
     log: list[dict[str, Any]] = []
-    start, total = time.perf_counter(), 0.0
-    for step, batch in enumerate(batches(motions, variety, seed, steps, workers)):
-        done = max(step / steps, (time.perf_counter() - start) / (60 * minutes))
-        if done >= 1:
-            break
-        for group in optimizer.param_groups:
-            group["lr"] = rate * min((step + 1) / WARM_UP, 0.5 + 0.5 * math.cos(math.pi * done))
-        with torch.autocast("cpu", torch.bfloat16):
-            points, log_sigma = network(torch.from_numpy(batch.input))
-        value = loss(points, log_sigma, torch.from_numpy(batch.points))
-        optimizer.zero_grad(set_to_none=True)
-        value.backward()
-        torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
-        optimizer.step()
-        decay = min(MEAN_DECAY, (step + 1) / (step + 10))
-        with torch.no_grad():
-            for a, b in zip(mean.parameters(), network.parameters(), strict=True):
-                a.lerp_(b, 1 - decay)
-        total += value.item()
-        if (step + 1) % 500 == 0:
-            row = {"step": step + 1, "s": round(time.perf_counter() - start), "loss": total / 500}
-            row |= measure(mean, validation)
-            row["mpjpe_renders_mm"] = measure(mean, rendered)["mpjpe_with_world_mm"]
-            total = 0.0
-            log.append({k: round(v, 4) for k, v in row.items()})
+    began, since = time.perf_counter(), 0
+    for step in range(settings.steps):
+        trainer.step(step)
+        since += 1
+        if since == report_every or step + 1 == settings.steps:
+            row: dict[str, Any] = {"step": step + 1, "s": round(time.perf_counter() - began)}
+            row["loss"] = round(trainer.take_loss() / since, 4)
+            log.append(row | measure_all(trainer.mean, held_out))
             print(json.dumps(log[-1]), flush=True)
-            folder.mkdir(parents=True, exist_ok=True)
-            torch.save(mean.state_dict(), folder / CHECKPOINT)
-    calibrate(mean, validation)
-    measured = {"held_out": measure(mean, validation), "renders": measure(mean, rendered)}
-    settings = {"seed": seed, "steps": step, "rate": rate, "batch": BATCH, "variety": asdict(variety)}
-    summary = {**settings, **measured, "log": log}
+            _save(trainer.mean, folder)
+            since = 0
+    calibrate(trainer.mean, held_out["augmented"])
+    measured = measure_all(trainer.mean, held_out)
+    print(json.dumps(measured), flush=True)
+    _save(trainer.mean, folder)
+    export(trainer.mean.cpu(), folder / NETWORK)
+    summary = {**asdict(settings), "start": str(start) if start else None, "device": device}
+    with atomic_path(folder / LOG) as temporary:
+        temporary.write_text(json.dumps(summary | {"held_out": measured, "log": log}, indent=1) + "\n")
+
+
+def _save(network: LiftingNetwork, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "log.json").write_text(json.dumps(summary, indent=1) + "\n")
-    export(mean, folder / "lifter.onnx")
-    print(json.dumps(measured))
+    with atomic_path(folder / CHECKPOINT) as temporary:
+        torch.save({name: value.cpu() for name, value in network.state_dict().items()}, temporary)
+
+
+def _arguments() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(description="Train the lifting network.")
+    parser.add_argument("motions", type=Path, help="file written by scope.tools.mocap.fit_body")
+    parser.add_argument("-o", "--output", type=Path, default=Path("assets/lifter"))
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--steps", type=int, default=20_800)
+    parser.add_argument("--batch", type=int, default=BATCH, help="windows of a step")
+    parser.add_argument("--rate", type=float, default=PEAK_RATE, help="the highest learning rate")
+    parser.add_argument("--start", type=Path, help="weights of an earlier training to go on from: .pt or .onnx")
+    parser.add_argument("--natural", type=float, default=0.6, help="share of samples whose joints are as recorded")
+    parser.add_argument("--segments", type=float, default=0.0, help="spread of the lengths of trunk, arms and legs")
+    parser.add_argument("--offsets", choices=("none", "random"), default="none", help="the landmark network's")
+    parser.add_argument("--device", choices=("cuda", "cpu"), default="cuda" if torch.cuda.is_available() else "cpu")
+    return parser
 
 
 def main() -> None:
     """Run the command line."""
-    parser = argparse.ArgumentParser(description="Train the lifting network.")
-    parser.add_argument("motions", type=Path, help="file written by scope.tools.mocap.fit_body")
-    parser.add_argument("pairs", type=Path, help="file written by scope.tools.train_lifter.render_pairs")
-    parser.add_argument("-o", "--output", type=Path, default=Path("assets/lifter"))
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--steps", type=int, default=6000)
-    parser.add_argument("--minutes", type=float, default=60.0)
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--rate", type=float, default=PEAK_RATE, help="the highest learning rate")
-    parser.add_argument("--start", type=Path, help="weights of an earlier training to go on from: .pt or .onnx")
-    parser.add_argument("--wide", action="store_true", help="more cameras, focal lengths and hanging arms")
-    parser.add_argument("--no-offsets", action="store_true", help="without the landmark network's keypoint offsets")
+    parser = _arguments()
     a = parser.parse_args()
-    variety = replace(WIDE if a.wide else USUAL, mean_offsets=not a.no_offsets)
-    train(a.motions, a.pairs, a.output, a.seed, a.steps, a.workers, a.minutes, a.rate, a.start, variety)
+    if a.steps < 1 or a.batch < 1:
+        parser.error("--steps and --batch must be at least 1")
+    if not 0 <= a.natural <= 1:
+        parser.error(f"--natural is a share from 0 to 1, but is {a.natural}")
+    if a.start and not a.start.is_file():
+        parser.error(f"{a.start} does not exist; --start expects the weights or the export of an earlier training")
+    try:
+        motions = load_motions(a.motions)
+    except MotionFileError as error:
+        parser.error(str(error))
+    variety = Variety(
+        natural_share=a.natural,
+        segment_spread=a.segments,
+        random_offsets=a.offsets == "random",
+        nearest_m=1.5,
+        field=(0.6, 0.45),
+        any_height_share=0.25,
+        rolled_share=0.1,
+        focal_spread=0.2,
+    )
+    train(motions, a.output, Settings(variety, a.steps, a.seed, a.rate, a.batch), a.start, a.device)
 
 
 if __name__ == "__main__":
