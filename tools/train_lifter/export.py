@@ -30,7 +30,7 @@ class _Graph:
         self.nodes: list[onnx.NodeProto] = []
         self.weights: list[onnx.TensorProto] = []
 
-    def constant(self, name: str, value: NDArray[np.float32]) -> str:
+    def constant(self, name: str, value: NDArray[Any]) -> str:
         self.weights.append(numpy_helper.from_array(np.asarray(value, order="C"), name))
         return name
 
