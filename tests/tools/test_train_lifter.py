@@ -420,7 +420,10 @@ def test_a_training_writes_what_another_continues_from(body, small, tmp_path):
         path = tmp_path / "a" / start
         train.train(recorded, tmp_path / "c", replace(small, rate=0.0), path, "cpu")
         kept = torch.load(tmp_path / "c" / "lifter.pt")
-        assert all(torch.allclose(kept[name], first[name], atol=1e-3) for name in first)
+        for name, value in first.items():  # an exported matrix has 8 bits
+            step = value.abs().amax(dim=-1, keepdim=True) / 127 if name.endswith("weight") and value.ndim == 2 else 0.0
+            again = 0.01 if name == "sigma_offset" else 1e-6  # the calibration, which is made again
+            assert ((kept[name] - value).abs() <= 0.501 * step + again).all(), name
 
 
 def test_the_command_line_says_what_is_wrong(monkeypatch, tmp_path, capsys):
@@ -447,7 +450,9 @@ def test_the_exported_network_is_the_trained_one(tmp_path):
     network = LiftingNetwork(width=32, blocks=2)
     for p in network.parameters():
         torch.nn.init.normal_(p, 0, 0.2)
-        p.data = p.data.half().float()
+        if p.ndim == 2:  # to what 8 bits and a scale for each row can state
+            step = p.data.abs().amax(dim=1, keepdim=True) / 127
+            p.data = step * (p.data / step).round()
     network.mean.normal_()
     network.spread.uniform_(0.5, 2)
     network.sigma_offset.normal_(0, 0.1)
