@@ -65,9 +65,9 @@ COLOURS = np.array([[217, 158, 128], [140, 89, 64], [76, 46, 31], [96, 120, 70],
 TO_2020 = np.array([[0.6274, 0.3293, 0.0433], [0.0691, 0.9195, 0.0114], [0.0164, 0.0880, 0.8956]])  # ITU-R BT.2087
 
 
-def as_hdr(sdr: np.ndarray, transfer: int) -> np.ndarray:
+def as_hdr(sdr: np.ndarray, transfer: int, from_709: np.ndarray = TO_2020) -> np.ndarray:
     """Calculate the codes that show SDR colours with white at 203 cd/m²: inverses of what is tested, in full."""
-    light = 203 * sdr**2.4 @ TO_2020.T
+    light = 203 * sdr**2.4 @ from_709.T
     if transfer == PQ:
         power = (light / 1e4) ** 0.1593017578125
         return ((0.8359375 + 18.8515625 * power) / (1 + 18.6875 * power)) ** 78.84375
@@ -86,6 +86,36 @@ def test_colours_come_back(transfer: int) -> None:
     assert np.abs(error[-1]).max() < 40, error.round()
 
 
+D65, DCI = (0.3127, 0.3290), (0.314, 0.351)  # whites
+SDR_PRIMARIES = ((0.64, 0.33), (0.30, 0.60), (0.15, 0.06))  # chromaticities of BT.709
+P3_PRIMARIES = ((0.680, 0.320), (0.265, 0.690), (0.150, 0.060))
+
+
+def xyz(chromaticity: tuple[float, float]) -> np.ndarray:
+    x, y = chromaticity
+    return np.array([x / y, 1, (1 - x - y) / y])
+
+
+def to_xyz(primaries: tuple[tuple[float, float], ...], white: tuple[float, float]) -> np.ndarray:
+    columns = np.column_stack([xyz(each) for each in primaries])
+    return columns * np.linalg.solve(columns, xyz(white))
+
+
+def adaptation_from_d65(white: tuple[float, float]) -> np.ndarray:
+    cones = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])  # Bradford
+    return np.linalg.inv(cones) @ np.diag(cones @ xyz(white) / (cones @ xyz(D65))) @ cones
+
+
+@pytest.mark.parametrize("transfer", [PQ, HLG])
+@pytest.mark.parametrize(("primaries", "white"), [(11, DCI), (12, D65)])
+def test_colours_of_p3_come_back(transfer: int, primaries: int, white: tuple[float, float]) -> None:
+    to_p3 = np.linalg.inv(to_xyz(P3_PRIMARIES, white)) @ adaptation_from_d65(white) @ to_xyz(SDR_PRIMARIES, D65)
+    patches = np.repeat(as_hdr(COLOURS, transfer, to_p3), 8, 0)[None].repeat(4, 0)
+    error = converted(coded_frame(patches, transfer, primaries=primaries))[2, 4::8] - 255 * COLOURS
+    assert np.abs(error[:-1]).max() < 8, error.round()
+    assert np.abs(error[-1]).max() < 25, error.round()
+
+
 @pytest.mark.parametrize("transfer", [0, 1, 2, 3, 4, 13, 14, 15, 17, 255])
 def test_other_frames_are_sdr(transfer: int) -> None:
     frame = grey(0.5, transfer)
@@ -94,7 +124,7 @@ def test_other_frames_are_sdr(transfer: int) -> None:
 
 
 @pytest.mark.parametrize("matrix", [0, 2, 3, 5, 8, 10, 14, 15, 200])
-@pytest.mark.parametrize("primaries", [0, BT709, 200])
+@pytest.mark.parametrize("primaries", [0, BT709, 11, 12, 200])
 def test_damaged_tags_leave_greys_alone(matrix: int, primaries: int) -> None:
     frame, right = grey(0.5, HLG, matrix=matrix, primaries=primaries), converted(grey(0.5, HLG))
     np.testing.assert_allclose(converted(frame).astype(int), right.astype(int), atol=1)
