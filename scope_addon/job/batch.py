@@ -21,7 +21,7 @@ from ..atomic_write import atomic_path
 from ..errors import NO_PERSON, OutputError, UsageError
 from ..footage import FOOTAGE_SUFFIXES, json_text
 from .clips.find import find_clips
-from .clips.finished import remove_finished
+from .clips.finished import finished_file
 from .clips.runner import LocalRunner, Runner
 from .clips.task import FINISHED, NO_EXTRAS, CaptureSettings, ClipTask, Entry, Extras
 from .request import program_version
@@ -172,7 +172,8 @@ class Batch:
         runner.report_written(self.report_file)
         written = {name for name, entry in entries.items() if entry["status"] in FINISHED}
         for name in written - self._reported:
-            remove_finished(self.out, name)
+            with suppress(OSError, KeyError):  # a record remains harmless: an entry of its key is in the report
+                finished_file(self.out, name, entries[name]["key"]).unlink(missing_ok=True)
         self._reported |= written
         taken = time.monotonic() - start
         self._next_report = 0.0 if taken < _QUICK_S else start + taken / _WRITING_SHARE

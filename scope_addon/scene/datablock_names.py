@@ -23,3 +23,8 @@ def holds(collection: bpy.types.Collection, obj: bpy.types.Object) -> bool:
     Looking it up by its name would also find an object of that name which is linked from another file.
     """
     return any(each == obj for each in collection.all_objects)
+
+
+def is_in_layer(view_layer: bpy.types.ViewLayer, obj: bpy.types.Object) -> bool:
+    """Return whether an object is in a view layer, found as in `holds`."""
+    return any(each == obj for each in view_layer.objects)

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import bpy
 
+from .datablock_names import is_in_layer
+
 # Custom property of objects hidden here, so that those hidden by the user stay hidden. Its value says whether the
 # object stays hidden or is only shown temporarily.
 _HIDDEN = "scope_hidden"
@@ -47,4 +49,4 @@ def hide_again(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> N
 def _person(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
     """Return armature and body, without objects outside the view layer, which cannot be hidden."""
     person = [armature, *(obj for obj in armature.children if obj.type == "MESH")]
-    return [obj for obj in person if obj.name in view_layer.objects]
+    return [obj for obj in person if is_in_layer(view_layer, obj)]

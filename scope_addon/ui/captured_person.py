@@ -47,7 +47,7 @@ def _retargeted_from(scene: bpy.types.Scene, rig: bpy.types.Object) -> bpy.types
         person = scene.objects.get(person)
     if not isinstance(person, bpy.types.Object) or "scope_source" not in person:
         return None
-    return person if scene.objects.get(person.name) == person else None
+    return person if holds(scene.collection, person) else None
 
 
 def captured_people(context: bpy.types.Context) -> list[bpy.types.Object]:

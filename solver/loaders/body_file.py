@@ -64,7 +64,7 @@ def load_body(which: str | Path = "scope") -> Body:
     if not os.path.isfile(path):  # unlike Path.is_file also of names that are too long for the system
         raise ModelFileError(f"body '{which}' was not found: {choice}")
     if str(which) in BUILT_IN:
-        data = _read_once(path)
+        data = _read_once(path, "body file")
     elif is_user_model(path):
         return load_model(path)
     elif is_motion(path):
@@ -109,20 +109,29 @@ def load_body(which: str | Path = "scope") -> Body:
     return body
 
 
-def _read_once(path: Path) -> dict[str, NDArray[Any]]:
-    """Return the arrays of a file of ours, which stays in memory: in the panel, every change of a capture needs it."""
-    return {key: value.copy() for key, value in _kept(path, path.stat().st_mtime_ns).items()}
+def _read_once(path: Path, what: str) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a file of ours, which stays in memory: in the panel, every change of a capture needs it.
+
+    :param what: what the file is, for messages.
+    :raises ModelFileError: it is missing or cannot be read.
+    """
+    try:
+        changed_ns = path.stat().st_mtime_ns
+    except OSError as error:
+        raise ModelFileError(f"the {what} {path} cannot be read ({error.strerror}); reinstall Scope") from error
+    # Copies in the files' order of memory, on which sums depend in their last bits, and the time that they take.
+    return {key: value.copy(order="K") for key, value in _kept(path, what, changed_ns).items()}
 
 
 @lru_cache(maxsize=4)
-def _kept(path: Path, changed_ns: int) -> dict[str, NDArray[Any]]:
+def _kept(path: Path, what: str, changed_ns: int) -> dict[str, NDArray[Any]]:
     del changed_ns  # another file of that name is read anew
-    return read_npz(path, ModelFileError, "body file")
+    return read_npz(path, ModelFileError, what)
 
 
 def _with_growth(data: dict[str, NDArray[Any]], which: str) -> dict[str, NDArray[Any]]:
     """Return the name and the shape derivatives of a body of all ages, from the arrays of the adult's."""
-    columns = _read_once(GROWTH)
+    columns = _read_once(GROWTH, "file of children's growth")
     changed = {"name": np.array(which)}
     for key in ("shapedirs", "J_shapedirs", "keypoint_shapedirs"):
         column = columns.get(f"{CHILDREN[which]}/{key}", np.zeros(0))

@@ -4,6 +4,7 @@
 import io
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -24,6 +25,7 @@ from scope.solver.loaders.body_file import BUILT_IN
 
 from .processes import runs, wait_for
 
+RECORD = r"\.[ab]\.finished-[0-9a-f]{16}\.json"  # of a clip's results
 FRAMES = 31  # of the sample clip up to --end 1, both ends included
 
 # Replaces the capture: the clip's text decides the outcome, and every call is logged in the folder of the clips. What
@@ -364,7 +366,7 @@ def test_the_clips_of_a_killed_batch_end_and_leave_no_partial_file(tmp_path, at)
     pids = [int(p.read_text("utf-8")) for p in clips.glob("*.pid")]
     wait_for(lambda: not any(runs(pid) for pid in pids))
     # Some of them, where a clip ended before it noticed that its parent is gone.
-    results = {p.name for p in out.iterdir() if ".finished-" not in p.name}
+    results = {p.name for p in out.iterdir() if not re.fullmatch(RECORD, p.name)}
     assert results <= {"a.npz", "b.npz", "a.overlay.mp4", "b.overlay.mp4"}
     for path in out.glob("*.npz"):
         assert len(Motion.load(path)) == FRAMES

@@ -4,7 +4,7 @@
 import bpy
 import pytest
 from scope.scope_addon.scene.build import BuildOptions, build_scene
-from scope.scope_addon.scene.datablock_names import SUFFIX_BYTES, holds, short_name
+from scope.scope_addon.scene.datablock_names import SUFFIX_BYTES, holds, is_in_layer, short_name
 
 
 @pytest.mark.parametrize("letter", ["x", "é", "歩", "🏃"])
@@ -43,3 +43,8 @@ def test_an_object_of_the_same_name_in_another_file_is_another_one(tmp_path):
     assert mine.name == other.name
     assert [holds(c, o) for c in (own, linked) for o in (mine, other)] == [True, False, False, True]
     assert [holds(scene.collection, o) for o in (mine, other)] == [True, True]
+    (layer := bpy.context.view_layer).update()
+    assert [is_in_layer(layer, o) for o in (mine, other)] == [True, True]
+    next(each for each in layer.layer_collection.children if each.collection == own).exclude = True
+    layer.update()
+    assert [is_in_layer(layer, o) for o in (mine, other)] == [False, True]

@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the export operator writes where a capture is linked from another file under the same names."""
+"""What operators act on where a capture is linked from another file under the same names."""
 
 import os
 import sys
 
 import bpy
 import pytest
-from scope.scope_addon.ui.captured_person import captured_armature
+from scope.scope_addon.errors import UsageError
+from scope.scope_addon.scene.visibility import hide
+from scope.scope_addon.ui.captured_person import PERSON, captured_armature
+from scope.scope_addon.ui.live.live_job import live_rig
+from scope.solver.loaders.body_file import load_body
 
 from ..edit.walking import motion_of, walk
 from ..scene.made_rigs import captured
@@ -52,3 +56,31 @@ def test_a_file_whose_name_is_not_utf8_is_written_and_reported(tmp_path, capfd):
     assert bpy.ops.scope.export(filepath=str(tmp_path / name), format="NPZ") == {"FINISHED"}
     assert (tmp_path / name).is_file()
     assert "Wrote l\ufffdufer.npz" in capfd.readouterr().out
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_the_person_of_a_rig_is_found(both, which):
+    rig = bpy.data.objects.new("rig", None)
+    bpy.context.scene.collection.objects.link(rig)
+    rig[PERSON] = both[which]
+    bpy.context.view_layer.objects.active = rig
+    assert captured_armature(bpy.context) == both[which]
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_what_the_view_layer_excludes_is_not_taken_for_the_other(both, which):
+    context, (excluded, shown) = bpy.context, both if which == 0 else both[::-1]
+    layers = context.view_layer.layer_collection.children
+    next(each for each in layers if each.collection == excluded.users_collection[0]).exclude = True
+    context.view_layer.update()
+    context.view_layer.objects.active = shown
+    shown.select_set(True)
+    hide(excluded, context.view_layer)
+    assert not shown.hide_get()
+    context.scene.scope.capture_index = list(bpy.data.collections).index(excluded.users_collection[0])
+    assert context.view_layer.objects.active == shown
+    assert shown.select_get()
+    context.scene.scope_retarget.rig = excluded
+    assert not bpy.ops.scope.retarget.poll()
+    with pytest.raises(UsageError, match="no rig of this scene's view layer is chosen"):
+        live_rig(context.scene, load_body("scope"))

@@ -64,7 +64,7 @@ def read_finished(file: Path, out: Path) -> dict[str, Any] | None:
 
 
 def remove_finished(out: Path, name: str) -> None:
-    """Remove the records of a clip, of whatever key."""
+    """Remove the records of a clip, of whatever key. This reads the whole folder; for one key, unlink its file."""
     target = out / name
     with suppress(OSError):
         for path in target.parent.glob(f".{glob.escape(target.name)}.finished-{'[0-9a-f]' * _KEY}.json"):

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import StringProperty
 
+from ...scene.datablock_names import is_in_layer
 from ..captured_person import captured_armature
 from ..reporting import iface_, tip_
 
@@ -67,7 +68,7 @@ def _make_active(capture: bpy.types.Collection) -> None:
     """Make a person of the shown capture active, so that the sections below act on what is shown."""
     context = bpy.context
     layer = context.view_layer
-    people = [person for person in people_of(capture) if layer is not None and person.name in layer.objects]
+    people = [person for person in people_of(capture) if layer is not None and is_in_layer(layer, person)]
     active = layer.objects.active if people else None
     if not people or captured_armature(context) in people or (active is not None and active.mode != "OBJECT"):
         return

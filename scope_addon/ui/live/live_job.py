@@ -28,6 +28,7 @@ from ...job.live.request import LiveRequest
 from ...job.process import START_SCRIPT
 from ...options import Place, options_at
 from ...options.body_choice import chosen_body
+from ...scene.datablock_names import is_in_layer
 from ...scene.live.datablocks import scene_of
 from ...scene.live.live_body import LiveBody
 from ...scene.live.live_rig import LiveRig
@@ -259,7 +260,7 @@ def live_rig(scene: bpy.types.Scene, body: Body) -> LiveRig:
     :raises ScopeError: there is none, or it cannot be used.
     """
     settings = scene.scope_retarget
-    if settings.rig is None or settings.rig.name not in bpy.context.view_layer.objects:
+    if settings.rig is None or not is_in_layer(bpy.context.view_layer, settings.rig):
         raise UsageError("no rig of this scene's view layer is chosen; choose one, or switch off Rig Follows")
     if settings.rig.library is not None:
         raise UsageError(f"'{settings.rig.name}' is linked; make an override of it, or switch off Rig Follows")

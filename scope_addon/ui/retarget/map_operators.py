@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
+from ...scene.datablock_names import is_in_layer
 from ..reporting import ReportingOperator, rpt_, tip_
 
 
 def is_in_view_layer(cls: type[bpy.types.Operator], context: bpy.types.Context, chosen: bpy.types.Object) -> bool:
     """Return whether an object that was chosen can be animated here: one that is deleted stays chosen."""
-    if chosen.name in context.view_layer.objects:
+    if is_in_layer(context.view_layer, chosen):
         return True
     cls.poll_message_set(
         tip_(

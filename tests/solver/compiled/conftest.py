@@ -8,6 +8,7 @@ import os
 import socket
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
@@ -15,22 +16,25 @@ import pytest
 
 Done = subprocess.CompletedProcess[str]
 
-# Takes code, folder, variables, and two file descriptors for what is printed; answers with the exit status.
+TIMEOUT_S = 600  # after which a process is ended, and fails its test
+
+# Takes code, folder, variables, seconds, and two file descriptors for what is printed; answers with the exit status.
 SERVER = """
-import gc, json, os, socket, sys
+import gc, json, os, signal, socket, sys
 from numba import njit
 from numba.core import config
 njit(lambda x: x + 1.0)(1.0)
 gc.freeze()
 server = socket.socket(fileno=int(sys.argv.pop()))
 while (received := socket.recv_fds(server, 1 << 20, 2))[0]:
-    code, folder, variables = json.loads(received[0])
+    code, folder, variables, timeout_s = json.loads(received[0])
     child = os.fork()
     for standard, given in zip((1, 2), received[1]):
         if not child:
             os.dup2(given, standard)
         os.close(given)
     if not child:
+        signal.alarm(timeout_s)
         server.close()
         os.chdir(folder)
         os.environ.clear()
@@ -50,6 +54,7 @@ def run_code() -> Iterator[Callable[[str, Path, Mapping[str, str]], Done]]:
         yield _started
         return
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    ours.settimeout(TIMEOUT_S + 60)  # the process ends by itself before
     command = [sys.executable, "-c", SERVER, str(theirs.fileno())]
     with ours, subprocess.Popen(command, pass_fds=[theirs.fileno()]) as process:
         theirs.close()
@@ -60,23 +65,24 @@ def run_code() -> Iterator[Callable[[str, Path, Mapping[str, str]], Done]]:
             return (_started if is_other else lambda *given: _forked(ours, *given))(code, folder, variables)
 
         yield run
-        ours.close()  # which ends the process
-        process.wait()
+        process.kill()
 
 
 def _started(code: str, folder: Path, variables: Mapping[str, str]) -> Done:
     command = [sys.executable, "-c", code]
-    return subprocess.run(command, cwd=folder, env=dict(variables), capture_output=True, text=True, check=True)
+    options = {"capture_output": True, "text": True, "check": True, "timeout": TIMEOUT_S}
+    return subprocess.run(command, cwd=folder, env=dict(variables), **options)
 
 
 def _forked(server: socket.socket, code: str, folder: Path, variables: Mapping[str, str]) -> Done:
-    pipes = os.pipe(), os.pipe()
-    socket.send_fds(server, [json.dumps([code, str(folder), dict(variables)]).encode()], [end for _, end in pipes])
-    printed = []
-    for begin, end in pipes:
-        os.close(end)
-        with open(begin, encoding="utf-8") as file:
-            printed.append(file.read())
-    done = subprocess.CompletedProcess(code, int(server.recv(100)), *printed)
+    # Files, because a process that prints much would wait for a reader of its pipe.
+    request = json.dumps([code, str(folder), dict(variables), TIMEOUT_S])
+    with tempfile.TemporaryFile() as stdout, tempfile.TemporaryFile() as stderr:
+        socket.send_fds(server, [request.encode()], [stdout.fileno(), stderr.fileno()])
+        status, printed = int(server.recv(100)), []
+        for file in (stdout, stderr):
+            file.seek(0)
+            printed.append(file.read().decode("utf-8"))
+    done = subprocess.CompletedProcess(code, status, *printed)
     done.check_returncode()
     return done

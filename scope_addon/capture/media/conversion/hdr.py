@@ -5,7 +5,7 @@ FFmpeg in PyAV's packages has no zscale, its libplacebo needs a GPU where there 
 takes eight times as long as the one to RGB. Here, 8-bit RGB passes one table for all channels and one matrix:
 
     table:   code -> light on a screen of 1000 cd/m² -> tone curve of ITU-R BT.2390, to `WHITE` -> code of gamma 2.4
-    matrix:  primaries of BT.2020 -> BT.709; for HLG also from one gamma per channel to that of the luminance
+    matrix:  primaries of BT.2020 or P3 -> BT.709; for HLG also from one gamma per channel to that of the luminance
 
 The matrix is that for linear light, but multiplies codes. This is exact for greys, and to the first order near them;
 skin is off by up to 6 of 255, saturated colours are by more.
@@ -29,10 +29,13 @@ SDR_GAMMA = 2.4  # of the screen (ITU-R BT.1886)
 HLG_GAMMA = 1.2  # system gamma of HLG for a screen of `PEAK` (ITU-R BT.2100)
 # Code points of ITU-T H.273, which FFmpeg uses.
 _PQ, _HLG = 16, 18  # transfer characteristics
-_PRIMARIES_709 = 1
 _YUV_MATRICES = {1: "ITU709", 5: "ITU601", 6: "ITU601"}  # matrix coefficients; others are taken for BT.2020's
 _LUMINANCE = np.array([0.2627, 0.6780, 0.0593])  # of the primaries of BT.2020
-_TO_709 = np.array([[1.6605, -0.5876, -0.0729], [-0.1246, 1.1329, -0.0083], [-0.0182, -0.1006, 1.1188]])  # BT.2087
+_2020_TO_709 = np.array([[1.6605, -0.5876, -0.0729], [-0.1246, 1.1329, -0.0083], [-0.0182, -0.1006, 1.1188]])  # BT.2087
+# From the chromaticities of SMPTE RP 431-2 and EG 432-1; the white of DCI-P3 becomes D65, by Bradford's adaptation.
+_DCI_P3_TO_709 = np.array([[1.1575, -0.1550, -0.0025], [-0.0415, 1.0456, -0.0041], [-0.0181, -0.0786, 1.0967]])
+_P3_D65_TO_709 = np.array([[1.2249, -0.2249, 0.0], [-0.0421, 1.0421, 0.0], [-0.0196, -0.0786, 1.0982]])
+_TO_709 = {1: np.eye(3), 11: _DCI_P3_TO_709, 12: _P3_D65_TO_709}  # primaries; others are taken for BT.2020's
 
 
 def hdr_rgb(frame: av.VideoFrame) -> NDArray[np.uint8] | None:
@@ -46,7 +49,7 @@ def hdr_rgb(frame: av.VideoFrame) -> NDArray[np.uint8] | None:
     yuv = _YUV_MATRICES.get(int(frame.colorspace), "BT2020")
     coded = frame.to_ndarray(format="rgb24", src_colorspace=yuv, dst_colorspace=yuv)
     toned = cv2.LUT(coded, _table(transfer))
-    return cast(NDArray[np.uint8], cv2.transform(toned, _matrix(transfer, frame.color_primaries == _PRIMARIES_709)))
+    return cast(NDArray[np.uint8], cv2.transform(toned, _matrix(transfer, int(frame.color_primaries))))
 
 
 @cache
@@ -58,14 +61,14 @@ def _table(transfer: int) -> NDArray[np.uint8]:
 
 
 @cache
-def _matrix(transfer: int, is_709: bool) -> NDArray[np.float64]:
+def _matrix(transfer: int, primaries: int) -> NDArray[np.float64]:
     """Return the matrix (3, 3) for codes of the table; its rows add up to 1."""
-    primaries = np.eye(3) if is_709 else _TO_709
+    to_709 = _TO_709.get(primaries, _2020_TO_709)
     if transfer == _PQ:
-        return primaries
+        return to_709
     # The luminance's power of gamma - 1 acts on all channels alike; the table has given each channel its own.
     system_gamma = (np.eye(3) + (HLG_GAMMA - 1) * np.tile(_LUMINANCE, (3, 1))) / HLG_GAMMA
-    return cast(NDArray[np.float64], primaries @ system_gamma)
+    return cast(NDArray[np.float64], to_709 @ system_gamma)
 
 
 def hlg_light(code: NDArray[np.float64]) -> NDArray[np.float64]:
