@@ -69,8 +69,9 @@ def run_code() -> Iterator[Callable[[str, Path, Mapping[str, str]], Done]]:
 
 def _started(code: str, folder: Path, variables: Mapping[str, str]) -> Done:
     command = [sys.executable, "-c", code]
-    options = {"capture_output": True, "text": True, "check": True, "timeout": TIMEOUT_S}
-    return subprocess.run(command, cwd=folder, env=dict(variables), **options)
+    return subprocess.run(
+        command, cwd=folder, env=dict(variables), capture_output=True, text=True, check=True, timeout=TIMEOUT_S
+    )
 
 
 def _forked(server: socket.socket, code: str, folder: Path, variables: Mapping[str, str]) -> Done:
