@@ -138,22 +138,16 @@ def _undecodable(path: Path) -> VideoError:
     )
 
 
-def _rgb(frame: av.VideoFrame) -> NDArray[np.uint8]:
+def rgb(frame: av.VideoFrame, matrix: str | None = None) -> NDArray[np.uint8]:
     """Convert a frame to RGB (H, W, 3) of SDR.
 
-    SDR is converted by ITU-R BT.601, also where it states another matrix, so that such a tag alone changes no result.
+    :param matrix: that of the YUV of SDR, as PyAV names it; None: the one that the frame states.
     """
     tone_mapped = hdr_rgb(frame)
     if tone_mapped is not None:
         return tone_mapped
-    image = frame.to_ndarray(format="rgb24", src_colorspace="ITU601", dst_colorspace="ITU601")
+    image = frame.to_ndarray(format="rgb24", src_colorspace=matrix, dst_colorspace=matrix)
     return cast(NDArray[np.uint8], image)
-
-
-def stated_rgb(frame: av.VideoFrame) -> NDArray[np.uint8]:
-    """Convert a frame of a picture or of a live source to RGB (H, W, 3) of SDR, by the matrix that it states."""
-    tone_mapped = hdr_rgb(frame)
-    return cast(NDArray[np.uint8], frame.to_ndarray(format="rgb24")) if tone_mapped is None else tone_mapped
 
 
 def orientation(frame: av.VideoFrame) -> tuple[int, bool]:
@@ -197,7 +191,7 @@ def decode_items(path: Path, numbers: Collection[int], max_pixels: int) -> dict[
                     if pixels_left < 0:
                         return {}
                     if packet.stream.id not in pictures:
-                        pictures[packet.stream.id] = stated_rgb(frame)
+                        pictures[packet.stream.id] = rgb(frame)
                 if len(pictures) == len(streams):
                     break
         except (failure, OSError, ValueError):
@@ -283,7 +277,8 @@ class PyavReader:
         if frame is None:
             return None
         self.clockwise_deg, self.is_mirrored = shown = orientation(frame)
-        return self._time(frame), upright(self._path, _rgb(frame), self._aspect, *shown)
+        image = rgb(frame, "ITU601")  # also where it states another matrix, so that a tag alone changes no result
+        return self._time(frame), upright(self._path, image, self._aspect, *shown)
 
     def skip_to(self, seconds: float, fps: Fraction) -> tuple[int, float | None]:
         """Skip to the first frame at or after a time.

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...capture.media.frame_readers import orientation, stated_rgb, upright
+from ...capture.media.frame_readers import orientation, rgb, upright
 from ...capture.media.image_size import check_size
 from ...errors import VideoError
 from ..clock import Clock
@@ -137,7 +137,7 @@ class StreamSource:
     def _image(self, frame: av.VideoFrame, aspect: float) -> NDArray[np.uint8]:
         """Return the frame as it is to be shown; phones send what they film upright as rotated, and may mirror it."""
         check_size(Path(self.name), frame.width, frame.height)
-        return upright(Path(self.name), stated_rgb(frame), aspect, *orientation(frame))
+        return upright(Path(self.name), rgb(frame), aspect, *orientation(frame))
 
 
 def _reason(error: Exception) -> str:

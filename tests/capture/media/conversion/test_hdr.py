@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.media.conversion.hdr import compress, hdr_rgb, hlg_light, pq_code, pq_light
-from scope.scope_addon.capture.media.frame_readers import stated_rgb
+from scope.scope_addon.capture.media.frame_readers import rgb
 from scope.scope_addon.capture.media.video import open_video
 
 from ..made_video import patch_track_header, with_time_table
@@ -120,7 +120,7 @@ def test_colours_of_p3_come_back(transfer: int, primaries: int, white: tuple[flo
 def test_other_frames_are_sdr(transfer: int) -> None:
     frame = grey(0.5, transfer)
     assert hdr_rgb(frame) is None
-    assert np.array_equal(stated_rgb(frame), frame.to_ndarray(format="rgb24"))
+    assert np.array_equal(rgb(frame), frame.to_ndarray(format="rgb24"))
 
 
 @pytest.mark.parametrize("matrix", [0, 2, 3, 5, 8, 10, 14, 15, 200])
