@@ -9,6 +9,8 @@ from __future__ import annotations
 import bpy
 
 LAST_FRAME = 1_048_574  # of Blender's timeline; the first one is its negative
+RATES = 0.01, 32767.0  # the least and the largest frame rate that Blender can store, frames per second
+RATE = "scope_rate"  # custom property of an armature: the scene's frame rate for which its keys were written
 _LARGEST = 1e9  # of numbers in a list
 
 
@@ -36,6 +38,11 @@ def stored_text(block: bpy.types.ID, name: str) -> str:
 def start_frame(armature: bpy.types.Object) -> float:
     """Return the scene frame of a captured armature's timestamp 0."""
     return stored_number(armature, "scope_start", 0.0, -LAST_FRAME, LAST_FRAME)
+
+
+def stored_rate(armature: bpy.types.Object, default: float) -> float:
+    """Return the frame rate for which a captured armature's keys were written; the default if it is not stored."""
+    return stored_number(armature, RATE, default, *RATES)
 
 
 def smoothing_of(armature: bpy.types.Object) -> float:

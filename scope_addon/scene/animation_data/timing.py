@@ -18,14 +18,13 @@ from numpy.typing import NDArray
 
 from ...errors import MotionFileError, UsageError
 from .retime import Retiming
-from .stored_values import LAST_FRAME, stored_number, stored_text
+from .stored_values import LAST_FRAME, RATE, RATES, stored_rate, stored_text
 
 # Rates within this tolerance (frames per second) of a standard one are taken to be it: 23.98 is 24 / 1.001.
 TOLERANCE = 0.005
 BROADCAST = tuple(Fraction(n * 1000, 1001) for n in (24, 30, 48, 60, 72, 96, 120, 240))
 POLICIES = ("keep", "set")
 RATE_POLICIES = (*POLICIES, "resample")
-_RATE = "scope_rate"  # custom property of an armature: the scene's frame rate for which its keys were written
 _CYCLE = "scope_cycle"  # custom property of an armature: the frame range of the cycle, and that of the scene before it
 
 
@@ -34,8 +33,11 @@ def blender_rate(frames_per_second: float) -> tuple[int, float]:
 
     :raises UsageError: when Blender cannot store the rate.
     """
-    if not math.isfinite(frames_per_second) or not 0.01 <= frames_per_second <= 32767:
-        raise UsageError(f"the frame rate must be between 0.01 and 32767 frames per second, not {frames_per_second}")
+    lowest, highest = RATES
+    if not lowest <= frames_per_second <= highest:
+        raise UsageError(
+            f"the frame rate must be between {lowest:g} and {highest:g} frames per second, not {frames_per_second}"
+        )
     for rate in BROADCAST:
         if abs(frames_per_second - float(rate)) < TOLERANCE:
             return rate.numerator // 1000, 1.001
@@ -89,12 +91,12 @@ def whole_frames_of(frames: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def store_rate(armature: bpy.types.Object, rate: float) -> None:
     """Store the frame rate for which an armature's keys were written, frames per second."""
-    armature[_RATE] = rate
+    armature[RATE] = rate
 
 
 def keyed_rate(armature: bpy.types.Object, scene: bpy.types.Scene) -> float:
     """Return the frame rate for which an armature's keys were written; older files do not say, and have the scene's."""
-    return stored_number(armature, _RATE, scene_rate(scene), 0.01, 32767)
+    return stored_rate(armature, scene_rate(scene))
 
 
 def set_frame_range(scene: bpy.types.Scene, first: float, last: float) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import bpy
 
-from ...scene.animation_data.stored_values import stored_number
+from ...scene.animation_data.stored_values import stored_rate
 from ..captured_person import PERSON, body_of, captured_people, library_of, motion_of
 from ..reporting import ReportingOperator, rpt_, sentence, tip_
 from .captures import people_of, shown_capture
@@ -52,7 +52,7 @@ def keyed_for(scene: bpy.types.Scene) -> float:
     """
     now = scene.render.fps / scene.render.fps_base
     capture = shown_capture(scene)
-    rates = [stored_number(person, "scope_rate", now, 0.01, 32767) for person in people_of(capture)] if capture else []
+    rates = [stored_rate(person, now) for person in people_of(capture)] if capture else []
     return next((rate for rate in rates if abs(rate - now) > _SAME), 0.0)
 
 

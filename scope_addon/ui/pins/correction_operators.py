@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
 
+from ...scene.animation_data.stored_values import LAST_FRAME
 from ...scene.character.correction_list import listed_corrections
 from ..captured_person import motion_of
 from ..edit.edit_base import EditOperator, SpanOperator
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from ....solver.body import Body
     from ...edit.pins.corrections import Correction
 
-_NOW = -1_048_574  # the first frame that Blender allows; stands for the current one
+_NOW = -LAST_FRAME  # the first frame that Blender allows; stands for the current one
 
 # Of the last pin. Blender does not show what an operator reports that another one has called, so that one shows these.
 last_pin_warnings: list[str] = []
