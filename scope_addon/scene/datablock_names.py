@@ -20,11 +20,16 @@ def short_name(name: str) -> str:
 def holds(collection: bpy.types.Collection, obj: bpy.types.Object) -> bool:
     """Return whether an object is in a collection or in one below it.
 
-    Looking it up by its name would also find an object of that name which is linked from another file.
+    Looking it up by its name alone would also find an object of that name which is linked from another file.
     """
-    return any(each == obj for each in collection.all_objects)
+    return _contains(collection.all_objects, obj)
 
 
 def is_in_layer(view_layer: bpy.types.ViewLayer, obj: bpy.types.Object) -> bool:
     """Return whether an object is in a view layer, found as in `holds`."""
-    return any(each == obj for each in view_layer.objects)
+    return _contains(view_layer.objects, obj)
+
+
+def _contains(objects: bpy.types.bpy_prop_collection, obj: bpy.types.Object) -> bool:
+    named = objects.get(obj.name)  # the panel asks at every redraw, and only a namesake needs the whole scene
+    return named == obj or (named is not None and any(each == obj for each in objects))
