@@ -13,6 +13,7 @@ and copies nothing between host and device once the objects are made, so that a 
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 import torch
@@ -54,27 +55,24 @@ class PoseSampler:
         device: str = "cpu",
     ) -> None:
         self.natural_share, self.segment_spread, self.device = natural_share, segment_spread, device
-        names = body.joint_names
+        names, on_device = body.joint_names, partial(constant, device=device)
         self.joint_count = len(names)
-        self._states = self._constant(motions.Omega).reshape(-1, 3, 3)  # row F·24 + k
-        self._cumulative = self._constant(np.cumsum(motions.share), torch.float64)
-        self._first, self._last = (self._constant(ends, torch.long) for ends in motions.ends)
-        self._fps = self._constant(motions.fps)
-        self._offsets_s = self._constant(OFFSETS_S)
-        self.partner = self._constant([names.index(_other_side(name)) for name in names], torch.long)
+        self._states = on_device(motions.Omega).reshape(-1, 3, 3)  # row F·24 + k
+        self._cumulative = on_device(np.cumsum(motions.share), dtype=torch.float64)
+        self._first, self._last = (on_device(ends, dtype=torch.long) for ends in motions.ends)
+        self._fps = on_device(motions.fps)
+        self._offsets_s = on_device(OFFSETS_S)
+        self.partner = on_device([names.index(_other_side(name)) for name in names], dtype=torch.long)
         self._joints = torch.arange(self.joint_count, device=device)
         self._alike = torch.minimum(self._joints, self.partner)
-        self._mirror_signs = self._constant(np.outer([-1, 1, 1], [-1, 1, 1]))
-        self._parts = [(self._constant(_from(body, root), torch.bool), share) for root, share in SWAPS.items()]
-        self._noise = self._constant([next((v for k, v in JOINT_NOISE.items() if k in n), 0.0) for n in names])
+        self._mirror_signs = on_device(np.outer([-1, 1, 1], [-1, 1, 1]))
+        self._parts = [(on_device(_from(body, root), dtype=torch.bool), share) for root, share in SWAPS.items()]
+        self._noise = on_device([next((v for k, v in JOINT_NOISE.items() if k in n), 0.0) for n in names])
         segment = [next((1 + i for i, s in enumerate(SEGMENTS) if any(w in n for w in s)), 0) for n in names]
-        self._segment = self._constant(segment, torch.long)
+        self._segment = on_device(segment, dtype=torch.long)
         at = list(body.keypoint_set("blazepose").values())
-        self._bones, self._bone_shapes = self._constant(body.l), self._constant(body.S)
-        self._keypoints, self._keypoint_shapes = self._constant(body.v_bar[at]), self._constant(body.V[at])
-
-    def _constant(self, values: object, dtype: torch.dtype = torch.float32) -> Tensor:
-        return torch.as_tensor(np.asarray(values), dtype=dtype, device=self.device)
+        self._bones, self._bone_shapes = on_device(body.l), on_device(body.S)
+        self._keypoints, self._keypoint_shapes = on_device(body.v_bar[at]), on_device(body.V[at])
 
     def mirror(self, Omega: Tensor) -> Tensor:
         """Return the mirror image of poses (..., 24, 3, 3) about the body's (and the world's) x = 0."""
@@ -84,28 +82,28 @@ class PoseSampler:
         """Draw n windows of one recording each: frames (n, WINDOW), and (n,) bool: whether they are mirrored."""
         drawn = torch.searchsorted(self._cumulative, torch.rand(n, device=self.device, dtype=torch.float64))
         middle = drawn.clamp(max=len(self._first) - 1)
-        backwards = torch.where(self._chance(n, 0.5), 1.0, -1.0)
-        speed = torch.exp(SPEED_SPREAD * self._normal(n)) * backwards
+        backwards = torch.where(chance(self._fps, 0.5, n), 1.0, -1.0)
+        speed = torch.exp(SPEED_SPREAD * normal(self._fps, n)) * backwards
         steps = torch.round(self._offsets_s * (self._fps[middle] * speed)[:, None]).long()
         frames = torch.maximum(middle[:, None] + steps, self._first[middle][:, None])
-        return torch.minimum(frames, self._last[middle][:, None]), self._chance(n, 0.5)
+        return torch.minimum(frames, self._last[middle][:, None]), chance(self._fps, 0.5, n)
 
     def motion_windows(self, n: int) -> Tensor:
         """Draw windows (n, WINDOW, 24, 3, 3); row 0 of a pose is R_world_root, y up, with a random heading."""
-        natural = self._chance(n, self.natural_share)
+        natural = chance(self._fps, self.natural_share, n)
         frames, mirrored = self._windows(n)
         frames, mirrored = frames[:, :, None].expand(-1, -1, self.joint_count), mirrored[:, None]
         for part, share in self._parts:
             other, other_mirrored = self._windows(n)
-            taken = (self._chance(n, share) & ~natural)[:, None] & part
+            taken = (chance(self._fps, share, n) & ~natural)[:, None] & part
             frames = torch.where(taken[:, None], other[:, :, None], frames)
             mirrored = torch.where(taken, other_mirrored[:, None], mirrored)
         source = torch.where(mirrored, self.partner, self._joints)
         Omega = self._states[frames * self.joint_count + source[:, None]]
         Omega = torch.where(mirrored[:, None, :, None, None], Omega * self._mirror_signs, Omega)
-        turned = ~natural & ~self._chance(n, UNTURNED_SHARE)
-        strength = (self._normal(n).abs() * turned)[:, None, None]
-        turn = self._normal(n, self.joint_count, 3) * self._noise[:, None] * strength
+        turned = ~natural & ~chance(self._fps, UNTURNED_SHARE, n)
+        strength = (normal(self._fps, n).abs() * turned)[:, None, None]
+        turn = normal(self._fps, n, self.joint_count, 3) * self._noise[:, None] * strength
         Omega = Omega @ rotation_matrices(turn)[:, None]
         root = self._placement(natural)[:, None] @ Omega[:, :, 0]
         return torch.cat([root[:, :, None], Omega[:, :, 1:]], 2)
@@ -114,7 +112,7 @@ class PoseSampler:
         """Draw rotations (n, 3, 3) of the world's people: a heading, then a lean, less of it where ``natural`` (n,)."""
         n = len(natural)
         heading, direction = 2 * math.pi * torch.rand(2, n, device=self.device)
-        lean = self._normal(n) * torch.where(self._chance(n, STRONG_LEAN_SHARE), STRONG_LEAN, LEAN)
+        lean = normal(self._fps, n) * torch.where(chance(self._fps, STRONG_LEAN_SHARE, n), STRONG_LEAN, LEAN)
         lean = torch.where(natural, NATURAL_LEAN * lean, lean)
         zero = torch.zeros_like(lean)
         leaning = rotation_matrices(torch.stack([lean * torch.cos(direction), zero, lean * torch.sin(direction)], 1))
@@ -122,18 +120,34 @@ class PoseSampler:
 
     def proportions(self, n: int) -> tuple[Tensor, Tensor]:
         """Draw bodies: joints relative to parents (n, 24, 3), BlazePose keypoints relative to joints (n, 33, 3)."""
-        betas = self._normal(n, self._bone_shapes.shape[-1]).clamp(-SHAPE_LIMIT, SHAPE_LIMIT)
-        factor = BONE_SPREAD * self._normal(n, self.joint_count)
-        factor = factor[:, self._alike] + (self.segment_spread * self._normal(n, 1 + len(SEGMENTS)))[:, self._segment]
+        betas = normal(self._fps, n, self._bone_shapes.shape[-1]).clamp(-SHAPE_LIMIT, SHAPE_LIMIT)
+        factor = BONE_SPREAD * normal(self._fps, n, self.joint_count)
+        factor = (
+            factor[:, self._alike] + (self.segment_spread * normal(self._fps, n, 1 + len(SEGMENTS)))[:, self._segment]
+        )
         bones = self._bones + torch.einsum("ijp,np->nij", self._bone_shapes, betas)
         keypoints = self._keypoints + torch.einsum("ijp,np->nij", self._keypoint_shapes, betas)
         return bones * torch.exp(factor)[..., None], keypoints
 
-    def _normal(self, *shape: int) -> Tensor:
-        return torch.randn(*shape, device=self.device)
 
-    def _chance(self, n: int, share: float) -> Tensor:
-        return torch.rand(n, device=self.device) < share
+def constant(values: object, device: str, dtype: torch.dtype = torch.float32) -> Tensor:
+    """Copy an array to a device, once and for all batches."""
+    return torch.as_tensor(np.asarray(values), dtype=dtype, device=device)
+
+
+def normal(like: Tensor, *shape: int) -> Tensor:
+    """Draw standard normal numbers on the device of a tensor."""
+    return torch.randn(*shape, device=like.device)
+
+
+def uniform(like: Tensor, limits: tuple[float, float], *shape: int) -> Tensor:
+    """Draw evenly distributed numbers on the device of a tensor."""
+    return limits[0] + (limits[1] - limits[0]) * torch.rand(*shape, device=like.device)
+
+
+def chance(like: Tensor, share: float, *shape: int) -> Tensor:
+    """Draw bools on the device of a tensor, a share of which is true."""
+    return torch.rand(*shape, device=like.device) < share
 
 
 def _other_side(name: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import torch
@@ -13,8 +14,8 @@ from torch import Tensor
 from ...scope_addon.capture.perception.lifter_window import MIDDLE, OFFSETS_S, WINDOW
 from ...solver.body import Body
 from . import detector_noise
-from .augment import PoseSampler, rotation_matrices
-from .detector_noise import Persistence, chance, normal, uniform
+from .augment import PoseSampler, chance, constant, normal, rotation_matrices, uniform
+from .detector_noise import Persistence
 from .motions import Motions
 from .network_input import hip_center, network_input, person_size, virtual_camera
 
@@ -84,19 +85,17 @@ class Dataset:
     def __init__(self, body: Body, motions: Motions, variety: Variety | None = None, device: str = "cpu") -> None:
         self.variety, self.device = variety or Variety(), device
         self.sampler = PoseSampler(body, motions, self.variety.natural_share, self.variety.segment_spread, device)
-        self._part = _indices(body.keypoint_part[list(body.keypoint_set("blazepose").values())], device)
+        on_device, indices = partial(constant, device=device), partial(constant, device=device, dtype=torch.long)
+        self._part = indices(body.keypoint_part[list(body.keypoint_set("blazepose").values())])
         parents = np.asarray(body.parents)
         depth = np.zeros(len(parents), int)
         for k, parent in enumerate(parents[1:], 1):
             depth[k] = depth[parent] + 1
         levels = [np.flatnonzero(depth == level) for level in range(1, depth.max() + 1)]
-        self._levels = [(_indices(joints, device), _indices(parents[joints], device)) for joints in levels]
-        self._offsets_s = torch.as_tensor(OFFSETS_S, dtype=torch.float32, device=device)
+        self._levels = [(indices(joints), indices(parents[joints])) for joints in levels]
+        self._offsets_s = on_device(OFFSETS_S)
         self._moments = torch.arange(WINDOW, device=device)
-        self._placement, self._mean_offsets = (
-            torch.as_tensor(values, dtype=torch.float32, device=device)
-            for values in (detector_noise.PLACEMENT, detector_noise.MEAN_OFFSETS)
-        )
+        self._placement, self._mean_offsets = map(on_device, (detector_noise.PLACEMENT, detector_noise.MEAN_OFFSETS))
 
     def keypoints(self, Omega: Tensor, bones: Tensor, local: Tensor, displaced: Tensor) -> tuple[Tensor, Tensor]:
         """Return BlazePose keypoints of windows of poses, and the same displaced in the axes of their parts.
@@ -157,10 +156,6 @@ class Dataset:
         middle = scene.points[:, MIDDLE]
         points = (middle - hip_center(middle)) @ R[:, MIDDLE].transpose(1, 2)
         return Batch(cut_short(x, self._moments, self.variety.still_share), points)
-
-
-def _indices(values: object, device: str) -> Tensor:
-    return torch.as_tensor(np.asarray(values), dtype=torch.long, device=device)
 
 
 def _turned(R: Tensor, vectors: Tensor) -> Tensor:

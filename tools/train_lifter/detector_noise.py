@@ -23,7 +23,7 @@ from torch import Tensor
 from ...scope_addon.capture.fitting.keypoint_offsets import offset
 from ...scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from ...scope_addon.capture.perception.lifter_window import MIDDLE, WINDOW
-from .augment import rotation_matrices
+from .augment import chance, normal, rotation_matrices, uniform
 from .network_input import hip_center
 
 # Metres, one standard deviation per coordinate, of a person's keypoint offsets.
@@ -93,21 +93,6 @@ class Persistence:
         """Draw e_t, (n, WINDOW, *shape)."""
         n = len(self.constant)
         return self.mix(normal(self.constant, n, 1, *shape), normal(self.constant, n, WINDOW, *shape))
-
-
-def normal(like: Tensor, *shape: int) -> Tensor:
-    """Draw standard normal numbers on the device of a tensor."""
-    return torch.randn(*shape, device=like.device)
-
-
-def uniform(like: Tensor, limits: tuple[float, float], *shape: int) -> Tensor:
-    """Draw evenly distributed numbers on the device of a tensor."""
-    return limits[0] + (limits[1] - limits[0]) * torch.rand(*shape, device=like.device)
-
-
-def chance(like: Tensor, share: float, *shape: int) -> Tensor:
-    """Draw bools on the device of a tensor, a share of which is true."""
-    return torch.rand(*shape, device=like.device) < share
 
 
 def placements(n: int, deviation: Tensor, mean: Tensor | None = None) -> Tensor:
