@@ -251,10 +251,10 @@ def dragged_in_side_view(joint: str, by: tuple[int, int]) -> Iterator[float]:
     use(bpy.ops.scope.side_view)
     yield 1.0
     area = next(a for a in viewport()["window"].screen.areas if a.type == "VIEW_3D" and a.spaces.active.lock_object)
-    # From the side, a wrist or the other leg can cover a handle.
-    some = ("left_hip", "right_hip", "left_knee", "right_knee", "left_ankle", "right_ankle")
-    seen = lambda: drawn("left_hip") and any(drawn(each, area) for each in some)  # noqa: E731
-    yield from until(seen, 30, "the handles in both views")
+    legs = [f"{side}_{name}" for name in ("hip", "knee", "ankle") for side in ("left", "right")]  # an arm can cover one
+    yield from until(
+        lambda: drawn("left_hip") and any(drawn(each, area) for each in legs), 30, "the handles in both views"
+    )
     before, (x, y) = len(listed()), on_screen(joint, area)
     xdotool(*move(x - 3, y), *move(x, y), "mousedown", 1, "sleep", "0.3", *move(x + by[0] / 2, y + by[1] / 2))
     yield 2.0

@@ -25,7 +25,7 @@ T_CAMERA_WORLD = np.linalg.inv(world_from_level_camera(np.array([0.0, -1.0, 0.0]
 
 
 def steps(height_m: float, betas: np.ndarray | None = None, right_m: float = 0.0) -> Track:
-    """Return the track of somebody, 3.5 m from the camera, who stands, steps up by ``height_m`` and stands again."""
+    """Return the track of a person 3.5 m from the camera who stands, steps up by ``height_m``, and stands again."""
     betas = np.zeros(BODY.P) if betas is None else betas
     times = np.arange(round((2 * STAYS_S + STEPS_S) * RATE)) / RATE
     share = np.clip((times - STAYS_S) / STEPS_S, 0.0, 1.0)
