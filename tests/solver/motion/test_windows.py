@@ -42,7 +42,7 @@ def test_a_gap_longer_than_a_window_leaves_none_empty() -> None:
 
 @pytest.mark.parametrize(("rate", "length"), [(5.0, 0.6), (10.0, 0.1)])
 def test_windows_without_overlap_lose_no_frame_to_rounding(rate: float, length: float) -> None:
-    """The end of a window and the start of the next are one time, computed in two ways; a frame may lie between them."""
+    """The end of one and the start of the next are one time, computed in two ways: a frame may lie between them."""
     for count in range(20, 300):
         times = np.arange(count) / rate
         windows = overlapping(times, length, 0.0)
