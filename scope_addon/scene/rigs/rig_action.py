@@ -17,7 +17,8 @@ from ..animation_data.actions import Channels, bone_path, fcurves_of, read_keys
 from ..animation_data.retime import Retiming, retime_keys
 from ..character.animation import on_one_hemisphere
 
-_CHECKSUM = "scope_keys"  # custom property of an action: the checksum of its keys when they were written
+# Custom properties of an action: the checksum of its keys when they were written, and the name of the captured armature.
+_CHECKSUM, _SOURCE = "scope_keys", "scope_keys_of"
 
 
 @dataclass(frozen=True)
@@ -57,10 +58,13 @@ def root_locations(
     return moved
 
 
-def write_action(rig: bpy.types.Object, keys: list[BoneKeys], frames: NDArray[np.float64]) -> bpy.types.Action:
+def write_action(
+    rig: bpy.types.Object, keys: list[BoneKeys], frames: NDArray[np.float64], source: str
+) -> bpy.types.Action:
     """Create a new action with the keys, in the rotation mode of each bone.
 
     :param frames: (T,) scene frames.
+    :param source: name of the captured armature.
     """
     action = bpy.data.actions.new(rig.name)
     channels = Channels(rig, action)
@@ -70,13 +74,18 @@ def write_action(rig: bpy.types.Object, keys: list[BoneKeys], frames: NDArray[np
     for key in keys:
         if key.locations is not None:
             channels.write(bone_path(key.bone, "location"), frames, key.locations, group=key.bone)
-    mark_written(action)
+    mark_written(action, source)
     return action
 
 
-def mark_written(action: bpy.types.Action) -> None:
-    """Remember the keys that retargeting has written, to tell later whether they were edited."""
+def mark_written(action: bpy.types.Action, source: str = "") -> None:
+    """Remember the keys that retargeting has written, to tell later whether they were edited.
+
+    :param source: name of the captured armature whose motion they are; empty: as before.
+    """
     action[_CHECKSUM] = _checksum(action)
+    if source:
+        action[_SOURCE] = source
 
 
 def leave_tweak_mode(animated: bpy.types.ID) -> None:
@@ -92,11 +101,15 @@ def override_nla(animation: bpy.types.AnimData) -> None:
         track.is_solo = False  # a solo track would silence the action
 
 
-def retire(former: bpy.types.Action | None) -> None:
-    """Keep the rig's former action in the file, unless it is an earlier retargeting that was not edited."""
+def retire(former: bpy.types.Action | None, source: str) -> None:
+    """Keep the rig's former action in the file, unless it is an earlier retargeting that was not edited.
+
+    :param source: name of the captured armature whose motion the rig has now; that of another one is kept.
+    """
     if former is None:
         return
-    if former.get(_CHECKSUM) == _checksum(former) and former.users == 0:
+    is_same = former.get(_SOURCE, source) == source
+    if is_same and former.get(_CHECKSUM) == _checksum(former) and former.users == 0:
         bpy.data.actions.remove(former)
     else:
         former.use_fake_user = True

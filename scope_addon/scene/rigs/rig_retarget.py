@@ -104,8 +104,8 @@ def retarget(
 ) -> RetargetResult:
     """Key the mapped bones of ``rig`` in a new action so that it moves like the captured ``source``.
 
-    The rig's former action is kept in the file, unless it is an earlier retargeting that was not edited. Fingers and
-    face keep their pose if they were not captured. The rig leaves Edit Mode, Rest Position and its NLA's Tweak Mode, in
+    The rig's former action is kept in the file, unless it is an earlier retargeting of the same capture that was not
+    edited. Fingers and face keep their pose if they were not captured. The rig leaves Edit Mode, Rest Position and its NLA's Tweak Mode, in
     which it would not move. Its NLA tracks are kept, below the new action.
 
     :param betas: (P,) shape coefficients of the captured person.
@@ -136,13 +136,13 @@ def retarget(
             keys[root] = replace(keys[root], locations=root_locations(rig, place, skeleton, root, motion.heads))
             keys += ik_keys(rig, keys)
         former = rig.animation_data.action if rig.animation_data else None
-        action = write_action(rig, keys, frames)
+        action = write_action(rig, keys, frames, source.name)
         if face is not None:
             key_face(rig, face)
         _set_parent(rig, frames, motion)
         rig.data.pose_position = "POSE"
         override_nla(rig.animation_data)
-        retire(former)
+        retire(former, source.name)
         action.name = f"{rig.name}_{source.name}"
     if face is not None:
         rest_face(rig, face)

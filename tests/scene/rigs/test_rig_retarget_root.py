@@ -117,6 +117,21 @@ def test_retargeting_again_replaces_its_own_action_unless_it_was_edited(source):
     assert len(bpy.data.actions) == actions + 1
 
 
+def test_several_captures_on_one_rig_keep_an_action_each(source):
+    rig, bone_of = build_rig("unreal")
+    bones = list(bone_of.values())
+    first = run(source, rig).action
+    wanted = seen(rig, bones)
+    second = run(captured(motion_of(walk(1.0, speed=0.5))), rig).action
+    assert {first, second} <= set(bpy.data.actions)
+    assert first.use_fake_user  # or saving and opening the file would remove it
+    bpy.context.view_layer.update()
+    rig.animation_data.action = first
+    if hasattr(rig.animation_data, "action_slot"):
+        rig.animation_data.action_slot = first.slots[0]
+    np.testing.assert_allclose(seen(rig, bones), wanted, atol=1e-6)
+
+
 def test_the_parent_of_a_rig_moves_along(source):
     rig, bone_of = build_rig("unreal")
     bones = list(bone_of.values())
