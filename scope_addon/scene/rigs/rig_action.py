@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import bpy
@@ -13,12 +14,13 @@ from numpy.typing import NDArray
 
 from ....solver.rotations import quaternion_from_matrix
 from ...retarget.skeleton import Skeleton
-from ..animation_data.actions import Channels, bone_path, fcurves_of, read_keys
+from ..animation_data.actions import Channels, bone_path, fcurves_of, nla_strips, read_keys
 from ..animation_data.retime import Retiming, retime_keys
 from ..character.animation import on_one_hemisphere
 
 # Custom properties of an action: the checksum of its keys when they were written, and the name of the captured armature.
 _CHECKSUM, _SOURCE = "scope_keys", "scope_keys_of"
+_OFFSETS = {"location": 0.0, "scale": 1.0}  # channels of a bone beside its rotation, and their values at rest
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,8 @@ def write_action(
 ) -> bpy.types.Action:
     """Create a new action with the keys, in the rotation mode of each bone.
 
+    Where the NLA moves or scales one of the bones, a key keeps it in place and in size.
+
     :param frames: (T,) scene frames.
     :param source: name of the captured armature.
     """
@@ -74,6 +78,11 @@ def write_action(
     for key in keys:
         if key.locations is not None:
             channels.write(bone_path(key.bone, "location"), frames, key.locations, group=key.bone)
+    below = {curve.data_path for strip in nla_strips(rig) if strip.action for curve in fcurves_of(strip.action)}
+    for key in keys:
+        for channel, value in _OFFSETS.items():
+            if (path := bone_path(key.bone, channel)) in below and (channel != "location" or key.locations is None):
+                channels.write(path, frames[:1], np.full((1, 3), value), "CONSTANT", group=key.bone)
     mark_written(action, source)
     return action
 
@@ -86,6 +95,13 @@ def mark_written(action: bpy.types.Action, source: str = "") -> None:
     action[_CHECKSUM] = _checksum(action)
     if source:
         action[_SOURCE] = source
+
+
+def clear_offsets(rig: bpy.types.Object, bones: Iterable[str]) -> None:
+    """Undo what the pose moves and scales bones by: retargeting turns them, and was measured without it. Cannot fail."""
+    for name in bones:
+        for channel, value in _OFFSETS.items():
+            setattr(rig.pose.bones[name], channel, (value,) * 3)
 
 
 def leave_tweak_mode(animated: bpy.types.ID) -> None:

@@ -34,7 +34,7 @@ from ..character.root_object import (
 )
 from .face_bones import face_keys, key_face, rest_face
 from .face_retarget import captured_expressions
-from .rig_action import BoneKeys, leave_tweak_mode, override_nla, retire, root_locations, write_action
+from .rig_action import BoneKeys, clear_offsets, leave_tweak_mode, override_nla, retire, root_locations, write_action
 from .rig_probe import at_rest, blocked_bones, probe
 from .rigify_ik import ik_keys
 
@@ -106,7 +106,8 @@ def retarget(
 
     The rig's former action is kept in the file, unless it is an earlier retargeting of the same capture that was not
     edited. Fingers and face keep their pose if they were not captured. The rig leaves Edit Mode, Rest Position and its NLA's Tweak Mode, in
-    which it would not move. Its NLA tracks are kept, below the new action.
+    which it would not move. Its NLA tracks are kept, below the new action, and its mapped bones lose what the pose moves
+    or scales them by.
 
     :param betas: (P,) shape coefficients of the captured person.
     :param rate: scene frames per second.
@@ -144,6 +145,7 @@ def retarget(
         override_nla(rig.animation_data)
         retire(former, source.name)
         action.name = f"{rig.name}_{source.name}"
+    clear_offsets(rig, [key.bone for key in keys])
     if face is not None:
         rest_face(rig, face)
     return RetargetResult(action, warnings, travel)
