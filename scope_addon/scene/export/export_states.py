@@ -16,7 +16,7 @@ from ..animation_data import actions
 from ..camera import set_resolution
 from ..character.animation import on_one_hemisphere
 from ..character.expression_keys import copy_expressions, expression_offsets
-from ..character.shape_keys import mixed_vertices
+from ..character.shape_keys import mixed_vertices, shape_key_name
 
 
 @contextmanager
@@ -167,8 +167,13 @@ def actions_over_scene_range(scene: bpy.types.Scene) -> Iterator[None]:
 
 @contextmanager
 def baked_meshes(scene: bpy.types.Scene) -> Iterator[None]:
-    """Replace meshes with shape keys by meshes of their current shape inside the block; expressions stay keys."""
-    shaped = [(obj, obj.data, obj.data.name) for obj in scene.objects if obj.type == "MESH" and obj.data.shape_keys]
+    """Replace captured bodies by meshes of their current shape inside the block; expressions stay keys.
+
+    Other meshes, those of a user's rig, keep their shape keys: these are not coefficients of a shape.
+    """
+    meshes = [obj for obj in scene.objects if obj.type == "MESH" and obj.data.shape_keys]
+    bodies = [obj for obj in meshes if shape_key_name(0) in obj.data.shape_keys.key_blocks]
+    shaped = [(obj, obj.data, obj.data.name) for obj in bodies]
     baked, actions_made = [], []
     try:
         for obj, mesh, name in shaped:
