@@ -21,7 +21,7 @@ from ...edit.clip import Clip, band_limited, sample
 from ...edit.reduce import angles_between, select_position_keys, select_quaternion_keys
 from ...errors import UsageError
 from ...kinematics.axes import R_WORLD_MODEL
-from ..animation_data.actions import bone_path, change_keys, fcurves, read_keys, rewrite_keys
+from ..animation_data.actions import bone_path, change_keys, check_not_in_nla, fcurves, read_keys, rewrite_keys
 from ..animation_data.timing import whole_frames_of
 from .animation import on_one_hemisphere
 from .armature import rest_orientations
@@ -192,13 +192,8 @@ def _curves(armature: bpy.types.Object, body: Body) -> dict[str, list[bpy.types.
         if curve.data_path in found and len(curve.keyframe_points):
             found[curve.data_path][curve.array_index] = curve
     missing = [path for path, count in wanted.items() if len(found[path]) != count]
-    animation = armature.animation_data
-    if missing and animation is not None and animation.action is None and len(animation.nla_tracks):
-        raise UsageError(
-            f"'{armature.name}' is animated by the NLA track '{animation.nla_tracks[0].name}', not by an action of its "
-            "own: enter Tweak Mode on the track's strip (Tab), or choose the action in the Action Editor again"
-        )
     if missing:
+        check_not_in_nla(armature)
         raise UsageError(f"'{armature.name}' has lost the keys of {missing[0]}; undo their removal, or capture again")
     return {path: [by_index[i] for i in sorted(by_index)] for path, by_index in found.items()}
 

@@ -130,8 +130,9 @@ def _write_one(
         external_parents_replaced(scene)
         if suffix == ".glb"
         else nullcontext(),  # its exporter omits children of objects outside the scene
+        # The exporter of .glb only reads actions, and so do meshes of the current shape, whose expressions move.
+        actions.nla_as_actions(scene) if suffix == ".glb" or options.bakes(suffix) else nullcontext(),
         baked_meshes(scene) if options.bakes(suffix) else nullcontext(),
-        actions.nla_as_actions(scene) if suffix == ".glb" else nullcontext(),  # its exporter only reads actions
         actions_over_scene_range(scene),
     ):
         rig = next((obj for obj in scene.objects if obj.type == "ARMATURE"), None)

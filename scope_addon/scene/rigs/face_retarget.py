@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ....solver.names import EXPRESSIONS
 from ...errors import UsageError
 from ...retarget.expression_map import ExpressionMap, guess_expression_map
-from ..animation_data.actions import Channels, fcurves, read_keys, shape_key_path
+from ..animation_data.actions import Channels, check_not_in_nla, fcurves, read_keys, shape_key_path
 from ..animation_data.transaction import all_or_nothing
 from ..character.expression_keys import MOVES, has_expression_keys
 from .rig_action import leave_tweak_mode, mark_written, override_nla, retire
@@ -28,11 +28,16 @@ class CapturedExpressions:
 
 
 def captured_expressions(armature: bpy.types.Object) -> CapturedExpressions | None:
-    """Return the expressions that the captured armature's body shows; None if its face was not captured."""
+    """Return the expressions that the captured armature's body shows; None if its face was not captured.
+
+    :raises UsageError: their keys are in the NLA.
+    """
     for mesh in armature.children:
         keys = mesh.data.shape_keys if mesh.type == "MESH" else None
         if keys is None or not has_expression_keys(keys):
             continue
+        if not fcurves(keys):
+            check_not_in_nla(keys)
         curves = {curve.data_path: read_keys(curve).astype(float) for curve in fcurves(keys)}
         found = [curves.get(shape_key_path(name)) for name in EXPRESSIONS]
         longest = max((keyed[:, 0] for keyed in found if keyed is not None and len(keyed)), key=len, default=np.ones(1))

@@ -44,18 +44,21 @@ class SCOPE_OT_push_to_nla(ActionOperator):
     bl_label = "Push to NLA"
 
     def work(self, context: bpy.types.Context) -> str:
-        """Add the track.
+        """Add the track, and those of the root object and of the face, which the motion's strips are moved with.
 
         :raises UsageError: the armature is in Tweak Mode.
         """
         from ...errors import UsageError
-        from ...scene.animation_data.actions import push_to_nla
+        from ...scene.animation_data.actions import animated_together, push_to_nla
+        from ...scene.character.root_object import root_object
 
         armature = animated_armature(context)
         assert armature is not None  # checked by poll
-        if armature.animation_data.use_tweak_mode:
-            raise UsageError(f"'{armature.name}' is in the NLA's Tweak Mode; leave it (key Tab) first")
-        strip = push_to_nla(armature)
+        moved = animated_together(armature, root_object(armature))
+        for block in moved:
+            if block.animation_data.use_tweak_mode:
+                raise UsageError(f"'{block.name}' is in the NLA's Tweak Mode; leave it (key Tab) first")
+        strip, *_ = [push_to_nla(block) for block in moved]
         return rpt_(
             "'{strip}' is now a strip of {armature}'s NLA; to edit its keys, enter Tweak Mode (key Tab)",
             strip=strip.name,

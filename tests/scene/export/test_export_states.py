@@ -1,14 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Exporting captures in various states: hidden, at rest, edited, linked, in the NLA, among other objects."""
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.scene.animation_data import actions
 from scope.scope_addon.scene.build import BuildOptions, build_scene
-from scope.scope_addon.scene.export.export import export
+from scope.scope_addon.scene.export.export import ExportOptions, export
 
+from ...made_motion import made_face
+from ..character.test_expression_keys import morph_animation
 from ..exported import JOINT_TOLERANCE, SKIN_TOLERANCE, corresponding, read_back
 
 
@@ -165,6 +169,22 @@ def test_objects_without_bones_may_be_in_the_nla_too(body, make_motion, tmp_path
     blender.go_to(first + 3)
     joints = blender.joints(blender.only("ARMATURE"), body.joint_names)
     np.testing.assert_allclose(joints, truth(body, motion).joints[3], atol=JOINT_TOLERANCE)
+
+
+@pytest.mark.parametrize("shape", ["keys", "baked"])
+def test_a_face_in_the_nla_moves_in_a_glb(whole_body, make_motion, tmp_path, shape):
+    jaw = np.array([0.0, 0.3, 0.9, 0.2, 0.5])
+    motion = replace(make_motion(whole_body, 5), face=made_face(5, jawOpen=jaw))
+    person = build_scene([motion], whole_body, options=BuildOptions(frame_rate="set")).people[0]
+    kept = [_to_nla(block, 40) for block in (person.armature, person.mesh.data.shape_keys)]
+    actions_before = set(bpy.data.actions)
+    export(tmp_path / "talk.glb", options=ExportOptions(shape=shape))
+    assert [(animation.action, animation.use_nla) for animation in kept] == [(None, True)] * 2
+    assert set(bpy.data.actions) == actions_before
+    weights = morph_animation(tmp_path / "talk.glb")
+    np.testing.assert_allclose(weights["jawOpen"], jaw, atol=1e-5)
+    if shape == "keys":
+        np.testing.assert_allclose(weights["Shape000"], motion.betas[0], atol=1e-5)
 
 
 def test_a_solo_track_determines_the_frame_range(body, make_motion):

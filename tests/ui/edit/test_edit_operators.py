@@ -405,11 +405,33 @@ def test_a_motion_in_the_nla_is_an_error_of_its_own(rig):
     strip = track.strips.new("walk", 1, action)
     if slot is not None:
         strip.action_slot = slot
-    with pytest.raises(RuntimeError, match="NLA track '.*', not by an action of its own: enter Tweak Mode"):
+    with pytest.raises(RuntimeError, match="NLA strip 'walk', not by an action of its own alone: enter Tweak Mode"):
         bpy.ops.scope.refloor()
     animation.nla_tracks.active, strip.select = track, True
     animation.use_tweak_mode = True
     assert bpy.ops.scope.refloor() == {"FINISHED"}
+
+
+def test_keys_over_those_in_the_nla_do_not_count_as_lost(rig):
+    before = seen(rig)
+    bpy.ops.scope.push_to_nla()
+    rig.animation_data.action, rig.animation_data.action_blend_type = bpy.data.actions.new("fix"), "ADD"
+    elbow = rig.pose.bones["left_elbow"]
+    elbow.rotation_quaternion = (0.9, 0.4, 0.0, 0.0)
+    elbow.keyframe_insert("rotation_quaternion", frame=1)
+    with pytest.raises(RuntimeError, match="NLA strip 'walk', .*: enter Tweak Mode .* bake all strips into one action"):
+        bpy.ops.scope.refloor()
+    fixed = seen(rig)
+    assert np.abs(fixed - before).max() > 0.05
+    bpy.ops.object.mode_set(mode="POSE")
+    bpy.ops.pose.select_all(action="SELECT")
+    first, last = map(int, rig.animation_data.nla_tracks[0].strips[0].action.frame_range)
+    bpy.ops.nla.bake(frame_start=first, frame_end=last, only_selected=False, bake_types={"POSE"}, clear_constraints=False)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for track in rig.animation_data.nla_tracks:
+        track.mute = True
+    np.testing.assert_allclose(seen(rig), fixed, atol=1e-4)
+    assert bpy.ops.scope.reduce_keys() == {"FINISHED"}
 
 
 def test_an_edit_keeps_manual_changes(rig):
