@@ -195,6 +195,24 @@ def test_a_solo_track_determines_the_frame_range(body, make_motion):
     assert actions.frame_range([person.armature])[1] < 10
 
 
+@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc", ".bvh"])
+@pytest.mark.parametrize("size", [1.0, 100.0])
+def test_a_capture_in_a_scene_in_centimetres_has_its_true_size(
+    body, make_motion, tmp_path, blender, truth, size, suffix
+):
+    bpy.context.scene.unit_settings.scale_length = 0.01
+    motion, path = make_motion(body, 4), tmp_path / f"walk{suffix}"
+    person = build_scene([motion], body, options=BuildOptions(frame_rate="set")).people[0]
+    person.armature.scale = (size,) * 3  # as the warning of the build suggests
+    bpy.context.view_layer.update()
+    export(path)
+    assert person.armature.parent is None
+    assert bpy.data.objects.get("Unit") is None
+    blender.go_to(read_back(path) + 3)
+    joints = blender.joints(blender.only("ARMATURE"), body.joint_names)
+    np.testing.assert_allclose(joints, truth(body, motion).joints[3], atol=JOINT_TOLERANCE)
+
+
 def test_hidden_objects_stay_hidden_in_a_blend(body, make_motion, tmp_path):
     result = build_scene([make_motion(body, 4)], body, options=BuildOptions(frame_rate="set"))
     person = result.people[0]
