@@ -317,8 +317,8 @@ def check_not_in_nla(datablock: bpy.types.ID) -> None:
     if strips := [strip for track in tracks for strip in track.strips]:
         raise UsageError(
             f"'{datablock.name}' is animated by the NLA strip '{strips[0].name}', not by an action of its own alone: "
-            "enter Tweak Mode on the strip (Tab), choose its action in the Action Editor again, or bake all strips into "
-            "one action (Bake Action)"
+            "enter Tweak Mode on the strip (Tab), choose its action in the Action Editor again, or bake all strips "
+            "into one action (Bake Action)"
         )
 
 

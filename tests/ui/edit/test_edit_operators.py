@@ -426,7 +426,9 @@ def test_keys_over_those_in_the_nla_do_not_count_as_lost(rig):
     bpy.ops.object.mode_set(mode="POSE")
     bpy.ops.pose.select_all(action="SELECT")
     first, last = map(int, rig.animation_data.nla_tracks[0].strips[0].action.frame_range)
-    bpy.ops.nla.bake(frame_start=first, frame_end=last, only_selected=False, bake_types={"POSE"}, clear_constraints=False)
+    bpy.ops.nla.bake(
+        frame_start=first, frame_end=last, only_selected=False, bake_types={"POSE"}, clear_constraints=False
+    )
     bpy.ops.object.mode_set(mode="OBJECT")
     for track in rig.animation_data.nla_tracks:
         track.mute = True
