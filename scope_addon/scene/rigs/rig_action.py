@@ -18,7 +18,7 @@ from ..animation_data.actions import Channels, bone_path, fcurves_of, nla_strips
 from ..animation_data.retime import Retiming, retime_keys
 from ..character.animation import on_one_hemisphere
 
-# Custom properties of an action: the checksum of its keys when they were written, and the name of the captured armature.
+# Custom properties of an action: the checksum of its keys when they were written, and the captured armature's name.
 _CHECKSUM, _SOURCE = "scope_keys", "scope_keys_of"
 _OFFSETS = {"location": 0.0, "scale": 1.0}  # channels of a bone beside its rotation, and their values at rest
 
@@ -54,9 +54,9 @@ def root_locations(
     """
     world = place[:3, :3]
     moved: NDArray[np.float64] = (heads - skeleton.heads[root]) @ np.linalg.inv(world).T
-    if rig.pose.bones[skeleton.names[root]].bone.use_local_location:
-        axes = skeleton.rotations[root].T @ (world / np.cbrt(np.linalg.det(world)))
-        moved = moved @ axes.T
+    bone = rig.pose.bones[skeleton.names[root]].bone
+    if bone.use_local_location:  # not by the bone's axes in the world, which a scale of three factors shears
+        moved = moved @ np.array(bone.matrix_local.to_3x3(), float)
     return moved
 
 
@@ -98,7 +98,10 @@ def mark_written(action: bpy.types.Action, source: str = "") -> None:
 
 
 def clear_offsets(rig: bpy.types.Object, bones: Iterable[str]) -> None:
-    """Undo what the pose moves and scales bones by: retargeting turns them, and was measured without it. Cannot fail."""
+    """Undo what the pose moves and scales bones by; retargeting only turns them, and measured them without it.
+
+    Cannot fail.
+    """
     for name in bones:
         for channel, value in _OFFSETS.items():
             setattr(rig.pose.bones[name], channel, (value,) * 3)
