@@ -16,6 +16,7 @@ from ....solver.rotations import quaternion_from_matrix
 from ...retarget.skeleton import Skeleton
 from ..animation_data.actions import Channels, bone_path, fcurves_of, nla_strips, read_keys
 from ..animation_data.retime import Retiming, retime_keys
+from ..animation_data.stored_values import stored_text
 from ..character.animation import on_one_hemisphere
 
 # Custom properties of an action: the checksum of its keys when they were written, and the captured armature's name.
@@ -95,6 +96,13 @@ def mark_written(action: bpy.types.Action, source: str = "") -> None:
     action[_CHECKSUM] = _checksum(action)
     if source:
         action[_SOURCE] = source
+
+
+def follow_renaming(names: dict[str, str]) -> None:
+    """Remember the new names of captured armatures, by their former ones, with the actions that have their motion."""
+    for action in bpy.data.actions:
+        if action.library is None and (name := names.get(stored_text(action, _SOURCE))):
+            action[_SOURCE] = name
 
 
 def clear_offsets(rig: bpy.types.Object, bones: Iterable[str]) -> None:

@@ -114,7 +114,10 @@ class SCOPE_OT_rename_take(ReportingOperator):
 
 def _rename(collection: bpy.types.Collection, name: str) -> None:
     """Rename a capture, and its objects, their data and actions whose names begin with the capture's."""
+    from ...scene.rigs.rig_action import follow_renaming
+
     former = collection.name
+    armatures = {obj.name: obj for obj in collection.all_objects if obj.type == "ARMATURE" and obj.library is None}
     blocks: list[bpy.types.ID] = [collection]
     for obj in collection.all_objects:
         data = [obj, obj.data, getattr(obj.data, "shape_keys", None)]
@@ -123,6 +126,7 @@ def _rename(collection: bpy.types.Collection, name: str) -> None:
     for block in dict.fromkeys(block for block in blocks if block is not None):
         if block.library is None and block.name.startswith(former):
             block.name = name + block.name.removeprefix(former)
+    follow_renaming({before: obj.name for before, obj in armatures.items()})
 
 
 CLASSES = (SCOPE_OT_push_to_nla, SCOPE_OT_rename_take)

@@ -238,6 +238,16 @@ def test_retargeting_again_after_an_edit_updates_the_rig(rig, tmp_path):
     assert np.ptp(seen(rig, ["pelvis"])[:, 0, 1]) > 1.0
 
 
+def test_a_renamed_take_still_replaces_its_action(rig):
+    bpy.ops.scope.retarget()
+    before = len(bpy.data.actions)
+    bpy.context.scene.scope.capture = next(c for c in bpy.data.collections if "scope_capture" in c)
+    bpy.ops.scope.rename_take(name="Scene 3")
+    bpy.ops.scope.retarget()
+    assert rig.animation_data.action.name == "unreal_Scene 3"
+    assert len(bpy.data.actions) == before
+
+
 @pytest.mark.parametrize("suffix", ["glb", "fbx"])
 def test_siblings_of_the_rig_are_not_exported_with_it(rig, tmp_path, suffix):
     scene, layer = bpy.context.scene, bpy.context.view_layer
