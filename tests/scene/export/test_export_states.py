@@ -138,7 +138,7 @@ def test_a_capture_with_a_parent_moves_with_it_in_the_file(body, make_motion, tm
     np.testing.assert_allclose(seen, wanted, atol=JOINT_TOLERANCE)
 
 
-@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".bvh"])
+@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".bvh", ".usdc"])
 def test_a_motion_in_the_nla_is_exported_as_displayed(body, make_motion, tmp_path, blender, truth, suffix):
     motion = make_motion(body, 5)
     person = build_scene([motion], body, options=BuildOptions(frame_rate="set")).people[0]
