@@ -101,7 +101,7 @@ def mark_written(action: bpy.types.Action, source: str = "") -> None:
 def follow_renaming(names: dict[str, str]) -> None:
     """Remember the new names of captured armatures, by their former ones, with the actions that have their motion."""
     for action in bpy.data.actions:
-        if action.library is None and (name := names.get(stored_text(action, _SOURCE))):
+        if action.library is None and (name := names.get(source_of(action))):
             action[_SOURCE] = name
 
 
@@ -153,6 +153,11 @@ def retime_written_keys(action: bpy.types.Action, retiming: Retiming) -> None:
 def is_retargeted(action: bpy.types.Action) -> bool:
     """Return whether retargeting has written the action."""
     return _CHECKSUM in action
+
+
+def source_of(action: bpy.types.Action) -> str:
+    """Return the name of the captured armature whose motion retargeting has written to the action; empty if unknown."""
+    return stored_text(action, _SOURCE)
 
 
 def _checksum(action: bpy.types.Action) -> str:
