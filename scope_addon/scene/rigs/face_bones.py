@@ -53,9 +53,9 @@ def retarget_face_bones(
     """Key the face of a rig so that it shows the captured expressions; its other keys stay as they are.
 
     They are written to a copy of the rig's action, or to a new one. Its former action is kept in the file, unless
-    retargeting has written it and it was not edited.
+    retargeting has written it for the same capture and it was not edited.
 
-    :param name: of the action, after that of the rig.
+    :param name: of the captured armature; the action has it after that of the rig.
     :raises UsageError: when the rig has none of the map's controls.
     :raises InputError: when the map cannot be used, or the rig's face cannot be measured.
     """
@@ -74,7 +74,8 @@ def retarget_face_bones(
         action = key_face(rig, keys)
         rig.data.pose_position = "POSE"
         override_nla(rig.animation_data)
-        retire(former)
+        mark_written(action, name)
+        retire(former, name)
         action.name = f"{rig.name}_{name}"
     rest_face(rig, keys)
     return action
