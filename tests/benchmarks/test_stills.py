@@ -10,12 +10,12 @@ from types import SimpleNamespace
 import cv2
 import numpy as np
 import pytest
-from scope.benchmarks.perception import stills
+from scope.benchmarks import stills
 from scope.scope_addon.errors import NoPersonError
 from scope.solver import Body
 from scope.solver.loaders.body_file import ASSETS
 
-from ...made_motion import made_motion
+from ..made_motion import made_motion
 
 SAMPLE = stills.Clip(ASSETS / "sample" / "sample.mp4", ASSETS / "sample" / "sample_truth.npz")
 

@@ -16,20 +16,20 @@ from typing import Any, NamedTuple
 import cv2
 import numpy as np
 
-from ...scope_addon.capture.options import CaptureOptions
-from ...scope_addon.capture.pipeline import capture
-from ...scope_addon.errors import NoPersonError
-from ...scope_addon.motion import Motion
-from ...solver import Body, load_body
-from ...solver.loaders.body_file import ASSETS
-from ..frames import DATA
-from ..report import table
-from ..scenes.accuracy import score_people
-from ..scenes.scene import FOLDER, SPLITS
-from ..scenes.statistics import mean_over_people
-from .accuracy import CAMERAS, evaluate_motion
-from .perception import PRESETS
-from .render_shots import RENDERS
+from ..scope_addon.capture.options import CaptureOptions
+from ..scope_addon.capture.pipeline import capture
+from ..scope_addon.errors import NoPersonError
+from ..scope_addon.motion import Motion
+from ..solver import Body, load_body
+from ..solver.loaders.body_file import ASSETS
+from .frames import DATA
+from .perception.accuracy import CAMERAS, evaluate_motion
+from .perception.perception import PRESETS
+from .perception.render_shots import RENDERS
+from .report import table
+from .scenes.accuracy import score_people
+from .scenes.scene import FOLDER, SPLITS
+from .scenes.statistics import mean_over_people
 
 PER_CLIP, PER_SCENE, QUICK = 5, 1, 1  # images, evenly spaced in time, none of them the first or the last
 Pair = tuple[float, float]  # MPJPE-root and PA-MPJPE in mm; NaN of people who are not found
