@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -107,26 +107,21 @@ def errors_table(figures: dict[str, dict[str, dict[str, list[Pair]]]]) -> str:
     rows = []
     for quality, groups in figures.items():
         for group, clips in groups.items():
-            pairs = np.array([pair for each in clips.values() for pair in each]).reshape(-1, 2)
-            pairs = pairs[np.isfinite(pairs[:, 0])]
-            missed = sum(map(len, clips.values())) - len(pairs)
-            cells = [
-                cell
-                for k in (0, 1)
-                for cell in (_mean(clips, k), f"{np.median(pairs[:, k]):.1f}" if len(pairs) else "")
-            ]
-            rows.append([f"{quality}, {group}", len(pairs) + missed, *cells, missed])
+            people = [pair for each in clips.values() for pair in each]
+            missed = int(np.isnan(people).any(axis=1).sum()) if people else 0
+            cells = *_mean_and_median(clips, 0), *_mean_and_median(clips, 1)
+            rows.append([f"{quality}, {group}", len(people), *cells, missed])
     names = ("MPJPE-root mm", "median", "PA-MPJPE mm", "median")
     return table(("preset, images", "people", *names, "not found"), rows)
 
 
-def _mean(clips: dict[str, list[Pair]], k: int) -> str:
-    """Return the mean over clips, each with the mean of its people who were found, and its interval if there is one."""
-    found = [np.array(each)[:, k] for each in clips.values()]
-    mean = mean_over_people([float(np.nanmean(each)) for each in found if np.isfinite(each).any()])
-    if not mean.people:
-        return ""
-    return f"{mean.mean:.1f}" + (f" ({mean.low:.1f} to {mean.high:.1f})" if mean.people > 1 else "")
+def _mean_and_median(clips: dict[str, list[Pair]], k: int) -> tuple[str, str]:
+    """Return the mean over clips of their people who were found, and the median over these people."""
+    found = [each[np.isfinite(each)] for each in (np.reshape(pairs, (-1, 2))[:, k] for pairs in clips.values())]
+    found = [each for each in found if len(each)]
+    if not found:
+        return "", ""
+    return mean_over_people([float(each.mean()) for each in found]).text, f"{np.median(np.concatenate(found)):.1f}"
 
 
 def _errors(motions: list[Motion], clip: Clip) -> Pair:
@@ -145,13 +140,16 @@ def _scene_errors(body: Body, motions: list[Motion], clip: Clip, truth: dict[str
 
 def _groups() -> dict[str, list[Clip]]:
     """Return the clips of each group that are there."""
-    cameras = [Clip(DATA / "pose2sim" / f"{name}.mp4", DATA / "pose2sim" / f"truth_{name}.npz") for name in CAMERAS]
-    sample = ASSETS / "sample" / "sample.mp4"
-    groups = {"Pose2Sim": cameras, "sample": [Clip(sample, sample.with_name("sample_truth.npz"))]}
-    groups["renders"] = [
-        Clip(video, video.with_name(f"{video.stem}_truth.npz")) for video in sorted(RENDERS.glob("*.mp4"))
-    ]
+    pose2sim = DATA / "pose2sim"
+    groups = {"Pose2Sim": [Clip(pose2sim / f"{name}.mp4", pose2sim / f"truth_{name}.npz") for name in CAMERAS]}
+    groups["sample"] = _rendered([ASSETS / "sample" / "sample.mp4"])
+    groups["renders"] = _rendered(RENDERS.glob("*.mp4"))
     for split in SPLITS:
-        videos = sorted(FOLDER.glob(f"{split}_*.mp4"))
-        groups[f"scenes, {split}"] = [Clip(video, video.with_name(f"{video.stem}_truth.npz"), True) for video in videos]
-    return {name: [clip for clip in clips if clip.truth.is_file()] for name, clips in groups.items() if clips}
+        groups[f"scenes, {split}"] = _rendered(FOLDER.glob(f"{split}_*.mp4"), is_scene=True)
+    return {name: clips for name, clips in groups.items() if clips}
+
+
+def _rendered(videos: Iterable[Path], is_scene: bool = False) -> list[Clip]:
+    """Return the videos that have ground truth beside them."""
+    clips = [Clip(video, video.with_name(f"{video.stem}_truth.npz"), is_scene) for video in sorted(videos)]
+    return [clip for clip in clips if clip.truth.is_file()]
