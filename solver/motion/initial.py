@@ -31,11 +31,9 @@ def initial_states(
 
 def _first_view(views: Sequence[View], points: int) -> View:
     """Return what a frame is first fitted to: its triangulated points, or one camera's view where that says more."""
-    if not views:
-        return View(Measurements())
+    if len(views) < 2:
+        return views[0] if views else View(Measurements())
     fullest = max(views, key=lambda view: _points_of(view, points))  # of equal ones the first
-    if len(views) == 1:
-        return fullest
     found = View(triangulated(views, points))
     return found if _points_of(found, points) > _LEAST_SHARE * _points_of(fullest, points) else fullest
 
