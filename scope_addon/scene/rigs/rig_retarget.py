@@ -152,7 +152,7 @@ def retarget(
         former = rig.animation_data.action if rig.animation_data else None
         action = write_action(rig, keys, frames, source.name)
         if face is not None:
-            key_face(rig, face)
+            key_face(rig, face, source.name)
         _set_parent(rig, frames, motion)
         rig.data.pose_position = "POSE"
         override_nla(rig.animation_data)
