@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from .execution import Execution
 from .letterbox import fit_in
-from .non_maximum_suppression import overlap_clusters
 from .region import Region, region_from_points
 from .sessions import network_path, open_session
 
@@ -198,3 +197,24 @@ def merge_overlapping(
     merged = [score[cluster] @ values[cluster] / score[cluster].sum() for cluster in clusters]
     best = np.array([cluster[0] for cluster in clusters], int)
     return score[best], np.array(merged).reshape(-1, values.shape[1])
+
+
+def overlap_clusters(corners: NDArray[np.float64], threshold: float) -> list[NDArray[np.intp]]:
+    """Cluster boxes: the best remaining box and all whose intersection over union with it exceeds the threshold.
+
+    :param corners: (N, 4 + M) left, top, right, bottom and M more columns; best box first.
+    :return: indices of the boxes of each cluster, the best first.
+    """
+    low, high = corners[:, :2], corners[:, 2:4]
+    area = np.maximum(high - low, 0).prod(axis=1)
+    remaining = np.arange(len(corners))
+    clusters = []
+    while len(remaining):
+        best = remaining[0]
+        sides = np.minimum(high[best], high[remaining]) - np.maximum(low[best], low[remaining])
+        shared = np.maximum(sides, 0).prod(axis=1)
+        same = shared > threshold * (area[best] + area[remaining] - shared)
+        same[0] = True
+        clusters.append(remaining[same])
+        remaining = remaining[~same]
+    return clusters

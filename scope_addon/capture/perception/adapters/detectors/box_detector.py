@@ -3,10 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -18,12 +15,9 @@ from ...letterbox import fit_in
 from ...person_detector import Detection
 from ..description import Description, description_path, read_description
 from ..graph import Graph
-from . import detections, end_to_end, yolov4, yolov8, yolox
-from .boxes import BORDER, Boxes, suppress
+from .boxes import BORDER, BOX_FORMATS, DETECTIONS, Boxes, BoxFormat, suppress
 
-# In the order in which they are matched: YOLOX with one class also has rows of six.
-_ADAPTERS: tuple[ModuleType, ...] = (yolox, yolov8, yolov4, end_to_end, detections)
-DETECTOR_TYPES = tuple(adapter.TYPE for adapter in _ADAPTERS)
+DETECTOR_TYPES = tuple(each.type for each in BOX_FORMATS)
 SCORE_THRESHOLD = 0.4
 
 
@@ -36,13 +30,9 @@ class BoxDetector:
     def __init__(self, path: Path, threads: int, execution: Execution | None = None) -> None:
         self._description = read_description(path, DETECTOR_TYPES)
         self._graph = Graph(path, self._description, threads, execution)
-        self._adapter = _adapter_for(self._graph, self._description)
-        self.type: str = self._adapter.TYPE
-        self._normalization = self._adapter.NORMALIZATION.with_description(self._description)
-        self._decode: Callable[..., Boxes] = self._adapter.decode
-        if self._adapter is yolox:
-            decoded = yolox.is_decoded(self._graph) if self._description.decoded is None else self._description.decoded
-            self._decode = partial(yolox.decode, decoded=decoded)
+        self._format = _format_of(self._graph, self._description)
+        self.type = self._format.type
+        self._normalization = self._format.normalization.with_description(self._description)
         self._boxes(self._graph.trial_outputs)  # so that a missing class is reported now
 
     def detect(
@@ -59,8 +49,8 @@ class BoxDetector:
             self._graph.width,
             self._graph.height,
             border=BORDER,
-            centered=self._adapter.CENTERED,
-            stretched=self._adapter.STRETCHED,
+            centered=self._format.centered,
+            stretched=self._format.stretched,
         )
         boxes = self._boxes(self._graph.run(fitted.picture_rgb, self._normalization))
         kept = suppress(boxes, threshold or self._description.score_threshold or SCORE_THRESHOLD)
@@ -77,7 +67,7 @@ class BoxDetector:
 
     def _boxes(self, outputs: list[NDArray[Any]]) -> Boxes:
         try:
-            boxes = self._decode(outputs, self._graph, self._description)
+            boxes = self._format.decode(outputs, self._graph, self._description)
             if boxes.corners.shape != (*boxes.scores.shape, 4):
                 raise ValueError("the numbers of boxes and scores differ")
             return boxes
@@ -96,16 +86,16 @@ def box_detection(score: float, box_px: NDArray[np.float64]) -> Detection:
     return Detection(score, box_px, np.stack([center, top, center, top]))
 
 
-def _adapter_for(graph: Graph, description: Description) -> ModuleType:
-    adapter = next((a for a in _ADAPTERS if a.TYPE == description.type), None)
-    adapter = adapter or next((a for a in _ADAPTERS if a.matches(graph)), None)
-    if adapter is None:
+def _format_of(graph: Graph, description: Description) -> BoxFormat:
+    found = next((each for each in BOX_FORMATS if each.type == description.type), None)
+    found = found or next((each for each in BOX_FORMATS if each.matches(graph)), None)
+    if found is None:
         raise graph.unrecognized("a detector", DETECTOR_TYPES)
-    if adapter is detections and (description.mean is None or description.channel_order is None):
+    if found is DETECTIONS and (description.mean is None or description.channel_order is None):
         raise ModelFileError(
             f"{graph.path} is an MMDeploy model, but its colour normalization is unknown; create "
             f"{description_path(graph.path)} "
             'with {"type": "detections", "mean": 0, "std": 1, "channel_order": "bgr"} for YOLOX, with '
             '"mean": [103.53, 116.28, 123.675], "std": [57.375, 57.12, 58.395] for RTMDet'
         )
-    return adapter
+    return found

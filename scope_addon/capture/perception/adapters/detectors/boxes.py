@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The parts that all box detectors share: letterboxing and non-maximum suppression.
+"""Boxes of person detectors: how the outputs of each kind of graph are read, and non-maximum suppression.
 
 Positions in the network's input are measured from its left and top edges, as detectors do; positions in the image
 from the centre of the top left pixel, as OpenCV does.
@@ -7,16 +7,22 @@ from the centre of the top left pixel, as OpenCV does.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...non_maximum_suppression import overlap_clusters
+from ...person_detector import overlap_clusters
+from ..description import Description
+from ..graph import PIXELS_BGR, UNIT, Graph, Normalization, finite
 
 BORDER = 114  # the grey level that the YOLO family is trained with
 OVERLAP_THRESHOLD = 0.5
 MAX_BOXES = 5000  # the best ones are compared with each other; a broken network may output millions
+_CELL_SIDES = (8, 16, 32)  # pixels
+_LARGEST_LOGARITHM = 10.0
 
 
 @dataclass(frozen=True)
@@ -27,7 +33,21 @@ class Boxes:
     scores: NDArray[np.float64]
 
 
-def corners_of(centers_and_sizes: NDArray[np.float64]) -> NDArray[np.float64]:
+Outputs = list[NDArray[Any]]
+
+
+class BoxFormat(NamedTuple):
+    """A kind of graph: ``matches`` recognizes it by its outputs, ``decode`` reads the boxes of people from these."""
+
+    type: str
+    normalization: Normalization
+    matches: Callable[[Graph], bool]
+    decode: Callable[[Outputs, Graph, Description], Boxes]
+    centered: bool = False  # the image lies in the middle of the input rather than in its top left corner
+    stretched: bool = False  # to the input, regardless of the image's aspect ratio
+
+
+def _corners_of(centers_and_sizes: NDArray[np.float64]) -> NDArray[np.float64]:
     """Convert (N, 4) centre x, y, width, height to left, top, right, bottom."""
     center, half = centers_and_sizes[:, :2], centers_and_sizes[:, 2:4] / 2
     return np.concatenate([center - half, center + half], axis=1)
@@ -44,3 +64,123 @@ def suppress(boxes: Boxes, threshold: float) -> Boxes:
     order = chosen[np.argsort(-boxes.scores[chosen], kind="stable")][:MAX_BOXES]
     kept = order[[cluster[0] for cluster in overlap_clusters(boxes.corners[order], OVERLAP_THRESHOLD)]]
     return Boxes(boxes.corners[kept], boxes.scores[kept])
+
+
+# YOLOX: one output (1, cells, 5 + classes), a row per cell of the grids of 8, 16 and 32 pixels. A row is x, y, width,
+# height, the probability of an object and one for each class; a score is the product of the two. If undecoded, x and y
+# are relative to the cell in units of its side, and width and height are logarithms:
+#
+#     x = (x_raw + column) · side,  width = exp(width_raw) · side
+
+
+def _is_yolox(graph: Graph) -> bool:
+    if len(graph.shapes) != 1 or len(graph.shapes[0]) != 3:
+        return False
+    _, rows, columns = graph.shapes[0]
+    return rows == len(cells(graph.width, graph.height)) and columns >= 6
+
+
+def _yolox(outputs: Outputs, graph: Graph, description: Description) -> Boxes:
+    rows = finite(outputs[0])[0]
+    box, decoded = rows[:, :4], description.decoded
+    if decoded is None:  # boxes in pixels spread over the whole input, others over a few units
+        decoded = bool(np.abs(finite(graph.trial_outputs[0][0, :, 0])).mean() > graph.width / 8)
+    if not decoded:
+        grid = cells(graph.width, graph.height)
+        center = (box[:, :2] + grid[:, :2]) * grid[:, 2:]
+        box = np.concatenate([center, np.exp(np.minimum(box[:, 2:], _LARGEST_LOGARITHM)) * grid[:, 2:]], axis=1)
+    return Boxes(_corners_of(box), rows[:, 4] * rows[:, 5 + description.person_class])
+
+
+def cells(width: int, height: int) -> NDArray[np.float64]:
+    """List column, row and side in pixels (N, 3) of every cell of YOLOX, in the order of the output's rows."""
+    grids = []
+    for side in _CELL_SIDES:
+        row, column = np.meshgrid(np.arange(height // side), np.arange(width // side), indexing="ij")
+        grids.append(np.stack([column, row, np.full(column.shape, side)], axis=-1).reshape(-1, 3))
+    table: NDArray[np.float64] = np.concatenate(grids).astype(np.float64)
+    return table
+
+
+# YOLOv8, YOLO11 and similar: one output (1, 4 + classes, cells), a column per box: its centre x, y, width and height,
+# and a score for each class. Rows after the classes (the keypoints of a pose network) are ignored.
+
+
+def _is_yolov8(graph: Graph) -> bool:
+    if len(graph.shapes) != 1 or len(graph.shapes[0]) != 3:
+        return False
+    _, numbers, boxes = graph.shapes[0]
+    return numbers >= 5 and boxes == sum((graph.width // s) * (graph.height // s) for s in _CELL_SIDES)
+
+
+def _yolov8(outputs: Outputs, graph: Graph, description: Description) -> Boxes:
+    columns = finite(outputs[0])[0]
+    return Boxes(_corners_of(columns[:4].T), columns[4 + description.person_class])
+
+
+# YOLOv4 and similar: ``boxes`` (1, N, 1, 4) and ``confs`` (1, N, classes), in either order. A box is left, top, right,
+# bottom as fractions of the input; a score is that of the class.
+
+
+def _is_yolov4(graph: Graph) -> bool:
+    if len(graph.shapes) != 2:
+        return False
+    boxes, scores = graph.shapes if _boxes_first(graph.shapes) else graph.shapes[::-1]
+    return _is_boxes(boxes) and len(scores) == 3 and scores[1] == boxes[1]
+
+
+def _yolov4(outputs: Outputs, graph: Graph, description: Description) -> Boxes:
+    boxes, scores = outputs if _boxes_first([o.shape for o in outputs]) else outputs[::-1]
+    size = np.array([graph.width, graph.height] * 2, float)
+    return Boxes(finite(boxes).reshape(-1, 4) * size, finite(scores)[0, :, description.person_class])
+
+
+def _boxes_first(shapes: list[tuple[int, ...]]) -> bool:
+    return not _is_boxes(shapes[1]) or _is_boxes(shapes[0])
+
+
+def _is_boxes(shape: tuple[int, ...]) -> bool:
+    return len(shape) == 4 and shape[2:] == (1, 4)
+
+
+# Detectors with non-maximum suppression inside the graph (YOLOv10, YOLO26, ``nms=True``): one output (1, N, 6), N
+# mostly 300. A row is left, top, right, bottom, score and index of the class.
+
+
+def _is_end_to_end(graph: Graph) -> bool:
+    return len(graph.shapes) == 1 and len(graph.shapes[0]) == 3 and graph.shapes[0][2] == 6
+
+
+def _end_to_end(outputs: Outputs, graph: Graph, description: Description) -> Boxes:
+    rows = finite(outputs[0])[0]
+    rows = rows[np.round(rows[:, 5]) == description.person_class]
+    return Boxes(rows[:, :4], rows[:, 4])
+
+
+# MMDeploy's detectors, also with non-maximum suppression inside: ``dets`` (1, N, 5) and ``labels`` (1, N). A row is
+# left, top, right, bottom and score. Several families of networks are exported with these outputs, each with its own
+# normalization, which their JSON has to specify.
+
+
+def _is_detections(graph: Graph) -> bool:
+    if len(graph.shapes) != 2:
+        return False
+    rows, labels = graph.shapes
+    return len(rows) == 3 and rows[2] == 5 and labels == rows[:2]
+
+
+def _detections(outputs: Outputs, graph: Graph, description: Description) -> Boxes:
+    people = outputs[1][0] == description.person_class
+    rows = finite(outputs[0])[0][people]
+    return Boxes(rows[:, :4], rows[:, 4])
+
+
+DETECTIONS = BoxFormat("detections", PIXELS_BGR, _is_detections, _detections)
+# In the order in which they are matched: YOLOX with one class also has rows of six.
+BOX_FORMATS = (
+    BoxFormat("yolox", PIXELS_BGR, _is_yolox, _yolox),
+    BoxFormat("yolov8", UNIT, _is_yolov8, _yolov8, centered=True),
+    BoxFormat("yolov4", UNIT, _is_yolov4, _yolov4, stretched=True),
+    BoxFormat("end_to_end", UNIT, _is_end_to_end, _end_to_end, centered=True),
+    DETECTIONS,
+)

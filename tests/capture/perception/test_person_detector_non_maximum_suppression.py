@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scope.scope_addon.capture.perception.non_maximum_suppression import overlap_clusters
+from scope.scope_addon.capture.perception.person_detector import overlap_clusters
 
 
 def iou(a: np.ndarray, b: np.ndarray) -> float:
