@@ -16,7 +16,7 @@ from .calibration import read_calibration
 
 # The default is a field of view of 60 degrees along the longer side, between a phone's main camera (65-70 degrees, less
 # the crop of its video stabilization) and a camera's standard lens (40-54 degrees). Edges of the background give a
-# better estimate (focal_length.py). The body adds little (focal_fits.py), because it depends on the lifted points, and
+# better estimate, and the body adds little (focal_length.py), because it depends on the lifted points, and
 # these on the assumed focal length. In 19 clips of known focal length (four calibrated cameras of 59.4 to 60.1 degrees,
 # fifteen renders) the root mean square error of its logarithm is 0.33 by default, and 0.30 with both estimates: for the
 # renders 0.33 instead of 0.37, for the cameras 0.06 instead of 0.01. Assuming 50 or 70 degrees for the cameras moved

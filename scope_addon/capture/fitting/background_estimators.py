@@ -23,8 +23,7 @@ from ..camera.bars import longer_content_side
 from ..camera.camera_rotation import BackgroundTracker
 from ..camera.intrinsics import Camera, assumed_camera
 from ..perception.observation import Observation
-from .focal_fits import FocalFits
-from .focal_length import camera_by_edges, camera_by_fits
+from .focal_length import FocalFits, camera_by_edges, camera_by_fits
 from .live_body import LiveBody
 
 KERNELS = 85  # that fitting a clip compiles

@@ -20,8 +20,7 @@ from ..world.assemble import assemble_motion
 from ..world.camera_path import CameraPath
 from ..world.camera_travel import camera_travel
 from ..world.clip.clip_fit import fit_clip
-from ..world.placement import PlacedTrack, place_track
-from ..world.raw_motion import RawMotion
+from ..world.placement import PlacedTrack, RawMotion, place_track
 from ..world.relative_sizes import relative_sizes, stander
 from ..world.shot import FittedPerson, Shot
 from ..world.stance import stance_on_ground

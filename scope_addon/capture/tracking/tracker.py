@@ -25,10 +25,9 @@ from ..perception.person_detector import Detection
 from ..perception.region import Region
 from .appearance import appearance
 from .frame_clock import FRAME_S, FrameClock
-from .landmarks.landmark_estimator import LandmarkEstimator
+from .landmarks.landmark_estimator import LandmarkEstimator, ReferenceEstimator
 from .landmarks.plausibility import PRESENCE_THRESHOLD, is_in_image, is_plausible, is_same_body, share_within
 from .landmarks.redetection import redetect_rotated
-from .landmarks.reference_estimator import ReferenceEstimator
 from .landmarks.tracking_networks import open_networks
 from .left_right import looks_swapped, swap_ratio
 from .search_schedule import EAGER_S, SearchSchedule

@@ -14,11 +14,10 @@ from ...kinematics.frame_blocks import by_blocks
 from ...motion import Motion
 from ..fitting.hands.hand_measurements import HAND_KEYPOINT_NAMES
 from ..perception.landmark_network import KEYPOINT_NAMES
+from ..tracking.face.expression_fit import with_expressions
 from ..tracking.face.expression_motion import expression_motion
-from ..tracking.face.expressions import with_expressions
 from .camera_path import CameraPath
-from .placement import PlacedTrack
-from .raw_motion import rotation_vectors_of_joints
+from .placement import PlacedTrack, rotation_vectors_of_joints
 from .shot import FittedPerson, Shot
 
 MIN_CONFIDENCE = 0.5  # of keypoints that count in the reprojection error

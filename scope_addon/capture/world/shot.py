@@ -12,7 +12,7 @@ from ..camera.line_segments import Lines
 from ..fitting.ablation import NO_ABLATION, Ablation
 from ..tracking.track import Track
 from .camera_path import CameraPath
-from .raw_motion import RawMotion
+from .placement import RawMotion
 
 
 @dataclass(frozen=True)

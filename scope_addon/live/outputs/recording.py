@@ -23,8 +23,7 @@ from ...capture.perception.landmark_network import KEYPOINT_COUNT
 from ...capture.tracking.track import Track
 from ...capture.world.assemble import assemble_motion
 from ...capture.world.camera_path import CameraPath
-from ...capture.world.placement import place_track
-from ...capture.world.raw_motion import RawMotion
+from ...capture.world.placement import RawMotion, place_track
 from ...capture.world.shot import FittedPerson, Shot
 from ...errors import NoPersonError
 from ...motion import Motion

@@ -4,15 +4,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...perception.landmark_network import LandmarkNetwork, PoseEstimate
+from ...perception.observation import PendingReference
 from ...perception.region import Region
 from ..tracked_target import MIN_VELOCITY_FRAMES, TrackedTarget
 from .plausibility import is_in_image, is_plausible, is_same_region
 from .tracking_networks import TrackingNetworks
+
+MAX_PENDING = 2  # calls that are not finished, each of which keeps its frame in memory
 
 
 class LandmarkEstimator:
@@ -90,3 +94,29 @@ class LandmarkEstimator:
         for f in live:
             if f.pending is None and is_in_image(f.estimate.next_region, upcoming_rgb):
                 f.pending = self._early.begin(upcoming_rgb, f.estimate.next_region, self._upcoming_with_masks)
+
+
+class ReferenceEstimator:
+    """Estimates world landmarks in the background; tracking does not depend on them, so it does not wait."""
+
+    def __init__(self, network: LandmarkNetwork) -> None:
+        self._network = network
+        self._pending: list[PendingReference] = []
+        self._pool = ThreadPoolExecutor(1, "scope-reference")
+
+    def submit(self, image_rgb: NDArray[np.uint8], region: Region) -> PendingReference:
+        """Start an estimate; wait first if too many are pending.
+
+        :param image_rgb: (H, W, 3), not to be changed until the result is there.
+        :return: world landmarks (33, 3) in metres, or None if they are not of a body.
+        """
+        self._pending = [call for call in self._pending if not call.done()]
+        if len(self._pending) >= MAX_PENDING:
+            self._pending[0].result()
+        call: PendingReference = self._pool.submit(self._estimate, image_rgb, region)
+        self._pending.append(call)
+        return call
+
+    def _estimate(self, image_rgb: NDArray[np.uint8], region: Region) -> NDArray[np.float64] | None:
+        (estimate,) = self._network.estimate(image_rgb, [region])
+        return estimate.world_landmarks if is_plausible(estimate) else None

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.intrinsics import Camera, assumed_camera
 from scope.scope_addon.capture.fitting.background_estimators import BackgroundEstimators
-from scope.scope_addon.capture.fitting.focal_fits import FocalFits
+from scope.scope_addon.capture.fitting.focal_length import FocalFits
 from scope.scope_addon.capture.media.frame import Frame
 from scope.scope_addon.capture.media.video import Video, open_video
 from scope.scope_addon.capture.options import CaptureOptions

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 from scope.scope_addon.capture.world.camera_path import CameraPath
-from scope.scope_addon.capture.world.raw_motion import RawMotion
+from scope.scope_addon.capture.world.placement import RawMotion
 from scope.solver.rotations import exp
 
 from .clip.waving_person import BODY, FRAMES, person

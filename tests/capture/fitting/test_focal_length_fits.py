@@ -8,8 +8,7 @@ import time
 import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.intrinsics import assumed_camera, choose_camera
-from scope.scope_addon.capture.fitting.focal_fits import FocalFits
-from scope.scope_addon.capture.fitting.focal_length import camera_by_fits
+from scope.scope_addon.capture.fitting.focal_length import FocalFits, camera_by_fits
 from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions

@@ -6,7 +6,7 @@ from __future__ import annotations
 from fractions import Fraction
 
 import pytest
-from scope.scope_addon.capture.media.frame_rate import exact_fps
+from scope.scope_addon.capture.media.frame_readers import exact_fps
 
 
 @pytest.mark.parametrize(

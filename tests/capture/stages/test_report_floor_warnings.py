@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.stages.floor_warnings import floor_warnings
+from scope.scope_addon.capture.stages.report import floor_warnings
 from scope.solver import rotations
 
 from ...made_motion import made_motion

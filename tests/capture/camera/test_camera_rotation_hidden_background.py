@@ -7,8 +7,7 @@ import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scope.scope_addon.capture.camera.camera_rotation import BackgroundTracker
-from scope.scope_addon.capture.camera.hidden_background import HiddenBackground
+from scope.scope_addon.capture.camera.camera_rotation import BackgroundTracker, HiddenBackground
 from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
 from scope.scope_addon.capture.camera.line_segments import Lines
 from scope.scope_addon.capture.camera.verticals import estimate_up_from_lines

@@ -10,9 +10,8 @@ from scope.scope_addon.capture.perception.face.face_landmarks import FaceNetwork
 from scope.scope_addon.capture.perception.face.face_record import RECORD, parts, record
 from scope.scope_addon.capture.perception.face.gaze import gaze
 from scope.scope_addon.capture.perception.region import Region
-from scope.scope_addon.capture.tracking.face import expressions
-from scope.scope_addon.capture.tracking.face.expression_fit import fitted
-from scope.scope_addon.capture.tracking.face.expressions import with_expressions
+from scope.scope_addon.capture.tracking.face import expression_fit
+from scope.scope_addon.capture.tracking.face.expression_fit import fitted, with_expressions
 
 FPS = 5
 BEFORE = np.zeros(RECORD)  # a frame without a face
@@ -45,7 +44,7 @@ def test_a_face_that_was_seen_briefly_gets_the_networks_weights_and_the_gaze_of_
 
 
 def test_the_expression_network_is_not_opened_for_a_face_that_is_seen_for_longer_or_not_at_all(clip, monkeypatch):
-    monkeypatch.setattr(expressions, "ExpressionNetwork", None)
+    monkeypatch.setattr(expression_fit, "ExpressionNetwork", None)
     rows = clip[1]
     times = np.arange(len(rows)) / FPS
     np.testing.assert_array_equal(with_expressions(rows, times), fitted(rows, times))
