@@ -81,7 +81,6 @@ class BackgroundTracker:
         """Process the next frame.
 
         :param image_rgb: (H, W, 3).
-        :param time_s: when it is shown.
         :param people: (n, 2) points of each person in pixels: the background is outside their bounding boxes.
         :param is_cut: whether another scene begins, for which the camera's rotation is assumed unchanged.
         :param is_sampled: whether the rotation is to be estimated in this frame even if the last estimate is recent.
@@ -211,7 +210,6 @@ def consensus_rotation(
     :param a: (n, 3) unit vectors, n at least 2.
     :param b: (n, 3) unit vectors.
     :param tolerance: radians.
-    :param random: draws the hypotheses.
     :return: R (3, 3), and (n,) whether each pair agrees with it.
     """
     pairs = random.integers(0, len(a), (HYPOTHESES, 2))

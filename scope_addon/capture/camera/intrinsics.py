@@ -78,7 +78,6 @@ def choose_camera(
     :param width, height: of the footage in pixels.
     :param focal_mm: 35 mm equivalent focal length along the longer side, f_px = f_mm / 36 · max(width, height).
     :param fov_deg: field of view along the longer side, f_px = max(width, height) / (2 tan(fov / 2)).
-    :param calibration: JSON file; see `calibration`.
     :param metadata_focal_mm: as ``focal_mm``, from the file's own metadata.
     :raises UsageError: the user's values contradict each other, or one is impossible.
     :raises InputError: the calibration cannot be used for footage of this size.
@@ -126,7 +125,6 @@ def estimated_camera(width: int, height: int, focal_px: float, deviation: float,
     """Return the camera with an estimated focal length.
 
     :param width, height: of the footage in pixels.
-    :param focal_px: focal length in pixels.
     :param deviation: its relative error, one standard deviation.
     :param longer_px: as for `assumed_camera`.
     """

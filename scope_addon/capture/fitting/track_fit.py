@@ -77,10 +77,7 @@ def ground(prepared: PreparedTrack, first: FittedTrack, stance: Stance) -> tuple
 def fit_each_frame(
     prepared: PreparedTrack, start: FittedTrack, progress: Callable[[str, int, int], None]
 ) -> FittedTrack:
-    """Fit every frame alone, from its state in another motion.
-
-    :param progress: called with the stage's name, the frames done and the total.
-    """
+    """Fit every frame alone, from its state in another motion."""
     frames = FrameSequence(replace(prepared, weights=clip_weights(prepared.weights)), start.betas)
     T = len(start.valid)
     for k in range(T):

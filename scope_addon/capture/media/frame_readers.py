@@ -72,7 +72,6 @@ def upright(
 ) -> NDArray[np.uint8]:
     """Stretch an image (H, W, 3) of a file or stream until its pixels are square; mirror it before and rotate it after.
 
-    :param path: its name, for messages.
     :param aspect: width of a pixel over its height.
     :param clockwise_deg: a multiple of 90; others do not rotate.
     :param is_mirrored: whether top and bottom are exchanged before the rotation, of which every mirroring consists.
@@ -173,7 +172,6 @@ def decode_items(path: Path, numbers: Collection[int], max_pixels: int) -> dict[
     PyAV's stream ids are the item numbers. Of several streams with one id, the first is the item; the others belong to
     an animation.
 
-    :param numbers: of the items to decode.
     :param max_pixels: the limit for all items together, beyond which nothing is returned.
     :return: (h, w, 3) uint8 RGB by item number; for a damaged file, the items that could be decoded.
     :raises VideoError: PyAV is not installed.

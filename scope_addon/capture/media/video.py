@@ -303,7 +303,6 @@ class _Decoder:
         """Warn if the file ended early, or was still being written.
 
         :param index: of the frame that would have come next.
-        :param time: of the last frame, seconds.
         """
         video = self._video
         # Both tests: a container that counts frames from its duration is wrong for a variable frame rate.

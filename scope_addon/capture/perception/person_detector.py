@@ -66,7 +66,6 @@ class PersonDetector:
         Searches the whole image. If that finds nobody with a high score, or with ``closely``, the search continues in
         overlapping squares of an oblong image, which show people larger.
 
-        :param threshold: least score.
         :param closely: search the squares in any case.
         """
         found = self._detect_in(image_rgb, threshold, (0, 0))
@@ -172,7 +171,6 @@ def decode(
     :param boxes: (A, 4 + 2n): box centre relative to the anchor, box size, n points relative to the anchor.
     :param logits: (A,) of the scores.
     :param anchors: (A, 2), see `make_anchors`.
-    :param threshold: least score.
     :return: scores (N,) and values (N, 4 + 2n): left, top, right, bottom, n × (x, y) in input pixels; best first.
     """
     score = 1.0 / (1.0 + np.exp(-np.clip(logits.astype(float), -_SCORE_LIMIT, _SCORE_LIMIT)))

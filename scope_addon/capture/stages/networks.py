@@ -34,10 +34,7 @@ def network_threads(wanted: int, execution: Execution) -> int:
 def open_trackers(
     options: CaptureOptions, threads: int, execution: Execution, kept: KeptEstimates | None = None
 ) -> Trackers:
-    """Open the networks for people, and for what is captured only on request.
-
-    :param kept: estimates of the landmark networks on disk.
-    """
+    """Open the networks for people, and for what is captured only on request."""
     people = PeopleTracker(
         options.quality,
         threads,

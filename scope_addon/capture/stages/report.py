@@ -145,8 +145,6 @@ def floor_warnings(name: str, body: Body, motions: list[Motion], heights_given: 
 
     There are none on uneven ground, which has no floor.
 
-    :param name: the footage's.
-    :param body: that of the motions.
     :param heights_given: of how many people the height was known.
     """
     warnings = []

@@ -17,8 +17,7 @@ from ..fitting.track_fit import fit_each_frame, fit_track, ground
 from ..tracking.track import Track
 from ..world.above_floor import raise_feet
 from ..world.assemble import assemble_motion
-from ..world.camera_path import CameraPath
-from ..world.camera_travel import camera_travel
+from ..world.camera_path import CameraPath, camera_travel
 from ..world.clip.clip_fit import fit_clip
 from ..world.placement import PlacedTrack, RawMotion, place_track
 from ..world.relative_sizes import relative_sizes, stander

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception.hand_landmarks import HAND_NAMES
+from scope.scope_addon.capture.perception.hand_landmarks import HAND_NAMES, INPUT_SIZE, _in_image
 from scope.scope_addon.capture.perception.hand_region import (
     HAND_LENGTH_M,
     pixels_per_metre,
@@ -14,7 +14,6 @@ from scope.scope_addon.capture.perception.hand_region import (
     region_from_palm,
 )
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
-from scope.scope_addon.capture.perception.palm_detector import INPUT_SIZE, _in_image
 from scope.scope_addon.capture.perception.region import Region
 
 

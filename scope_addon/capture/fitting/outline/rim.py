@@ -97,8 +97,8 @@ class OutlineMeasurer:
         rows, contour, outward, m_px = rows[visible], contour[visible], outward[visible], m_px[visible]
         if not len(rows):
             return _NOTHING
-        m = self._normalized(m_px)
-        n = self._normalized(mask.region.image_from_crop((contour + outward + 0.5) / SIZE)) - m
+        m = self._camera.rays(m_px)[:, :2]
+        n = self._camera.rays(mask.region.image_from_crop((contour + outward + 0.5) / SIZE))[:, :2] - m
         n /= np.linalg.norm(n, axis=1)[:, None]
         depth = points[rows, 2]
         sigmas = (OUTSIDE_SIGMA_M / depth) ** 2, (self._width[rows] / depth) ** 2
@@ -113,12 +113,6 @@ class OutlineMeasurer:
             shaped = replace(body, v_template=body.rest_vertices(betas), J_template=body.rest_joints(betas))
             self._shaped = betas.copy(), shaped
         return shaped
-
-    def _normalized(self, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
-        K = self._camera.intrinsics
-        straight = self._camera.undistort(pixels)
-        out: NDArray[np.float64] = (straight - K[:2, 2]) / np.diag(K)[:2]
-        return out
 
     def _crop(self, region: Region, points_cam: NDArray[np.float64]) -> NDArray[np.float64]:
         """Project points (n, 3) to pixels (n, 2) of the mask."""

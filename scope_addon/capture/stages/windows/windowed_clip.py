@@ -53,7 +53,6 @@ _THREADS = 2  # in which backgrounds are followed
 class WindowedClip:
     """A clip and its windows.
 
-    :param windows: all of them.
     :param pool: in which the background is followed.
     :param unfinished: folder with what an earlier capture that was killed has found, and in which to keep what this one
         finds; None: nothing is kept.
@@ -312,7 +311,6 @@ def run_windows(
     """Observe the windows until their frames end.
 
     :param windows: at least one, in order.
-    :param begin: starts the run of a window.
     :param pairs: from the first window's anchor on; see `frame_pairs`.
     :param watch: called with each frame and its largest person.
     """

@@ -44,8 +44,6 @@ class _Face:
 class FaceTracker:
     """Tracks the faces of the people whom `PeopleTracker` tracks; frames are given in order.
 
-    :param threads: of the network.
-    :param execution: what the network runs on.
     :raises SetupError: a network is missing.
     :raises ModelFileError: a network is damaged.
     """
@@ -71,7 +69,6 @@ class FaceTracker:
 
         :param image_rgb: (H, W, 3).
         :param observations: tracklet number and observation of each person.
-        :param time_s: when the frame is shown.
         """
         before, self._faces = self._faces, {}
         found = []

@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...perception.execution import Execution
-from ...perception.hand_landmarks import HAND_POINTS, HandEstimate, HandNetwork
+from ...perception.hand_landmarks import HAND_POINTS, SCORE_THRESHOLD, HandEstimate, HandNetwork, PalmDetector
 from ...perception.hand_region import SIDES, pixels_per_metre
 from ...perception.observation import Observation
-from ...perception.palm_detector import SCORE_THRESHOLD, PalmDetector
 from ...perception.region import Region
 from ..frame_clock import EAGER_S, FRAME_S, PATIENCE_S, is_search_due
 from .hand_assignment import (
@@ -81,7 +80,6 @@ class HandTracker:
     run of these small networks takes twice the processor time.
 
     :param threads: number of hands that are looked for in parallel.
-    :param execution: what the networks run on.
     :param least_px: length of the smallest hands that are looked for, by the body's scale; pixels.
     :raises SetupError: a network is missing.
     """

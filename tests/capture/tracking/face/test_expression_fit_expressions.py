@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.perception.face.expression_network import EXPRESSION_POINTS, ExpressionNetwork
 from scope.scope_addon.capture.perception.face.face_landmarks import FaceNetwork
-from scope.scope_addon.capture.perception.face.face_record import RECORD, parts, record
-from scope.scope_addon.capture.perception.face.gaze import gaze
+from scope.scope_addon.capture.perception.face.face_record import RECORD, gaze, parts, record
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.face import expression_fit
 from scope.scope_addon.capture.tracking.face.expression_fit import fitted, with_expressions

@@ -56,7 +56,6 @@ def _corners_of(centers_and_sizes: NDArray[np.float64]) -> NDArray[np.float64]:
 def suppress(boxes: Boxes, threshold: float) -> Boxes:
     """Apply non-maximum suppression.
 
-    :param threshold: least score.
     :return: the remaining boxes, best first; none overlaps a better one by more than half.
     """
     size = boxes.corners[:, 2:] - boxes.corners[:, :2]

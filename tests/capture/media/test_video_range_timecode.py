@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from fractions import Fraction
 
 import pytest
-from scope.scope_addon.capture.media.timecode import Timecode, parse_time
+from scope.scope_addon.capture.media.video_range import Timecode, parse_time
 from scope.scope_addon.errors import UsageError
 
 

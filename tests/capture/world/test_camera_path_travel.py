@@ -8,8 +8,7 @@ from scope.scope_addon.capture.fitting.prepared_track import Stance
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.pipeline import capture
-from scope.scope_addon.capture.world.camera_path import CameraPath
-from scope.scope_addon.capture.world.camera_travel import camera_travel
+from scope.scope_addon.capture.world.camera_path import CameraPath, camera_travel
 from scope.solver import load_body
 from scope.solver.rotations import exp
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.tracking.face.face_alignment import aligned, view_terms
+from scope.scope_addon.capture.tracking.face.expression_fit import aligned, view_terms
 from scope.solver.rotations import exp
 
 Y_UP = np.array([1.0, -1.0, -1.0])

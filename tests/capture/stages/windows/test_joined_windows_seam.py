@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.background_record import BackgroundRecord
+from scope.scope_addon.capture.stages.windows.joined_windows import distance, faded, missed_people, same_people
 from scope.scope_addon.capture.stages.windows.plan import Window
-from scope.scope_addon.capture.stages.windows.seam import distance, faded, missed_people, same_people
 from scope.scope_addon.capture.stages.windows.window_record import WindowRecord
 from scope.scope_addon.capture.tracking.track import Tracklet
 
