@@ -15,7 +15,7 @@ from ..options.capture import ALL, LARGEST, OFF
 from .camera.calibration import read_calibration
 from .camera.intrinsics import choose_camera
 from .fitting.ablation import NO_ABLATION, Ablation
-from .fitting.hands.hand_measurements import require_fingers
+from .fitting.hand_measurements import require_fingers
 from .fitting.stature import require_stature
 from .media.video_range import FootageRange, VideoRange, parse_range
 from .perception.adapters.detectors.box_detector import BoxDetector

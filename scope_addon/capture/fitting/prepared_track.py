@@ -20,7 +20,7 @@ from ..tracking.face.head_direction import across_head, certainty
 from ..tracking.track import Track
 from .ablation import NO_ABLATION, Ablation
 from .frame_measurements import DEPTH_SIGMA_M, EARS, Measurer
-from .hands.hand_measurements import HandMeasurer, with_finger_limits, without_fingers
+from .hand_measurements import HandMeasurer, with_finger_limits, without_fingers
 from .keypoint_offsets import with_keypoint_offsets
 from .stature import with_population, with_stature, with_unknown_stature
 from .weights import WEIGHTS, joint_weights

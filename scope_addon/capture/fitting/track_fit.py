@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ....solver import ClipFit, Fit, State, fit_clip
 from .frame_measurements import NEAREST_M
 from .frame_sequence import FittedTrack, FrameSequence, is_usable
-from .outline.shape_fit import PRIOR_SHARE, fit_shape_to_outline, usable_masks
+from .outline import PRIOR_SHARE, fit_shape_to_outline, usable_masks
 from .prepared_track import PreparedTrack, Stance
 from .stature import stature_sigma, with_population
 from .weights import ROBUST, clip_weights, cold_stages

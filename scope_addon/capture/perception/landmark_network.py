@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ....solver.names import BLAZEPOSE
 from .execution import Execution
-from .kept.kept_estimates import KeptEstimates
+from .kept_estimates import KeptEstimates
 from .region import MARGIN, Region, region_from_points
 from .sessions import network_path, open_session
 

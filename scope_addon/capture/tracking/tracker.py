@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..perception.adapters.keypoints.keypoint_network import KeypointNetwork
 from ..perception.execution import Execution
-from ..perception.kept.kept_estimates import KeptEstimates
+from ..perception.kept_estimates import KeptEstimates
 from ..perception.landmark_network import LandmarkNetwork, PoseEstimate
 from ..perception.observation import Observation, PendingReference, PersonMask
 from ..perception.person_detector import Detection

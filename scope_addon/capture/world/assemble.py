@@ -12,7 +12,7 @@ from ....solver import rotations
 from ...kinematics.contact_points import SOLES
 from ...kinematics.frame_blocks import by_blocks
 from ...motion import Motion
-from ..fitting.hands.hand_measurements import HAND_KEYPOINT_NAMES
+from ..fitting.hand_measurements import HAND_KEYPOINT_NAMES
 from ..perception.landmark_network import KEYPOINT_NAMES
 from ..tracking.face.expression_fit import with_expressions
 from ..tracking.face.expression_motion import expression_motion

@@ -31,7 +31,7 @@ from ...media.opencv_threads import opencv_in_one_thread
 from ...media.video import Video, open_video
 from ...options import CaptureOptions, most_people
 from ...perception.execution import Execution
-from ...perception.kept.kept_estimates import KeptEstimates
+from ...perception.kept_estimates import KeptEstimates
 from ...perception.observation import Observation
 from ...perception.region import Region
 from ...tracking.landmarks.mask_schedule import MaskSchedule

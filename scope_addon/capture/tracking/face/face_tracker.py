@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from ...perception.execution import Execution
 from ...perception.face.expression_network import ExpressionNetwork
 from ...perception.face.eye_light import eye_light
-from ...perception.face.face_landmarks import FaceEstimate, FaceNetwork
+from ...perception.face.face_landmarks import HEAD, FaceEstimate, FaceNetwork, facing, region_from_body
 from ...perception.face.face_record import record
-from ...perception.face.face_region import HEAD, facing, region_from_body
 from ...perception.observation import Observation
 from ...perception.region import Region
 from ..frame_clock import PATIENCE_S, is_search_due

@@ -16,7 +16,7 @@ from ....errors import SetupError
 from ...perception.adapters.detectors.box_detector import BoxDetector
 from ...perception.adapters.keypoints.keypoint_network import KeypointNetwork
 from ...perception.execution import Execution
-from ...perception.kept.kept_estimates import KeptEstimates
+from ...perception.kept_estimates import KeptEstimates
 from ...perception.landmark_network import LandmarkNetwork, PoseEstimate
 from ...perception.observation import PendingReference
 from ...perception.person_detector import PersonDetector

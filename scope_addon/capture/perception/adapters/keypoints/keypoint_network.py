@@ -7,11 +7,8 @@ Its input is a box around the person, rotated so that the trunk is upright. It d
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
-from types import ModuleType
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +18,11 @@ from ...execution import Execution
 from ...landmark_network import KEYPOINT_NAMES, PoseEstimate
 from ...region import Region, box_along
 from ..description import Description, description_path, read_description
-from ..graph import Graph
+from ..graph import IMAGENET, Graph
 from ..keypoint_sets import COCO_17, KEYPOINT_SETS, KeypointSet
-from . import heatmap, simcc
+from .keypoint_formats import KEYPOINT_FORMATS, KeypointFormat
 
-_ADAPTERS: tuple[ModuleType, ...] = (simcc, heatmap)
-KEYPOINT_TYPES = tuple(adapter.TYPE for adapter in _ADAPTERS)
+KEYPOINT_TYPES = tuple(each.type for each in KEYPOINT_FORMATS)
 SCORE_THRESHOLD = 0.3  # from which a keypoint counts as seen
 UNSURE = 0.25  # share of this threshold from which a keypoint widens the next region
 MARGIN = 1.4  # the keypoints' box lacks crown, feet and the border that these networks are trained with
@@ -38,8 +34,6 @@ _SHOULDERS = np.array([KEYPOINT_NAMES.index(f"{side}_shoulder") for side in ("le
 _HIPS = np.array([KEYPOINT_NAMES.index(f"{side}_hip") for side in ("left", "right")])
 _LEGS = [[KEYPOINT_NAMES.index(f"{side}_{joint}") for joint in ("hip", "knee", "ankle")] for side in ("left", "right")]
 
-Decode = Callable[[list[NDArray[Any]], Graph], tuple[NDArray[np.float64], NDArray[np.float64]]]
-
 
 class KeypointNetwork:
     """The user's network; see `Description` for its JSON.
@@ -48,16 +42,13 @@ class KeypointNetwork:
     """
 
     def __init__(self, path: Path, threads: int, execution: Execution | None = None) -> None:
-        description = read_description(path, KEYPOINT_TYPES)
+        self._description = description = read_description(path, KEYPOINT_TYPES)
         self._graph = Graph(path, description, threads, execution)
-        self._adapter = _adapter_for(self._graph, description)
-        self.type: str = self._adapter.TYPE
+        self._format = _format_of(self._graph, description)
+        self.type = self._format.type
         self.keypoint_set = _set_for(self._graph, description)
-        self._normalization = self._adapter.NORMALIZATION.with_description(description)
+        self._normalization = IMAGENET.with_description(description)
         self._threshold = description.score_threshold or SCORE_THRESHOLD
-        self._decode: Decode = self._adapter.decode
-        if self._adapter is heatmap:
-            self._decode = partial(heatmap.decode, refinement=description.decode, udp=description.udp)
         self._side = max(self._graph.width, self._graph.height)
         self._corner = np.array([(self._side - self._graph.width) // 2, (self._side - self._graph.height) // 2])
 
@@ -72,7 +63,8 @@ class KeypointNetwork:
         left, top = self._corner
         square = region.cut(image_rgb, self._side)
         picture = square[top : top + self._graph.height, left : left + self._graph.width]
-        points, scores = self._decode(self._graph.run(picture, self._normalization), self._graph)
+        outputs = self._graph.run(picture, self._normalization)
+        points, scores = self._format.decode(outputs, self._graph, self._description)
         pixels = region.image_from_crop((points + self._corner + 0.5) / self._side)
         ours, confidence = self.keypoint_set.to_blazepose(pixels, np.clip(scores, 0.0, 1.0))
         height, width = image_rgb.shape[:2]
@@ -112,12 +104,12 @@ def _stature(points: NDArray[np.float64], seen: NDArray[np.bool_]) -> float:
     return trunk + max(legs)
 
 
-def _adapter_for(graph: Graph, description: Description) -> ModuleType:
-    adapter = next((a for a in _ADAPTERS if a.matches(graph) and description.type in (None, a.TYPE)), None)
-    if adapter is None:
+def _format_of(graph: Graph, description: Description) -> KeypointFormat:
+    found = next((f for f in KEYPOINT_FORMATS if f.matches(graph) and description.type in (None, f.type)), None)
+    if found is None:
         why = f"it is not {description.type}" if description.type else "its outputs match no known type"
         raise graph.unrecognized("a keypoint network", KEYPOINT_TYPES, why)
-    return adapter
+    return found
 
 
 def _set_for(graph: Graph, description: Description) -> KeypointSet:

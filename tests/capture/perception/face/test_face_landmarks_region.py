@@ -5,8 +5,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception.face.face_landmarks import FACE_POINTS
-from scope.scope_addon.capture.perception.face.face_region import region_from_body, region_from_landmarks
+from scope.scope_addon.capture.perception.face.face_landmarks import (
+    FACE_POINTS,
+    region_from_body,
+    region_from_landmarks,
+)
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 
 # A frontal head, metres from the middle of the eyes, y down; the person's left is to the right.

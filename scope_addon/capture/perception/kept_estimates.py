@@ -17,10 +17,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .....solver.errors import ScopeError
-from .....solver.loaders.archive import read_members
-from ....atomic_write import write_npz
-from ..region import Region
+from ....solver.errors import ScopeError
+from ....solver.loaders.archive import read_members
+from ...atomic_write import write_npz
+from .region import Region
 
 INTERVAL_S = 20.0  # between two files: the work that a kill can cost
 LARGEST = 1 << 30  # bytes of one capture's files; some five hours

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scope.scope_addon.capture.camera.intrinsics import Camera
-from scope.scope_addon.capture.fitting.outline.rim import OutlineMeasurer
+from scope.scope_addon.capture.fitting.outline import OutlineMeasurer
 from scope.scope_addon.capture.perception.observation import PersonMask
 from scope.solver import Body, ClipFit, Options, PosePriors, Priors, Stage, State, Weights, fit_clip
 from scope.solver.measurements import Measurements

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
 from scope.scope_addon.capture.fitting.frame_measurements import Measurer
-from scope.scope_addon.capture.fitting.hands.hand_measurements import (
+from scope.scope_addon.capture.fitting.hand_measurements import (
     FINGERS,
     HAND_KEYPOINT_NAMES,
     HandMeasurer,

@@ -8,9 +8,9 @@ import pytest
 from numpy.typing import NDArray
 from scope.benchmarks.scenes.garments import COAT_M, SKIRT_M, Garment, coat, girths_m, mass_kg, skirt
 from scope.scope_addon.capture.camera.intrinsics import Camera
+from scope.scope_addon.capture.fitting import outline
 from scope.scope_addon.capture.fitting.ablation import Ablation
-from scope.scope_addon.capture.fitting.outline import rim
-from scope.scope_addon.capture.fitting.outline.shape_fit import fit_shape_to_outline, usable_masks
+from scope.scope_addon.capture.fitting.outline import fit_shape_to_outline, usable_masks
 from scope.scope_addon.capture.fitting.prepared_track import prepare_track
 from scope.scope_addon.capture.tracking.track import Track
 from scope.solver import Body
@@ -74,7 +74,7 @@ def test_as_much_weight_inside_the_mask_as_outside_exceeds_the_limits(
     body: Body, seen: dict[object, Track], monkeypatch: pytest.MonkeyPatch, name: str, hem: float
 ) -> None:
     """So the limits tell that clothes explain some of what the body lacks."""
-    monkeypatch.setattr(rim, "INSIDE_WEIGHT", rim.OUTSIDE_WEIGHT)
+    monkeypatch.setattr(outline, "INSIDE_WEIGHT", outline.OUTSIDE_WEIGHT)
     girth, mass = added_by(body, seen, 0, name, hem)
     assert girth > GIRTH_M[name]
     assert mass > MASS_KG[name]
@@ -85,7 +85,7 @@ def test_squares_instead_of_a_robust_kernel_exceed_the_limits(
     body: Body, seen: dict[object, Track], monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     """So the limits tell that contours far from the body count little."""
-    monkeypatch.setattr(rim, "OUTSIDE_SIGMA_M", 10.0)
-    monkeypatch.setattr(rim, "_WIDTHS_M", {})
-    monkeypatch.setattr(rim, "_WIDTH_M", 10.0)
+    monkeypatch.setattr(outline, "OUTSIDE_SIGMA_M", 10.0)
+    monkeypatch.setattr(outline, "_WIDTHS_M", {})
+    monkeypatch.setattr(outline, "_WIDTH_M", 10.0)
     assert added_by(body, seen, None, name, 3.0)[1] > MASS_KG[name]

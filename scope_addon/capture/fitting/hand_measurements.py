@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .....solver import Body, Keypoints2D, Measurements, OrientationField, Priors
-from .....solver.residuals import joint_limits
-from .....solver.rotations import exp, log
-from ....errors import UsageError
-from ....kinematics.smoothing import fill_rotation_gaps
-from ...perception.hand_landmarks import HAND_NAMES, HAND_POINTS
-from ...perception.hand_region import SIDES
-from ...perception.lifter import camera_towards
+from ....solver import Body, Keypoints2D, Measurements, OrientationField, Priors
+from ....solver.residuals import joint_limits
+from ....solver.rotations import exp, log
+from ...errors import UsageError
+from ...kinematics.smoothing import fill_rotation_gaps
+from ..perception.hand_landmarks import HAND_NAMES, HAND_POINTS
+from ..perception.hand_region import SIDES
+from ..perception.lifter import camera_towards
 
 FINGERS = ("index", "middle", "ring", "pinky", "thumb")
 HAND_KEYPOINT_NAMES = tuple(f"hand/{side}_{name}" for side in SIDES for name in HAND_NAMES)
