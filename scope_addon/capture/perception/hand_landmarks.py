@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The hand landmark network: from a region of the image to the 21 keypoints of one hand, in 2D and 3D."""
+"""The hand landmark network: 21 keypoints of one hand in a region of the image; and the palm detector."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ HAND_NAMES = (
 )  # fmt: skip
 HAND_POINTS = len(HAND_NAMES)
 _OUTPUTS = ["landmarks", "presence", "handedness", "world"]
-INPUT_SIZE = 192
-SCORE_THRESHOLD = 0.5
+PALM_INPUT_SIZE = 192  # of the palm detector
+PALM_THRESHOLD = 0.5
 _LAYERS = ((8, 2), (16, 6))  # stride, anchors per cell; the three stride-16 layers are combined
 
 
@@ -99,11 +99,11 @@ class PalmDetector:
 
     def __init__(self, threads: int, execution: Execution | None = None) -> None:
         self._session = open_session(network_path("palm_detection"), threads, execution)
-        self._anchors = make_anchors(INPUT_SIZE, _LAYERS)
+        self._anchors = make_anchors(PALM_INPUT_SIZE, _LAYERS)
 
-    def detect(self, image_rgb: NDArray[np.uint8], square: Region, threshold: float = SCORE_THRESHOLD) -> list[Region]:
+    def detect(self, image_rgb: NDArray[np.uint8], square: Region, threshold: float = PALM_THRESHOLD) -> list[Region]:
         """Return the hands' regions by all palms in a square of an (H, W, 3) uint8 RGB image, the best palm first."""
-        blob = cv2.dnn.blobFromImage(square.cut(image_rgb, INPUT_SIZE), 1 / 255.0)
+        blob = cv2.dnn.blobFromImage(square.cut(image_rgb, PALM_INPUT_SIZE), 1 / 255.0)
         boxes, scores = self._session.run(["boxes", "scores"], {"input": blob})
         _, values = merge_overlapping(*decode(boxes[0], scores[0, :, 0], self._anchors, threshold))
         return [_in_image(v, square) for v in values]
@@ -111,7 +111,7 @@ class PalmDetector:
 
 def _in_image(values: NDArray[np.float64], square: Region) -> Region:
     """Calculate the hand's region in the image from a box and points (18,) in the network's input pixels."""
-    unit = values / INPUT_SIZE
+    unit = values / PALM_INPUT_SIZE
     in_square = region_from_palm(unit[:4], unit[4:].reshape(-1, 2))
     x, y = square.image_from_crop(np.array(in_square.center_px))
     return Region((float(x), float(y)), in_square.side_px * square.side_px, in_square.rotation + square.rotation)

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception.hand_landmarks import HAND_NAMES, INPUT_SIZE, _in_image
+from scope.scope_addon.capture.perception.hand_landmarks import HAND_NAMES, PALM_INPUT_SIZE, _in_image
 from scope.scope_addon.capture.perception.hand_region import (
     HAND_LENGTH_M,
     pixels_per_metre,
@@ -101,5 +101,5 @@ def test_a_palm_gives_the_region_also_in_a_rotated_square():
     where = Region((500.0, 300.0), 384.0, 0.6)
     found = _in_image(np.concatenate([[72, 72, 120, 120], points.ravel()]).astype(float), where)
     assert found.rotation == pytest.approx(0.6)
-    assert found.side_px == pytest.approx(upright.side_px * 384 / INPUT_SIZE)
-    assert found.center_px == pytest.approx(tuple(where.image_from_crop(np.array([96, 72]) / INPUT_SIZE)))
+    assert found.side_px == pytest.approx(upright.side_px * 384 / PALM_INPUT_SIZE)
+    assert found.center_px == pytest.approx(tuple(where.image_from_crop(np.array([96, 72]) / PALM_INPUT_SIZE)))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...perception.execution import Execution
-from ...perception.hand_landmarks import HAND_POINTS, SCORE_THRESHOLD, HandEstimate, HandNetwork, PalmDetector
+from ...perception.hand_landmarks import HAND_POINTS, PALM_THRESHOLD, HandEstimate, HandNetwork, PalmDetector
 from ...perception.hand_region import SIDES, pixels_per_metre
 from ...perception.observation import Observation
 from ...perception.region import Region
@@ -224,7 +224,7 @@ class HandTracker:
         if sight.hand_px < self._least_px or not _is_in_image(predicted, sight.image_rgb):
             return None
         around = replace(predicted, side_px=SEARCH_SCALE * predicted.side_px)
-        palms = self._palms_near(sight, around, SCORE_THRESHOLD)
+        palms = self._palms_near(sight, around, PALM_THRESHOLD)
         found = self._first_sure(sight, [*((palm, DETECTED) for palm in palms), (predicted, PREDICTED)], TENTATIVE)
         if not look_again or (found is not None and found.is_sure) or sight.wrist_confidence < SURE_WRIST:
             return found
