@@ -97,8 +97,7 @@ def depth_under_floor(motion: Motion, body: Body) -> NDArray[np.float64]:
     """Return how far the lowest foot of each frame is under the floor, (T,) metres; 0 above it and on uneven ground."""
     if motion.uneven_ground:
         return np.zeros(len(motion))
-    depth: NDArray[np.float64] = np.maximum(-foot_heights(motion, body).min(axis=1), 0.0)
-    return depth
+    return np.maximum(-foot_heights(motion, body).min(axis=1), 0.0)
 
 
 def lower_floors(

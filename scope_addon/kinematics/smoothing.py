@@ -105,8 +105,7 @@ def gaussian_smooth(
         w = np.exp(-0.5 * ((times[start] - times[to]) / sigma) ** 2)
         total[to] += w[:, None] * flat[start]
         weight[to] += w
-    smooth: NDArray[np.float64] = (total / weight[:, None]).reshape(values.shape)
-    return smooth
+    return (total / weight[:, None]).reshape(values.shape)
 
 
 def smooth_rotations(
@@ -144,7 +143,4 @@ def smooth_root(
     distance = np.maximum(np.linalg.norm(t_camera_root, axis=1, keepdims=True), 1e-6)
     ray = gaussian_smooth(t_camera_root / distance, times, ROTATION_CUTOFF_HZ / strength)
     ray /= np.maximum(np.linalg.norm(ray, axis=1, keepdims=True), 1e-6)
-    smooth: NDArray[np.floating[Any]] = ray * np.exp(
-        gaussian_smooth(np.log(distance), times, DEPTH_CUTOFF_HZ / strength)
-    )
-    return smooth
+    return ray * np.exp(gaussian_smooth(np.log(distance), times, DEPTH_CUTOFF_HZ / strength))

@@ -62,8 +62,7 @@ class Measurer:
 
     def rays(self, pixels: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
         """Convert undistorted pixels (..., 2) to normalized image coordinates (..., 2)."""
-        normalized: NDArray[np.floating[Any]] = pixels @ self._unproject[:2, :2].T + self._unproject[:2, 2]
-        return normalized
+        return pixels @ self._unproject[:2, :2].T + self._unproject[:2, 2]
 
     def measure(
         self,

@@ -207,14 +207,12 @@ def _first_contact(contact: NDArray[np.floating[Any]], times: NDArray[np.float64
     if len(times) < 2:
         return np.ones(len(times), np.bool_)
     on_ground_s = contact.max(axis=1) * np.gradient(times)
-    first: NDArray[np.bool_] = np.cumsum(on_ground_s) - on_ground_s < FIRST_S
-    return first
+    return np.cumsum(on_ground_s) - on_ground_s < FIRST_S
 
 
 def _lowest(soles_cam: NDArray[np.floating[Any]], up: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
     """Return the (T, 3) lowest sole point of each frame."""
-    lowest: NDArray[np.floating[Any]] = soles_cam[np.arange(len(soles_cam)), (soles_cam @ up).argmin(axis=1)]
-    return lowest
+    return soles_cam[np.arange(len(soles_cam)), (soles_cam @ up).argmin(axis=1)]
 
 
 def _unit(vector: NDArray[np.floating[Any]]) -> NDArray[np.float64]:

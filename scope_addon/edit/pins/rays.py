@@ -14,8 +14,7 @@ def pixel_of(camera: Camera, point: NDArray[np.float64]) -> NDArray[np.float64]:
     """Project a point (3,), world, to a pixel (2,)."""
     T, K = camera
     p = K @ (T[:3, :3].T @ (np.asarray(point, float) - T[:3, 3]))
-    pixel: NDArray[np.float64] = p[:2] / p[2]
-    return pixel
+    return p[:2] / p[2]
 
 
 def nearest_on_ray(camera: Camera, pixel: NDArray[np.float64], point: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -23,8 +22,7 @@ def nearest_on_ray(camera: Camera, pixel: NDArray[np.float64], point: NDArray[np
     T, K = camera
     ray = T[:3, :3] @ np.linalg.solve(K, np.array([*pixel, 1.0]))
     ray /= np.linalg.norm(ray)
-    nearest: NDArray[np.float64] = T[:3, 3] + max(float((point - T[:3, 3]) @ ray), 1e-3) * ray
-    return nearest
+    return T[:3, 3] + max(float((point - T[:3, 3]) @ ray), 1e-3) * ray
 
 
 def point_at_depth(camera: Camera, pixel: NDArray[np.float64], point: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -41,5 +39,4 @@ def point_at_depth(camera: Camera, pixel: NDArray[np.float64], point: NDArray[np
     along = float(ray @ normal)
     if along < 1e-3 * float(np.linalg.norm(ray) * np.linalg.norm(normal)):  # beside or behind the camera
         return nearest_on_ray(camera, pixel, point)
-    place: NDArray[np.float64] = T[:3, 3] + ray * (float((point - T[:3, 3]) @ normal) / along)
-    return place
+    return T[:3, 3] + ray * (float((point - T[:3, 3]) @ normal) / along)

@@ -102,5 +102,4 @@ def rest_orientations(armature: bpy.types.Object, body: Body) -> NDArray[np.floa
     bones = armature.data.bones
     M = np.array([np.array(bones[name].matrix_local)[:3, :3] for name in body.joint_names], float)
     U, _, Vt = np.linalg.svd(M)
-    M_i: NDArray[np.float64] = U @ Vt
-    return M_i
+    return U @ Vt

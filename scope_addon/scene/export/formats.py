@@ -185,8 +185,7 @@ def sample_armature(scene: bpy.types.Scene, rig: bpy.types.Object) -> bvh.Sample
 
 
 def _unscaled(R: NDArray[np.float64]) -> NDArray[np.float64]:
-    rotations: NDArray[np.float64] = R / np.linalg.norm(R, axis=-2, keepdims=True)
-    return rotations
+    return R / np.linalg.norm(R, axis=-2, keepdims=True)
 
 
 @contextmanager

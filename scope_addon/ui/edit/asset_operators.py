@@ -50,8 +50,7 @@ class SCOPE_OT_mark_asset(ActionOperator):
             self.author, self.description_text = data.author, data.description
         else:
             self.description_text = self.catalog = ""
-        outcome: set[str] = context.window_manager.invoke_props_dialog(self)
-        return outcome
+        return context.window_manager.invoke_props_dialog(self)
 
     def work(self, context: bpy.types.Context) -> str:
         """Mark the action and draw its picture.

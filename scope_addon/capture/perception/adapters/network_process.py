@@ -85,8 +85,7 @@ class NetworkProcess:
         with self._lock:
             answer = self._ask({"input": name}, [array])
             self._limit_s = RUN_S  # the first run may still compile
-        outputs: list[Any] = answer["arrays"]
-        return outputs
+        return answer["arrays"]
 
     def _ask(self, request: dict[str, Any], arrays: list[Any] | None = None) -> dict[str, Any]:
         if not self._end.alive:

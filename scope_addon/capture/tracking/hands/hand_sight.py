@@ -76,8 +76,7 @@ class Sight:
     @property
     def wrist_px(self) -> NDArray[np.float64]:
         """The body's wrist (2,)."""
-        wrist: NDArray[np.float64] = self.person.keypoints_px[WRISTS[self.side]]
-        return wrist
+        return self.person.keypoints_px[WRISTS[self.side]]
 
     @property
     def wrist_confidence(self) -> float:
