@@ -19,8 +19,7 @@ from ....solver.residuals import joint_limits
 from ....solver.rotations import exp, log
 from ...errors import UsageError
 from ...kinematics.smoothing import fill_rotation_gaps
-from ..perception.hand_landmarks import HAND_NAMES, HAND_POINTS
-from ..perception.hand_region import SIDES
+from ..perception.hand_landmarks import HAND_NAMES, HAND_POINTS, SIDES
 from ..perception.lifter import camera_towards
 
 FINGERS = ("index", "middle", "ring", "pinky", "thumb")

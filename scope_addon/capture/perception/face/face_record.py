@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .....solver.names import EXPRESSIONS
-from .expression_network import EXPRESSION_POINTS
-from .face_landmarks import FACE_POINTS, FaceEstimate
+from .face_landmarks import EXPRESSION_POINTS, FACE_POINTS, FaceEstimate
 
 # Landmarks that are kept: the outline of the face, brows, eyes, irises, nose and lips.
 CONTOURS = (

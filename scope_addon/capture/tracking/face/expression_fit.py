@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from .....solver.errors import ModelFileError
 from .....solver.loaders.npz import read_npz
 from .....solver.rotations import log
-from ...perception.face.expression_network import EXPRESSION_POINTS, ExpressionNetwork
+from ...perception.face.face_landmarks import EXPRESSION_POINTS, ExpressionNetwork
 from ...perception.face.face_record import gaze, kept_landmarks, landmarks_of, parts, with_expression
 
 FILE = Path(__file__).resolve().parents[4] / "assets" / "face" / "response.npz"

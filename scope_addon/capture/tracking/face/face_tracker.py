@@ -12,9 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...perception.execution import Execution
-from ...perception.face.expression_network import ExpressionNetwork
 from ...perception.face.eye_light import eye_light
-from ...perception.face.face_landmarks import HEAD, FaceEstimate, FaceNetwork, facing, region_from_body
+from ...perception.face.face_landmarks import (
+    HEAD,
+    ExpressionNetwork,
+    FaceEstimate,
+    FaceNetwork,
+    facing,
+    region_from_body,
+)
 from ...perception.face.face_record import record
 from ...perception.observation import Observation
 from ...perception.region import Region

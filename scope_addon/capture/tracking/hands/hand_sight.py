@@ -10,8 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...perception.hand_landmarks import HAND_POINTS, HandEstimate, HandNetwork
-from ...perception.hand_region import HAND_LENGTH_M, WRISTS, region_from_body
+from ...perception.hand_landmarks import HAND_LENGTH_M, HAND_POINTS, WRISTS, HandEstimate, HandNetwork, region_from_body
 from ...perception.observation import Observation
 from ...perception.region import Region
 from ..appearance import sample

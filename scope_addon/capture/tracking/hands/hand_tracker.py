@@ -13,8 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...perception.execution import Execution
-from ...perception.hand_landmarks import HAND_POINTS, PALM_THRESHOLD, HandEstimate, HandNetwork, PalmDetector
-from ...perception.hand_region import SIDES, pixels_per_metre
+from ...perception.hand_landmarks import (
+    HAND_POINTS,
+    PALM_THRESHOLD,
+    SIDES,
+    HandEstimate,
+    HandNetwork,
+    PalmDetector,
+    pixels_per_metre,
+)
 from ...perception.observation import Observation
 from ...perception.region import Region
 from ..frame_clock import EAGER_S, FRAME_S, PATIENCE_S, is_search_due

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...perception.hand_region import HAND_LENGTH_M, SIDES, pixels_per_metre
+from ...perception.hand_landmarks import HAND_LENGTH_M, SIDES, pixels_per_metre
 from ...perception.landmark_network import KEYPOINT_NAMES
 from ..track import Track
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception.hand_region import HAND_LENGTH_M, pixels_per_metre
+from scope.scope_addon.capture.perception.hand_landmarks import HAND_LENGTH_M, pixels_per_metre
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.tracking.hands.wrists_at_hands import wrists_at_hands
 

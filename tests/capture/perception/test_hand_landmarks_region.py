@@ -5,9 +5,11 @@ import math
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception.hand_landmarks import HAND_NAMES, PALM_INPUT_SIZE, _in_image
-from scope.scope_addon.capture.perception.hand_region import (
+from scope.scope_addon.capture.perception.hand_landmarks import (
     HAND_LENGTH_M,
+    HAND_NAMES,
+    PALM_INPUT_SIZE,
+    _in_image,
     pixels_per_metre,
     region_from_body,
     region_from_landmarks,
