@@ -14,8 +14,7 @@ from ....solver.loaders.body_file import CHILD_BELOW_M
 from ...kinematics.body_surface import with_arm_points
 from ...kinematics.contact_points import CONTACT_POINTS, with_contact_points
 from ..camera.intrinsics import Camera
-from ..perception.lifter import Lifted, default_lifter
-from ..perception.lifter_window import windows_around
+from ..perception.lifter import Lifted, default_lifter, windows_around
 from ..tracking.face.head_direction import across_head, certainty
 from ..tracking.track import Track
 from .ablation import NO_ABLATION, Ablation

@@ -13,8 +13,8 @@ import onnx
 import pytest
 from onnx import TensorProto, helper, numpy_helper
 from scope.scope_addon.capture.perception.adapters.detectors.box_detector import BoxDetector
+from scope.scope_addon.capture.perception.adapters.graph import check_onnx_file
 from scope.scope_addon.capture.perception.adapters.keypoints.keypoint_network import KeypointNetwork
-from scope.scope_addon.capture.perception.adapters.onnx_file import check_onnx_file
 from scope.scope_addon.cli import SAMPLE, main
 from scope.solver.errors import ModelFileError
 
