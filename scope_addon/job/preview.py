@@ -126,7 +126,8 @@ def draw(
         large = _with_body(large, pose, scale * _SUPERSAMPLE)
     elif observation is not None:
         _draw_skeleton(large, observation, scale * _SUPERSAMPLE)
-    return cv2.cvtColor(cv2.resize(large, size, interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2RGBA)
+    rgba: NDArray[Any] = cv2.cvtColor(cv2.resize(large, size, interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2RGBA)
+    return rgba
 
 
 def _with_body(image: NDArray[np.uint8], pose: LivePose, scale: float) -> NDArray[np.uint8]:

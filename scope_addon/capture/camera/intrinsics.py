@@ -43,7 +43,8 @@ class Camera:
 
         flat = np.ascontiguousarray(points_px, float).reshape(-1, 1, 2)
         undistorted = cv2.undistortPoints(flat, self.intrinsics, self.dist, P=self.intrinsics)
-        return undistorted.reshape(points_px.shape)
+        reshaped: NDArray[Any] = undistorted.reshape(points_px.shape)
+        return reshaped
 
     def rays(self, points_px: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
         """Return the (..., 3) lines of sight of pixels (..., 2), in camera axes, with z = 1."""

@@ -16,7 +16,7 @@ from scope.scope_addon.capture.world.clip import clip_fit
 from scope.scope_addon.errors import UsageError
 from scope.solver import Body, Weights
 
-from .outline.silhouettes import K, seen_in
+from ..silhouettes import K, seen_in
 
 WEIGHTS = Weights(keypoints2d=1e5, keypoints3d=100.0, orientation_field=400.0, joint_prior=3.0)
 

@@ -15,7 +15,7 @@ from scope.scope_addon.capture.perception.observation import PersonMask
 from scope.solver import Body, ClipFit, Options, PosePriors, Priors, Stage, State, Weights, fit_clip
 from scope.solver.measurements import Measurements
 
-from .silhouettes import REGION, SIZE, K, mask_of, posed, standing, surface_error
+from ..silhouettes import REGION, SIZE, K, mask_of, posed, standing, surface_error
 
 CLOTHES_PX = 12  # of the mask: 17 cm at this distance
 WEIGHTS = Weights(keypoints2d=0.0, joint_prior=0.0, joint_limits=0.0, shape=1.0, tables={"outline": 3e5})

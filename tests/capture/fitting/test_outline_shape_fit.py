@@ -15,7 +15,7 @@ from scope.scope_addon.capture.fitting.prepared_track import prepare_track
 from scope.scope_addon.capture.tracking.track import Track
 from scope.solver import Body
 
-from .silhouettes import K, seen_in
+from ..silhouettes import K, seen_in
 
 GIRTH_M, MASS_KG = {"skirt": 0.078, "coat": 0.38}, {"skirt": 5.0, "coat": 38.0}  # what they may add
 HEMS = (0.5, 1.0, 2.0, 3.0)  # times as far off the body as the garment's own

@@ -32,7 +32,7 @@ def test_heatmap_peaks_between_cells(tmp_path: Path, how: str, udp: bool) -> Non
     path = fixed(tmp_path / "m.onnx", 192, 256, {"heatmaps": np.stack(maps)[None].astype(np.float32)})
     path.with_suffix(".json").write_text(json.dumps({"decode": how, "udp": udp}))
     network = KeypointNetwork(path, threads=1)
-    points, scores = network._decode(network._graph.trial_outputs, network._graph)
+    points, scores = network._format.decode(network._graph.trial_outputs, network._graph, network._description)
     pixels = middle * ([191 / 47, 255 / 63] if udp else 4.0)
     assert np.abs(points - pixels).max() < (0.05 if how == "dark" else 1.1)
     assert scores.min() > 0.9
