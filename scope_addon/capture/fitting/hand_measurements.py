@@ -35,6 +35,13 @@ RELIABLE = 0.8  # presence below which directions count by its cube: of a blurre
 # Flexion of a finger joint towards the palm, at least and at most, and largest deviation from this axis; radians.
 _KNUCKLE, _HINGE = (-0.5, 1.7, 0.4), (-0.2, 2.0, 0.2)
 _THUMB = (-0.4, 0.4, 1.2)  # rotation of a thumb joint about its own bone, and deviation from it
+# The keypoints that are joints, in the keypoints' order: the wrist, then three per finger, the thumb first.
+_JOINTS = np.array([0, *(4 * finger + k for finger in range(5) for k in (1, 2, 3))])
+# Pairs of keypoints with a known direction: those of the palm, then three per finger.
+_PALM_BONES = [(0, 5), (0, 9), (0, 13), (0, 17), (5, 17)]
+_BONES = np.array([*_PALM_BONES, *((4 * finger + k, 4 * finger + k + 1) for finger in range(5) for k in (1, 2, 3))])
+_PIXEL_WEIGHTS = np.array([WRIST_PIXEL_WEIGHT, *[PIXEL_WEIGHT] * (HAND_POINTS - 1)])
+_TIP = {f: f"{f}_tip" if f in ("pinky", "thumb") else f"{f}_finger_tip" for f in FINGERS}
 _MIDDLE_KNUCKLE = HAND_NAMES.index("middle_finger_mcp")
 SHORT_GAP_S, LONG_GAP_S = 0.3, 1.0  # unseen fingers begin to return to rest after the first, and rest after the second
 
@@ -80,7 +87,7 @@ class HandMeasurer:
         self.fingers = [finger_joints(body, side) for side in SIDES]
         self.wrists = [body.joint_names.index(f"{side}_wrist") for side in SIDES]
         # Bones as (from, to): pairs of the hand's keypoints, and the solver's indices of the same points.
-        self._from, self._to = np.array(_bones()).T
+        self._from, self._to = _BONES.T
         self._starts, self._ends = (
             np.array([self._points(side)[pairs] for side in range(len(SIDES))]) for pairs in (self._from, self._to)
         )
@@ -138,20 +145,6 @@ class HandMeasurer:
         return out
 
 
-def _bones() -> list[tuple[int, int]]:
-    """Return the pairs of keypoints with a known direction: those of the palm, then three per finger."""
-    palm = [(0, 5), (0, 9), (0, 13), (0, 17), (5, 17)]
-    return palm + [(k, k + 1) for finger in range(5) for k in range(4 * finger + 1, 4 * finger + 4)]
-
-
-# The keypoints that are joints, in the keypoints' order: the wrist, then three per finger, the thumb first.
-_JOINTS = np.array([0, *(4 * finger + k for finger in range(5) for k in (1, 2, 3))])
-
-
-_PIXEL_WEIGHTS = np.full(HAND_POINTS, PIXEL_WEIGHT)
-_PIXEL_WEIGHTS[0] = WRIST_PIXEL_WEIGHT
-
-
 def with_finger_limits(priors: Priors, body: Body) -> Priors:
     """Add joint limits of the fingers to the priors.
 
@@ -182,9 +175,6 @@ def with_finger_limits(priors: Priors, body: Body) -> Priors:
     if priors.limits is not None:
         ints, floats = np.vstack([priors.limits[0], ints]), np.vstack([priors.limits[1], floats])
     return replace(priors, limits=(ints, floats))
-
-
-_TIP = {f: f"{f}_tip" if f in ("pinky", "thumb") else f"{f}_finger_tip" for f in FINGERS}
 
 
 def smooth_fingers(

@@ -124,13 +124,8 @@ def _film(path: Path, container: InputContainer) -> av.VideoStream:
         raise VideoError(f"{path} contains only audio; choose the file with the video")
     if film is None or not film.codec_context:
         raise _undecodable(path)
-    check_size(path, *_size(film.width, film.height, _aspect(film)))
+    check_size(path, *_size(film.width, film.height, float(film.sample_aspect_ratio or 1)))
     return film
-
-
-def _aspect(stream: av.VideoStream) -> float:
-    """Return the width of a stream's pixels over their height."""
-    return float(stream.sample_aspect_ratio or 1)
 
 
 def _undecodable(path: Path) -> VideoError:
@@ -228,7 +223,7 @@ class PyavReader:
         self._frames = self._whole(self._decoded)
         self._start = self._stream.start_time or 0  # in units of the stream
         self.is_mirrored, self.clockwise_deg = False, 0
-        self._aspect = _aspect(self._stream)
+        self._aspect = float(self._stream.sample_aspect_ratio or 1)  # width of a pixel over its height
         self.rate = float(self._stream.guessed_rate or self._stream.average_rate or 0)
         duration_s = (container.duration or 0) / 1e6
         self.frame_count = float(self._stream.frames or round(duration_s * self.rate))

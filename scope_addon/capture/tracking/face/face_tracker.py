@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...perception.execution import Execution
-from ...perception.face.eye_light import eye_light
 from ...perception.face.face_landmarks import (
     HEAD,
     ExpressionNetwork,
     FaceEstimate,
     FaceNetwork,
+    eye_light,
     facing,
     region_from_body,
 )

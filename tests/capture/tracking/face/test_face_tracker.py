@@ -7,8 +7,12 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
-from scope.scope_addon.capture.perception.face.eye_light import eye_light
-from scope.scope_addon.capture.perception.face.face_landmarks import FACE_POINTS, FaceEstimate, region_from_body
+from scope.scope_addon.capture.perception.face.face_landmarks import (
+    FACE_POINTS,
+    FaceEstimate,
+    eye_light,
+    region_from_body,
+)
 from scope.scope_addon.capture.perception.face.face_record import eye_light_of, parts
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.observation import Observation
