@@ -65,8 +65,6 @@ class PersonDetector:
 
         Searches the whole image. If that finds nobody with a high score, or with ``closely``, the search continues in
         overlapping squares of an oblong image, which show people larger.
-
-        :param closely: search the squares in any case.
         """
         found = self._detect_in(image_rgb, threshold, (0, 0))
         if closely or not found or found[0].score < _SURE_SCORE:

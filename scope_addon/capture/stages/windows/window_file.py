@@ -287,7 +287,6 @@ class KeptWindows:
     and this program, each set of options has a folder of its own. What cannot be read or written is not kept.
 
     :param unfinished: folder of the capture, need not exist; None: nothing is kept.
-    :param size: of the image, width and height in pixels.
     """
 
     def __init__(self, unfinished: Path | None, options: CaptureOptions, size: tuple[int, int]) -> None:

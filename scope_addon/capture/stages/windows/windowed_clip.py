@@ -85,7 +85,6 @@ class WindowedClip:
     ) -> tuple[Footage, list[Track]]:
         """Observe all windows, and join them.
 
-        :param background: which loads the solver, and estimates the focal length.
         :param folder: with the files of windows that were observed before.
         :raises VideoError: there is no frame.
         """
