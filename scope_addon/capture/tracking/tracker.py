@@ -58,10 +58,11 @@ APPEARANCE_S = 4 * FRAME_S  # between two samples of the appearance
 _MIN_REDETECTION_AGE = 6  # frames for which somebody was tracked
 _JUST_LOST_FRAMES = 2  # within which a detected body at the prediction continues the tracklet
 _SAME_TARGET, _LOST_TARGET, _REPLACED_TARGET = 0.12, 0.5, 0.35  # distances of regions in sides, see `Region.resembles`
-_ROTATIONS = tuple(k * math.pi / 6 for k in range(12))
-_SCALES = (1.0, 1.35)
-_MIN_PRESENCE = 0.9
-_MAX_INNOVATION = 0.35
+# Of the regions in which somebody who was lost is looked for, see `redetect_rotated`, and of what is found there.
+_REDETECTION_ROTATIONS = tuple(k * math.pi / 6 for k in range(12))
+_REDETECTION_SCALES = (1.0, 1.35)
+_MIN_REDETECTION_PRESENCE = 0.9
+_MAX_REDETECTION_INNOVATION = 0.35
 CURLED_SPREAD = 0.25
 LEAVING_SHARE = 0.8  # a lost person with fewer of the keypoints in the image has left it
 
@@ -382,13 +383,13 @@ def redetect_rotated(
         return None
     candidates = [
         replace(predicted, rotation=predicted.rotation + rotation, side_px=predicted.side_px * scale)
-        for scale in _SCALES
-        for rotation in _ROTATIONS
+        for scale in _REDETECTION_SCALES
+        for rotation in _REDETECTION_ROTATIONS
     ]
     regions = [region for region in candidates if is_in_image(region, image_rgb)]
-    found = [e for e in landmarks.estimate(image_rgb, regions) if e.presence >= _MIN_PRESENCE]
+    found = [e for e in landmarks.estimate(image_rgb, regions) if e.presence >= _MIN_REDETECTION_PRESENCE]
     found = [e for e in found if e.spread >= CURLED_SPREAD and e.disagreement <= DISAGREEMENT_THRESHOLD]
     found = [e for e in found if is_center_in_image(e, image_rgb)]
     found = [e for e in found if not any(is_same_body(e, target.estimate) for target in live)]
     nearest = min(found, key=lost.innovation, default=None)
-    return nearest if nearest is not None and lost.innovation(nearest) <= _MAX_INNOVATION else None
+    return nearest if nearest is not None and lost.innovation(nearest) <= _MAX_REDETECTION_INNOVATION else None

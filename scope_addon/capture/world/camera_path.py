@@ -14,6 +14,7 @@ from ..fitting.frame_sequence import FittedTrack
 from ..fitting.prepared_track import Stance
 from ..tracking.scene_cuts import SCENE_GAP_S
 
+# Of the travel, see `camera_travel`.
 MIN_SPEED_M_S = 0.25  # slower sliding is explained by depth errors
 MAX_SPREAD = 0.8  # median deviation of the feet's velocities from their median, relative to the median
 MIN_SAMPLES = 12

@@ -47,7 +47,7 @@ from .window_run import WindowRun
 
 # Called when a window has ended, with its run and that of the next window; returns the run to go on with.
 Seam = Callable[[WindowRun, WindowRun | None], WindowRun | None]
-_THREADS = 2  # in which backgrounds are followed
+_THREADS = 2  # in which backgrounds are followed by `observe_windows`
 
 
 class WindowedClip:
