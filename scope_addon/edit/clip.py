@@ -43,7 +43,8 @@ class Clip:
         :return: (T, 4, 3) left heel, left toe, right heel, right toe on the sole, metres, world frame.
         """
         R, t = body.forward_kinematics(self.rotations, self.root - body.rest_joints(betas)[0], betas)
-        return contact_point_positions(with_contact_points(body, betas), R, t)[:, : len(SOLES)]
+        points: NDArray[np.float64] = contact_point_positions(with_contact_points(body, betas), R, t)[:, : len(SOLES)]
+        return points
 
     def joints(self, body: Body, betas: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
         """Return the joint positions.

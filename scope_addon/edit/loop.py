@@ -83,13 +83,15 @@ def _moves(joints: NDArray[np.float64], least: float) -> NDArray[np.bool_]:
     """
     apart = np.sqrt(_squared_distances(joints.reshape(len(joints), -1)) / joints.shape[1])
     farthest = np.maximum.accumulate(np.triu(apart), axis=1)  # from pose a on, up to pose b
-    return (farthest >= least) & (apart <= 0.5 * farthest)
+    moves: NDArray[np.bool_] = (farthest >= least) & (apart <= 0.5 * farthest)
+    return moves
 
 
 def _squared_distances(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the squared distances (N, N) between points (N, D)."""
     squares = (points**2).sum(1)
-    return np.maximum(squares[:, None] + squares[None] - 2 * points @ points.T, 0.0)
+    apart: NDArray[np.float64] = np.maximum(squares[:, None] + squares[None] - 2 * points @ points.T, 0.0)
+    return apart
 
 
 def close_cycle(clip: Clip, cycle: Cycle, blend: float = 0.2) -> Clip:

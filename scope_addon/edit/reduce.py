@@ -70,7 +70,8 @@ def _keep(
 
 def _lerp(times: NDArray[np.float64], values: NDArray[np.float64], a: int, b: int, part: slice) -> NDArray[np.float64]:
     share: NDArray[np.float64] = ((times[part] - times[a]) / (times[b] - times[a]))[:, None]
-    return values[a] + share * (values[b] - values[a])
+    interpolated: NDArray[np.float64] = values[a] + share * (values[b] - values[a])
+    return interpolated
 
 
 def angles_between(q: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -82,4 +83,5 @@ def angles_between(q: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArr
     """
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
     chord = np.minimum(np.linalg.norm(q - wanted, axis=-1), np.linalg.norm(q + wanted, axis=-1))
-    return 4.0 * np.arcsin(np.clip(0.5 * chord, 0.0, 1.0))
+    angles: NDArray[np.float64] = 4.0 * np.arcsin(np.clip(0.5 * chord, 0.0, 1.0))
+    return angles

@@ -92,7 +92,8 @@ def _smoothed_further(clip: Clip, strength: float) -> Clip:
 def _reflected(root: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return positions (n, 3) with directions turned by 180° about that of ``end``, and distances d as end² / d."""
     squared = np.maximum(np.sum(root * root, axis=1, keepdims=True), 1e-12)
-    return (2 * (root @ end)[:, None] * end - float(end @ end) * root) / squared
+    reflected: NDArray[np.float64] = (2 * (root @ end)[:, None] * end - float(end @ end) * root) / squared
+    return reflected
 
 
 def _with_resting_feet(calm: Clip, finished: Clip, motion: Motion, body: Body) -> Clip:

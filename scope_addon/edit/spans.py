@@ -99,7 +99,8 @@ def _limited(v: NDArray[np.float64], step: NDArray[np.float64]) -> NDArray[np.fl
     """Limit velocities to three times the step; above that a cubic overshoots (Fritsch and Carlson)."""
     size = np.linalg.norm(v, axis=-1, keepdims=True)
     most = 3.0 * np.linalg.norm(step, axis=-1, keepdims=True)
-    return v * np.minimum(1.0, most / np.maximum(size, 1e-12))
+    limited: NDArray[np.float64] = v * np.minimum(1.0, most / np.maximum(size, 1e-12))
+    return limited
 
 
 def _velocities(clip: Clip, k: int, side: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -157,7 +157,8 @@ def _vertex_normals(body: Body, betas: NDArray[np.floating[Any]]) -> NDArray[np.
     for corner in range(3):
         np.add.at(normals, triangles[:, corner], areas if volume > 0.0 else -areas)
     length: NDArray[np.float64] = np.linalg.norm(normals, axis=1, keepdims=True)
-    return normals / np.maximum(length, np.finfo(float).tiny)
+    unit: NDArray[np.float64] = normals / np.maximum(length, np.finfo(float).tiny)
+    return unit
 
 
 def one_per_cell(points: NDArray[np.floating[Any]], side_m: float) -> NDArray[np.intp]:

@@ -97,7 +97,8 @@ def depth_under_floor(motion: Motion, body: Body) -> NDArray[np.float64]:
     """Return how far the lowest foot of each frame is under the floor, (T,) metres; 0 above it and on uneven ground."""
     if motion.uneven_ground:
         return np.zeros(len(motion))
-    return np.maximum(-foot_heights(motion, body).min(axis=1), 0.0)
+    depth: NDArray[np.float64] = np.maximum(-foot_heights(motion, body).min(axis=1), 0.0)
+    return depth
 
 
 def lower_floors(

@@ -36,7 +36,8 @@ def bone_depths(
     :param ends: (T, 3) the next one.
     :param center: (T, 3) the camera.
     """
-    return ((ends - starts) * line_of_sight(ends - center)).sum(axis=1)
+    depths: NDArray[np.float64] = ((ends - starts) * line_of_sight(ends - center)).sum(axis=1)
+    return depths
 
 
 def runs_of_one_sign(depths: NDArray[np.floating[Any]], shallow: float, deep: float) -> list[slice]:
@@ -83,4 +84,5 @@ def _mirrored(
 ) -> NDArray[np.floating[Any]]:
     bone, sight = ends - starts, line_of_sight(ends - center)
     other = bone - 2.0 * (bone * sight).sum(axis=1, keepdims=True) * sight
-    return shortest_turn(bone, other) @ R
+    turned: NDArray[np.floating[Any]] = shortest_turn(bone, other) @ R
+    return turned

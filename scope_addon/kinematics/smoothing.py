@@ -105,7 +105,8 @@ def gaussian_smooth(
         w = np.exp(-0.5 * ((times[start] - times[to]) / sigma) ** 2)
         total[to] += w[:, None] * flat[start]
         weight[to] += w
-    return (total / weight[:, None]).reshape(values.shape)
+    smooth: NDArray[np.float64] = (total / weight[:, None]).reshape(values.shape)
+    return smooth
 
 
 def smooth_rotations(
@@ -143,4 +144,7 @@ def smooth_root(
     distance = np.maximum(np.linalg.norm(t_camera_root, axis=1, keepdims=True), 1e-6)
     ray = gaussian_smooth(t_camera_root / distance, times, ROTATION_CUTOFF_HZ / strength)
     ray /= np.maximum(np.linalg.norm(ray, axis=1, keepdims=True), 1e-6)
-    return ray * np.exp(gaussian_smooth(np.log(distance), times, DEPTH_CUTOFF_HZ / strength))
+    smooth: NDArray[np.floating[Any]] = ray * np.exp(
+        gaussian_smooth(np.log(distance), times, DEPTH_CUTOFF_HZ / strength)
+    )
+    return smooth

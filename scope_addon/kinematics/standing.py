@@ -28,7 +28,8 @@ LEVEL_M = 0.25  # h_l: feet standing farther above or below stand on something e
 
 def line_of_sight(position: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
     """Return the (..., 3) unit vectors from the camera's centre to positions (..., 3) relative to it."""
-    return position / np.maximum(np.linalg.norm(position, axis=-1, keepdims=True), 1e-9)
+    unit: NDArray[np.floating[Any]] = position / np.maximum(np.linalg.norm(position, axis=-1, keepdims=True), 1e-9)
+    return unit
 
 
 def standing_probability(
@@ -104,7 +105,8 @@ def speed_across(
     :param times: (T,) seconds.
     :param center: (T, 3) or (3,) the camera's centre; None: the whole speed.
     """
-    return np.linalg.norm(velocity_across(points, times, center), axis=-1)
+    speed: NDArray[np.floating[Any]] = np.linalg.norm(velocity_across(points, times, center), axis=-1)
+    return speed
 
 
 def velocity_across(
@@ -133,7 +135,8 @@ def _downward_acceleration(
         return np.zeros(velocity.shape[:2])
     down = -np.gradient(velocity @ up, times, axis=0)
     down[0], down[-1] = down[1], down[-2]  # differences of the two outermost frames alone are mostly noise
-    return np.maximum(down, 0.0)
+    falling: NDArray[np.floating[Any]] = np.maximum(down, 0.0)
+    return falling
 
 
 def logistic(x: NDArray[np.floating[Any]] | float) -> NDArray[np.floating[Any]]:

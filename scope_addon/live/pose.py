@@ -50,4 +50,5 @@ class LivePose:
     @property
     def R_world_root(self) -> NDArray[np.float64]:
         """Rotation (3, 3) of the pelvis."""
-        return self.T_world_camera[:3, :3] @ self.rotations[0]
+        R: NDArray[np.float64] = self.T_world_camera[:3, :3] @ self.rotations[0]
+        return R

@@ -301,4 +301,5 @@ class LiveSession:
         """Return the (K+1, 3) joints, world."""
         body = self._body
         _, joints = body.forward_kinematics(rotations, root - body.rest_joints(betas)[0], betas)
-        return joints @ T_world_camera[:3, :3].T + T_world_camera[:3, 3]
+        world: NDArray[np.float64] = joints @ T_world_camera[:3, :3].T + T_world_camera[:3, 3]
+        return world

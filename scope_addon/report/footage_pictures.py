@@ -69,7 +69,8 @@ def overlay_pictures(
 
 def spread_rows(count: int, most: int) -> NDArray[np.int64]:
     """Return at most ``most`` of the rows from 0 to ``count`` − 1, (n,), spread evenly, the first and last included."""
-    return np.unique(np.round(np.linspace(0, count - 1, min(count, most))).astype(np.int64))
+    rows: NDArray[np.int64] = np.unique(np.round(np.linspace(0, count - 1, min(count, most))).astype(np.int64))
+    return rows
 
 
 def small_picture(row: int, image: NDArray[np.uint8], longest_side: int = LONGEST_SIDE) -> Picture:

@@ -38,8 +38,10 @@ class Axis:
     def share(self, values: Array) -> Array:
         """Return where values (n,) lie between ``low``, 0, and ``high``, 1: (n,)."""
         if self.logarithmic:
-            return np.log(np.asarray(values) / self.low) / math.log(self.high / self.low)
-        return (np.asarray(values) - self.low) / (self.high - self.low)
+            shares: Array = np.log(np.asarray(values) / self.low) / math.log(self.high / self.low)
+            return shares
+        linear: Array = (np.asarray(values) - self.low) / (self.high - self.low)
+        return linear
 
     def ticks(self, count: int = 5) -> list[float]:
         """Return at most about ``count`` round values between the ends, both included where they are round."""

@@ -105,7 +105,8 @@ def flat_toes(
     angle = np.arcsin(np.clip(tip[..., 2] / length, -1, 1))
     lift = np.where(penetrates, np.arcsin(lowest / length) - angle, 0.0)
     side = np.stack([tip[..., 1], -tip[..., 0], np.zeros_like(across)], axis=-1) / np.maximum(across, 1e-9)[..., None]
-    return exp(side * lift[..., None]) @ toe
+    raised: NDArray[np.float64] = exp(side * lift[..., None]) @ toe
+    return raised
 
 
 def pelvis_drop(
@@ -129,7 +130,8 @@ def pelvis_drop(
     width = np.arange(-frames, frames + 1)
     near = np.clip(np.arange(len(needed))[:, None] + width, 0, len(needed) - 1)
     weight = 1 + np.cos(np.pi * width / (frames + 1))
-    return needed[near].max(axis=1)[near] @ (weight / weight.sum())
+    smooth: NDArray[np.float64] = needed[near].max(axis=1)[near] @ (weight / weight.sum())
+    return smooth
 
 
 def _heading(turn: NDArray[np.float64]) -> NDArray[np.float64]:

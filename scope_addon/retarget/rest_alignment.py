@@ -74,7 +74,8 @@ def _heading_turn(along: NDArray[np.float64], wanted: NDArray[np.float64]) -> ND
     if np.linalg.norm(flat) <= 0.3 * np.linalg.norm(along):
         return np.eye(3)
     angle = np.arctan2(goal[1], goal[0]) - np.arctan2(flat[1], flat[0])
-    return exp(UP * ((angle + np.pi) % (2 * np.pi) - np.pi))
+    turn: NDArray[np.float64] = exp(UP * ((angle + np.pi) % (2 * np.pi) - np.pi))
+    return turn
 
 
 def _palm_alignment(
@@ -93,4 +94,5 @@ def _palm_alignment(
             return None
         axes = np.stack([along, np.cross(normal, along), normal], axis=1)
         palms.append(axes / np.linalg.norm(axes, axis=0))
-    return palms[1] @ palms[0].T
+    alignment: NDArray[np.float64] = palms[1] @ palms[0].T
+    return alignment

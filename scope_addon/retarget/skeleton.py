@@ -29,12 +29,16 @@ class Skeleton:
     @cached_property
     def offsets(self) -> NDArray[np.float64]:
         """From the head of each bone's carrier to its own (B, 3), metres, in its axes; undefined for roots."""
-        return rotated(np.swapaxes(self.rotations[self.carriers], 1, 2), self.heads - self.heads[self.carriers])
+        out: NDArray[np.float64] = rotated(
+            np.swapaxes(self.rotations[self.carriers], 1, 2), self.heads - self.heads[self.carriers]
+        )
+        return out
 
     @cached_property
     def rested(self) -> NDArray[np.float64]:
         """R_parent0ᵀ R_b0 of each bone (B, 3, 3); undefined without a parent."""
-        return np.swapaxes(self.rotations[self.parents], 1, 2) @ self.rotations
+        out: NDArray[np.float64] = np.swapaxes(self.rotations[self.parents], 1, 2) @ self.rotations
+        return out
 
 
 @dataclass(frozen=True)
@@ -55,7 +59,8 @@ def basis(rig: Skeleton, world: NDArray[np.float64]) -> NDArray[np.float64]:
     rested = world[:, rig.parents] @ rig.rested
     roots = rig.parents < 0
     rested[:, roots] = rig.rotations[roots]
-    return np.swapaxes(rested, 2, 3) @ world
+    out: NDArray[np.float64] = np.swapaxes(rested, 2, 3) @ world
+    return out
 
 
 def head_positions(rig: Skeleton, world: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -75,4 +80,5 @@ def head_positions(rig: Skeleton, world: NDArray[np.float64]) -> NDArray[np.floa
 
 def rotated(rotations: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the vectors (..., 3) rotated by (..., 3, 3)."""
-    return (rotations @ vectors[..., None])[..., 0]
+    out: NDArray[np.float64] = (rotations @ vectors[..., None])[..., 0]
+    return out

@@ -41,7 +41,8 @@ def skeleton_picture(
     blocks = picture.reshape(size, _FINER, size, _FINER, 4)
     alpha = blocks[..., 3].mean(axis=(1, 3))
     color = (blocks[..., :3] * blocks[..., 3:]).mean(axis=(1, 3)) / np.maximum(alpha, 1e-6)[..., None]
-    return np.concatenate([np.clip(color, 0.0, 1.0), alpha[..., None]], axis=2).astype(np.float32)
+    out: NDArray[np.float32] = np.concatenate([np.clip(color, 0.0, 1.0), alpha[..., None]], axis=2).astype(np.float32)
+    return out
 
 
 def _on_screen(

@@ -179,4 +179,5 @@ def _link(before: BackgroundRecord, part: BackgroundRecord, first: int) -> NDArr
         total = before.R_first_camera[seen[-1]] if len(seen) else np.eye(3)
     U, _, Vt = np.linalg.svd(total)
     U[:, -1] *= np.sign(np.linalg.det(U @ Vt))
-    return U @ Vt
+    link: NDArray[np.float64] = U @ Vt
+    return link

@@ -191,7 +191,8 @@ class BackgroundTracker:
         # A working pixel's centre in the full image: OpenCV scales areas, not their centres.
         full = ((points + 0.5) / (self._scale * self._step) - 0.5) * self._step
         rays = self._camera.rays(full)
-        return rays / np.linalg.norm(rays, axis=1, keepdims=True)
+        unit: NDArray[np.float64] = rays / np.linalg.norm(rays, axis=1, keepdims=True)
+        return unit
 
     def _box(self, box_px: NDArray[Any]) -> NDArray[np.float64]:
         """Return a box x0, y0, x1, y1 in the working image, with a margin."""
@@ -231,7 +232,8 @@ def _kabsch(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float6
     U, _, Vt = np.linalg.svd(np.swapaxes(b, -1, -2) @ a)
     sign = np.sign(np.linalg.det(U @ Vt))
     U[..., :, 2] *= sign[..., None]
-    return U @ Vt
+    R: NDArray[np.float64] = U @ Vt
+    return R
 
 
 def _flow(
@@ -276,7 +278,8 @@ class HiddenBackground:
     def hides(self, points: NDArray[np.floating[Any]]) -> NDArray[np.bool_]:
         """Return (n,) whether each point (n, 2) of the image, in pixels, was hidden so far."""
         column, row = np.clip((points + 0.5) / self._cell_px, 0, CELLS - 1).astype(int).reshape(-1, 2).T
-        return self._hidden[row * CELLS + column]
+        hidden: NDArray[np.bool_] = self._hidden[row * CELLS + column]
+        return hidden
 
     def _covered(self, people: Sequence[NDArray[Any]]) -> NDArray[np.bool_]:
         """Return whether each cell is wholly behind one of the people."""

@@ -83,7 +83,8 @@ def remove_heading_drift(
     vectors = np.array([np.zeros(3), *(vector for _, vector in known)])
     drifts = np.stack([np.interp(times, times[rows], vectors[:, k]) for k in range(3)], axis=1)
     corrected: NDArray[np.float64] = exp(gaussian_smooth(drifts, times, DRIFT_CUTOFF_HZ)) @ R_first_camera
-    return corrected[0].T @ corrected
+    aligned: NDArray[np.float64] = corrected[0].T @ corrected
+    return aligned
 
 
 def _drift(

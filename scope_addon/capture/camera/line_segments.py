@@ -74,7 +74,8 @@ def plane_normals(rays: NDArray[np.floating[Any]]) -> NDArray[Any]:
     :param rays: (N, 2, 3) directions to the ends of each edge.
     """
     normals = np.cross(rays[:, 0], rays[:, 1])
-    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    unit: NDArray[Any] = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    return unit
 
 
 def find_segments(

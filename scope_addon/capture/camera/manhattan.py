@@ -116,7 +116,8 @@ class Edges:
         x, y = (np.float32(focal_px) * d[:, k, None] - d[:, 2, None] * self.middle[:, k] for k in (0, 1))
         across = x * self.along[:, 1] - y * self.along[:, 0]
         sine2 = across * across / np.maximum(x * x + y * y, np.float32(1e-12))
-        return np.exp(np.float32(-0.5 / EDGE_SIGMA**2) * sine2)
+        explained: NDArray[Any] = np.exp(np.float32(-0.5 / EDGE_SIGMA**2) * sine2)
+        return explained
 
 
 def intersection_directions(normals: NDArray[Any], up: NDArray[np.float64]) -> NDArray[Any]:
@@ -126,7 +127,8 @@ def intersection_directions(normals: NDArray[Any], up: NDArray[np.float64]) -> N
     size = np.linalg.norm(v, axis=1)
     v = v[size > 0.02] / size[size > 0.02, None]
     v *= np.where(v @ up < 0, -1.0, 1.0)[:, None]
-    return v[v @ up > np.cos(MAX_TILT)]
+    near: NDArray[Any] = v[v @ up > np.cos(MAX_TILT)]
+    return near
 
 
 def line_normal_equations(

@@ -94,7 +94,8 @@ def _grid(up: NDArray[np.float64]) -> NDArray[np.float64]:
     steps = np.tan(np.arange(-MAX_LEAN, MAX_LEAN + 1e-9, GRID_STEP))
     v = up + (steps[:, None, None] * across[0] + steps[:, None] * across[1]).reshape(-1, 3)
     v /= np.linalg.norm(v, axis=1, keepdims=True)
-    return v[v @ up > np.cos(MAX_LEAN)]
+    near: NDArray[np.float64] = v[v @ up > np.cos(MAX_LEAN)]
+    return near
 
 
 def _best_with_up(u: NDArray[np.float64], lines: Lines, up: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:

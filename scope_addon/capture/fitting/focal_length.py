@@ -93,7 +93,8 @@ def focal_from_edges(segments: Segments, width: int, height: int, assumed_px: fl
 
 
 def _log_posterior(log_ratio: NDArray[np.float64], scores: list[float]) -> NDArray[np.float64]:
-    return KAPPA * np.array(scores) - 0.5 * np.square(log_ratio / ASSUMED_DEVIATION)
+    log_p: NDArray[np.float64] = KAPPA * np.array(scores) - 0.5 * np.square(log_ratio / ASSUMED_DEVIATION)
+    return log_p
 
 
 def _moments(log_ratio: NDArray[np.float64], log_p: NDArray[np.float64]) -> tuple[float, float]:

@@ -62,7 +62,8 @@ class Measurer:
 
     def rays(self, pixels: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
         """Convert undistorted pixels (..., 2) to normalized image coordinates (..., 2)."""
-        return pixels @ self._unproject[:2, :2].T + self._unproject[:2, 2]
+        normalized: NDArray[np.floating[Any]] = pixels @ self._unproject[:2, :2].T + self._unproject[:2, 2]
+        return normalized
 
     def measure(
         self,

@@ -134,7 +134,8 @@ class HandMeasurer:
         """Return the (n, bones, 3) vectors along the bones of n hands (n, 21, 6), camera axes."""
         rays = hands[..., :2].mean(axis=1) @ self._unproject[:2, :2].T + self._unproject[:2, 2]
         R_virtual_camera = camera_towards(rays)
-        return (hands[:, self._to, 3:] - hands[:, self._from, 3:]) @ R_virtual_camera
+        bones: NDArray[np.floating[Any]] = (hands[:, self._to, 3:] - hands[:, self._from, 3:]) @ R_virtual_camera
+        return bones
 
     def joint_confidence(self, hands: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
         """Return (T, K+1), the confidence of the hand of each wrist and finger joint, of hands (T, 2, 21, 6)."""

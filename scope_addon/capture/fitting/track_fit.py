@@ -120,4 +120,5 @@ def _height_sigma(prepared: PreparedTrack, shape: ClipFit) -> float:
 def _spread(indices: NDArray[np.intp], count: int) -> NDArray[np.intp]:
     """Return at most ``count`` of the indices, evenly spread."""
     rows = np.unique(np.linspace(0, len(indices) - 1, min(count, len(indices))).round().astype(int))
-    return indices[rows]
+    chosen: NDArray[np.intp] = indices[rows]
+    return chosen

@@ -167,7 +167,8 @@ def blended(image_rgb: NDArray[np.uint8], canvas: Canvas) -> NDArray[np.uint8]:
 
 def tint(person: int) -> NDArray[np.float64]:
     """Return the (3,) sRGB colour of the person with this index."""
-    return _TINTS[person % len(_TINTS)]
+    color: NDArray[np.float64] = _TINTS[person % len(_TINTS)]
+    return color
 
 
 def body_colors(body: Body, person: int) -> NDArray[np.float64]:
@@ -176,7 +177,8 @@ def body_colors(body: Body, person: int) -> NDArray[np.float64]:
         return np.tile(tint(person), (len(body.faces), 1))
     linear = np.clip(body.material_colors[:, :3], 0, 1)
     srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    return (0.85 * tint(person) + 0.15 * srgb)[body.face_material]
+    colors: NDArray[np.float64] = (0.85 * tint(person) + 0.15 * srgb)[body.face_material]
+    return colors
 
 
 def camera_vertices(motion: Motion, body: Body, row: int) -> NDArray[np.float64]:

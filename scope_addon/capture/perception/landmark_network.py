@@ -163,7 +163,8 @@ class LandmarkNetwork:
 
 def _probability(logits: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the mask (256, 256) of the network's output (1, 1, 256, 256)."""
-    return 1.0 / (1.0 + np.exp(-np.clip(logits[0, 0], -50.0, 50.0)))
+    probability: NDArray[np.float32] = 1.0 / (1.0 + np.exp(-np.clip(logits[0, 0], -50.0, 50.0)))
+    return probability
 
 
 def _blob(crop_rgb: NDArray[np.uint8]) -> NDArray[np.float32]:

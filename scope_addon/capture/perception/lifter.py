@@ -88,7 +88,8 @@ def person_size(image_points: NDArray[np.floating[Any]]) -> NDArray[np.floating[
     """Calculate s (T,) of the module's equation from points (T, 33, 2), in the points' unit."""
     limbs = image_points[:, LIMBS]
     square = np.square(limbs - limbs.mean(axis=1, keepdims=True)).sum(axis=-1).mean(axis=-1)
-    return np.maximum(np.sqrt(square), 1e-4)
+    size: NDArray[np.floating[Any]] = np.maximum(np.sqrt(square), 1e-4)
+    return size
 
 
 def network_input(

@@ -38,12 +38,14 @@ class Region:
     def image_from_crop(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Convert crop coordinates (..., 2) to pixels: p = center + side · R · (s − ½)."""
         offset = self.side_px * (np.asarray(points) - 0.5) @ self.R_image_crop.T
-        return np.asarray(self.center_px) + offset
+        pixels: NDArray[np.float64] = np.asarray(self.center_px) + offset
+        return pixels
 
     def crop_from_image(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Convert pixels (..., 2) to crop coordinates, the inverse of `image_from_crop`."""
         offset = np.asarray(points) - np.asarray(self.center_px)
-        return offset @ self.R_image_crop / self.side_px + 0.5
+        cropped: NDArray[np.float64] = offset @ self.R_image_crop / self.side_px + 0.5
+        return cropped
 
     def cut(self, image_rgb: NDArray[np.uint8], size: int) -> NDArray[np.uint8]:
         """Resample the square to (size, size, 3); outside the image (H, W, 3), its border pixels are repeated.

@@ -71,7 +71,8 @@ def sample(image_rgb: NDArray[np.uint8], points: NDArray[np.floating[Any]]) -> N
     height, width = image_rgb.shape[:2]
     x, y = np.round(points).astype(int).T
     inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
-    return image_rgb[y[inside], x[inside]]
+    pixels: NDArray[np.uint8] = image_rgb[y[inside], x[inside]]
+    return pixels
 
 
 def _histogram(pixels: NDArray[np.uint8]) -> NDArray[np.float64]:

@@ -81,7 +81,8 @@ def scale_px_per_m(track: Track) -> NDArray[np.float64]:
     reach = round(SPREAD_S / max(float(np.median(np.diff(track.times))), 1e-3)) if len(track) > 1 else 0
     padded = np.pad(size, reach, mode="edge")
     largest = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
-    return np.maximum(largest / SPREAD_M, 1e-3)
+    scale: NDArray[np.float64] = np.maximum(largest / SPREAD_M, 1e-3)
+    return scale
 
 
 def _interpolated(

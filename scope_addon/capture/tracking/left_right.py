@@ -130,7 +130,8 @@ def _centred_body(estimate: PoseEstimate) -> NDArray[np.floating[Any]]:
     """Return the (33, n) body about its middle: in space, or in the image where depth is unknown."""
     if estimate.world_landmarks.any():
         return estimate.world_landmarks
-    return estimate.keypoints_px - estimate.keypoints_px[LIMBS].mean(axis=0)
+    centred: NDArray[np.floating[Any]] = estimate.keypoints_px - estimate.keypoints_px[LIMBS].mean(axis=0)
+    return centred
 
 
 def find_labels(
@@ -266,4 +267,5 @@ def _limb_distance(a: NDArray[np.floating[Any]], b: NDArray[np.floating[Any]]) -
 
 def mean_distance(a: NDArray[np.floating[Any]], b: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
     """Return the (...) mean distance of corresponding points a (..., n, m) and b (..., n, m)."""
-    return np.linalg.norm(a - b, axis=-1).mean(axis=-1)
+    distance: NDArray[np.floating[Any]] = np.linalg.norm(a - b, axis=-1).mean(axis=-1)
+    return distance

@@ -101,7 +101,10 @@ def _features(track: Track, limbs: _Limbs) -> tuple[NDArray[np.floating[Any]], N
     """Return f: (T, 4, 3 or 4) x, y, (z,) confidence; and the reference network's (T, 4, 2 or 3), NaN elsewhere."""
 
     def from_anchor(points: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
-        return points[:, limbs.joints] - points[:, limbs.anchors].mean(axis=1, keepdims=True)
+        relative: NDArray[np.floating[Any]] = points[:, limbs.joints] - points[:, limbs.anchors].mean(
+            axis=1, keepdims=True
+        )
+        return relative
 
     dimensions = 3 if track.has_depth else 2
     in_image = from_anchor(track.keypoints_px) / scale_px_per_m(track)[:, None, None]
@@ -115,7 +118,8 @@ def _features(track: Track, limbs: _Limbs) -> tuple[NDArray[np.floating[Any]], N
 def _reference_cost(f: NDArray[np.floating[Any]], reference: NDArray[np.float64]) -> NDArray[np.floating[Any]]:
     """Return j_t by label, (N, 2); 0 in frames without a reference."""
     residual = np.linalg.norm(f[..., : reference.shape[-1]] - reference, axis=-1) / REFERENCE_SIGMA_M
-    return np.where(np.isfinite(residual), np.minimum(residual, LIMIT), 0.0).mean(axis=-1).T
+    cost: NDArray[np.floating[Any]] = np.where(np.isfinite(residual), np.minimum(residual, LIMIT), 0.0).mean(axis=-1).T
+    return cost
 
 
 def _continuity_cost(
@@ -153,4 +157,5 @@ def _cheapest(cost: NDArray[np.float64], label_cost: NDArray[np.floating[Any]]) 
     pairs[0] += label_cost[0][:, None] + cost[1].mean(axis=0)
     switching = np.where(np.eye(2, dtype=bool)[:, :, None], cost[2:, :, :, None], np.inf)  # (N−2, a, b, b', c)
     path = least_cost_path(pairs.reshape(-1, 4), switching.reshape(-1, 4, 4))
-    return np.concatenate([path[:1] // 2, path % 2]).astype(bool)
+    labels: NDArray[np.bool_] = np.concatenate([path[:1] // 2, path % 2]).astype(bool)
+    return labels

@@ -128,7 +128,8 @@ class Tracklet:
 
 def trunk_px(keypoints_px: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
     """Return the middle (2,) of the trunk, of keypoints (33, 2) in the image."""
-    return keypoints_px[_TRUNK].mean(axis=0)
+    center: NDArray[np.floating[Any]] = keypoints_px[_TRUNK].mean(axis=0)
+    return center
 
 
 def make_track(frames: Sequence[int], times: Sequence[float], tracklets: Sequence[Tracklet]) -> Track:

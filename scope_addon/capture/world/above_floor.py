@@ -78,7 +78,8 @@ def _heights(placed: PlacedTrack, T_floor_camera: NDArray[np.float64]) -> NDArra
         poses = body.forward_kinematics(rotations, root - pelvis_at_rest, betas)
         return (skin.heights(*poses, T_floor_camera[2, :3]),)
 
-    return by_blocks(heights, placed.rotations, placed.root)[0] + T_floor_camera[2, 3]
+    above: NDArray[np.float64] = by_blocks(heights, placed.rotations, placed.root)[0] + T_floor_camera[2, 3]
+    return above
 
 
 def _foot_lifts(

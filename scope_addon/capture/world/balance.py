@@ -70,7 +70,10 @@ def leg_support(body: Body, joints: NDArray[np.floating[Any]]) -> NDArray[np.flo
     :return: (T,) 0..1.
     """
     straight = np.max([(shank * thigh).sum(1) for shank, thigh in leg_directions(body, joints)], axis=0)
-    return np.clip((straight - RESTING_KNEE_COS) / (CARRYING_KNEE_COS - RESTING_KNEE_COS), 0.0, 1.0)
+    support: NDArray[np.floating[Any]] = np.clip(
+        (straight - RESTING_KNEE_COS) / (CARRYING_KNEE_COS - RESTING_KNEE_COS), 0.0, 1.0
+    )
+    return support
 
 
 def leg_directions(
@@ -89,7 +92,8 @@ def leg_directions(
 def direction(body: Body, joints: NDArray[np.floating[Any]], a: str, b: str) -> NDArray[np.floating[Any]]:
     """Return the (T, 3) unit vectors from joint a to joint b, given the joints (T, K+1, 3)."""
     d = joints[:, body.joint_names.index(b)] - joints[:, body.joint_names.index(a)]
-    return d / np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1e-9)
+    unit: NDArray[np.floating[Any]] = d / np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1e-9)
+    return unit
 
 
 def balancing_rotations(
@@ -140,7 +144,8 @@ def _excess(
     any_contact = in_contact.any(axis=1)
     low = np.where(any_contact, np.where(in_contact, extent, np.inf).min(axis=1), -np.inf)
     high = np.where(any_contact, np.where(in_contact, extent, -np.inf).max(axis=1), np.inf)
-    return np.maximum(at - high, 0) - np.maximum(low - at, 0)
+    excess: NDArray[np.floating[Any]] = np.maximum(at - high, 0) - np.maximum(low - at, 0)
+    return excess
 
 
 def _sole_ends(contact_points: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:

@@ -77,7 +77,8 @@ class CameraPath:
         """
         if self.is_static:
             return points
-        return np.einsum("tji,tkj->tki", self.R_first_camera, points - self.center[:, None])
+        local: NDArray[np.float64] = np.einsum("tji,tkj->tki", self.R_first_camera, points - self.center[:, None])
+        return local
 
     def stance_to_frames(self, stance: Stance) -> Stance:
         """Transform a stance from the first frame's axes to each frame's camera; the argument for a static camera."""

@@ -64,7 +64,8 @@ class PlacedTrack:
         weight = contact.copy()
         weight[:, : len(SOLES)] += MIN_SOLE_WEIGHT
         share = weight / weight.sum(axis=1, keepdims=True)
-        return (share[..., None] * self.contact_points).sum(axis=1)
+        center: NDArray[np.floating[Any]] = (share[..., None] * self.contact_points).sum(axis=1)
+        return center
 
     def contact(self, up: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
         """Return the (T, 6) probability that each contact point rests on something, 0 for those that are not visible.

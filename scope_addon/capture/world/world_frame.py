@@ -207,12 +207,14 @@ def _first_contact(contact: NDArray[np.floating[Any]], times: NDArray[np.float64
     if len(times) < 2:
         return np.ones(len(times), np.bool_)
     on_ground_s = contact.max(axis=1) * np.gradient(times)
-    return np.cumsum(on_ground_s) - on_ground_s < FIRST_S
+    first: NDArray[np.bool_] = np.cumsum(on_ground_s) - on_ground_s < FIRST_S
+    return first
 
 
 def _lowest(soles_cam: NDArray[np.floating[Any]], up: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
     """Return the (T, 3) lowest sole point of each frame."""
-    return soles_cam[np.arange(len(soles_cam)), (soles_cam @ up).argmin(axis=1)]
+    lowest: NDArray[np.floating[Any]] = soles_cam[np.arange(len(soles_cam)), (soles_cam @ up).argmin(axis=1)]
+    return lowest
 
 
 def _unit(vector: NDArray[np.floating[Any]]) -> NDArray[np.float64]:

@@ -199,14 +199,16 @@ class PoseRefit:
             return np.zeros(3)
         at = self.place(rotations, root)[1]
         shifts = [point_at_depth(camera, pixel, at[joint]) - at[joint] for joint, pixel in pixels]
-        return np.mean(shifts, axis=0)
+        mean: NDArray[np.float64] = np.mean(shifts, axis=0)
+        return mean
 
     def _root_prior(self, R: NDArray[np.float64], t: NDArray[np.float64], joints: tuple[str, ...]) -> PosePriors:
         """Return the prior on the pelvis, which may move where the trunk is corrected."""
         trunk = any(limb_of(j) == "trunk" or j.endswith(("hip", "collar")) for j in joints)
         share = 0.1 if trunk and not _bent_by(joints) else 1.0  # legs rather than bend than let the body move away
         rotation = PELVIS_ROTATION * (0.1 if trunk else 1.0)
-        return self._solver.PosePriors([0], R[None], t[None], [rotation], [PELVIS_POSITION * share])
+        posed: PosePriors = self._solver.PosePriors([0], R[None], t[None], [rotation], [PELVIS_POSITION * share])
+        return posed
 
     def _weights(self, joints: tuple[str, ...]) -> NDArray[np.float64]:
         """Return the weights (K,) of the joints' prior."""

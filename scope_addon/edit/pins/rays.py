@@ -14,7 +14,8 @@ def pixel_of(camera: Camera, point: NDArray[np.float64]) -> NDArray[np.float64]:
     """Project a point (3,), world, to a pixel (2,)."""
     T, K = camera
     p = K @ (T[:3, :3].T @ (np.asarray(point, float) - T[:3, 3]))
-    return p[:2] / p[2]
+    pixel: NDArray[np.float64] = p[:2] / p[2]
+    return pixel
 
 
 def nearest_on_ray(camera: Camera, pixel: NDArray[np.float64], point: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -22,7 +23,8 @@ def nearest_on_ray(camera: Camera, pixel: NDArray[np.float64], point: NDArray[np
     T, K = camera
     ray = T[:3, :3] @ np.linalg.solve(K, np.array([*pixel, 1.0]))
     ray /= np.linalg.norm(ray)
-    return T[:3, 3] + max(float((point - T[:3, 3]) @ ray), 1e-3) * ray
+    nearest: NDArray[np.float64] = T[:3, 3] + max(float((point - T[:3, 3]) @ ray), 1e-3) * ray
+    return nearest
 
 
 def point_at_depth(camera: Camera, pixel: NDArray[np.float64], point: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -39,4 +41,5 @@ def point_at_depth(camera: Camera, pixel: NDArray[np.float64], point: NDArray[np
     along = float(ray @ normal)
     if along < 1e-3 * float(np.linalg.norm(ray) * np.linalg.norm(normal)):  # beside or behind the camera
         return nearest_on_ray(camera, pixel, point)
-    return T[:3, 3] + ray * (float((point - T[:3, 3]) @ normal) / along)
+    place: NDArray[np.float64] = T[:3, 3] + ray * (float((point - T[:3, 3]) @ normal) / along)
+    return place

@@ -240,7 +240,8 @@ class _Correction:
         """
         own = [k for k, part in enumerate(FOOT_PARTS) if limb_of(part) == limb_of(track.joints[0])]
         lowest = heights[:, own].min(axis=1, initial=np.inf)
-        return np.maximum(self._floor[span] - lowest, 0.0)[:, None] * UP
+        rise: NDArray[np.float64] = np.maximum(self._floor[span] - lowest, 0.0)[:, None] * UP
+        return rise
 
     def _share(self, index: int, key: int) -> float:
         """Return 1 at a track's pinned keys, fading to 0 at the ends of its span."""

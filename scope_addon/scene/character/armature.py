@@ -102,4 +102,5 @@ def rest_orientations(armature: bpy.types.Object, body: Body) -> NDArray[np.floa
     bones = armature.data.bones
     M = np.array([np.array(bones[name].matrix_local)[:3, :3] for name in body.joint_names], float)
     U, _, Vt = np.linalg.svd(M)
-    return U @ Vt
+    M_i: NDArray[np.float64] = U @ Vt
+    return M_i

@@ -61,7 +61,8 @@ def rest_vertices_world(
     :param betas: (P,) shape coefficients; None for the mean shape.
     :return: (V, 3) metres, z up.
     """
-    return body.rest_vertices(betas) @ R_WORLD_MODEL.T + lift
+    vertices: NDArray[np.float64] = body.rest_vertices(betas) @ R_WORLD_MODEL.T + lift
+    return vertices
 
 
 def skin_to_armature(mesh: bpy.types.Object, armature: bpy.types.Object, body: Body) -> None:

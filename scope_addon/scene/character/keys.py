@@ -216,4 +216,5 @@ def _axes(armature: bpy.types.Object, body: Body) -> NDArray[np.float64]:
     missing = [name for name in body.joint_names if name not in armature.data.bones]
     if missing:
         raise UsageError(f"'{armature.name}' has no bone '{missing[0]}'; choose an armature that Scope captured")
-    return np.swapaxes(rest_orientations(armature, body), 1, 2) @ R_WORLD_MODEL
+    axes: NDArray[np.float64] = np.swapaxes(rest_orientations(armature, body), 1, 2) @ R_WORLD_MODEL
+    return axes

@@ -85,7 +85,8 @@ def _channel_values(pose: SampledPose, order: list[int]) -> NDArray[np.float64]:
     local[:, child] = np.swapaxes(turned[:, parents[child]], 2, 3) @ turned[:, child]
     angles, positions = euler_zyx_degrees(local), pose.joints @ R_GLTF_WORLD.T
     columns = [part[:, i] for i in order for part in ((angles,) if child[i] else (positions, angles))]
-    return np.concatenate(columns, axis=1)
+    values: NDArray[np.float64] = np.concatenate(columns, axis=1)
+    return values
 
 
 def euler_zyx_degrees(R: NDArray[np.float64]) -> NDArray[np.float64]:

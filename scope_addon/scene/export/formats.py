@@ -185,7 +185,8 @@ def sample_armature(scene: bpy.types.Scene, rig: bpy.types.Object) -> bvh.Sample
 
 
 def _unscaled(R: NDArray[np.float64]) -> NDArray[np.float64]:
-    return R / np.linalg.norm(R, axis=-2, keepdims=True)
+    rotations: NDArray[np.float64] = R / np.linalg.norm(R, axis=-2, keepdims=True)
+    return rotations
 
 
 @contextmanager

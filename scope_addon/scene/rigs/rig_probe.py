@@ -179,7 +179,8 @@ def _matrices(rig: bpy.types.Object, names: list[str]) -> NDArray[np.float64]:
 def _rotations(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the rotations (B, 3, 3) of matrices (B, 4, 4), without scale."""
     U, _, Vt = np.linalg.svd(matrices[:, :3, :3])
-    return U @ Vt
+    rotations: NDArray[np.float64] = U @ Vt
+    return rotations
 
 
 @contextmanager

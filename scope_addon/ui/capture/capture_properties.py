@@ -77,7 +77,8 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
     def result(self) -> SCOPE_PG_result:
         """Result of the capture that is selected in the list; empty in a scene without captures."""
         capture = shown_capture(self.id_data)
-        return capture.scope_result if capture else self.no_result
+        result: SCOPE_PG_result = capture.scope_result if capture else self.no_result
+        return result
 
 
 CLASSES = (SCOPE_PG_warning, SCOPE_PG_result, SCOPE_PG_settings)

@@ -33,7 +33,8 @@ def shown_capture(scene: bpy.types.Scene) -> bpy.types.Collection | None:
     """Return the capture that is selected in the list; the last one if the selected one was removed."""
     found = captures_of(scene)
     if scene.scope.capture in found:
-        return scene.scope.capture
+        chosen: bpy.types.Collection = scene.scope.capture
+        return chosen
     return found[-1] if found else None
 
 

@@ -37,7 +37,8 @@ class JobOperator(bpy.types.Operator):
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Start from the panel, and continue on a timer."""
         if bpy.app.background:
-            return self.execute(context)
+            outcome: set[str] = self.execute(context)
+            return outcome
         if not self.start(context):
             return {"CANCELLED"}
         manager = context.window_manager

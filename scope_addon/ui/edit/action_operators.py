@@ -87,7 +87,8 @@ class SCOPE_OT_rename_take(ReportingOperator):
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Ask for the name."""
         self.name = context.scene.scope.result.collection.name
-        return context.window_manager.invoke_props_dialog(self)
+        outcome: set[str] = context.window_manager.invoke_props_dialog(self)
+        return outcome
 
     def draw(self, _context: bpy.types.Context) -> None:
         """Draw the name, which is typed over at once."""

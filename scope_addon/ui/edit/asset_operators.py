@@ -50,7 +50,8 @@ class SCOPE_OT_mark_asset(ActionOperator):
             self.author, self.description_text = data.author, data.description
         else:
             self.description_text = self.catalog = ""
-        return context.window_manager.invoke_props_dialog(self)
+        outcome: set[str] = context.window_manager.invoke_props_dialog(self)
+        return outcome
 
     def work(self, context: bpy.types.Context) -> str:
         """Mark the action and draw its picture.

@@ -92,7 +92,8 @@ class SpanOperator(EditOperator):
             self.start, self.end = scene.frame_preview_start, scene.frame_preview_end
         else:
             self.start, self.end = self.default_span(scene)
-        return context.window_manager.invoke_props_dialog(self)
+        outcome: set[str] = context.window_manager.invoke_props_dialog(self)
+        return outcome
 
     def work(self, context: bpy.types.Context) -> str:
         """Edit the keys within the span.

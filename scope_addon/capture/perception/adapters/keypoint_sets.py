@@ -91,7 +91,8 @@ def _approximate(name: str, at: dict[str, NDArray[np.float64]]) -> NDArray[np.fl
     if "mouth" in name:
         neck = (at["left_shoulder"] + at["right_shoulder"]) / 2
         to_eye = (at[f"{side}_eye"] - at["nose"]) * np.array([1.0, 0.0])
-        return at["nose"] + 0.2 * (neck - at["nose"]) + 0.3 * to_eye
+        mouth: NDArray[np.float64] = at["nose"] + 0.2 * (neck - at["nose"]) + 0.3 * to_eye
+        return mouth
     if "heel" in name or "foot" in name:
         lower_leg = at[f"{side}_ankle"] - at[f"{side}_knee"]
         return at[f"{side}_ankle"] + (0.12 if "heel" in name else 0.2) * lower_leg

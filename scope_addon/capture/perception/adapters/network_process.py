@@ -85,7 +85,8 @@ class NetworkProcess:
         with self._lock:
             answer = self._ask({"input": name}, [array])
             self._limit_s = RUN_S  # the first run may still compile
-        return answer["arrays"]
+        outputs: list[Any] = answer["arrays"]
+        return outputs
 
     def _ask(self, request: dict[str, Any], arrays: list[Any] | None = None) -> dict[str, Any]:
         if not self._end.alive:

@@ -94,7 +94,8 @@ def eye_light_of(rows: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
 def presence_of(rows: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
     """Return (T,) the presence of the faces of rows, less where they are seen from the side, but not where small."""
     of_size = np.maximum(_ramp(rows[:, 1], *_FACE_PX), 1e-3)
-    return np.minimum(rows[:, 0] / of_size, 1.0)
+    found: NDArray[np.floating[Any]] = np.minimum(rows[:, 0] / of_size, 1.0)
+    return found
 
 
 def with_expression(

@@ -64,4 +64,5 @@ def certainty(
     """
     cosine = (ears * directions).sum(axis=1) / np.maximum(np.linalg.norm(ears, axis=1), 1e-9)
     agreed = np.clip((cosine - _CONTRADICTED) / (_AGREED - _CONTRADICTED), 0.0, 1.0)
-    return agreed * parts(face)[0] * presence_of(face) ** 2
+    out: NDArray[np.float64] = agreed * parts(face)[0] * presence_of(face) ** 2
+    return out

@@ -75,7 +75,8 @@ class Sight:
     @property
     def wrist_px(self) -> NDArray[np.float64]:
         """The body's wrist (2,)."""
-        return self.person.keypoints_px[WRISTS[self.side]]
+        wrist: NDArray[np.float64] = self.person.keypoints_px[WRISTS[self.side]]
+        return wrist
 
     @property
     def wrist_confidence(self) -> float:

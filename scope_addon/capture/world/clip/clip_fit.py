@@ -182,4 +182,5 @@ def joint_sigma(
     rate = 1.0 / float(np.median(np.diff(times))) if len(times) > 1 else _MIN_HZ
     inflation = (max(rate, _MIN_HZ) / _RATE_HZ) ** _EXPONENT
     variance = np.maximum(np.stack([along, across], axis=-1), 0.0)
-    return inflation * np.sqrt(variance) * [ALONG, ACROSS]
+    sigma: NDArray[np.float64] = inflation * np.sqrt(variance) * [ALONG, ACROSS]
+    return sigma

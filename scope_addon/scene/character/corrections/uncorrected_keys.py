@@ -116,7 +116,8 @@ def write_both(
 
 def differ(a: Clip, b: Clip) -> NDArray[np.bool_]:
     """Return at which keys (T,) two clips differ."""
-    return (a.rotations != b.rotations).any((1, 2, 3)) | (a.root != b.root).any(1)
+    different: NDArray[np.bool_] = (a.rotations != b.rotations).any((1, 2, 3)) | (a.root != b.root).any(1)
+    return different
 
 
 def changed_rows(

@@ -97,7 +97,8 @@ def cells(width: int, height: int) -> NDArray[np.float64]:
     for side in _CELL_SIDES:
         row, column = np.meshgrid(np.arange(height // side), np.arange(width // side), indexing="ij")
         grids.append(np.stack([column, row, np.full(column.shape, side)], axis=-1).reshape(-1, 3))
-    return np.concatenate(grids).astype(np.float64)
+    table: NDArray[np.float64] = np.concatenate(grids).astype(np.float64)
+    return table
 
 
 # YOLOv8, YOLO11 and similar: one output (1, 4 + classes, cells), a column per box: its centre x, y, width and height,
