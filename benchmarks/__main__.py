@@ -25,6 +25,7 @@ ELSEWHERE = {  # imported where they are wanted: some need packages that others 
     "choices": (".perception.choices", "choices"),
     "renders": (".perception.renders", "renders"),
     "scenes": (".scenes.accuracy", "scenes"),
+    "stills": (".stills", "stills"),
     "smplify": (".smplify.comparison", "smplify"),
     "outline": (".perception.outline", "outline"),
     "faces": (".perception.face_conditions", "faces_and_conditions"),

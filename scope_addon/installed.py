@@ -32,11 +32,7 @@ def check_cluster() -> None:
 
 def _check_has(module: str, otherwise: str, script: str) -> None:
     if find_spec(f"{__package__}.{module}") is None:
-        extra = module.split(".")[0]
-        raise SetupError(
-            f"Blender's extension {otherwise}; use ./scripts/{script} in the repository, or install the package: "
-            f"pip install 'scope-mocap[capture,{extra}]'"
-        )
+        raise SetupError(f"Blender's extension {otherwise}; use ./scripts/{script} in the repository")
 
 
 def check_installed(modules: Sequence[str]) -> None:

@@ -28,3 +28,12 @@ def package(name: str) -> ModuleType:
         return importlib.import_module(name)
     except ImportError as error:
         missing(f"{name} cannot be imported ({error}); ./scripts/setup installs it")
+
+
+def need_encoder(codec: str) -> None:
+    """Call ``missing`` if PyAV has been built without an encoder."""
+    av = package("av")
+    try:
+        av.Codec(codec, "w")
+    except av.codec.codec.UnknownCodecError:
+        missing(f"this build of PyAV has no encoder {codec}; ./scripts/setup installs one that does")

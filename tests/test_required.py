@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from .required import missing, package
+from .required import missing, need_encoder, package
 
 
 @pytest.fixture(autouse=True)
@@ -36,3 +36,10 @@ def test_a_package_that_is_not_installed_fails_in_ci(monkeypatch: pytest.MonkeyP
     monkeypatch.setenv("CI", "1")
     with pytest.raises(pytest.fail.Exception, match="nowhere_to_be_found cannot be imported"):
         package("nowhere_to_be_found")
+
+
+def test_an_encoder_that_was_not_built_in_fails_in_ci(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CI", "1")
+    need_encoder("mpeg4")
+    with pytest.raises(pytest.fail.Exception, match="no encoder nowhere_to_be_found"):
+        need_encoder("nowhere_to_be_found")

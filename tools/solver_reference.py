@@ -22,7 +22,9 @@ PAGE = Path(__file__).resolve().parents[1] / "docs" / "solver_api.md"
 _INTRODUCTION = """\
 # The solver: API
 
-Everything here is importable from `scope.solver`, which needs numpy and numba only.
+Everything here is importable from `scope.solver`, which needs numpy and numba only. `pip install CHECKOUT`, with the
+folder of this repository, installs it in an environment of your own (Python 3.11 or newer), with its bodies and joint
+prior; Scope is in no package index. The first fit compiles the solver, for a minute or two.
 [Mathematics](solver_mathematics.md) explains the equations, and the [glossary](glossary.md) the terms. This page is
 written by `python -m scope.tools.solver_reference` from the docstrings; edit those.
 

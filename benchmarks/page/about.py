@@ -36,6 +36,10 @@ ABOUT = {  # by the name of the benchmark, or of the script
         "Errors are means over the frames in which a person was found. Parentheses: 95 % intervals by "
         "bootstrap over people. Depth flips: of the fit of the clip, and of every frame fitted alone."
     ),
+    "stills": (
+        "Single frames of the clips with ground truth, each captured as an image by itself. Means over clips, "
+        "medians over people who were found. Parentheses: 95 % intervals by bootstrap over clips."
+    ),
     "two_people": (
         "Pose2Sim's man with a computer-generated woman drawn beside him, captured one camera at a time with "
         "--people all. Her ground truth is triangulated from keypoints of all four cameras."

@@ -71,6 +71,7 @@ LONG = (  # what takes hours together, and is left out of a quick run
     Command("What each part of the pipeline brings", "bench", ("ablation",)),
     Command("Rendered clips with exact truth", "bench", ("renders",)),
     Command("Rendered scenes of many people", "bench", ("scenes",)),
+    Command("Single frames as images", "bench", ("stills",)),
     Command("Two people whose truth is triangulated", "bench", ("two_people",)),
     Command("Climbs onto boxes, with one floor and with uneven ground", "bench", ("climbs",)),
     Command("An optimizer in the manner of SMPLify", "bench", ("smplify",)),

@@ -23,7 +23,7 @@ from ...solver.loaders.body_file import ASSETS
 from ...solver.rotations import exp
 from ..frames import DATA
 from ..report import table
-from ..scenes.statistics import Estimate, mean_over_people
+from ..scenes.statistics import mean_over_people
 from .accuracy import evaluate_clip
 from .depth_flips import BONES, FITS, depth_flips, flips_table, total
 from .held_out import feet_world, held_out_takes
@@ -101,7 +101,7 @@ def intervals_table(figures: dict[str, Any]) -> str:
             ours = _of_clips(clips, "mpjpe_root")
             more = mean_over_people([ours[name] - default[name] for name in ours if name in default])
             same = quality == CaptureOptions().quality or not more.people
-            rows.append([f"{quality}, {known}", errors[0].people, *map(_shown, errors), "" if same else _shown(more)])
+            rows.append([f"{quality}, {known}", errors[0].people, *(e.text for e in errors), "" if same else more.text])
     return table(("preset", "clips", "MPJPE-root mm", "PA-MPJPE mm", "more than the default, mm"), rows)
 
 
@@ -113,10 +113,6 @@ def _of_clips(clips: dict[str, Any], key: str) -> dict[str, float]:
 def _pair(row: dict[str, Any]) -> str:
     known = [row.get(key) for key in ("mpjpe_root", "pa_mpjpe")]
     return "not found" if None in known else " / ".join(f"{value:.1f}" for value in known)
-
-
-def _shown(estimate: Estimate) -> str:
-    return f"{estimate.mean:.1f} ({estimate.low:.1f} to {estimate.high:.1f})"
 
 
 def evaluate_render(body: Body, video: Path, truth: Path, quality: str, known: str) -> dict[str, Any]:

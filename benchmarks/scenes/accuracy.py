@@ -96,7 +96,7 @@ def _tables(split: str, by_variant: dict[str, list[Result]]) -> dict[str, Any]:
         print(table(columns, [_row(name, row) for name, row in rows.items()]), end="\n\n", flush=True)
     more = {name: more_than(default[1], results) for name, results in others}
     columns = (f"{split}: MPJPE-root, more than the default, mm", "people", "mean")
-    print(table(columns, [(name, each.people, _shown(each)) for name, each in more.items()]), end="\n\n")
+    print(table(columns, [(name, each.people, each.text) for name, each in more.items()]), end="\n\n")
     flips = {}
     for name, results in by_variant.items():
         flips[name] = {fit: total(r.flips[fit] for r in results if r.flips) for fit in FITS}
@@ -286,13 +286,6 @@ def _figures(result: Result) -> dict[str, Any]:
     return {"clip": result.clip, **errors, "found": found, "size": result.size, "flips": result.flips, **result.person}
 
 
-def _shown(estimate: Estimate) -> str:
-    if not estimate.people:
-        return "–"
-    interval = f" ({estimate.low:.1f} to {estimate.high:.1f})" if estimate.people > 1 else ""
-    return f"{estimate.mean:.1f}{interval}"
-
-
 def _row(name: str, row: dict[str, Estimate]) -> list[object]:
     people, share = row["found"].people, f"{100 * row['found'].mean:.0f} %"
-    return [name, people, _shown(row["mpjpe_root"]), _shown(row["pa_mpjpe"]), share, _shown(row["size_off"])]
+    return [name, people, row["mpjpe_root"].text, row["pa_mpjpe"].text, share, row["size_off"].text]

@@ -20,6 +20,14 @@ class Estimate(NamedTuple):
     high: float
     people: int
 
+    @property
+    def text(self) -> str:
+        """The mean and, in parentheses, its interval if there is one; a dash of nobody."""
+        if not self.people:
+            return "–"
+        interval = f" ({self.low:.1f} to {self.high:.1f})" if self.people > 1 else ""
+        return f"{self.mean:.1f}{interval}"
+
 
 def mean_over_people(values: Sequence[float] | NDArray[np.float64]) -> Estimate:
     """Return the mean of one value a person, with the bootstrap's percentile interval (Efron 1979) of 95 %.

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from .skeleton_picture import skeleton_picture
 
 TAGS = ("mocap", "scope")
 CATALOGS_FILE = "blender_assets.cats.txt"
+_ID = re.compile(r"[0-9a-f]{8}(?:-[0-9a-f]{4}){3}-[0-9a-f]{12}", re.ASCII | re.IGNORECASE)
 _SIZE = 256  # pixels of Blender's large previews
 _MAX_BONES = 200
 _THICKNESS, _THIN, _THICK = 0.12, 0.012, 0.07  # of a bone without a ring: share of its length, and limits in metres
@@ -94,9 +96,9 @@ def catalogs() -> dict[str, str]:
     except (OSError, ValueError):
         return {}
     for line in lines:
-        parts = line.split(":")
-        if len(parts) >= 2 and not line.startswith(("#", "VERSION")):
-            found[parts[1].strip()] = parts[0].strip()
+        parts = [part.strip() for part in line.split(":")]
+        if len(parts) >= 2 and _ID.fullmatch(parts[0]):  # Blender leaves out other lines too
+            found[parts[1]] = parts[0]
     return found
 
 

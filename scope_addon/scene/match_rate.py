@@ -18,7 +18,7 @@ import bpy
 from ..motion import Motion
 from .animation_data import timing
 from .animation_data.actions import fcurves, frame_range
-from .animation_data.retime import Retiming, retime_keys, retime_strips
+from .animation_data.retime import Retiming, action_strips, retime_keys, retime_strip
 from .animation_data.stored_values import start_frame
 from .camera import same_camera, show_footage_again
 from .character.confidence_curves import MARKER_NAMES
@@ -27,7 +27,7 @@ from .character.expression_keys import has_expression_keys
 from .character.root_object import retime_unused_trajectory, root_object
 from .character.shape_keys import shape_key_name
 from .datablock_names import holds
-from .rigs.rig_action import is_retargeted, retime_written_keys
+from .rigs.rig_action import is_retargeted, retime_written_keys, source_of
 
 _MARKER = re.compile(rf"((?:person \d+ )?(?:{'|'.join(MARKER_NAMES.values())})) (-?\d+)(?:-(-?\d+))?")
 
@@ -56,8 +56,7 @@ def change_rate(
             _retime(datablock, retiming, done)
         if (root := root_object(person)) is not None:
             retime_unused_trajectory(root, retiming)
-    for rig, person in rigs:
-        _retime_rig(rig, moves[person], done)
+    _retime_rigs(rigs, moves, done)
     for collection in scene.collection.children_recursive:
         here = [person for person in people if holds(collection, person)]
         for camera in [obj for obj in collection.objects if obj.type == "CAMERA"] if here else ():
@@ -111,19 +110,51 @@ def _retime(datablock: bpy.types.ID, retiming: Retiming, done: set[bpy.types.Act
     animation = datablock.animation_data
     if animation is None:
         return
-    for action in [animation.action, *retime_strips(animation, retiming)]:
+    strips = action_strips(animation)
+    for strip in strips:
+        retime_strip(strip, retiming)
+    for action in [animation.action, *(strip.action for strip in strips)]:
         if action is not None and action not in done:
             done.add(action)
             retime_keys(action, retiming)
 
 
-def _retime_rig(rig: bpy.types.Object, retiming: Retiming, done: set[bpy.types.Action]) -> None:
-    """Move the keys that retargeting has written; the rig's other actions keep their frames."""
-    action = rig.animation_data.action if rig.animation_data else None
-    if action is None or action in done or not is_retargeted(action):
+def _retime_rigs(
+    rigs: Iterable[tuple[bpy.types.Object, bpy.types.Object]],
+    moves: dict[bpy.types.Object, Retiming],
+    done: set[bpy.types.Action],
+) -> None:
+    """Move what retargeting has written, also of captures other than the one that a rig has now."""
+    sources = {person.name: retiming for person, retiming in moves.items()}
+    for rig, person in rigs:
+        _retime_rig(rig, moves[person], sources, done)
+    for action in bpy.data.actions:
+        if action.library is None and action not in done and is_retargeted(action) and source_of(action) in sources:
+            done.add(action)
+            retime_written_keys(action, sources[source_of(action)])
+
+
+def _retime_rig(
+    rig: bpy.types.Object, retiming: Retiming, sources: dict[str, Retiming], done: set[bpy.types.Action]
+) -> None:
+    """Move the keys that retargeting has written, and the strips that play them; the rig's other actions stay.
+
+    :param retiming: of the capture that the rig was retargeted to last.
+    :param sources: of every capture, by the name of its armature.
+    """
+    animation = rig.animation_data
+    if animation is None:
         return
-    done.add(action)
-    retime_written_keys(action, retiming)
+    strips = [strip for strip in action_strips(animation) if is_retargeted(strip.action)]
+    for strip in strips:
+        retime_strip(strip, sources.get(source_of(strip.action), retiming))
+    own = [animation.action] if animation.action is not None and is_retargeted(animation.action) else []
+    moved = {action for action in [*own, *(strip.action for strip in strips)] if action not in done}
+    for action in moved:
+        done.add(action)
+        retime_written_keys(action, sources.get(source_of(action), retiming))
+    if not moved:
+        return
     if (root := root_object(rig)) is not None:
         retime_unused_trajectory(root, retiming)
         _retime(root, retiming, done)

@@ -114,15 +114,14 @@ class SCOPE_OT_export(ReportingOperator):
     def work(self, context: bpy.types.Context) -> str:
         """Write the files.
 
-        :raises UsageError: the file has no name, or there is nothing of what is to be written.
+        :raises UsageError: the file has no name or folder, or there is nothing of what is to be written.
         """
         from ..errors import UsageError
         from ..scene.export.export import ExportOptions, captures, export
         from ..scene.rigs.rig_export import export_rig
+        from .files.output_file import output_file
 
-        if not bpy.path.basename(self.filepath).removesuffix(_SUFFIX[self.format]):
-            raise UsageError("the file has no name; enter one")
-        path = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), _SUFFIX[self.format]))
+        path = output_file(self.filepath, _SUFFIX[self.format])
         if not is_available(self.format):
             raise UsageError(_NO_USD[0].lower() + _NO_USD[1:])
         options = ExportOptions(

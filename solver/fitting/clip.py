@@ -124,32 +124,50 @@ def fit_clip(
     )
 
 
+Camera = tuple[NDArray[np.float64], NDArray[np.float64]]  # R_camera_world (3, 3), t_camera_world (3,)
+_AT_ORIGIN: Camera = np.eye(3), np.zeros(3)
+
+
 def fit_in_order(
-    tree: Tree, measurements: Sequence[Measurements], priors: Priors, options: Options, temporal: Temporal | None
+    tree: Tree,
+    measurements: Sequence[Measurements],
+    priors: Priors,
+    options: Options,
+    temporal: Temporal | None,
+    cameras: Sequence[Camera] | None = None,
 ) -> list[State]:
     """Fit each frame from the one before, carrying the shape's information; a lost person starts afresh.
 
     Frames without measurements hold the last state that was measured, before the first the first.
 
+    :param cameras: the camera in whose axes each frame's measurements are; without it, all are in the states' axes.
+    :return: states in the axes of the world.
     :raises InvalidValueError: the weight of the shape in ``options`` is negative, infinite or not a number.
     """
     states: list[State] = []
     last: State | None = None
     seen = False
     weight = options.schedule(cold=False)[-1].weights.shape
-    for m in measurements:
-        pulled = m if temporal is None or last is None else with_previous(m, last, temporal)
-        fitted = fit_tree(tree, pulled, last, priors, options)
+    for m, (R, t) in zip(measurements, cameras or [_AT_ORIGIN] * len(measurements), strict=True):
+        start = None if last is None else _moved(last, R, t)
+        pulled = m if temporal is None or start is None else with_previous(m, start, temporal)
+        fitted = fit_tree(tree, pulled, start, priors, options)
+        state = _moved(fitted.state, R.T, -R.T @ t)
         if fitted.status is Status.NO_MEASUREMENTS:
-            states.append(states[-1] if seen else fitted.state)
+            states.append(states[-1] if seen else state)
             last = None
             continue
         if not seen:
-            states, seen = [fitted.state] * len(states), True
-        last = fitted.state
+            states, seen = [state] * len(states), True
+        last = state
         priors = carry(priors, fitted, weight)
         states.append(last)
     return states
+
+
+def _moved(state: State, R: NDArray[np.float64], t: NDArray[np.float64]) -> State:
+    """Return the state in other axes, in which a point p is at R p + t."""
+    return replace(state, R_camera_root=R @ state.R_camera_root, t_camera_root=R @ state.t_camera_root + t)
 
 
 def _fit_with_shape(

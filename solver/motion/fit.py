@@ -91,7 +91,7 @@ def fit_motion(
     :param times: (T,) seconds, increasing; they need not be evenly spaced. Whole numbers are probably frame
         numbers, and give a `UnitsWarning`.
     :param init: each frame's state in the world's axes; without it, the frames are first fitted in order, several
-        cameras by points triangulated from their 2D keypoints.
+        cameras by points triangulated from their 2D keypoints, or by one of them where their rays are too parallel.
     :param priors: `default_priors(body)` unless given.
     :param options: the stages are those of a fit that starts from a state; `report` has no effect.
     :param motion: weights of acceleration and of standing points.

@@ -2,18 +2,20 @@
 """Where a clip's optimization starts: frames fitted in order, what several cameras see triangulated first."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ..compiled.part import Array
 from ..compiled.tree import Tree
-from ..fitting.clip import fit_in_order
+from ..fitting.clip import Camera, fit_in_order
 from ..measurements import Keypoints3D, Measurements
 from ..options import Options, Priors
 from ..state import State
 from .views import View
 
 _MIN_CONDITION = 1e-4  # of a point's rays: smallest over largest eigenvalue, below which they are too nearly parallel
+_LEAST_SHARE = 1 / 3  # of one camera's points that must be triangulated, or that camera says more
 
 
 def initial_states(
@@ -21,17 +23,29 @@ def initial_states(
 ) -> list[State]:
     """Return each frame's state in the world's axes, of one shape."""
     views = [[View(frame)] if isinstance(frame, Measurements) else list(frame) for frame in frames]
-    if any(len(v) > 1 for v in views):
-        measured, cameras = [triangulated(v, len(tree.point_part)) for v in views], [View(Measurements())] * len(views)
-    else:
-        cameras = [v[0] if v else View(Measurements()) for v in views]
-        measured = [camera.measurements for camera in cameras]
-    states = fit_in_order(tree, measured, priors, options, None)
-    out = []
-    for state, camera in zip(states, cameras, strict=True):
-        R, t = np.asarray(camera.R_camera_world, dtype=float), np.asarray(camera.t_camera_world, dtype=float)
-        out.append(State(R.T @ state.R_camera_root, R.T @ (state.t_camera_root - t), state.Omega, states[-1].beta))
-    return out
+    chosen = [_first_view(v, len(tree.point_part)) for v in views]
+    cameras = [_camera_of(view) for view in chosen]
+    states = fit_in_order(tree, [view.measurements for view in chosen], priors, options, None, cameras)
+    return [replace(state, beta=states[-1].beta) for state in states]
+
+
+def _first_view(views: Sequence[View], points: int) -> View:
+    """Return what a frame is first fitted to: its triangulated points, or one camera's view where that says more."""
+    if len(views) < 2:
+        return views[0] if views else View(Measurements())
+    fullest = max(views, key=lambda view: _points_of(view, points))  # of equal ones the first
+    found = View(triangulated(views, points))
+    return found if _points_of(found, points) > _LEAST_SHARE * _points_of(fullest, points) else fullest
+
+
+def _points_of(view: View, points: int) -> int:
+    """Return how many usable 2D and 3D keypoints a camera has."""
+    tables = view.measurements.packed2d(points)[1], view.measurements.packed3d(points)[1]
+    return sum(int((np.isfinite(m).all(axis=1) & (m[:, -1] > 0.0)).sum()) for m in tables)
+
+
+def _camera_of(view: View) -> Camera:
+    return np.asarray(view.R_camera_world, dtype=float), np.asarray(view.t_camera_world, dtype=float)
 
 
 def triangulated(views: Sequence[View], points: int) -> Measurements:

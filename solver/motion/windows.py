@@ -29,6 +29,7 @@ def overlapping(times: Array, length: float, overlap: float) -> list[Window]:
     first = np.searchsorted(times, starts)
     last = np.searchsorted(times, starts + length, side="right")
     last[-1] = T
+    first[1:] = np.minimum(first[1:], last[:-1])  # without overlap, rounding may leave a frame between two windows
     middle = [0, *((a + b) // 2 for a, b in zip(first[1:], last[:-1], strict=True)), T]
     return [
         Window(slice(int(first[k]), int(last[k])), slice(int(middle[k]), int(middle[k + 1])))

@@ -9,9 +9,8 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 import numpy as np
-import pytest
 
-from ..required import package
+from ..required import need_encoder, package
 
 _PARAMETERS, _SEQUENCE_PARAMETERS = (32, 33, 34), 33  # kinds of HEVC's units
 
@@ -27,10 +26,8 @@ def full_box(name: bytes, content: bytes, version: int = 0, flags: int = 0) -> b
 def coded(picture_rgb: np.ndarray) -> tuple[bytes, bytes]:
     """Return the decoder's configuration (hvcC box, ISO 14496-15) and the coded picture, by x265."""
     av = package("av")
-    try:
-        encoder = av.CodecContext.create("libx265", "w")
-    except ValueError as error:  # a build may lack the codec
-        pytest.skip(f"this PyAV does not write HEVC: {error}")
+    need_encoder("libx265")
+    encoder = av.CodecContext.create("libx265", "w")
     encoder.width, encoder.height, encoder.pix_fmt = picture_rgb.shape[1], picture_rgb.shape[0], "yuv444p"
     encoder.time_base, encoder.options = Fraction(1), {"crf": "8", "x265-params": "log-level=none:repeat-headers=1"}
     frame = av.VideoFrame.from_ndarray(picture_rgb, "rgb24")

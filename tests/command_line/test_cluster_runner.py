@@ -15,7 +15,7 @@ def batch(tmp_path, scheduler):
     ("hidden", "says"),
     [
         ("distributed", "distributed must be installed for this: pip install 'scope-mocap[cluster]'"),
-        (".cluster", "Blender's extension cannot use a cluster; use ./scripts/batch in the repository"),
+        (".cluster", "Blender's extension cannot use a cluster; use ./scripts/batch in the repository\n"),
     ],
 )
 def test_a_cluster_needs_the_package_and_the_room(tmp_path, capsys, monkeypatch, hidden, says):

@@ -78,7 +78,8 @@ def test_the_extension_says_where_live_captures_are(capsys, monkeypatch):
 
     monkeypatch.setattr(installed, "find_spec", find_spec)
     assert main(["live", "0"]) == 1
-    assert "Blender's extension captures live in its panel alone; use ./scripts/live" in capsys.readouterr().err
+    said = "scope: Blender's extension captures live in its panel alone; use ./scripts/live in the repository\n"
+    assert capsys.readouterr().err == said
 
 
 @pytest.mark.usefixtures("networks")

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +32,7 @@ MAX_EDGES = 120
 HORIZONTAL_CANDIDATES = 60  # edges, the longest ones, each of which may be horizontal
 UP_CANDIDATES = 16  # directions that may be up, those with most support
 MIN_CANDIDATE_ANGLE = np.radians(0.7)  # between two of them
-_BLOCK = 256
+_BLOCK = 64  # directions that are tried at once
 _TILTS = np.arange(-MAX_TILT, MAX_TILT + 1e-9, np.radians(1.0))
 _TILTED = np.stack([np.zeros_like(_TILTS), -np.cos(_TILTS), np.sin(_TILTS)], axis=1)  # up, for a camera without roll
 
@@ -59,8 +59,8 @@ class Edges:
 
         :return: the sides of the picture that they explain; their (3, 3) rows u, h, u × h, in camera axes.
         """
-        normals = self._normals(focal_px)
-        return self._best(self._up_candidates(normals, focal_px), normals, focal_px)
+        normals, equations = self._normals(focal_px), self._equations(focal_px)
+        return self._best(self._up_candidates(normals, equations), normals, equations)
 
     def support(self, focal_px: float) -> float:
         """Return the sides of the picture that the best three directions explain, with or without vertical edges.
@@ -68,32 +68,36 @@ class Edges:
         At a focal length for which no two vertical edges intersect, the horizontal ones alone may be explained as well
         as at another focal length for which two happen to: by a camera with tilt and no roll.
         """
-        normals = self._normals(focal_px)
-        return self._best(self._up_candidates(normals, focal_px) or list(_TILTED), normals, focal_px)[0]
+        normals, equations = self._normals(focal_px), self._equations(focal_px)
+        return self._best(self._up_candidates(normals, equations) or list(_TILTED), normals, equations)[0]
 
     def _normals(self, focal_px: float) -> NDArray[Any]:
         """Return the (N, 3) normals of the planes through the camera's centre and the edges."""
         return plane_normals(np.concatenate([self.ends, np.full((*self.ends.shape[:2], 1), focal_px, np.float32)], -1))
 
     def _best(
-        self, candidates: Sequence[NDArray[Any]], normals: NDArray[Any], focal_px: float
+        self, candidates: Sequence[NDArray[Any]], normals: NDArray[Any], equations: NDArray[np.float32]
     ) -> tuple[float, NDArray[np.float64]]:
         """Return what `axes` does, where one of the candidates is up."""
-        score, axes = 0.0, np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-        for up in candidates:
-            level = np.cross(normals[:HORIZONTAL_CANDIDATES], up)  # along the edge, if it is horizontal
-            size = np.linalg.norm(level, axis=1)
-            level = level[size > 0.1] / size[size > 0.1, None]
-            if not len(level):
-                continue
-            explained = np.maximum(self._explained(level, focal_px), self._explained(np.cross(up, level), focal_px))
-            explained = np.maximum(explained, self._explained(up[None], focal_px)) @ self.weight
-            best = int(explained.argmax())
-            if explained[best] > score:
-                score, axes = float(explained[best]), np.array([up, level[best], np.cross(up, level[best])], float)
-        return score, axes
+        ups = np.asarray(candidates).reshape(-1, 3)
+        level = np.cross(normals[None, :HORIZONTAL_CANDIDATES], ups[:, None])  # along the edges, if they are horizontal
+        size = np.linalg.norm(level, axis=2)
+        which, _ = np.nonzero(size > 0.1)
+        if not len(which):
+            return 0.0, np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+        level = level[size > 0.1] / size[size > 0.1, None]
+        across, up_sine2 = np.cross(ups[which], level), _sine2(ups, equations)
+        explained = []
+        for k in range(0, len(level), _BLOCK):
+            sine2 = _sine2(level[k : k + _BLOCK], equations)
+            np.minimum(sine2, _sine2(across[k : k + _BLOCK], equations), out=sine2)
+            np.minimum(sine2, up_sine2[which[k : k + _BLOCK]], out=sine2)
+            explained.append(_explained(sine2) @ self.weight)
+        score = np.concatenate(explained)
+        best = int(score.argmax())
+        return float(score[best]), np.array([ups[which[best]], level[best], across[best]], float)
 
-    def _up_candidates(self, normals: NDArray[Any], focal_px: float) -> list[NDArray[Any]]:
+    def _up_candidates(self, normals: NDArray[Any], equations: NDArray[np.float32]) -> list[NDArray[Any]]:
         """Return distinct directions near the picture's vertical in which pairs of edges intersect, the best first."""
         up = np.array([0.0, -1.0, 0.0])
         may_be_vertical = np.abs(normals @ up) < np.sin(MAX_TILT + PLANE_SIGMA)
@@ -101,23 +105,38 @@ class Edges:
         if not len(found):
             return []
         blocks = np.array_split(found, len(found) // _BLOCK + 1)
-        score = np.concatenate([self._explained(block, focal_px) @ self.weight for block in blocks])
-        chosen: list[NDArray[Any]] = []
-        for candidate in found[np.argsort(-score)]:
-            if all(candidate @ other < np.cos(MIN_CANDIDATE_ANGLE) for other in chosen):
-                chosen.append(candidate)
-            if len(chosen) == UP_CANDIDATES:
-                break
+        score = np.concatenate([_explained(_sine2(block, equations)) @ self.weight for block in blocks])
+        rest, chosen = found[np.argsort(-score)], list[NDArray[Any]]()
+        while len(rest) and len(chosen) < UP_CANDIDATES:
+            chosen.append(rest[0])
+            rest = rest[rest @ rest[0] < np.cos(MIN_CANDIDATE_ANGLE)]
         return chosen
 
-    def _explained(self, directions: NDArray[Any], focal_px: float) -> NDArray[Any]:
-        """Return (n, N) how well each edge points at the vanishing points of directions (n, 3); 1: exactly."""
-        d = directions.astype(np.float32)
-        x, y = (np.float32(focal_px) * d[:, k, None] - d[:, 2, None] * self.middle[:, k] for k in (0, 1))
-        across = x * self.along[:, 1] - y * self.along[:, 0]
-        sine2 = across * across / np.maximum(x * x + y * y, np.float32(1e-12))
-        explained: NDArray[Any] = np.exp(np.float32(-0.5 / EDGE_SIGMA**2) * sine2)
-        return explained
+    def _equations(self, focal_px: float) -> NDArray[np.float32]:
+        """Return (3, 3 N): a direction d times it is, for each edge, f d_xy − d_z m and its component across the edge.
+
+        With m the edge's middle, that is the vector from there to the vanishing point, times d_z: x, y, and across.
+        """
+        f, zero = np.full_like(self.weight, focal_px), np.zeros_like(self.weight)
+        to_x, to_y = np.stack([f, zero, -self.middle[:, 0]]), np.stack([zero, f, -self.middle[:, 1]])
+        return np.concatenate([to_x, to_y, to_x * self.along[:, 1] - to_y * self.along[:, 0]], axis=1)
+
+
+def _sine2(directions: NDArray[Any], equations: NDArray[np.float32]) -> NDArray[Any]:
+    """Return (n, N) sin² of the angles between each edge and the vanishing points of directions (n, 3)."""
+    squares = directions.astype(np.float32) @ equations
+    squares *= squares
+    x2, y2, across2 = np.split(squares, 3, axis=1)
+    x2 += y2
+    sine2: NDArray[Any] = across2 / np.maximum(x2, np.float32(1e-12), out=x2)
+    return sine2
+
+
+def _explained(sine2: NDArray[Any]) -> NDArray[Any]:
+    """Turn sin² of angles between edges and vanishing points into how well the edges point at them; 1: exactly."""
+    sine2 *= np.float32(-0.5 / EDGE_SIGMA**2)
+    explained: NDArray[Any] = np.exp(sine2, out=sine2)
+    return explained
 
 
 def intersection_directions(normals: NDArray[Any], up: NDArray[np.float64]) -> NDArray[Any]:
@@ -139,16 +158,17 @@ def line_normal_equations(
     With r_i = min_d n_i·d and J_i = d × n_i, the Gauss-Newton step of max Σ_i v_d w_i exp(−r_i² / 2σ²) is ω = H⁻¹ g:
     H = Σ_i ρ_i J_i J_iᵀ and g = −Σ_i ρ_i r_i J_i with ρ_i = v_d w_i exp(−r_i² / 2σ²).
 
-    :param directions: (3, 3) unit rows, in the lines' axes.
+    :param directions: (..., 3, 3) unit rows, in the lines' axes.
     :param sigma: σ in radians.
     :param value: v of each direction (3,), or of all.
-    :return: H (3, 3), g (3,), and (3,) how much each direction explains, Σ w_i exp(−r_i² / 2σ²), in sides.
+    :return: H (..., 3, 3), g (..., 3), and (..., 3) how much each direction explains, Σ w_i exp(−r_i² / 2σ²), in sides.
     """
-    off = lines.normals @ directions.T
-    nearest = np.abs(off).argmin(axis=1)
-    residual = off[np.arange(len(off)), nearest]
+    off = lines.normals @ directions.swapaxes(-1, -2)
+    nearest = np.abs(off).argmin(axis=-1)
+    residual = np.take_along_axis(off, nearest[..., None], -1)[..., 0]
     explained = lines.lengths * np.exp(-0.5 * np.square(residual / sigma))
     weight = explained * np.broadcast_to(value, 3)[nearest]
-    J = np.cross(directions[nearest], lines.normals)
-    supports = cast(NDArray[np.float64], np.bincount(nearest, explained, minlength=3))
-    return (weight[:, None] * J).T @ J, -(weight * residual) @ J, supports
+    J = np.cross(np.take_along_axis(directions, nearest[..., None], -2), lines.normals)
+    g: NDArray[np.float64] = -((weight * residual)[..., None, :] @ J)[..., 0, :]
+    supports = np.where(nearest[..., None] == np.arange(3), explained[..., None], 0.0).sum(axis=-2)
+    return (weight[..., None] * J).swapaxes(-1, -2) @ J, g, supports

@@ -37,6 +37,7 @@ KAPPA = 4.0
 VALUE = np.array([2.0, 1.0, 1.0])  # of a line along u, h and u × h
 MAX_LINES = 120
 HORIZONTAL_CANDIDATES = 24  # lines, the longest ones, each of which may be horizontal
+_BLOCK = 16  # up directions that are tried at once
 GRID_STEP = np.radians(3.0)
 GRID_SIGMA = np.radians(2.2)  # s on the grid; PLANE_SIGMA in the refinement
 MAX_REFINED = 16
@@ -72,8 +73,7 @@ def estimate_up_from_lines(lines: Lines, up: NDArray[np.float64]) -> UpEstimate:
     if not len(lines.lengths):
         return UpEstimate()
     lines = Lines(lines.normals[:MAX_LINES], lines.lengths[:MAX_LINES])
-    coarse = sorted((_best_with_up(u, lines, up) for u in _grid(up)), key=lambda scored: -scored[0])[:MAX_REFINED]
-    best, *others = sorted((_refined(axes, lines, up) for _, axes in coarse), key=lambda axes: -axes.score)
+    best, *others = sorted(_refined(_best_on_grid(lines, up), lines, up), key=lambda axes: -axes.score)
     share = best.supports.sum() / lines.lengths.sum()
     count = np.square(lines.lengths.sum()) / np.square(lines.lengths).sum()
     found = best.directions[0]
@@ -98,31 +98,48 @@ def _grid(up: NDArray[np.float64]) -> NDArray[np.float64]:
     return near
 
 
-def _best_with_up(u: NDArray[np.float64], lines: Lines, up: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
-    """Return the score and the axes (3, 3) of the best horizontal directions for an up direction u."""
-    hat = np.array([[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]])  # v @ hat = v x u
-    level = np.concatenate([lines.normals[:HORIZONTAL_CANDIDATES], np.eye(3)]) @ hat  # along a horizontal line
-    size = np.linalg.norm(level, axis=1)
-    level = level[size > 0.1] / size[size > 0.1, None]
-    across = -level @ hat
-    off2 = np.minimum(np.square(level @ lines.normals.T), np.square(across @ lines.normals.T))
-    explained = np.exp(-0.5 / GRID_SIGMA**2 * off2)
-    explained = np.maximum(explained, VALUE[0] * np.exp(-0.5 / GRID_SIGMA**2 * np.square(lines.normals @ u)))
-    support = explained @ lines.lengths
-    best = int(support.argmax())
-    return _score(float(support[best]), u, up), np.array([u, level[best], across[best]])
+def _best_on_grid(lines: Lines, up: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the axes (n, 3, 3) of the best up directions around one, each with its best horizontal directions."""
+    ups = _grid(up)
+    found = [_best_with_ups(ups[k : k + _BLOCK], lines) for k in range(0, len(ups), _BLOCK)]
+    support, axes = (np.concatenate(each) for each in zip(*found, strict=True))
+    best: NDArray[np.float64] = axes[np.argsort(-_score(support, ups, up), kind="stable")[:MAX_REFINED]]
+    return best
 
 
-def _refined(directions: NDArray[np.float64], lines: Lines, up: NDArray[np.float64]) -> _Axes:
+def _best_with_ups(ups: NDArray[np.float64], lines: Lines) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the support and the axes (n, 3, 3) of the best horizontal directions for each of the up directions (n, 3).
+
+    Of several weighted exponentials, the largest is that of the least exponent, which needs one call instead of three.
+    """
+    level = np.cross(np.concatenate([lines.normals[:HORIZONTAL_CANDIDATES], np.eye(3)]), ups[:, None])
+    size = np.linalg.norm(level, axis=2, keepdims=True)  # level: along a horizontal line
+    level /= np.maximum(size, 0.1)
+    across = np.cross(ups[:, None], level)
+    off2 = np.square(level @ lines.normals.T)
+    np.minimum(off2, np.square(across @ lines.normals.T), out=off2)
+    scale = -0.5 / GRID_SIGMA**2
+    np.minimum(off2, (np.square(ups @ lines.normals.T) + np.log(VALUE[0]) / scale)[:, None], out=off2)
+    off2 *= scale
+    support = np.where(size[..., 0] > 0.1, np.exp(off2, out=off2) @ lines.lengths, -np.inf)
+    rows, best = np.arange(len(ups)), support.argmax(axis=1)
+    return support[rows, best], np.stack([ups, level[rows, best], across[rows, best]], axis=1)
+
+
+def _refined(directions: NDArray[np.float64], lines: Lines, up: NDArray[np.float64]) -> list[_Axes]:
+    """Refine each of the axes (n, 3, 3)."""
     for _ in range(REFINEMENT_STEPS):
         H, g, _ = line_normal_equations(lines, directions, PLANE_SIGMA, VALUE)
-        u = directions[0]
-        H = KAPPA / PLANE_SIGMA**2 * H + (np.eye(3) - np.outer(u, u)) / BODY_SIGMA**2 + 1e-9 * np.eye(3)
+        u = directions[:, 0]
+        H = KAPPA / PLANE_SIGMA**2 * H + (np.eye(3) - u[:, :, None] * u[:, None]) / BODY_SIGMA**2 + 1e-9 * np.eye(3)
         g = KAPPA / PLANE_SIGMA**2 * g + np.cross(u, up) / BODY_SIGMA**2
-        directions = directions @ exp(np.linalg.solve(H, g)).T
+        directions = directions @ exp(np.linalg.solve(H, g[..., None])[..., 0]).swapaxes(1, 2)
     supports = line_normal_equations(lines, directions, PLANE_SIGMA)[2]
-    return _Axes(directions, supports, _score(float(VALUE @ supports), directions[0], up))
+    scores = _score(supports @ VALUE, directions[:, 0], up)
+    return [_Axes(*each) for each in zip(directions, supports, scores.tolist(), strict=True)]
 
 
-def _score(support: float, u: NDArray[np.float64], up: NDArray[np.float64]) -> float:
-    return KAPPA * support - 0.5 * float(np.arccos(np.clip(u @ up, -1.0, 1.0)) / BODY_SIGMA) ** 2
+def _score(support: NDArray[np.float64], u: NDArray[np.float64], up: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the scores (n,) of up directions (n, 3) that explain so much."""
+    scores: NDArray[np.float64] = KAPPA * support - 0.5 * np.square(np.arccos(np.clip(u @ up, -1.0, 1.0)) / BODY_SIGMA)
+    return scores

@@ -43,7 +43,8 @@ def network_path(name: str) -> Path:
     path = NETWORKS_FOLDER / f"{name}.onnx"
     if not path.is_file():
         raise SetupError(
-            f"{path} is missing. Build the networks in the repository with: python -m scope.tools.convert_networks"
+            f"{path} is missing. Build the networks in the repository with: python -m scope.tools.convert_networks "
+            "(a wheel contains none: capture with the scripts of the repository)"
         )
     return path
 

@@ -17,6 +17,7 @@ import numpy as np
 from bpy_extras import anim_utils
 from numpy.typing import NDArray
 
+from ...errors import UsageError
 from .fcurve_modifiers import read_modifiers, write_modifiers
 
 # Values of Blender's keyframe interpolation enum, which foreach_set takes as integers.
@@ -281,6 +282,14 @@ def nla_strips(datablock: bpy.types.ID) -> list[bpy.types.NlaStrip]:
     return [strip for track in tracks for strip in track.strips if not strip.mute]
 
 
+def animated_together(armature: bpy.types.Object, root: bpy.types.Object | None) -> list[bpy.types.ID]:
+    """Return an armature with an action, and of its root object and the shape keys of its meshes those that move."""
+    keys = [getattr(obj.data, "shape_keys", None) for obj in armature.children_recursive if obj.type == "MESH"]
+    others = [block for block in dict.fromkeys([root, *keys]) if block is not None and block.library is None]
+    moving = [block for block in others if any(len(curve.keyframe_points) > 1 for curve in fcurves(block))]
+    return [armature, *moving]
+
+
 def push_to_nla(datablock: bpy.types.ID) -> bpy.types.NlaStrip:
     """Move the action of a datablock to a strip on a new NLA track, at the frames of its keys.
 
@@ -299,9 +308,23 @@ def push_to_nla(datablock: bpy.types.ID) -> bpy.types.NlaStrip:
     return strip
 
 
+def check_not_in_nla(datablock: bpy.types.ID) -> None:
+    """Check that keys that are missing in the action of a datablock are not in its NLA, where they are not read.
+
+    :raises UsageError: they may be.
+    """
+    tracks = datablock.animation_data.nla_tracks if datablock.animation_data else ()
+    if strips := [strip for track in tracks for strip in track.strips]:
+        raise UsageError(
+            f"'{datablock.name}' is animated by the NLA strip '{strips[0].name}', not by an action of its own alone: "
+            "enter Tweak Mode on the strip (Tab), choose its action in the Action Editor again, or bake all strips "
+            "into one action (Bake Action)"
+        )
+
+
 @contextmanager
 def nla_as_actions(scene: bpy.types.Scene) -> Iterator[None]:
-    """Bake the NLA of the scene's objects to actions for the duration of the block, on whole frames."""
+    """Bake the NLA of the scene's objects and shape keys to actions for the duration of the block, on whole frames."""
     options = anim_utils.BakeOptions(
         only_selected=False,
         do_pose=True,
@@ -317,7 +340,9 @@ def nla_as_actions(scene: bpy.types.Scene) -> Iterator[None]:
         do_custom_props=False,
     )
     blended = [obj for obj in scene.objects if nla_strips(obj)]
-    animations = [obj.animation_data for obj in blended]
+    blocks = {obj.data.shape_keys for obj in scene.objects if obj.type == "MESH" and obj.data.shape_keys}
+    shaped = [keys for keys in blocks if nla_strips(keys)]
+    animations = [datablock.animation_data for datablock in (*blended, *shaped)]
     kept = [(a, a.action, getattr(a, "action_slot", None), a.action_blend_type) for a in animations]
     baked: list[bpy.types.Action] = []
     try:
@@ -326,6 +351,7 @@ def nla_as_actions(scene: bpy.types.Scene) -> Iterator[None]:
             pairs = [(obj, None) for obj in blended if (obj.pose is not None) is posed]
             if pairs:
                 baked += anim_utils.bake_action_objects(pairs, frames=frames, bake_options=options)
+        baked += _baked_shape_keys(scene, shaped, frames)
         for animation in animations:
             animation.use_nla = False
         yield
@@ -336,6 +362,23 @@ def nla_as_actions(scene: bpy.types.Scene) -> Iterator[None]:
                 animation.action_slot = slot
             animation.action_blend_type = blend_type
         bpy.data.batch_remove([action for action in baked if action is not None])
+
+
+def _baked_shape_keys(scene: bpy.types.Scene, shaped: list[bpy.types.Key], frames: range) -> list[bpy.types.Action]:
+    """Give shape keys an action each with the values that they show at scene frames; return the actions."""
+    shown = {keys: np.empty((len(frames), len(keys.key_blocks)), np.float32) for keys in shaped}
+    for row, frame in enumerate(frames if shaped else ()):
+        scene.frame_set(frame)
+        evaluated = bpy.context.evaluated_depsgraph_get()
+        for keys, values in shown.items():
+            values[row] = [block.value for block in keys.evaluated_get(evaluated).key_blocks]
+    made = []
+    for keys, values in shown.items():
+        channels = Channels(keys, bpy.data.actions.new(keys.name))
+        made.append(channels.action)
+        for name, column in list(zip(keys.key_blocks.keys(), values.T, strict=True))[1:]:  # without the basis
+            channels.write(shape_key_path(name), np.array(frames, float), column)
+    return made
 
 
 def frame_range(datablocks: Iterable[bpy.types.ID]) -> tuple[float, float] | None:

@@ -51,16 +51,15 @@ def retime_keys(action: bpy.types.Action, retiming: Retiming) -> None:
         curve.update()
 
 
-def retime_strips(animation: bpy.types.AnimData, retiming: Retiming) -> list[bpy.types.Action]:
-    """Move the NLA strips of a datablock, with the part of their actions that they play.
+def action_strips(animation: bpy.types.AnimData) -> list[bpy.types.NlaStrip]:
+    """Return the NLA strips of a datablock that play an action."""
+    return [s for track in animation.nla_tracks for s in track.strips if s.type == "CLIP" and s.action]
 
-    :return: the strips' actions, whose keys are not moved.
-    """
-    strips = [s for track in animation.nla_tracks for s in track.strips if s.type == "CLIP" and s.action]
-    for strip in strips:
-        ends = strip.frame_start, strip.frame_end, strip.action_frame_start, strip.action_frame_end
-        start, end, first, last = (retiming.frame(frame) for frame in ends)
-        strip.action_frame_end = max(last, strip.action_frame_start + 1.0)  # Blender keeps the end after the start
-        strip.action_frame_start, strip.action_frame_end = first, last
-        strip.frame_start_raw, strip.frame_end_raw = start, end
-    return [strip.action for strip in strips]
+
+def retime_strip(strip: bpy.types.NlaStrip, retiming: Retiming) -> None:
+    """Move an NLA strip, with the part of its action that it plays; the action's keys are not moved."""
+    ends = strip.frame_start, strip.frame_end, strip.action_frame_start, strip.action_frame_end
+    start, end, first, last = (retiming.frame(frame) for frame in ends)
+    strip.action_frame_end = max(last, strip.action_frame_start + 1.0)  # Blender keeps the end after the start
+    strip.action_frame_start, strip.action_frame_end = first, last
+    strip.frame_start_raw, strip.frame_end_raw = start, end

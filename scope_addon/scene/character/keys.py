@@ -21,7 +21,7 @@ from ...edit.clip import Clip, band_limited, sample
 from ...edit.reduce import angles_between, select_position_keys, select_quaternion_keys
 from ...errors import UsageError
 from ...kinematics.axes import R_WORLD_MODEL
-from ..animation_data.actions import bone_path, change_keys, fcurves, read_keys, rewrite_keys
+from ..animation_data.actions import bone_path, change_keys, check_not_in_nla, fcurves, read_keys, rewrite_keys
 from ..animation_data.timing import whole_frames_of
 from .animation import on_one_hemisphere
 from .armature import rest_orientations
@@ -186,19 +186,15 @@ def _root_head(armature: bpy.types.Object, body: Body) -> NDArray[np.float64]:
 
 def _curves(armature: bpy.types.Object, body: Body) -> dict[str, list[bpy.types.FCurve]]:
     """Return the curves of every bone's rotation and the root's location by data path, in the order of their index."""
+    _check_bones(armature, body)
     wanted = {bone_path(name, ROTATION): 4 for name in body.joint_names} | {location_path(body): 3}
     found: dict[str, dict[int, bpy.types.FCurve]] = {path: {} for path in wanted}
     for curve in fcurves(armature):
         if curve.data_path in found and len(curve.keyframe_points):
             found[curve.data_path][curve.array_index] = curve
     missing = [path for path, count in wanted.items() if len(found[path]) != count]
-    animation = armature.animation_data
-    if missing and animation is not None and animation.action is None and len(animation.nla_tracks):
-        raise UsageError(
-            f"'{armature.name}' is animated by the NLA track '{animation.nla_tracks[0].name}', not by an action of its "
-            "own: enter Tweak Mode on the track's strip (Tab), or choose the action in the Action Editor again"
-        )
     if missing:
+        check_not_in_nla(armature)
         raise UsageError(f"'{armature.name}' has lost the keys of {missing[0]}; undo their removal, or capture again")
     return {path: [by_index[i] for i in sorted(by_index)] for path, by_index in found.items()}
 
@@ -211,10 +207,27 @@ def _values(curve: bpy.types.FCurve, frames: NDArray[np.float64]) -> NDArray[np.
     return np.array([curve.evaluate(frame) for frame in frames])
 
 
+def _check_bones(armature: bpy.types.Object, body: Body) -> None:
+    """Check that an armature has the body's bones, and that the keys that a capture has written rotate them.
+
+    :raises UsageError: a bone was renamed or removed, or has another rotation mode.
+    """
+    for name in body.joint_names:
+        if name not in armature.pose.bones:
+            raise UsageError(
+                f"'{armature.name}' has no bone '{name}'; if you have renamed it, give it this name again, or choose "
+                "another armature that Scope captured"
+            )
+        mode = armature.pose.bones[name].rotation_mode
+        if mode != "QUATERNION":
+            raise UsageError(
+                f"'{name}' of '{armature.name}' has the rotation mode {mode}, in which its captured keys have no "
+                "effect; change it back to Quaternion (WXYZ), and its keys too if you have converted them"
+            )
+
+
 def _axes(armature: bpy.types.Object, body: Body) -> NDArray[np.float64]:
     """Return C_i = M_iᵀ R_world_model (K+1, 3, 3)."""
-    missing = [name for name in body.joint_names if name not in armature.data.bones]
-    if missing:
-        raise UsageError(f"'{armature.name}' has no bone '{missing[0]}'; choose an armature that Scope captured")
+    _check_bones(armature, body)
     axes: NDArray[np.float64] = np.swapaxes(rest_orientations(armature, body), 1, 2) @ R_WORLD_MODEL
     return axes

@@ -18,7 +18,7 @@ from ...edit.clip import Clip
 from ...edit.pins.moved import moved_clip
 from ...edit.root_motion import floor_trajectory, relative_to_trajectory, with_trajectory
 from ...errors import UsageError
-from ..animation_data.actions import Channels, fcurves, read_keys
+from ..animation_data.actions import Channels, check_not_in_nla, fcurves, read_keys
 from ..animation_data.removal import remove_blocks
 from ..animation_data.retime import Retiming
 from ..animation_data.stored_values import stored_numbers
@@ -162,7 +162,7 @@ def clip_with_root_motion(armature: bpy.types.Object, clip: Clip, frames: NDArra
     """Return the clip including the trajectory stored in its root object, in use or not, in the armature's own space.
 
     :param frames: (T,) scene frames of the clip's keys.
-    :raises UsageError: the stored trajectory was changed.
+    :raises UsageError: the stored trajectory was changed, or is in the NLA.
     """
     whole, empty = with_trajectory(clip, *removed_root_motion(armature, frames)), root_object(armature)
     if empty is None:
@@ -177,7 +177,7 @@ def removed_root_motion(
 
     :param frames: (T,) scene frames.
     :return: positions (T, 3) in the armature's units; angles (T,) about the vertical, radians.
-    :raises UsageError: the stored trajectory was changed.
+    :raises UsageError: the stored trajectory was changed, or is in the NLA.
     """
     empty = root_object(armature)
     if empty is None:
@@ -213,6 +213,7 @@ def clip_as_displayed(armature: bpy.types.Object, clip: Clip, frames: NDArray[np
     """Return the clip as displayed: moved by its root object, whether animated or at rest.
 
     :param frames: (T,) scene frames of the clip's keys.
+    :raises UsageError: the root object's keys are in its NLA.
     """
     empty = root_object(armature)
     return clip if empty is None else with_trajectory(clip, *_keyed_path(armature, empty, frames))
@@ -221,8 +222,13 @@ def clip_as_displayed(armature: bpy.types.Object, clip: Clip, frames: NDArray[np
 def _keyed_path(
     armature: bpy.types.Object, empty: bpy.types.Object, frames: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the empty's positions (T, 3), in the armature's units, and angles (T,), radians, at scene frames (T,)."""
+    """Return the empty's positions (T, 3), in the armature's units, and angles (T,), radians, at scene frames (T,).
+
+    :raises UsageError: the empty's keys are in its NLA.
+    """
     columns = {}
+    if not fcurves(empty):
+        check_not_in_nla(empty)
     for curve in fcurves(empty):
         keys = read_keys(curve)
         columns[curve.data_path, curve.array_index] = np.interp(frames, keys[:, 0], keys[:, 1])

@@ -32,12 +32,13 @@ class SampledPose:
 
 
 def bvh_text(pose: SampledPose, unit: str = "cm") -> str:
-    """Return the content of the file.
+    """Return the content of the file; names are without spaces, at which readers would cut them off.
 
     :param unit: of its lengths, a key of ``UNITS_PER_METRE``.
     """
     scale = UNITS_PER_METRE[unit]
     pose = replace(pose, heads=scale * pose.heads, tails=scale * pose.tails, joints=scale * pose.joints)
+    pose = replace(pose, names=_words(pose.names))
     children: list[list[int]] = [[] for _ in pose.names]
     for i, parent in enumerate(pose.parents):
         if parent >= 0:
@@ -51,6 +52,17 @@ def bvh_text(pose: SampledPose, unit: str = "cm") -> str:
     lines += ["MOTION", f"Frames: {len(values)}", f"Frame Time: {1.0 / pose.rate:.9f}"]
     lines += [" ".join(f"{v:.6f}" for v in row) for row in values.tolist()]
     return "\n".join(lines) + "\n"
+
+
+def _words(names: list[str]) -> list[str]:
+    """Return names as single words, all different."""
+    found: list[str] = []
+    for name in names:
+        word = "_".join(name.split())
+        while word in found or (word != name and word in names):
+            word += "_"
+        found.append(word)
+    return found
 
 
 def _subtree(children: list[list[int]], i: int) -> list[int]:

@@ -34,8 +34,10 @@ from .export_states import (
     external_parents_replaced,
     one_person,
     out_of_edit_mode,
+    scaled,
     scene_of,
     temporary_scene,
+    unit_of_captures,
 )
 from .output_paths import check_output, person_paths
 
@@ -53,6 +55,7 @@ class ExportOptions:
     separate: bool = False  # one file per person, also in formats that can hold several
     bvh_unit: str = "cm"  # of the lengths in .bvh: "cm" or "m"
     take: str = ""  # name of the animation; empty: the capture's
+    unit: float = 0.0  # metres that a length of 1 stands for; 0: as ``unit_of_captures`` says
 
     def __post_init__(self) -> None:
         """Check the values.
@@ -123,15 +126,20 @@ def _write_one(
     """Write these collections over the frame range of all ``rigs``, so that separate files start at the same time."""
     suffix = path.suffix.lower()
     take = options.take or (collections[0].name if len(collections) == 1 else path.stem)
+    unit = options.unit or unit_of_captures(rigs, bpy.context.scene.unit_settings.scale_length)
+    by_scene = suffix in (".fbx", ".blend")  # which regard the scene's unit
+    is_in_metres = by_scene or abs(unit - 1.0) < 1e-6
     with (
         out_of_edit_mode(collections),
         nullcontext() if suffix == ".blend" else all_evaluated(collections),  # keeps hidden objects as they are
-        scene_of(collections, rigs, options.camera) as scene,
+        scene_of(collections, rigs, options.camera, unit if by_scene else 1.0) as scene,
         external_parents_replaced(scene)
-        if suffix == ".glb"
-        else nullcontext(),  # its exporter omits children of objects outside the scene
+        if suffix == ".glb" or not is_in_metres
+        else nullcontext(),  # the exporter of .glb omits children of objects outside the scene
+        nullcontext() if is_in_metres else scaled(scene, unit),
+        # The exporter of .glb only reads actions, and so do meshes of the current shape, whose expressions move.
+        actions.nla_as_actions(scene) if suffix == ".glb" or options.bakes(suffix) else nullcontext(),
         baked_meshes(scene) if options.bakes(suffix) else nullcontext(),
-        actions.nla_as_actions(scene) if suffix == ".glb" else nullcontext(),  # its exporter only reads actions
         actions_over_scene_range(scene),
     ):
         rig = next((obj for obj in scene.objects if obj.type == "ARMATURE"), None)

@@ -16,7 +16,7 @@ from ..animation_data import actions
 from ..camera import set_resolution
 from ..character.animation import on_one_hemisphere
 from ..character.expression_keys import copy_expressions, expression_offsets
-from ..character.shape_keys import mixed_vertices
+from ..character.shape_keys import mixed_vertices, shape_key_name
 
 
 @contextmanager
@@ -37,12 +37,16 @@ def temporary_scene(name: str) -> Iterator[bpy.types.Scene]:
 
 @contextmanager
 def scene_of(
-    collections: Sequence[bpy.types.Collection], rigs: Sequence[bpy.types.Object], with_camera: bool
+    collections: Sequence[bpy.types.Collection],
+    rigs: Sequence[bpy.types.Object],
+    with_camera: bool,
+    unit: float = 1.0,
 ) -> Iterator[bpy.types.Scene]:
     """Provide a scene that contains only these collections, with the frame rate and resolution of the active scene.
 
     Its frame range is that of the motion of ``rigs``.
 
+    :param unit: of the scene, metres.
     :param with_camera: use the footage's resolution, from which exporters compute the camera's vertical field of view.
     :raises UsageError: when the motion begins before frame 0.
     """
@@ -52,6 +56,7 @@ def scene_of(
             scene.collection.children.link(collection)
         for name in ("fps", "fps_base", "resolution_x", "resolution_y", "pixel_aspect_x", "pixel_aspect_y"):
             setattr(scene.render, name, getattr(source.render, name))
+        scene.unit_settings.scale_length = unit
         for marker in source.timeline_markers:
             scene.timeline_markers.new(marker.name, frame=marker.frame)
         cameras = [obj for obj in scene.objects if obj.type == "CAMERA"]
@@ -71,6 +76,17 @@ def scene_of(
         scene.frame_set(scene.frame_start)
         yield scene
     source.frame_set(source.frame_current, subframe=source.frame_subframe)
+
+
+def unit_of_captures(rigs: Sequence[bpy.types.Object], unit: float) -> float:
+    """Return the metres that a length of 1 stands for in captures, which are built in metres in any scene.
+
+    In a scene of another unit, the user may have scaled them to their true size in that unit, as a warning suggests.
+
+    :param unit: of the scene, metres.
+    """
+    size = abs(rigs[0].matrix_world.median_scale) if rigs else 1.0
+    return min((1.0, unit), key=lambda metres: abs(math.log(max(size * metres, 1e-9))))
 
 
 @contextmanager
@@ -109,6 +125,25 @@ def external_parents_replaced(scene: bpy.types.Scene) -> Iterator[None]:
         for obj, parent, kind, bone, inverse in kept:
             obj.parent, obj.parent_type, obj.parent_bone, obj.matrix_parent_inverse = parent, kind, bone, inverse
         bpy.data.batch_remove(created)
+
+
+@contextmanager
+def scaled(scene: bpy.types.Scene, size: float) -> Iterator[None]:
+    """Parent everything in a scene to an empty of a size inside the block; no object has a parent outside the scene."""
+    tops = [(obj, obj.matrix_parent_inverse.copy()) for obj in scene.objects if obj.parent is None]
+    empty = bpy.data.objects.new("Unit", None)
+    empty.scale = (size,) * 3
+    scene.collection.objects.link(empty)
+    try:
+        for obj, _ in tops:
+            obj.parent = empty
+            obj.matrix_parent_inverse.identity()
+        bpy.context.view_layer.update()
+        yield
+    finally:
+        for obj, inverse in tops:
+            obj.parent, obj.matrix_parent_inverse = None, inverse
+        bpy.data.objects.remove(empty)
 
 
 @contextmanager
@@ -167,8 +202,13 @@ def actions_over_scene_range(scene: bpy.types.Scene) -> Iterator[None]:
 
 @contextmanager
 def baked_meshes(scene: bpy.types.Scene) -> Iterator[None]:
-    """Replace meshes with shape keys by meshes of their current shape inside the block; expressions stay keys."""
-    shaped = [(obj, obj.data, obj.data.name) for obj in scene.objects if obj.type == "MESH" and obj.data.shape_keys]
+    """Replace captured bodies by meshes of their current shape inside the block; expressions stay keys.
+
+    Other meshes, those of a user's rig, keep their shape keys: these are not coefficients of a shape.
+    """
+    meshes = [obj for obj in scene.objects if obj.type == "MESH" and obj.data.shape_keys]
+    bodies = [obj for obj in meshes if shape_key_name(0) in obj.data.shape_keys.key_blocks]
+    shaped = [(obj, obj.data, obj.data.name) for obj in bodies]
     baked, actions_made = [], []
     try:
         for obj, mesh, name in shaped:

@@ -151,7 +151,7 @@ def write_bvh(path: Path, scene: bpy.types.Scene, rig: bpy.types.Object, unit: s
 
     :param unit: of the file's lengths, ``cm`` or ``m``.
     """
-    path.write_text(bvh.bvh_text(sample_armature(scene, rig), unit), encoding="ascii", errors="replace")
+    path.write_text(bvh.bvh_text(sample_armature(scene, rig), unit), encoding="utf-8", errors="replace")
 
 
 def sample_armature(scene: bpy.types.Scene, rig: bpy.types.Object) -> bvh.SampledPose:

@@ -95,7 +95,7 @@ class LiveRig:
         self._write(rig, turns, (heads[0] - self._rest) @ self._location)
 
     def _write(self, rig: bpy.types.Object, turns: NDArray[np.float64], location: NDArray[np.float64]) -> None:
-        """Set the channels of the mapped bones that still exist, each in its own rotation mode.
+        """Set the channels of the mapped bones that still exist, each in its own rotation mode; their scale is 1.
 
         All at once where possible: setting a property of a single bone has every editor that shows it drawn again.
 
@@ -105,23 +105,23 @@ class LiveRig:
         bones, values = rig.pose.bones, quaternion_from_matrix(turns)
         if (names := bones.keys()) != self._names:
             self._names, self._places = names, {name: place for place, name in enumerate(names)}
-        quaternions, locations = np.empty((len(names), 4), np.float32), np.empty((len(names), 3), np.float32)
+        quaternions = np.empty((len(names), 4), np.float32)
+        locations, scales = np.empty((2, len(names), 3), np.float32)
         bones.foreach_get("rotation_quaternion", quaternions.ravel())
         bones.foreach_get("location", locations.ravel())
+        bones.foreach_get("scale", scales.ravel())
         for b, name in enumerate(self._skeleton.names):
             place = self._places.get(name)
             if place is None:
                 continue
-            if b == self._root:
-                locations[place] = location
+            locations[place], scales[place] = location if b == self._root else 0.0, 1.0
             if (bone := bones[name]).rotation_mode == "QUATERNION":
                 quaternions[place] = values[b]
             else:
-                matrix = Matrix(turns[b].tolist()).to_4x4()  # in the bone's own rotation mode
-                matrix.translation = bone.location
-                bone.matrix_basis = matrix
+                bone.matrix_basis = Matrix(turns[b].tolist()).to_4x4()  # in the bone's own rotation mode
         bones.foreach_set("rotation_quaternion", quaternions.ravel())
         bones.foreach_set("location", locations.ravel())
+        bones.foreach_set("scale", scales.ravel())
         rig.update_tag(refresh={"DATA"})
 
     def _transfer_of(self, betas: NDArray[np.floating[Any]]) -> Transfer:

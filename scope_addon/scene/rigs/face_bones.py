@@ -53,9 +53,9 @@ def retarget_face_bones(
     """Key the face of a rig so that it shows the captured expressions; its other keys stay as they are.
 
     They are written to a copy of the rig's action, or to a new one. Its former action is kept in the file, unless
-    retargeting has written it and it was not edited.
+    retargeting has written it for the same capture and it was not edited.
 
-    :param name: of the action, after that of the rig.
+    :param name: of the captured armature; the action has it after that of the rig.
     :raises UsageError: when the rig has none of the map's controls.
     :raises InputError: when the map cannot be used, or the rig's face cannot be measured.
     """
@@ -71,10 +71,10 @@ def retarget_face_bones(
             if slot is not None:
                 same = (s for s in rig.animation_data.action.slots if s.identifier == slot.identifier)
                 rig.animation_data.action_slot = next(same)
-        action = key_face(rig, keys)
+        action = key_face(rig, keys, name)
         rig.data.pose_position = "POSE"
         override_nla(rig.animation_data)
-        retire(former)
+        retire(former, name)
         action.name = f"{rig.name}_{name}"
     rest_face(rig, keys)
     return action
@@ -105,15 +105,18 @@ def face_keys(captured: CapturedExpressions, rig: bpy.types.Object, expression_m
     return FaceKeys(captured.frames, {motion.bone: _channels(rig, motion) for motion in motions})
 
 
-def key_face(rig: bpy.types.Object, keys: FaceKeys) -> bpy.types.Action:
-    """Replace the keys of a face in the action of its rig; return the action."""
+def key_face(rig: bpy.types.Object, keys: FaceKeys, source: str) -> bpy.types.Action:
+    """Replace the keys of a face in the action of its rig; return the action.
+
+    :param source: name of the captured armature.
+    """
     channels = Channels.of(rig)
     channels.remove({bone_path(bone, channel) for bone in keys.controls for channel in _CHANNELS})
     for bone, moved in keys.controls.items():
         for path, values in moved.items():
             interpolation = "CONSTANT" if len(values) == 1 else "LINEAR"
             channels.write(bone_path(bone, path), keys.frames[: len(values)], values, interpolation, group=bone)
-    mark_written(channels.action)
+    mark_written(channels.action, source)
     return channels.action
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ....solver.names import EXPRESSIONS
 from ...errors import UsageError
 from ...retarget.expression_map import ExpressionMap, guess_expression_map
-from ..animation_data.actions import Channels, fcurves, read_keys, shape_key_path
+from ..animation_data.actions import Channels, check_not_in_nla, fcurves, read_keys, shape_key_path
 from ..animation_data.transaction import all_or_nothing
 from ..character.expression_keys import MOVES, has_expression_keys
 from .rig_action import leave_tweak_mode, mark_written, override_nla, retire
@@ -28,11 +28,16 @@ class CapturedExpressions:
 
 
 def captured_expressions(armature: bpy.types.Object) -> CapturedExpressions | None:
-    """Return the expressions that the captured armature's body shows; None if its face was not captured."""
+    """Return the expressions that the captured armature's body shows; None if its face was not captured.
+
+    :raises UsageError: their keys are in the NLA.
+    """
     for mesh in armature.children:
         keys = mesh.data.shape_keys if mesh.type == "MESH" else None
         if keys is None or not has_expression_keys(keys):
             continue
+        if not fcurves(keys):
+            check_not_in_nla(keys)
         curves = {curve.data_path: read_keys(curve).astype(float) for curve in fcurves(keys)}
         found = [curves.get(shape_key_path(name)) for name in EXPRESSIONS]
         longest = max((keyed[:, 0] for keyed in found if keyed is not None and len(keyed)), key=len, default=np.ones(1))
@@ -64,11 +69,11 @@ def retarget_expressions(
 ) -> list[bpy.types.Action]:
     """Key the shape keys of meshes in new actions so that they show the captured expressions.
 
-    A mesh's former action is kept in the file, unless it is an earlier retargeting that was not edited. A key that
-    never moves gets a value without keyframes; sliders whose range ends below 1 are widened to it.
+    A mesh's former action is kept in the file, unless it is an earlier retargeting of the same capture that was not
+    edited. A key that never moves gets a value without keyframes; sliders whose range ends below 1 are widened to it.
 
     :param expression_map: None to guess one for each mesh by the names of its keys.
-    :param name: of the actions, after that of the mesh.
+    :param name: of the captured armature; the actions have it after that of the mesh.
     :return: the actions, of the meshes that have mapped keys.
     :raises UsageError: when no mesh has any mapped key.
     :raises InputError: when the map cannot be used.
@@ -91,15 +96,15 @@ def retarget_expressions(
     with all_or_nothing(bpy.context.scene, *faces, keys=[face.data.shape_keys for face in faces]):
         for face, values in plans:
             if values:
-                written.append((face, *_write(face.data.shape_keys, captured.frames, values)))
+                written.append((face, *_write(face.data.shape_keys, captured.frames, values, name)))
         for face, action, former in written:
-            retire(former)
+            retire(former, name)
             action.name = f"{face.name}_{name}"  # which an earlier retargeting had until now
     return [action for _, action, _ in written]
 
 
 def _write(
-    keys: bpy.types.Key, frames: NDArray[np.float64], values: dict[str, NDArray[np.float64]]
+    keys: bpy.types.Key, frames: NDArray[np.float64], values: dict[str, NDArray[np.float64]], source: str
 ) -> tuple[bpy.types.Action, bpy.types.Action | None]:
     """Write the keys of one mesh; return the new action and the former one."""
     former = keys.animation_data.action if keys.animation_data else None
@@ -111,5 +116,5 @@ def _write(
         if np.ptp(column) >= MOVES:
             channels.write(shape_key_path(key), frames, column, group="Face")
     override_nla(keys.animation_data)
-    mark_written(channels.action)
+    mark_written(channels.action, source)
     return channels.action, former

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import bpy
@@ -13,11 +14,14 @@ from numpy.typing import NDArray
 
 from ....solver.rotations import quaternion_from_matrix
 from ...retarget.skeleton import Skeleton
-from ..animation_data.actions import Channels, bone_path, fcurves_of, read_keys
+from ..animation_data.actions import Channels, bone_path, fcurves_of, nla_strips, read_keys
 from ..animation_data.retime import Retiming, retime_keys
+from ..animation_data.stored_values import stored_text
 from ..character.animation import on_one_hemisphere
 
-_CHECKSUM = "scope_keys"  # custom property of an action: the checksum of its keys when they were written
+# Custom properties of an action: the checksum of its keys when they were written, and the captured armature's name.
+_CHECKSUM, _SOURCE = "scope_keys", "scope_keys_of"
+_OFFSETS = {"location": 0.0, "scale": 1.0}  # channels of a bone beside its rotation, and their values at rest
 
 
 @dataclass(frozen=True)
@@ -51,16 +55,21 @@ def root_locations(
     """
     world = place[:3, :3]
     moved: NDArray[np.float64] = (heads - skeleton.heads[root]) @ np.linalg.inv(world).T
-    if rig.pose.bones[skeleton.names[root]].bone.use_local_location:
-        axes = skeleton.rotations[root].T @ (world / np.cbrt(np.linalg.det(world)))
-        moved = moved @ axes.T
+    bone = rig.pose.bones[skeleton.names[root]].bone
+    if bone.use_local_location:  # not by the bone's axes in the world, which a scale of three factors shears
+        moved = moved @ np.array(bone.matrix_local.to_3x3(), float)
     return moved
 
 
-def write_action(rig: bpy.types.Object, keys: list[BoneKeys], frames: NDArray[np.float64]) -> bpy.types.Action:
+def write_action(
+    rig: bpy.types.Object, keys: list[BoneKeys], frames: NDArray[np.float64], source: str
+) -> bpy.types.Action:
     """Create a new action with the keys, in the rotation mode of each bone.
 
+    Where the NLA moves or scales one of the bones, a key keeps it in place and in size.
+
     :param frames: (T,) scene frames.
+    :param source: name of the captured armature.
     """
     action = bpy.data.actions.new(rig.name)
     channels = Channels(rig, action)
@@ -70,13 +79,40 @@ def write_action(rig: bpy.types.Object, keys: list[BoneKeys], frames: NDArray[np
     for key in keys:
         if key.locations is not None:
             channels.write(bone_path(key.bone, "location"), frames, key.locations, group=key.bone)
-    mark_written(action)
+    below = {curve.data_path for strip in nla_strips(rig) if strip.action for curve in fcurves_of(strip.action)}
+    for key in keys:
+        for channel, value in _OFFSETS.items():
+            if (path := bone_path(key.bone, channel)) in below and (channel != "location" or key.locations is None):
+                channels.write(path, frames[:1], np.full((1, 3), value), "CONSTANT", group=key.bone)
+    mark_written(action, source)
     return action
 
 
-def mark_written(action: bpy.types.Action) -> None:
-    """Remember the keys that retargeting has written, to tell later whether they were edited."""
+def mark_written(action: bpy.types.Action, source: str = "") -> None:
+    """Remember the keys that retargeting has written, to tell later whether they were edited.
+
+    :param source: name of the captured armature whose motion they are; empty: as before.
+    """
     action[_CHECKSUM] = _checksum(action)
+    if source:
+        action[_SOURCE] = source
+
+
+def follow_renaming(names: dict[str, str]) -> None:
+    """Remember the new names of captured armatures, by their former ones, with the actions that have their motion."""
+    for action in bpy.data.actions:
+        if action.library is None and (name := names.get(source_of(action))):
+            action[_SOURCE] = name
+
+
+def clear_offsets(rig: bpy.types.Object, bones: Iterable[str]) -> None:
+    """Undo what the pose moves and scales bones by; retargeting only turns them, and measured them without it.
+
+    Cannot fail.
+    """
+    for name in bones:
+        for channel, value in _OFFSETS.items():
+            setattr(rig.pose.bones[name], channel, (value,) * 3)
 
 
 def leave_tweak_mode(animated: bpy.types.ID) -> None:
@@ -92,11 +128,15 @@ def override_nla(animation: bpy.types.AnimData) -> None:
         track.is_solo = False  # a solo track would silence the action
 
 
-def retire(former: bpy.types.Action | None) -> None:
-    """Keep the rig's former action in the file, unless it is an earlier retargeting that was not edited."""
+def retire(former: bpy.types.Action | None, source: str) -> None:
+    """Keep the rig's former action in the file, unless it is an earlier retargeting that was not edited.
+
+    :param source: name of the captured armature whose motion the rig has now; that of another one is kept.
+    """
     if former is None:
         return
-    if former.get(_CHECKSUM) == _checksum(former) and former.users == 0:
+    is_same = former.get(_SOURCE, source) == source
+    if is_same and former.get(_CHECKSUM) == _checksum(former) and former.users == 0:
         bpy.data.actions.remove(former)
     else:
         former.use_fake_user = True
@@ -113,6 +153,11 @@ def retime_written_keys(action: bpy.types.Action, retiming: Retiming) -> None:
 def is_retargeted(action: bpy.types.Action) -> bool:
     """Return whether retargeting has written the action."""
     return _CHECKSUM in action
+
+
+def source_of(action: bpy.types.Action) -> str:
+    """Return the name of the captured armature whose motion retargeting has written to the action; empty if unknown."""
+    return stored_text(action, _SOURCE)
 
 
 def _checksum(action: bpy.types.Action) -> str:

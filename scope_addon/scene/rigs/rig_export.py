@@ -106,12 +106,15 @@ def _retarget_face(
 def export_rig(path: Path, rig: bpy.types.Object, options: ExportOptions) -> list[Path]:
     """Write an animated rig of the scene with the meshes that it deforms; return the files written.
 
+    Its size is the one that it has in the unit of the scene.
+
     :param options: without a ``take``, the animation is named after the rig's action.
     :raises UsageError: when the suffix is unknown.
     :raises OutputError: when a file cannot be written.
     """
     action = rig.animation_data.action if rig.animation_data else None
-    options = replace(options, take=options.take or (action.name if action else rig.name))
+    unit = bpy.context.scene.unit_settings.scale_length
+    options = replace(options, take=options.take or (action.name if action else rig.name), unit=unit)
     collection, parts = bpy.data.collections.new(rig.name), with_meshes(rig, bpy.context.scene.objects)
     try:
         for obj in parts:

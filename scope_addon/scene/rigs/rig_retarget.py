@@ -34,9 +34,11 @@ from ..character.root_object import (
 )
 from .face_bones import face_keys, key_face, rest_face
 from .face_retarget import captured_expressions
-from .rig_action import BoneKeys, leave_tweak_mode, override_nla, retire, root_locations, write_action
+from .rig_action import BoneKeys, clear_offsets, leave_tweak_mode, override_nla, retire, root_locations, write_action
 from .rig_probe import at_rest, blocked_bones, probe
 from .rigify_ik import ik_keys
+
+_OTHER = {"left": "right", "right": "left"}
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,18 @@ def guess_bone_map(rig: bpy.types.Object) -> BoneMap:
     names = [bone.name for bone in bones]
     parents = np.array([names.index(bone.parent.name) if bone.parent else -1 for bone in bones], int)
     heads = np.array([rig.matrix_world @ bone.head_local for bone in bones]).reshape(-1, 3)
-    return guess(RestBones(names, parents, heads))
+    found = guess(RestBones(names, parents, heads))
+    is_by_name = max(found.confidence.values(), default=0.0) > 0.5
+    if not is_by_name or rig.matrix_world.determinant() >= 0.0:
+        return found
+    # The rig is mirrored: what its bones call left is on its right.
+    return BoneMap({bone: _other_side(part) for bone, part in found.parts.items()}, found.confidence)
+
+
+def _other_side(part: str) -> str:
+    """Return the same part of the other side; the part itself if it has no side."""
+    side, _, kind = part.partition("_")
+    return f"{_OTHER[side]}_{kind}" if side in _OTHER else part
 
 
 def retarget(
@@ -104,9 +117,10 @@ def retarget(
 ) -> RetargetResult:
     """Key the mapped bones of ``rig`` in a new action so that it moves like the captured ``source``.
 
-    The rig's former action is kept in the file, unless it is an earlier retargeting that was not edited. Fingers and
-    face keep their pose if they were not captured. The rig leaves Edit Mode, Rest Position and its NLA's Tweak Mode, in
-    which it would not move. Its NLA tracks are kept, below the new action.
+    The rig's former action is kept in the file, unless it is an earlier retargeting of the same capture that was not
+    edited. Fingers and face keep their pose if they were not captured. The rig leaves Edit Mode, Rest Position and its
+    NLA's Tweak Mode, in which it would not move. Its NLA tracks are kept, below the new action, and its mapped bones
+    lose what the pose moves or scales them by.
 
     :param betas: (P,) shape coefficients of the captured person.
     :param rate: scene frames per second.
@@ -136,14 +150,15 @@ def retarget(
             keys[root] = replace(keys[root], locations=root_locations(rig, place, skeleton, root, motion.heads))
             keys += ik_keys(rig, keys)
         former = rig.animation_data.action if rig.animation_data else None
-        action = write_action(rig, keys, frames)
+        action = write_action(rig, keys, frames, source.name)
         if face is not None:
-            key_face(rig, face)
+            key_face(rig, face, source.name)
         _set_parent(rig, frames, motion)
         rig.data.pose_position = "POSE"
         override_nla(rig.animation_data)
-        retire(former)
+        retire(former, source.name)
         action.name = f"{rig.name}_{source.name}"
+    clear_offsets(rig, [key.bone for key in keys])
     if face is not None:
         rest_face(rig, face)
     return RetargetResult(action, warnings, travel)

@@ -44,18 +44,21 @@ class SCOPE_OT_push_to_nla(ActionOperator):
     bl_label = "Push to NLA"
 
     def work(self, context: bpy.types.Context) -> str:
-        """Add the track.
+        """Add the track, and those of the root object and of the face, which the motion's strips are moved with.
 
         :raises UsageError: the armature is in Tweak Mode.
         """
         from ...errors import UsageError
-        from ...scene.animation_data.actions import push_to_nla
+        from ...scene.animation_data.actions import animated_together, push_to_nla
+        from ...scene.character.root_object import root_object
 
         armature = animated_armature(context)
         assert armature is not None  # checked by poll
-        if armature.animation_data.use_tweak_mode:
-            raise UsageError(f"'{armature.name}' is in the NLA's Tweak Mode; leave it (key Tab) first")
-        strip = push_to_nla(armature)
+        moved = animated_together(armature, root_object(armature))
+        for block in moved:
+            if block.animation_data.use_tweak_mode:
+                raise UsageError(f"'{block.name}' is in the NLA's Tweak Mode; leave it (key Tab) first")
+        strip, *_ = [push_to_nla(block) for block in moved]
         return rpt_(
             "'{strip}' is now a strip of {armature}'s NLA; to edit its keys, enter Tweak Mode (key Tab)",
             strip=strip.name,
@@ -111,7 +114,10 @@ class SCOPE_OT_rename_take(ReportingOperator):
 
 def _rename(collection: bpy.types.Collection, name: str) -> None:
     """Rename a capture, and its objects, their data and actions whose names begin with the capture's."""
+    from ...scene.rigs.rig_action import follow_renaming
+
     former = collection.name
+    armatures = {obj.name: obj for obj in collection.all_objects if obj.type == "ARMATURE" and obj.library is None}
     blocks: list[bpy.types.ID] = [collection]
     for obj in collection.all_objects:
         data = [obj, obj.data, getattr(obj.data, "shape_keys", None)]
@@ -120,6 +126,7 @@ def _rename(collection: bpy.types.Collection, name: str) -> None:
     for block in dict.fromkeys(block for block in blocks if block is not None):
         if block.library is None and block.name.startswith(former):
             block.name = name + block.name.removeprefix(former)
+    follow_renaming({before: obj.name for before, obj in armatures.items()})
 
 
 CLASSES = (SCOPE_OT_push_to_nla, SCOPE_OT_rename_take)

@@ -53,13 +53,11 @@ class SaveMapOperator(MapFileOperator):
     def work(self, context: bpy.types.Context) -> str:
         """Write the file.
 
-        :raises UsageError: the file has no name.
+        :raises UsageError: the file has no name, or is beside a .blend file that was never saved.
         """
-        from ...errors import UsageError
+        from ..files.output_file import output_file
 
-        if not bpy.path.basename(self.filepath).removesuffix(".json"):
-            raise UsageError("the file has no name; enter one")
-        path = bpy.path.ensure_ext(bpy.path.abspath(self.filepath), ".json")
+        path = str(output_file(self.filepath, ".json"))
         self.save(context.scene.scope_retarget, path)
         return rpt_("Saved {file}", file=path)
 

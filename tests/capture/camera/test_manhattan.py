@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.line_segments import Lines, Segments
-from scope.scope_addon.capture.camera.manhattan import Edges, line_normal_equations
+from scope.scope_addon.capture.camera.manhattan import EDGE_SIGMA, Edges, line_normal_equations
 from scope.solver.rotations import exp
 
 WIDTH, HEIGHT, FOCAL_PX = 1280, 720, 1000.0
@@ -45,6 +45,17 @@ def test_the_true_focal_length_explains_most() -> None:
     assert max(support, key=lambda factor: support[factor]) == 1.0
 
 
+def test_each_edge_counts_as_far_as_it_points_at_the_nearest_vanishing_point() -> None:
+    edges = Edges.of(projected(exp(np.array([0.1, 0.6, 0.05])), np.random.default_rng(3), 40), WIDTH, HEIGHT)
+    explained, axes = edges.axes(FOCAL_PX)
+    expected = 0.0
+    for middle, along, weight in zip(edges.middle, edges.along, edges.weight, strict=True):
+        to_points = [FOCAL_PX * d[:2] - d[2] * middle for d in axes]
+        sines = [(x * along[1] - y * along[0]) / np.hypot(x, y) for x, y in to_points]
+        expected += weight * max(np.exp(-0.5 * (sine / EDGE_SIGMA) ** 2) for sine in sines)
+    assert explained == pytest.approx(expected, rel=1e-4)
+
+
 def test_no_edges_explain_nothing() -> None:
     explained, axes = Edges.of(Segments.none(), WIDTH, HEIGHT).axes(FOCAL_PX)
     assert explained == 0.0
@@ -69,3 +80,14 @@ def test_directions_without_value_do_not_count() -> None:
     H, g, _ = line_normal_equations(lines, np.eye(3), 0.05, np.zeros(3))
     np.testing.assert_array_equal(H, np.zeros((3, 3)))
     np.testing.assert_array_equal(g, np.zeros(3))
+
+
+def test_several_sets_of_directions_at_once() -> None:
+    rng = np.random.default_rng(11)
+    lines, several = Lines(rng.normal(size=(20, 3)) / 2, rng.uniform(0.1, 0.5, 20)), exp(rng.normal(size=(4, 3)))
+    together = line_normal_equations(lines, several, 0.3, np.array([2.0, 1.0, 1.0]))
+    for k, directions in enumerate(several):
+        for all_of_them, one in zip(
+            together, line_normal_equations(lines, directions, 0.3, np.array([2.0, 1.0, 1.0])), strict=True
+        ):
+            np.testing.assert_allclose(all_of_them[k], one, rtol=1e-12)

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Opening a network leaves nothing behind: onnxruntime's wheels keep a list of events for a server of Microsoft's."""
+"""Opening a network leaves nothing behind: onnxruntime's wheels keep a list of events for a server of Microsoft's.
+
+And networks that are missing: a wheel of Scope has none, nor the tool that builds them.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,10 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+
+import pytest
+from scope.scope_addon.capture.perception import sessions
+from scope.scope_addon.errors import SetupError
 
 PROGRAM = """
 from scope.scope_addon.capture.perception.adapters import network_server
@@ -33,3 +40,9 @@ def test_opening_a_network_records_no_events(tmp_path: Path, networks: None) -> 
         program = PROGRAM.format(direct=direct)
         subprocess.run([sys.executable, "-c", program], env=environment, check=True, timeout=600)
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
+
+
+def test_a_wheel_has_no_networks_and_says_what_has(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sessions, "NETWORKS_FOLDER", tmp_path)
+    with pytest.raises(SetupError, match="a wheel contains none: capture with the scripts of the repository"):
+        sessions.network_path("pose_landmark_lite")

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.scene.animation_data.actions import fcurves
-from scope.scope_addon.scene.animation_data.retime import Retiming, retime_keys, retime_strips
+from scope.scope_addon.scene.animation_data.retime import Retiming, action_strips, retime_keys, retime_strip
 
 DOUBLED = Retiming(1.0, 2.0)
 
@@ -57,6 +57,8 @@ def test_strips_move_with_the_part_that_they_play(moved: bpy.types.Object, facto
     strip = animation.nla_tracks.new().strips.new("walk", 21, action)
     strip.action_frame_start, strip.action_frame_end = 2.0, 8.0
     strip.frame_start_raw, strip.frame_end_raw = 21.0, 27.0
-    assert retime_strips(animation, Retiming(1.0, factor)) == [action]
+    (strip,) = action_strips(animation)
+    assert strip.action == action
+    retime_strip(strip, Retiming(1.0, factor))
     ends = strip.frame_start, strip.frame_end, strip.action_frame_start, strip.action_frame_end
     assert ends == pytest.approx([1 + factor * (frame - 1) for frame in (21, 27, 2, 8)])

@@ -1,14 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Exporting captures in various states: hidden, at rest, edited, linked, in the NLA, among other objects."""
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.scene.animation_data import actions
 from scope.scope_addon.scene.build import BuildOptions, build_scene
-from scope.scope_addon.scene.export.export import export
+from scope.scope_addon.scene.export.export import ExportOptions, export
 
+from ...made_motion import made_face
+from ..character.test_expression_keys import morph_animation
 from ..exported import JOINT_TOLERANCE, SKIN_TOLERANCE, corresponding, read_back
 
 
@@ -134,7 +138,7 @@ def test_a_capture_with_a_parent_moves_with_it_in_the_file(body, make_motion, tm
     np.testing.assert_allclose(seen, wanted, atol=JOINT_TOLERANCE)
 
 
-@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".bvh"])
+@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".bvh", ".usdc"])
 def test_a_motion_in_the_nla_is_exported_as_displayed(body, make_motion, tmp_path, blender, truth, suffix):
     motion = make_motion(body, 5)
     person = build_scene([motion], body, options=BuildOptions(frame_rate="set")).people[0]
@@ -167,12 +171,46 @@ def test_objects_without_bones_may_be_in_the_nla_too(body, make_motion, tmp_path
     np.testing.assert_allclose(joints, truth(body, motion).joints[3], atol=JOINT_TOLERANCE)
 
 
+@pytest.mark.parametrize("shape", ["keys", "baked"])
+def test_a_face_in_the_nla_moves_in_a_glb(whole_body, make_motion, tmp_path, shape):
+    jaw = np.array([0.0, 0.3, 0.9, 0.2, 0.5])
+    motion = replace(make_motion(whole_body, 5), face=made_face(5, jawOpen=jaw))
+    person = build_scene([motion], whole_body, options=BuildOptions(frame_rate="set")).people[0]
+    kept = [_to_nla(block, 40) for block in (person.armature, person.mesh.data.shape_keys)]
+    actions_before = set(bpy.data.actions)
+    export(tmp_path / "talk.glb", options=ExportOptions(shape=shape))
+    assert [(animation.action, animation.use_nla) for animation in kept] == [(None, True)] * 2
+    assert set(bpy.data.actions) == actions_before
+    weights = morph_animation(tmp_path / "talk.glb")
+    np.testing.assert_allclose(weights["jawOpen"], jaw, atol=1e-5)
+    if shape == "keys":
+        np.testing.assert_allclose(weights["Shape000"], motion.betas[0], atol=1e-5)
+
+
 def test_a_solo_track_determines_the_frame_range(body, make_motion):
     person = build_scene([make_motion(body, 5)], body, options=BuildOptions(frame_rate="set")).people[0]
     animation = _to_nla(person.armature, 1, 1000)
     assert actions.frame_range([person.armature])[1] > 1000
     animation.nla_tracks[0].is_solo = True
     assert actions.frame_range([person.armature])[1] < 10
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc", ".bvh"])
+@pytest.mark.parametrize("size", [1.0, 100.0])
+def test_a_capture_in_a_scene_in_centimetres_has_its_true_size(
+    body, make_motion, tmp_path, blender, truth, size, suffix
+):
+    bpy.context.scene.unit_settings.scale_length = 0.01
+    motion, path = make_motion(body, 4), tmp_path / f"walk{suffix}"
+    person = build_scene([motion], body, options=BuildOptions(frame_rate="set")).people[0]
+    person.armature.scale = (size,) * 3  # as the warning of the build suggests
+    bpy.context.view_layer.update()
+    export(path)
+    assert person.armature.parent is None
+    assert bpy.data.objects.get("Unit") is None
+    blender.go_to(read_back(path) + 3)
+    joints = blender.joints(blender.only("ARMATURE"), body.joint_names)
+    np.testing.assert_allclose(joints, truth(body, motion).joints[3], atol=JOINT_TOLERANCE)
 
 
 def test_hidden_objects_stay_hidden_in_a_blend(body, make_motion, tmp_path):

@@ -94,6 +94,15 @@ def test_an_unedited_result_is_replaced_and_an_edited_one_is_kept(captured):
     assert len(bpy.data.actions) == before_and(2)
 
 
+def test_the_result_of_another_capture_is_kept(captured):
+    face = face_mesh(["A", "Blink"])
+    (first,) = retarget_expressions(captured, [face], name="take 1")
+    (second,) = retarget_expressions(captured, [face], name="take 2")
+    assert {first.name, second.name} == {"Head_take 1", "Head_take 2"}
+    retarget_expressions(captured, [face], name="take 2")
+    assert [a.name for a in bpy.data.actions if a.name.startswith("Head_")] == ["Head_take 1", "Head_take 2"]
+
+
 def before_and(count):
     """The number of actions of the captured body, and ``count``."""
     return count + len([action for action in bpy.data.actions if not action.name.startswith("Head_")])
@@ -111,7 +120,7 @@ def test_what_fails_changes_nothing(captured, monkeypatch):
     retarget_expressions(captured, faces)
     before = [(keyed(face), face.data.shape_keys.animation_data.action) for face in faces]
     count = len(bpy.data.actions)
-    monkeypatch.setattr(face_retarget, "retire", lambda _former: 1 / 0)
+    monkeypatch.setattr(face_retarget, "retire", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         retarget_expressions(captured, faces, ExpressionMap({"A": {"eyeBlinkLeft": 1.0}}))
     assert len(bpy.data.actions) == count
@@ -182,7 +191,7 @@ def test_a_failure_in_tweak_mode_keeps_the_action_outside_of_it(captured, monkey
     animation.nla_tracks[0].strips[0].select = animation.nla_tracks[0].select = True
     animation.use_tweak_mode = True
     assert animation.action != own
-    monkeypatch.setattr(face_retarget, "mark_written", lambda action: 1 / 0)
+    monkeypatch.setattr(face_retarget, "mark_written", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         retarget_expressions(captured, [face])
     assert animation.action == own

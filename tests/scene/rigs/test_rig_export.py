@@ -17,13 +17,16 @@ from scope.scope_addon.retarget.bone_map import BoneMap, save_bone_map
 from scope.scope_addon.retarget.rig_source import rig_source
 from scope.scope_addon.scene.build import NEW_SCENE
 from scope.scope_addon.scene.export import formats
-from scope.scope_addon.scene.rigs.rig_export import RigExportOptions, export_on_rig
+from scope.scope_addon.scene.export.export import ExportOptions
+from scope.scope_addon.scene.rigs.rig_export import RigExportOptions, export_on_rig, export_rig
 from scope.scope_addon.scene.rigs.rig_file import check_rig
+from scope.scope_addon.scene.rigs.rig_retarget import guess_bone_map, retarget
 from scope.solver.errors import InputError
 
-from ...edit.walking import BODY, NAMES, motion_of, walk
+from ...edit.walking import BODY, NAMES, RATE, motion_of, walk
 from ...retarget.naming_schemes import names_of
-from ..made_rigs import ARMS, FRAMES, build_rig, seen, truth
+from ..exported import read_back
+from ..made_rigs import ARMS, FRAMES, build_rig, captured, seen, truth
 
 
 def save_rig(path, scheme="mixamo", armatures=1, animated=False):
@@ -106,6 +109,25 @@ def test_a_rig_from_a_file_goes_into_every_format(tmp_path, kind):
         assert len(skins) == 1
         assert "Stone" not in bpy.data.objects
         assert worst_arm(rigs[0], names_of("mixamo"), 0) < 1.0, path
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc", ".bvh"])
+def test_a_rig_of_a_scene_in_centimetres_has_its_true_size(tmp_path, suffix):
+    bpy.context.scene.unit_settings.scale_length = 0.01
+    source = captured(motion_of(walk(0.5)))
+    rig, bones = build_rig("unreal", size=130.0)
+    stage = bpy.data.objects.new("Stage", None)
+    bpy.context.scene.collection.objects.link(stage)
+    rig.parent, stage.location = stage, (50.0, 20.0, 0.0)
+    bpy.ops.mesh.primitive_cube_add()
+    bpy.context.object.parent = stage  # so that the parent is not exported
+    retarget(source, BODY, np.zeros(BODY.P), rig, guess_bone_map(rig), RATE)
+    wanted = seen(rig, bones.values(), [11])
+    (path,) = export_rig(tmp_path / f"rig{suffix}", rig, ExportOptions())
+    np.testing.assert_allclose(seen(rig, bones.values(), [11]), wanted, atol=1e-6)
+    first = max(read_back(path), suffix == ".usdc")  # which keeps the scene's frames
+    read = next(obj for obj in bpy.data.objects if obj.type == "ARMATURE")
+    np.testing.assert_allclose(seen(read, bones.values(), [int(first) + 10]), wanted / 100, atol=1e-3)
 
 
 def test_two_people_have_a_rig_each(tmp_path):

@@ -186,6 +186,36 @@ def test_a_rig_whose_nla_plays_moves_as_captured(source, prepare):
     assert [strip.action for strip in track.strips] == [own]
 
 
+def _posed(bone):
+    bone.location, bone.scale = (0.1, 0.0, 0.05), (1.3, 1.0, 1.2)
+
+
+def _keyed(bone):
+    _posed(bone)
+    for channel in ("location", "scale"):
+        bone.keyframe_insert(channel, frame=1)
+
+
+def _in_the_nla(bone):
+    _keyed(bone)
+    animation = bone.id_data.animation_data
+    animation.nla_tracks.new().strips.new("own", 1, animation.action)
+    animation.action = None
+
+
+@pytest.mark.parametrize("pose", [_posed, _keyed, _in_the_nla])
+def test_bones_that_were_moved_and_scaled_before_follow_as_at_rest(source, pose):
+    rig, bone_of = build_rig("unreal")
+    bones = list(bone_of.values())
+    run(source, rig)
+    wanted = seen(rig, bones)
+    rig.animation_data_clear()
+    for part in ("pelvis", "left_hip", "spine2", "right_elbow"):
+        pose(rig.pose.bones[bone_of[part]])
+    run(source, rig)
+    np.testing.assert_allclose(seen(rig, bones), wanted, atol=1e-5)
+
+
 @pytest.mark.parametrize(
     "step",
     [

@@ -117,6 +117,42 @@ def test_retargeting_again_replaces_its_own_action_unless_it_was_edited(source):
     assert len(bpy.data.actions) == actions + 1
 
 
+@pytest.mark.parametrize("scale", [(1.3, 1.0, 1.0), (1.1, 0.9, 1.2), (-1.0, 1.0, 1.0)])
+def test_the_path_of_a_rig_with_three_factors_of_scale_is_the_captured_one(source, scale):
+    rig, bone_of = build_rig("unreal")
+    rig.scale, rig.rotation_euler = scale, (0.0, 0.0, 0.5)
+    travel = run(source, rig).travel
+    path, wanted = seen(rig, [bone_of["pelvis"]])[:, 0], seen(source, ["pelvis"])[:, 0]
+    np.testing.assert_allclose((path - path[0])[:, :2], travel * (wanted - wanted[0])[:, :2], atol=0.02)
+
+
+def test_a_mirrored_rig_moves_as_the_one_that_it_mirrors(source):
+    rig, bone_of = build_rig("unreal")
+    run(source, rig)
+    wanted = seen(rig, bone_of.values())
+    rig.scale = (-1.0, 1.0, 1.0)
+    bpy.context.view_layer.update()
+    run(source, rig)
+    swap = {"left": "right", "right": "left"}
+    mirrored = [bone_of["_".join(swap.get(word, word) for word in part.split("_"))] for part in bone_of]
+    np.testing.assert_allclose(seen(rig, mirrored), wanted, atol=1e-3)
+
+
+def test_several_captures_on_one_rig_keep_an_action_each(source):
+    rig, bone_of = build_rig("unreal")
+    bones = list(bone_of.values())
+    first = run(source, rig).action
+    wanted = seen(rig, bones)
+    second = run(captured(motion_of(walk(1.0, speed=0.5))), rig).action
+    assert {first, second} <= set(bpy.data.actions)
+    assert first.use_fake_user  # or saving and opening the file would remove it
+    bpy.context.view_layer.update()
+    rig.animation_data.action = first
+    if hasattr(rig.animation_data, "action_slot"):
+        rig.animation_data.action_slot = first.slots[0]
+    np.testing.assert_allclose(seen(rig, bones), wanted, atol=1e-6)
+
+
 def test_the_parent_of_a_rig_moves_along(source):
     rig, bone_of = build_rig("unreal")
     bones = list(bone_of.values())

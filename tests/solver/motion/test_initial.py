@@ -1,10 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Points that several cameras see, triangulated against where they are."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from scope.solver import Keypoints2D, Keypoints3D, Measurements, rotations
-from scope.solver.motion.initial import triangulated
+from scope.solver import (
+    Keypoints2D,
+    Keypoints3D,
+    Measurements,
+    Options,
+    default_priors,
+    load_body,
+    make_tree,
+    rotations,
+)
+from scope.solver.examples import person
+from scope.solver.motion.initial import initial_states, triangulated
 from scope.solver.motion.views import View
 
 K = np.array([[800.0, 0, 320], [0, 800, 240], [0, 0, 1]])
@@ -88,3 +100,44 @@ def test_3d_keypoints_of_a_camera_are_moved_to_the_world(world: np.ndarray) -> N
     found = points_of([View(given, R, t)])
     np.testing.assert_array_equal(found.indices, [3])
     np.testing.assert_allclose(np.asarray(found.points), world[[3]], atol=1e-12)
+
+
+BODY = load_body("scope")
+INDEX = np.array(list(BODY.keypoint_set("blazepose").values()))
+
+
+def filmed(frame: int, *cameras: int) -> tuple[list[View], np.ndarray]:
+    """One frame of a person who moves, as some cameras see it, and the person's joints in the world."""
+    start = person.pose(BODY, seed=9)
+    state = replace(start, t_camera_root=np.array([0.1 * frame, 0.0, 0.0]))
+    R, joints = person.place(BODY, state)
+    points = BODY.keypoints(R, joints, state.beta)
+    return [seen(points, camera, INDEX) for camera in cameras], joints
+
+
+def started(clip: list[tuple[list[View], np.ndarray]]) -> np.ndarray:
+    """How far the joints (T, K+1) of the states are from the true ones, where a clip's optimization starts."""
+    states = initial_states(make_tree(BODY), [views for views, _ in clip], default_priors(BODY), Options())
+    found = [person.place(BODY, state)[1] for state in states]
+    return np.linalg.norm(np.array(found) - [joints for _, joints in clip], axis=-1)
+
+
+def test_one_camera_that_does_not_see_the_person_holds_them_in_the_world() -> None:
+    """They were held in the camera's axes, as if those were the world's."""
+    clip = [filmed(0), filmed(0, 1), filmed(1), filmed(1), filmed(2, 1)]
+    errors = started(clip)
+    np.testing.assert_allclose(errors[0], errors[1], atol=1e-6)
+    assert errors.mean() < 0.25  # depth is uncertain; elsewhere in the world they would be metres away
+
+
+def test_cameras_that_take_turns_start_from_one_person_in_the_world() -> None:
+    """The state of the frame before was taken into the next frame's camera as it was, at another angle."""
+    turns = started([filmed(f, f % 3) for f in range(6)]).mean(axis=1)
+    for camera in range(3):
+        alone = started([filmed(f, camera) for f in range(6)]).mean(axis=1)
+        assert turns[camera::3].max() < 1.5 * alone.max()
+
+
+def test_cameras_in_one_place_say_as_much_as_one_of_them() -> None:
+    """Nothing can be triangulated: the clip started from the pose at rest, somewhere."""
+    np.testing.assert_allclose(started([filmed(f, 1, 1) for f in range(2)]), started([filmed(f, 1) for f in range(2)]))

@@ -40,6 +40,17 @@ def test_a_gap_longer_than_a_window_leaves_none_empty() -> None:
     assert all(w.frames.start <= w.kept.start < w.kept.stop <= w.frames.stop for w in windows)
 
 
+@pytest.mark.parametrize(("rate", "length"), [(5.0, 0.6), (10.0, 0.1)])
+def test_windows_without_overlap_lose_no_frame_to_rounding(rate: float, length: float) -> None:
+    """The end of one and the start of the next are one time, computed in two ways: a frame may lie between them."""
+    for count in range(20, 300):
+        times = np.arange(count) / rate
+        windows = overlapping(times, length, 0.0)
+        kept = np.concatenate([np.arange(count)[w.kept] for w in windows])
+        np.testing.assert_array_equal(kept, np.arange(count))
+        assert all(w.frames.start <= w.kept.start < w.kept.stop <= w.frames.stop for w in windows), count
+
+
 def test_tiles_are_what_is_kept() -> None:
     windows = overlapping(np.arange(900) / 30, 8.0, 2.0)
     assert [(t.frames, t.kept) for t in tiles(windows)] == [(w.kept, w.kept) for w in windows]

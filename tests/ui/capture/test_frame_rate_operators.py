@@ -159,6 +159,29 @@ def test_a_retargeted_rig_moves_along_and_its_own_action_stays(scene):
     assert read_keys(fcurves(rig)[0])[:, 0].tolist() == [7]
 
 
+def test_every_take_of_a_rig_moves_along_in_the_nla_too(scene):
+    first, second = built(), built(start=101.0)
+    rig, bones = build_rig("mixamo")
+    scene.scope_retarget.rig = rig
+    bpy.context.view_layer.objects.active = first
+    bpy.ops.scope.retarget()
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.scope.push_to_nla()
+    (strip,) = rig.animation_data.nla_tracks[0].strips
+    bpy.context.view_layer.objects.active = second
+    bpy.ops.scope.retarget()
+    take_2 = at_times(rig, list(bones.values()), 101.0)
+    rig.animation_data.action, kept = None, rig.animation_data.action
+    take_1 = at_times(rig, list(bones.values()))
+    bpy.ops.scope.match_frame_rate()
+    assert strip.frame_end - strip.frame_start == pytest.approx(60, abs=0.01)
+    np.testing.assert_allclose(at_times(rig, list(bones.values())), take_1, atol=1e-3)
+    rig.animation_data.action = kept
+    if hasattr(rig.animation_data, "action_slot"):
+        rig.animation_data.action_slot = kept.slots[0]
+    np.testing.assert_allclose(at_times(rig, list(bones.values()), 101.0), take_2, atol=1e-3)
+
+
 def test_review_frames_and_corrections_name_the_moved_frames(scene):
     valid = np.ones(61, bool)
     valid[30:45] = False

@@ -1,12 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Renaming a take, and moving its motion to the NLA."""
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
+from scope.scope_addon.errors import UsageError
 from scope.scope_addon.scene.character.root_object import root_object
+from scope.scope_addon.scene.rigs.face_retarget import captured_expressions
 
 from ...edit.walking import NAMES, motion_of, walk
+from ...made_motion import made_face
 from ...scene import made_rigs
 from ...scene.made_rigs import captured
 
@@ -25,6 +30,30 @@ def test_pushing_to_the_nla_keeps_the_motion(rig):
     np.testing.assert_allclose(made_rigs.seen(rig, NAMES, [1, 9, 20]), before, atol=1e-4)
     with pytest.raises(RuntimeError, match="has no action"):
         bpy.ops.scope.push_to_nla()
+
+
+def test_a_strip_has_the_time_of_the_body_the_root_motion_and_the_face():
+    clip = walk(1.0)
+    jaw = np.linspace(0.0, 0.9, len(clip))
+    rig = captured(replace(motion_of(clip), face=made_face(len(clip), jawOpen=jaw)))
+    rig["scope_body_file"] = "scope"
+    bpy.ops.scope.root_motion(mode="OBJECT")
+    (face,) = (child.data.shape_keys for child in rig.children if child.type == "MESH")
+    before = made_rigs.seen(rig, NAMES, [1, 9, 20])
+    bpy.ops.scope.push_to_nla()
+    moved = [block for block in (rig, root_object(rig), face) if block.animation_data.action is None]
+    for block in moved:
+        (strip,) = (strip for track in block.animation_data.nla_tracks for strip in track.strips)
+        strip.frame_end += 50
+        strip.frame_start += 50
+    np.testing.assert_allclose(made_rigs.seen(rig, NAMES, [51, 59, 70]), before, atol=1e-4)
+    assert face.key_blocks["jawOpen"].value == pytest.approx(jaw[19], abs=1e-4)
+    for edit in (lambda: bpy.ops.scope.refloor(), lambda: captured_expressions(rig)):
+        with pytest.raises((RuntimeError, UsageError), match="is animated by the NLA strip"):
+            edit()
+    rig.animation_data.action = rig.animation_data.nla_tracks[0].strips[0].action
+    with pytest.raises(RuntimeError, match=f"'{root_object(rig).name}' is animated by the NLA strip"):
+        bpy.ops.scope.root_motion(mode="BONES")
 
 
 def test_renaming_a_take_renames_its_objects_and_actions(rig):

@@ -5,6 +5,7 @@ import bpy
 import numpy as np
 import pytest
 from mathutils import Matrix
+from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.character.keys import read_clip
 from scope.scope_addon.scene.character.root_object import root_object
@@ -387,14 +388,38 @@ def test_a_linked_capture_is_not_edited_until_it_is_local(rig, tmp_path, overrid
 
 
 def test_missing_keys_are_an_error_and_change_nothing(rig):
-    from scope.scope_addon.scene.animation_data.actions import fcurves
-
     name = NAMES[5]
     for curve in fcurves(rig):
         if name in curve.data_path:
             curve.keyframe_points.clear()
     with pytest.raises(RuntimeError, match="has lost the keys"):
         bpy.ops.scope.refloor()
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        lambda: bpy.ops.scope.refloor(),
+        lambda: bpy.ops.scope.smooth(strength=2.0),
+        lambda: bpy.ops.scope.root_motion(mode="OBJECT"),
+        lambda: bpy.ops.scope.reduce_keys(),
+        lambda: bpy.ops.scope.add_pin(joint="left_wrist", frame=20, location=(0.3, 0.0, 1.2)),
+        lambda: bpy.ops.scope.floor_here(),
+    ],
+)
+@pytest.mark.parametrize("change", ["name", "mode"])
+def test_a_renamed_or_converted_bone_is_named_and_the_keys_stay(rig, edit, change):
+    bpy.context.scene.frame_set(20)
+    if change == "name":
+        rig.data.bones["left_elbow"].name = "forearm.L"
+        wanted = "'walk' has no bone 'left_elbow'; if you have renamed it"
+    else:
+        rig.pose.bones["left_elbow"].rotation_mode = "XYZ"
+        wanted = "'left_elbow' of 'walk' has the rotation mode XYZ, in which its captured keys have no effect"
+    before = [(c.data_path, c.array_index, read_keys(c).tobytes()) for c in fcurves(rig)]
+    with pytest.raises(RuntimeError, match=wanted):
+        edit()
+    assert [(c.data_path, c.array_index, read_keys(c).tobytes()) for c in fcurves(rig)] == before
 
 
 def test_a_motion_in_the_nla_is_an_error_of_its_own(rig):
@@ -405,11 +430,35 @@ def test_a_motion_in_the_nla_is_an_error_of_its_own(rig):
     strip = track.strips.new("walk", 1, action)
     if slot is not None:
         strip.action_slot = slot
-    with pytest.raises(RuntimeError, match="NLA track '.*', not by an action of its own: enter Tweak Mode"):
+    with pytest.raises(RuntimeError, match="NLA strip 'walk', not by an action of its own alone: enter Tweak Mode"):
         bpy.ops.scope.refloor()
     animation.nla_tracks.active, strip.select = track, True
     animation.use_tweak_mode = True
     assert bpy.ops.scope.refloor() == {"FINISHED"}
+
+
+def test_keys_over_those_in_the_nla_do_not_count_as_lost(rig):
+    before = seen(rig)
+    bpy.ops.scope.push_to_nla()
+    rig.animation_data.action, rig.animation_data.action_blend_type = bpy.data.actions.new("fix"), "ADD"
+    elbow = rig.pose.bones["left_elbow"]
+    elbow.rotation_quaternion = (0.9, 0.4, 0.0, 0.0)
+    elbow.keyframe_insert("rotation_quaternion", frame=1)
+    with pytest.raises(RuntimeError, match="NLA strip 'walk', .*: enter Tweak Mode .* bake all strips into one action"):
+        bpy.ops.scope.refloor()
+    fixed = seen(rig)
+    assert np.abs(fixed - before).max() > 0.05
+    bpy.ops.object.mode_set(mode="POSE")
+    bpy.ops.pose.select_all(action="SELECT")
+    first, last = map(int, rig.animation_data.nla_tracks[0].strips[0].action.frame_range)
+    bpy.ops.nla.bake(
+        frame_start=first, frame_end=last, only_selected=False, bake_types={"POSE"}, clear_constraints=False
+    )
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for track in rig.animation_data.nla_tracks:
+        track.mute = True
+    np.testing.assert_allclose(seen(rig), fixed, atol=1e-4)
+    assert bpy.ops.scope.reduce_keys() == {"FINISHED"}
 
 
 def test_an_edit_keeps_manual_changes(rig):
@@ -424,6 +473,4 @@ def test_an_edit_keeps_manual_changes(rig):
 
 
 def _curves(rig):
-    from scope.scope_addon.scene.animation_data.actions import fcurves
-
     return fcurves(rig)

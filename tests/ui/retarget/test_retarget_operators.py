@@ -238,6 +238,16 @@ def test_retargeting_again_after_an_edit_updates_the_rig(rig, tmp_path):
     assert np.ptp(seen(rig, ["pelvis"])[:, 0, 1]) > 1.0
 
 
+def test_a_renamed_take_still_replaces_its_action(rig):
+    bpy.ops.scope.retarget()
+    before = len(bpy.data.actions)
+    bpy.context.scene.scope.capture = next(c for c in bpy.data.collections if "scope_capture" in c)
+    bpy.ops.scope.rename_take(name="Scene 3")
+    bpy.ops.scope.retarget()
+    assert rig.animation_data.action.name == "unreal_Scene 3"
+    assert len(bpy.data.actions) == before
+
+
 @pytest.mark.parametrize("suffix", ["glb", "fbx"])
 def test_siblings_of_the_rig_are_not_exported_with_it(rig, tmp_path, suffix):
     scene, layer = bpy.context.scene, bpy.context.view_layer
@@ -342,6 +352,29 @@ def test_the_rig_is_exported_with_its_animation_and_only_its_mesh(rig, tmp_path,
     assert len(meshes) == (0 if kind == "bvh" else 1)
     way = seen(moved[0], ["pelvis"])[:, 0]
     assert np.ptp(way, axis=0).max() == pytest.approx(np.ptp(there, axis=0).max(), rel=0.05)
+
+
+@pytest.mark.parametrize("shape", ["AUTO", "BAKED"])
+def test_the_shape_keys_of_the_rigs_own_face_move_in_usd(rig, tmp_path, shape):
+    mesh = bpy.data.meshes.new("head")
+    mesh.from_pydata([(0, 0, 1.6), (0.1, 0, 1.6), (0, 0, 1.7)], [], [(0, 1, 2)])
+    face = bpy.data.objects.new("head", mesh)
+    bpy.context.scene.collection.objects.link(face)
+    face.modifiers.new("rig", "ARMATURE").object = face.parent = rig
+    face.vertex_groups.new(name="head").add([0, 1, 2], 1.0, "REPLACE")
+    face.shape_key_add(name="Basis", from_mix=False)
+    face.shape_key_add(name="Fcl_MTH_A", from_mix=False).data[0].co.y = 0.05
+    bpy.ops.scope.retarget()
+    for frame, value in ((1, 0.0), (41, 0.8)):
+        mesh.shape_keys.key_blocks["Fcl_MTH_A"].value = value
+        mesh.shape_keys.keyframe_insert('key_blocks["Fcl_MTH_A"].value', frame=frame)
+    path = tmp_path / "hero.usdc"
+    assert bpy.ops.scope.export(filepath=str(path), format="USDC", which="RIG", shape=shape) == {"FINISHED"}
+    read_back(path, RATE)
+    (read,) = (obj for obj in bpy.data.objects if obj.type == "MESH")
+    for frame, value in ((1, 0.0), (41, 0.8)):
+        bpy.context.scene.frame_set(frame)
+        assert read.data.shape_keys.key_blocks["Fcl_MTH_A"].value == pytest.approx(value, abs=1e-4)
 
 
 def test_the_rig_is_exported_also_when_the_person_was_deleted(rig, tmp_path):

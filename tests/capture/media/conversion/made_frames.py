@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ....required import missing, package
+from ....required import package
 
 av = package("av")
 PQ, HLG, BT709 = 16, 18, 1  # transfer characteristics of ITU-T H.273
@@ -28,14 +28,6 @@ def coded_frame(code: np.ndarray, transfer: int, bits: int = 10, matrix: int = B
         plane.update(rows.tobytes())
     frame.color_trc, frame.color_primaries, frame.colorspace, frame.color_range = transfer, primaries, matrix, 1
     return frame
-
-
-def need_encoder(codec: str) -> None:
-    """Call ``missing`` if PyAV has been built without an encoder."""
-    try:
-        av.Codec(codec, "w")
-    except av.codec.codec.UnknownCodecError:
-        missing(f"this build of PyAV has no encoder {codec}; ./scripts/setup installs one that does")
 
 
 def write_frames(path: Path, frames: Iterable, codec: str, pixels: str, rate: int = 25, **options: str) -> Path:

@@ -14,7 +14,8 @@ from scope.scope_addon.capture.media.frame_readers import PyavReader
 from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.media.video_range import VideoRange
 
-from .made_frames import BT2020, HLG, av, coded_frame, marked, need_encoder, with_fields
+from ....required import need_encoder
+from .made_frames import BT2020, HLG, av, coded_frame, marked, with_fields
 
 HEIGHT, WIDTH = 48, 96
 

@@ -12,8 +12,9 @@ from scope.scope_addon.capture.media.conversion.hdr import compress, hdr_rgb, hl
 from scope.scope_addon.capture.media.frame_readers import rgb
 from scope.scope_addon.capture.media.video import open_video
 
+from ....required import need_encoder
 from ..made_video import patch_track_header, with_time_table
-from .made_frames import BT709, BT2020, HLG, PQ, av, coded_frame, need_encoder, write_frames
+from .made_frames import BT709, BT2020, HLG, PQ, av, coded_frame, write_frames
 
 # Codes for light in cd/m² on a screen of 1000 cd/m², from tables of ITU-R BT.2408 and BT.2100.
 LEVELS = {
