@@ -46,7 +46,7 @@ def load_runtime() -> ModuleType:
     os.environ["ORT_DISABLE_TELEMETRY"] = "1"
     import onnxruntime
 
-    return onnxruntime
+    return onnxruntime  # type: ignore[no-any-return]
 
 
 def make_session(runtime: ModuleType, path: str, threads: int, providers: list[str], mem_pattern: bool) -> Any:
