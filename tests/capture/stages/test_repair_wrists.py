@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.perception.hand_landmarks import HAND_LENGTH_M, pixels_per_metre
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
-from scope.scope_addon.capture.tracking.hands.wrists_at_hands import wrists_at_hands
+from scope.scope_addon.capture.stages.repair import wrists_at_hands
 
-from ...walking import someone_walking, track_without_depth
+from ..walking import someone_walking, track_without_depth
 
 LEFT, RIGHT = 0, 1
 WRISTS = [KEYPOINT_NAMES.index(f"{side}_wrist") for side in ("left", "right")]
