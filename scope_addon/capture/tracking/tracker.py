@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..perception.adapters.keypoints.keypoint_network import KeypointNetwork
+from ..perception.adapters.keypoint_network import KeypointNetwork
 from ..perception.execution import Execution
 from ..perception.kept_estimates import KeptEstimates
 from ..perception.landmark_network import LandmarkNetwork, PoseEstimate

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....errors import SetupError
-from ...perception.adapters.detectors.box_detector import BoxDetector
-from ...perception.adapters.keypoints.keypoint_network import KeypointNetwork
+from ...perception.adapters.box_detector import BoxDetector
+from ...perception.adapters.keypoint_network import KeypointNetwork
 from ...perception.execution import Execution
 from ...perception.kept_estimates import KeptEstimates
 from ...perception.landmark_network import LandmarkNetwork, PoseEstimate

@@ -12,9 +12,9 @@ import numpy as np
 import onnx
 import pytest
 from onnx import TensorProto, helper, numpy_helper
-from scope.scope_addon.capture.perception.adapters.detectors.box_detector import BoxDetector
+from scope.scope_addon.capture.perception.adapters.box_detector import BoxDetector
 from scope.scope_addon.capture.perception.adapters.graph import check_onnx_file
-from scope.scope_addon.capture.perception.adapters.keypoints.keypoint_network import KeypointNetwork
+from scope.scope_addon.capture.perception.adapters.keypoint_network import KeypointNetwork
 from scope.scope_addon.cli import SAMPLE, main
 from scope.solver.errors import ModelFileError
 

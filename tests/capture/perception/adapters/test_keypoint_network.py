@@ -9,13 +9,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from scope.scope_addon.capture.perception.adapters.keypoint_network import KeypointNetwork
 from scope.scope_addon.capture.perception.adapters.keypoint_sets import COCO_17, KEYPOINT_SETS
-from scope.scope_addon.capture.perception.adapters.keypoints.keypoint_network import KeypointNetwork
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.region import Region
 from scope.solver.errors import ModelFileError
 
-from ....small_graphs import fixed, heatmaps, simcc
+from ...small_graphs import fixed, heatmaps, simcc
 from .spots_in_picture import REGIONS, SPOTS, spots, unit_colours
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Heatmap networks on small graphs: coloured spots at known pixels, and maxima between cells."""
+"""Heatmap and SimCC networks on small graphs: coloured spots at known pixels, and maxima between cells."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception.adapters.keypoints.keypoint_network import KeypointNetwork
+from scope.scope_addon.capture.perception.adapters.keypoint_network import KeypointNetwork
 from scope.scope_addon.capture.perception.region import Region
 
-from ....small_graphs import fixed, heatmaps
+from ...small_graphs import fixed, heatmaps, simcc
 from .spots_in_picture import REGIONS, SIZES, assert_finds_the_spots
 
 
 @pytest.mark.parametrize("region", REGIONS.values(), ids=REGIONS)
 @pytest.mark.parametrize("size", SIZES, ids=str)
-def test_known_pixels_are_found(tmp_path: Path, region: Region, size: tuple[int, int]) -> None:
+def test_known_pixels_are_found_in_heatmaps(tmp_path: Path, region: Region, size: tuple[int, int]) -> None:
     assert_finds_the_spots(heatmaps(tmp_path / "m.onnx", 17, *size), region, atol=1.0)
 
 
@@ -36,3 +36,9 @@ def test_heatmap_peaks_between_cells(tmp_path: Path, how: str, udp: bool) -> Non
     pixels = middle * ([191 / 47, 255 / 63] if udp else 4.0)
     assert np.abs(points - pixels).max() < (0.05 if how == "dark" else 1.1)
     assert scores.min() > 0.9
+
+
+@pytest.mark.parametrize("region", REGIONS.values(), ids=REGIONS)
+@pytest.mark.parametrize("size", SIZES, ids=str)
+def test_known_pixels_are_found_by_simcc(tmp_path: Path, region: Region, size: tuple[int, int]) -> None:
+    assert_finds_the_spots(simcc(tmp_path / "m.onnx", 17, *size), region, atol=0.8)

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception.adapters.detectors.box_detector import BoxDetector
+from scope.scope_addon.capture.perception.adapters.box_detector import BoxDetector
 from scope.solver.errors import ModelFileError
 
-from ....small_graphs import fixed
+from ...small_graphs import fixed
 from .person_in_picture import CELLS, HEIGHT, IMAGE, WIDTH, yolox_rows
 
 

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception.adapters.detectors.box_detector import BoxDetector
-from scope.scope_addon.capture.perception.adapters.detectors.boxes import cells
+from scope.scope_addon.capture.perception.adapters.box_detector import BoxDetector, cells
 
 WIDTH, HEIGHT = 160, 96  # of the networks
 IMAGE = np.zeros((251, 333, 3), np.uint8)  # 251 / 96 is more than 333 / 160: as high as the network's picture

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scope.scope_addon.capture.perception.adapters.detectors.boxes import BORDER, MAX_BOXES, Boxes, suppress
+from scope.scope_addon.capture.perception.adapters.box_detector import BORDER, MAX_BOXES, Boxes, suppress
 from scope.scope_addon.capture.perception.letterbox import fit_in
 
 from .person_in_picture import HEIGHT, WIDTH
