@@ -53,7 +53,7 @@ class SCOPE_OT_guess_bones(_RigOperator):
 
 
 class SCOPE_OT_retarget(_RigOperator):
-    """Transfer the captured motion to your rig, as a new action. An action of this button is replaced if unchanged"""
+    """Transfer the captured motion to your rig, as a new action. One of the same capture is replaced if unchanged"""
 
     bl_idname = "scope.retarget"
     bl_label = "Retarget"

@@ -407,7 +407,7 @@ TEXTS = (
         "Threads": "Threads",
         "Toggle the view of the body over the footage. Sets the scene's camera and resolution": "Ansicht des Körpers über dem Filmmaterial ein- oder ausschalten. Setzt Kamera und Auflösung der Szene",
         "Transfer the captured expressions to the mesh's shape keys or the rig's face, as a new action": "Die erfassten Ausdrücke als neue Aktion auf die Formschlüssel des Mesh oder das Gesicht des Rigs übertragen",
-        "Transfer the captured motion to your rig, as a new action. An action of this button is replaced if unchanged": "Die erfasste Bewegung als neue Aktion auf das eigene Rig übertragen. Eine unveränderte Aktion dieses Knopfs wird ersetzt",
+        "Transfer the captured motion to your rig, as a new action. One of the same capture is replaced if unchanged": "Die erfasste Bewegung als neue Aktion auf das eigene Rig übertragen. Eine unveränderte derselben Erfassung wird ersetzt",
         "Travel Scale": "Wegmaßstab",
         "Turn the capture and its camera so that a line in an orthographic view from a side is upright": "Erfassung und Kamera so drehen, dass eine Linie in einer orthografischen Ansicht von einer Seite senkrecht ist",
         "Turn the capture and its camera so that a line in the footage is upright": "Erfassung und Kamera so drehen, dass eine Linie im Filmmaterial senkrecht ist",

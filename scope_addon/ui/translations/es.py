@@ -407,7 +407,7 @@ TEXTS = (
         "Threads": "Hilos",
         "Toggle the view of the body over the footage. Sets the scene's camera and resolution": "Alternar la vista del cuerpo sobre la filmación. Define la cámara y la resolución de la escena",
         "Transfer the captured expressions to the mesh's shape keys or the rig's face, as a new action": "Transferir las expresiones capturadas a las formas clave de la malla o a la cara del rig, como una acción nueva",
-        "Transfer the captured motion to your rig, as a new action. An action of this button is replaced if unchanged": "Transferir el movimiento capturado a su rig, como acción nueva. Una acción de este botón se reemplaza si no cambió",
+        "Transfer the captured motion to your rig, as a new action. One of the same capture is replaced if unchanged": "Transferir el movimiento capturado a su rig, como acción nueva. La de la misma captura se reemplaza si no cambió",
         "Travel Scale": "Escala de recorrido",
         "Turn the capture and its camera so that a line in an orthographic view from a side is upright": "Girar la captura y su cámara para que una línea en una vista ortográfica lateral sea vertical",
         "Turn the capture and its camera so that a line in the footage is upright": "Girar la captura y su cámara para que una línea de la filmación sea vertical",

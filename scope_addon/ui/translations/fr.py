@@ -407,7 +407,7 @@ TEXTS = (
         "Threads": "Threads",
         "Toggle the view of the body over the footage. Sets the scene's camera and resolution": "Afficher ou non le corps sur le métrage. Définit la caméra et la résolution de la scène",
         "Transfer the captured expressions to the mesh's shape keys or the rig's face, as a new action": "Transférer les expressions capturées aux clés de forme du maillage ou au visage du rig, dans une nouvelle action",
-        "Transfer the captured motion to your rig, as a new action. An action of this button is replaced if unchanged": "Transférer le mouvement capturé à votre rig, en nouvelle action. Une action de ce bouton est remplacée si elle est inchangée",
+        "Transfer the captured motion to your rig, as a new action. One of the same capture is replaced if unchanged": "Transférer le mouvement capturé à votre rig, en nouvelle action. Celle de la même capture est remplacée si elle est inchangée",
         "Travel Scale": "Échelle du trajet",
         "Turn the capture and its camera so that a line in an orthographic view from a side is upright": "Tourner la capture et sa caméra pour qu’une ligne d’une vue orthographique de côté soit verticale",
         "Turn the capture and its camera so that a line in the footage is upright": "Tourner la capture et sa caméra pour qu’une ligne du métrage soit verticale",

@@ -407,7 +407,7 @@ TEXTS = (
         "Threads": "スレッド",
         "Toggle the view of the body over the footage. Sets the scene's camera and resolution": "フッテージに重ねたボディの表示を切り替えます。シーンのカメラと解像度を設定します",
         "Transfer the captured expressions to the mesh's shape keys or the rig's face, as a new action": "キャプチャした表情をメッシュのシェイプキーまたはリグの顔に新しいアクションとして転送",
-        "Transfer the captured motion to your rig, as a new action. An action of this button is replaced if unchanged": "キャプチャしたモーションを新しいアクションとして自分のリグに転送します。このボタンのアクションは、変更がなければ置き換えます",
+        "Transfer the captured motion to your rig, as a new action. One of the same capture is replaced if unchanged": "キャプチャしたモーションを新しいアクションとして自分のリグに転送します。同じキャプチャのアクションは、変更がなければ置き換えます",
         "Travel Scale": "移動の倍率",
         "Turn the capture and its camera so that a line in an orthographic view from a side is upright": "横からの平行投影ビューの線が垂直になるように、キャプチャとカメラを回転",
         "Turn the capture and its camera so that a line in the footage is upright": "フッテージの線が垂直になるように、キャプチャとカメラを回転",

@@ -407,7 +407,7 @@ TEXTS = (
         "Threads": "线程",
         "Toggle the view of the body over the footage. Sets the scene's camera and resolution": "切换身体叠加在素材上的视图。会设置场景的摄像机和分辨率",
         "Transfer the captured expressions to the mesh's shape keys or the rig's face, as a new action": "将捕捉的表情作为新动作传递到网格的形态键或骨架的面部",
-        "Transfer the captured motion to your rig, as a new action. An action of this button is replaced if unchanged": "将捕捉的动作作为新动作传递到您的绑定。此按钮先前生成且未修改的动作会被替换",
+        "Transfer the captured motion to your rig, as a new action. One of the same capture is replaced if unchanged": "将捕捉的动作作为新动作传递到您的绑定。同一次捕捉先前生成且未修改的动作会被替换",
         "Travel Scale": "移动比例",
         "Turn the capture and its camera so that a line in an orthographic view from a side is upright": "旋转捕捉及其摄像机，使侧面正交视图中的一条线竖直",
         "Turn the capture and its camera so that a line in the footage is upright": "旋转捕捉及其摄像机，使素材中的一条线竖直",
