@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ....solver.errors import ModelFileError
+from ....solver.errors import ModelFileError, ShapeError
 from ...errors import SetupError
 from ...kinematics.frame_blocks import by_blocks
 from .sessions import open_session
@@ -182,8 +182,9 @@ class Lifter:
         :param confidence: (T, 33) 0..1.
         :param world: (T, 33, 3) world landmarks in metres, hip-centred, or None to lift without them.
         :param windows: of the frames around each; None if every frame is a still.
+        :raises ShapeError: an array has the wrong shape.
         """
-        around = windows or single_frame_windows(len(rays))
+        around = _windows(rays, confidence, windows)
 
         def lift(rows: NDArray[np.intp]) -> tuple[NDArray[np.floating[Any]], ...]:
             lifted = self._lift(*_window_input(rows, rays, confidence, world, around))
@@ -206,8 +207,9 @@ class Lifter:
         :param world: (T, 33, 3) world landmarks in metres, hip-centred.
         :param windows: of the frames around each; None if every frame is a still.
         :param rows: (n,) the frames to lift, ascending; None: all.
+        :raises ShapeError: an array has the wrong shape.
         """
-        around = windows or single_frame_windows(len(rays))
+        around = _windows(rays, confidence, windows)
 
         def lift(rows: NDArray[np.intp]) -> tuple[NDArray[np.floating[Any]], ...]:
             x, R = _window_input(rows, rays, confidence, world, around)
@@ -234,6 +236,17 @@ class Lifter:
         runs = [self._session.run(None, {name: x[k : k + _BATCH]}) for k in range(0, max(len(x), 1), _BATCH)]
         points, log_sigma = (np.concatenate([r[i] for r in runs]).astype(float) for i in (0, 1))
         return points, log_sigma
+
+
+def _windows(
+    rays: NDArray[np.floating[Any]], confidence: NDArray[np.floating[Any]], windows: Windows | None
+) -> Windows:
+    """Check the shapes of the arrays; default to one still per frame."""
+    T = len(rays)
+    for name, value, shape in (("rays", rays, (T, 33, 2)), ("confidence", confidence, (T, 33))):
+        if value.shape != shape:
+            raise ShapeError(f"{name} must have shape {shape}, but has {value.shape}")
+    return single_frame_windows(T) if windows is None else windows
 
 
 def _window_input(

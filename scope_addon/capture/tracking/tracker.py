@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ....solver.errors import ShapeError
 from ..perception.adapters.keypoint_network import KeypointNetwork
 from ..perception.execution import Execution
 from ..perception.kept_estimates import KeptEstimates
@@ -150,7 +151,10 @@ class PeopleTracker:
         :param upcoming_with_masks: whether the people of the frame after it need masks; only `mask_network` gives them,
             and not to people whom it was not already following.
         :return: tracklet number and observation of each person.
+        :raises ShapeError: the frame is not (H, W, 3) uint8.
         """
+        if image_rgb.ndim != 3 or image_rgb.shape[2] != 3 or image_rgb.dtype != np.uint8:
+            raise ShapeError(f"A frame must be (H, W, 3) uint8 RGB, but got {image_rgb.shape} {image_rgb.dtype}.")
         self._clock.advance(time_s)
         self._estimator.advance(upcoming_with_masks)
         self._update_live(image_rgb, upcoming_rgb)
