@@ -31,7 +31,7 @@ from ..scope_addon.capture.stages.observe import observe
 from ..scope_addon.capture.stages.repair import repair
 from ..scope_addon.capture.stages.solve import solve
 from ..scope_addon.capture.tracking.track import Track
-from ..scope_addon.capture.world.shot import Shot
+from ..scope_addon.capture.world.assemble import Shot
 from ..scope_addon.errors import NoPersonError
 from ..scope_addon.motion import Motion
 from ..solver import Body, load_body

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ...scope_addon.capture.fitting import prepared_track
 from ...scope_addon.capture.options import CaptureOptions
 from ...scope_addon.capture.perception import lifter
-from ...scope_addon.capture.world import balance, ground_plane
+from ...scope_addon.capture.world import balance, stance
 from ...scope_addon.kinematics import standing
 from ...solver import load_body
 from ..frames import DATA
@@ -65,7 +65,7 @@ CHOICES = (
     Choice("weight of the floor under standing feet", prepared_track, "WEIGHTS", (5e3, 2e4), "floor"),
     Choice("share lifted with world landmarks", lifter, "WORLD_SHARE", (0.5, 1.0)),
     Choice("speed at which balance is doubted, m/s", balance, "STANDING_M_S", (0.25, 1.0)),
-    Choice("deviation of feet from the floor, m", ground_plane, "FLOOR_SIGMA_M", (0.015, 0.06)),
+    Choice("deviation of feet from the floor, m", stance, "FLOOR_SIGMA_M", (0.015, 0.06)),
     Choice("depth error that a still foot may have, m", standing, "WRONG_DEPTH_M", (0.2, 0.8)),
 )
 

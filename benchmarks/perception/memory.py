@@ -28,8 +28,8 @@ from ...scope_addon.capture.tracking.left_right import repair_left_right
 from ...scope_addon.capture.tracking.people import build_tracks
 from ...scope_addon.capture.tracking.track import Tracklet
 from ...scope_addon.capture.tracking.tracker import PeopleTracker
+from ...scope_addon.capture.world.assemble import Shot
 from ...scope_addon.capture.world.camera_path import CameraPath
-from ...scope_addon.capture.world.shot import Shot
 from ...scope_addon.cli import SAMPLE
 from ...solver import load_body
 

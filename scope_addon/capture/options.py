@@ -15,11 +15,11 @@ from ..options.capture import ALL, LARGEST, OFF
 from .camera.calibration import read_calibration
 from .camera.intrinsics import choose_camera
 from .fitting.ablation import NO_ABLATION, Ablation
-from .fitting.hands.hand_measurements import require_fingers
+from .fitting.hand_measurements import require_fingers
 from .fitting.stature import require_stature
 from .media.video_range import FootageRange, VideoRange, parse_range
-from .perception.adapters.detectors.box_detector import BoxDetector
-from .perception.adapters.keypoints.keypoint_network import KeypointNetwork
+from .perception.adapters.box_detector import BoxDetector
+from .perception.adapters.keypoint_network import KeypointNetwork
 from .perception.execution import Execution
 from .perception.sessions import landmark_network_name
 from .tracking.tracker import MAX_PEOPLE

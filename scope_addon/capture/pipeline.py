@@ -19,8 +19,8 @@ from .stages.observe import observe
 from .stages.repair import repair
 from .stages.report import make_report
 from .stages.solve import solve
+from .world.assemble import Shot
 from .world.camera_path import CameraPath
-from .world.shot import Shot
 
 
 @dataclass

@@ -56,7 +56,7 @@ def window_report(
     """
     if not args.windows:
         return None
-    from ..capture.stages.windows.observe_part import count_windows, observe_windows
+    from ..capture.stages.windows.windowed_clip import count_windows, observe_windows
 
     if args.windows == COUNT:
         count = count_windows(video, options)

@@ -19,8 +19,7 @@ from ..capture.camera.bars import find_bars, longer_content_side
 from ..capture.camera.intrinsics import Camera, assumed_camera
 from ..capture.camera.line_segments import Segments, find_segments
 from ..capture.camera.verticals import estimate_up_from_lines
-from ..capture.fitting.focal_fits import FocalFits
-from ..capture.fitting.focal_length import camera_by_edges, camera_by_fits
+from ..capture.fitting.focal_length import FocalFits, camera_by_edges, camera_by_fits
 from ..capture.fitting.frame_sequence import FittedTrack
 from ..capture.fitting.prepared_track import prepare_track
 from ..capture.fitting.track_fit import fit_track

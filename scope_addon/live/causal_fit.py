@@ -2,7 +2,7 @@
 """The body fitted to one observation after another, each from the state of the one before.
 
 The lifting network's window ends with the newest frame, which stands for the samples after it: at the end of a clip,
-it is the same (see `lifter_window`). A frame whose fit contradicts the lifter is fitted again with the stages of a
+it is the same (see `lifter`). A frame whose fit contradicts the lifter is fitted again with the stages of a
 cold start, and keeps the fit of lower cost, as in `frame_sequence`; earlier frames stay as they were given.
 """
 
@@ -22,8 +22,7 @@ from ..capture.fitting.frame_sequence import LONGEST_COAST_S, is_usable
 from ..capture.fitting.prepared_track import prepare_track
 from ..capture.fitting.weights import ROBUST, cold_stages, warm_stages
 from ..capture.perception.landmark_network import KEYPOINT_NAMES
-from ..capture.perception.lifter import KEYPOINT_COUNT, default_lifter
-from ..capture.perception.lifter_window import OFFSETS_S, windows_around
+from ..capture.perception.lifter import KEYPOINT_COUNT, OFFSETS_S, default_lifter, windows_around
 from ..capture.perception.observation import Observation
 from ..capture.tracking.track import single_frame_track
 from ..kinematics.contact_points import CONTACT_POINTS, with_contact_points

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
-from scope.scope_addon.capture.perception import landmark_network
-from scope.scope_addon.capture.perception.kept import kept_estimates
+from scope.scope_addon.capture.perception import kept_estimates, landmark_network
 from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.errors import CancelledError
 

@@ -85,7 +85,7 @@ def read_description(path: Path) -> None:
 
 
 def find_estimates(path: Path) -> None:
-    from scope.scope_addon.capture.perception.kept.kept_estimates import KeptEstimates
+    from scope.scope_addon.capture.perception.kept_estimates import KeptEstimates
 
     folder = path.with_name("estimates")
     folder.mkdir(exist_ok=True)

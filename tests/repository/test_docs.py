@@ -17,9 +17,9 @@ import numpy as np
 import pytest
 from scope import solver
 from scope.scope_addon.capture.camera.calibration import read_calibration
+from scope.scope_addon.capture.perception.adapters.box_detector import DETECTOR_TYPES
 from scope.scope_addon.capture.perception.adapters.description import read_description
-from scope.scope_addon.capture.perception.adapters.detectors.box_detector import DETECTOR_TYPES
-from scope.scope_addon.capture.perception.adapters.keypoints.keypoint_network import KEYPOINT_TYPES
+from scope.scope_addon.capture.perception.adapters.keypoint_network import KEYPOINT_TYPES
 from scope.scope_addon.cli import SAMPLE, build_parser, main
 from scope.scope_addon.command_line.arguments import body_and_options
 from scope.scope_addon.edit.pins.corrected_motion import with_corrections

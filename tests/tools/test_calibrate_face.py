@@ -4,10 +4,8 @@
 from __future__ import annotations
 
 import numpy as np
-from scope.scope_addon.capture.perception.face.expression_network import EXPRESSION_POINTS
-from scope.scope_addon.capture.perception.face.face_landmarks import FACE_POINTS
-from scope.scope_addon.capture.tracking.face.expression_fit import fit_units
-from scope.scope_addon.capture.tracking.face.face_alignment import aligned
+from scope.scope_addon.capture.perception.face.face_landmarks import EXPRESSION_POINTS, FACE_POINTS
+from scope.scope_addon.capture.tracking.face.expression_fit import aligned, fit_units
 from scope.solver.names import EXPRESSIONS
 from scope.tools.calibrate_face.observe import SeenFaces
 from scope.tools.calibrate_face.response import measure_response, units_of_expression

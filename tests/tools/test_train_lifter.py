@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.fitting.keypoint_offsets import offset
 from scope.scope_addon.capture.perception import lifter
-from scope.scope_addon.capture.perception.lifter import HIPS, Lifter
-from scope.scope_addon.capture.perception.lifter_window import MIDDLE, OFFSETS_S, SPACING_S, WINDOW
+from scope.scope_addon.capture.perception.lifter import HIPS, MIDDLE, OFFSETS_S, SPACING_S, WINDOW, Lifter
 from scope.scope_addon.capture.tracking.left_right import MIRROR_PARTNER
 from scope.solver.names import BLAZEPOSE
 from scope.solver.rotations import exp

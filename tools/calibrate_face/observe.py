@@ -11,9 +11,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.capture.perception.face.expression_network import EXPRESSION_POINTS, ExpressionNetwork
-from ...scope_addon.capture.perception.face.eye_light import eye_light
-from ...scope_addon.capture.perception.face.face_landmarks import FaceNetwork
+from ...scope_addon.capture.perception.face.face_landmarks import (
+    EXPRESSION_POINTS,
+    ExpressionNetwork,
+    FaceNetwork,
+    eye_light,
+)
 from ...scope_addon.capture.perception.region import Region
 from ..render_faces.truth import FOLDER, SIZE
 

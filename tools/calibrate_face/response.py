@@ -8,9 +8,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.capture.perception.face.expression_network import EXPRESSION_POINTS
-from ...scope_addon.capture.tracking.face.expression_fit import FaceResponse, error_size
-from ...scope_addon.capture.tracking.face.face_alignment import VIEW_TERMS, AlignedFaces, aligned, view_terms
+from ...scope_addon.capture.perception.face.face_landmarks import EXPRESSION_POINTS
+from ...scope_addon.capture.tracking.face.expression_fit import (
+    VIEW_TERMS,
+    AlignedFaces,
+    FaceResponse,
+    aligned,
+    error_size,
+    view_terms,
+)
 from ...solver.names import EXPRESSIONS
 from .observe import SeenFaces
 

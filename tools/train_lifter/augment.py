@@ -20,7 +20,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from ...scope_addon.capture.perception.lifter_window import OFFSETS_S
+from ...scope_addon.capture.perception.lifter import OFFSETS_S
 from ...solver.body import Body
 from .motions import Motions
 

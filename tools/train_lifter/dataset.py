@@ -11,7 +11,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ...scope_addon.capture.perception.lifter_window import MIDDLE, OFFSETS_S, WINDOW
+from ...scope_addon.capture.perception.lifter import MIDDLE, OFFSETS_S, WINDOW
 from ...solver.body import Body
 from . import detector_noise
 from .augment import PoseSampler, chance, constant, normal, rotation_matrices, uniform

@@ -22,7 +22,7 @@ from torch import Tensor
 
 from ...scope_addon.capture.fitting.keypoint_offsets import offset
 from ...scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
-from ...scope_addon.capture.perception.lifter_window import MIDDLE, WINDOW
+from ...scope_addon.capture.perception.lifter import MIDDLE, WINDOW
 from .augment import chance, normal, rotation_matrices, uniform
 from .network_input import hip_center
 

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
 from ...scope_addon.atomic_write import atomic_path
-from ...scope_addon.capture.perception.lifter import INPUT_SIZE, KEYPOINT_COUNT
-from ...scope_addon.capture.perception.lifter_window import WINDOW
+from ...scope_addon.capture.perception.lifter import INPUT_SIZE, KEYPOINT_COUNT, WINDOW
 from .network import LOG_SIGMA_RANGE, MERGES, LiftingNetwork
 
 OPSET = 17

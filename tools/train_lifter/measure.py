@@ -6,7 +6,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from ...scope_addon.capture.perception.lifter_window import MIDDLE
+from ...scope_addon.capture.perception.lifter import MIDDLE
 from ...solver.body import Body
 from .dataset import Batch, Dataset, Variety
 from .motions import Motions

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.capture.perception.lifter_window import ends_of_runs
+from ...scope_addon.capture.perception.lifter import ends_of_runs
 from ...scope_addon.errors import MotionFileError
 from ...solver.loaders.npz import read_npz
 from ...solver.rotations import exp

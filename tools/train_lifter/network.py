@@ -6,8 +6,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from ...scope_addon.capture.perception.lifter import INPUT_SIZE, KEYPOINT_COUNT
-from ...scope_addon.capture.perception.lifter_window import WINDOW
+from ...scope_addon.capture.perception.lifter import INPUT_SIZE, KEYPOINT_COUNT, WINDOW
 
 WIDTH, BLOCKS = 512, 6
 MERGES = 2  # 9 moments, 3, 1

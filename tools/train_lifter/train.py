@@ -24,7 +24,7 @@ from typing import Any
 import torch
 
 from ...scope_addon.atomic_write import atomic_path
-from ...scope_addon.capture.perception.lifter_window import MIDDLE
+from ...scope_addon.capture.perception.lifter import MIDDLE
 from ...scope_addon.errors import MotionFileError
 from ...solver.body import Body
 from ...solver.loaders.body_file import load_body

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from ....solver.errors import InputError
 from ...json_file import read_json_object
 
+_FORMAT = 'write {"intrinsics": [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], "dist": [k1, k2, p1, p2, k3], "size": [w, h]}'
 # The name in our files, and the names that OpenCV's examples and other programs use.
 _NAMES = {
     "intrinsics": ("intrinsics", "camera_matrix", "K"),
@@ -104,15 +105,11 @@ def read_calibration(path: Path) -> Calibration:
 
     :raises InputError: the file cannot be read, or holds an unknown key or an impossible value.
     """
-    values = _by_our_names(path, read_json_object(path, InputError, "calibration", _format()))
+    values = _by_our_names(path, read_json_object(path, InputError, "calibration", _FORMAT))
     if "intrinsics" not in values:
-        raise InputError(f'{path} is not a calibration: it has no "intrinsics"; {_format()}')
+        raise InputError(f'{path} is not a calibration: it has no "intrinsics"; {_FORMAT}')
     intrinsics = _intrinsics(path, values["intrinsics"])
     return Calibration(path, intrinsics, _distortion(path, values.get("dist")), _size(path, values.get("size")))
-
-
-def _format() -> str:
-    return 'write {"intrinsics": [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], "dist": [k1, k2, p1, p2, k3], "size": [w, h]}'
 
 
 def _by_our_names(path: Path, data: dict[str, Any]) -> dict[str, Any]:
@@ -143,7 +140,7 @@ def _numbers(value: Any) -> NDArray[np.float64] | None:
 def _intrinsics(path: Path, value: Any) -> NDArray[np.float64]:
     K = _numbers(value)
     if K is None or K.shape != (3, 3):
-        raise InputError(f"{path}: intrinsics must be three rows of three numbers; {_format()}")
+        raise InputError(f"{path}: intrinsics must be three rows of three numbers; {_FORMAT}")
     if K[0, 0] <= 0 or K[1, 1] <= 0:
         raise InputError(f"{path}: intrinsics have focal lengths {K[0, 0]:g} and {K[1, 1]:g}, which must be above 0")
     if np.array_equal(K[:, 2], [0, 0, 1]) and K[2, :2].any():

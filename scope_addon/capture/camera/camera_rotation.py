@@ -28,7 +28,6 @@ from ..perception.region import inside, surroundings
 from .background_record import REVEALING_S, SAMPLES_HZ, BackgroundRecord, is_rotated
 from .bars import find_bars
 from .heading_drift import EDGE_INTERVAL_S, EDGE_SIDE_PX, FrameEdges
-from .hidden_background import HiddenBackground
 from .intrinsics import Camera
 from .line_segments import find_segments
 
@@ -40,6 +39,7 @@ KEY_SHARE = 0.5  # of a key frame's corners; with fewer left, the next key frame
 INLIER_PX = 1.2  # in the working image
 MIN_INLIER_SHARE = 0.35  # of corners; a crowd or water that fills the picture gives no rotation
 REVEALED_SHARE = 0.01  # of the image: how much must have come into view
+CELLS = 40  # of the grid of hidden background, along either side of the image
 
 
 class BackgroundTracker:
@@ -81,7 +81,6 @@ class BackgroundTracker:
         """Process the next frame.
 
         :param image_rgb: (H, W, 3).
-        :param time_s: when it is shown.
         :param people: (n, 2) points of each person in pixels: the background is outside their bounding boxes.
         :param is_cut: whether another scene begins, for which the camera's rotation is assumed unchanged.
         :param is_sampled: whether the rotation is to be estimated in this frame even if the last estimate is recent.
@@ -211,7 +210,6 @@ def consensus_rotation(
     :param a: (n, 3) unit vectors, n at least 2.
     :param b: (n, 3) unit vectors.
     :param tolerance: radians.
-    :param random: draws the hypotheses.
     :return: R (3, 3), and (n,) whether each pair agrees with it.
     """
     pairs = random.integers(0, len(a), (HYPOTHESES, 2))
@@ -255,3 +253,35 @@ def _flow(
         before, after, start, guess.copy(), winSize=(15, 15), maxLevel=levels, flags=flags
     )
     return np.array(moved, np.float32), np.array(found).ravel() == 1
+
+
+class HiddenBackground:
+    """Which part of a static camera's background people have hidden in all frames so far: a grid, at first all hidden.
+
+    :param size: of the image, width and height in pixels.
+    """
+
+    def __init__(self, size: tuple[int, int]) -> None:
+        self._cell_px = np.array(size) / CELLS
+        x, y = np.meshgrid(np.arange(CELLS), np.arange(CELLS))
+        self._centers = (np.stack([x, y], axis=-1).reshape(-1, 2) + 0.5) * self._cell_px - 0.5
+        self._hidden = np.ones(CELLS * CELLS, bool)
+
+    def reveal(self, people: Sequence[NDArray[Any]]) -> None:
+        """Add a frame with people at these points (n, 2) each, in pixels: what they do not hide has been seen."""
+        self._hidden &= self._covered(people)
+
+    def share_in_view(self, people: Sequence[NDArray[Any]]) -> float:
+        """Return the share of the image that was hidden so far and is not hidden by people at these points (n, 2)."""
+        return float((self._hidden & ~self._covered(people)).mean())
+
+    def hides(self, points: NDArray[np.floating[Any]]) -> NDArray[np.bool_]:
+        """Return (n,) whether each point (n, 2) of the image, in pixels, was hidden so far."""
+        column, row = np.clip((points + 0.5) / self._cell_px, 0, CELLS - 1).astype(int).reshape(-1, 2).T
+        hidden: NDArray[np.bool_] = self._hidden[row * CELLS + column]
+        return hidden
+
+    def _covered(self, people: Sequence[NDArray[Any]]) -> NDArray[np.bool_]:
+        """Return whether each cell is wholly behind one of the people."""
+        margin = 0.5 * np.concatenate([self._cell_px, -self._cell_px])
+        return inside(self._centers, [surroundings(points) + margin for points in people])

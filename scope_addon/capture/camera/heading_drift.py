@@ -57,7 +57,6 @@ def remove_heading_drift(
     :param R_first_camera: (T, 3, 3) the camera's axes in the first frame's, with drift.
     :param times: (T,) seconds.
     :param edge_frames: in order; the drift at the first one is small.
-    :param camera: the intrinsics.
     :param image_size: (width, height) in pixels.
     :return: (T, 3, 3); the input itself where there is nothing to correct.
     """

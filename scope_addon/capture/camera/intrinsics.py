@@ -16,7 +16,7 @@ from .calibration import read_calibration
 
 # The default is a field of view of 60 degrees along the longer side, between a phone's main camera (65-70 degrees, less
 # the crop of its video stabilization) and a camera's standard lens (40-54 degrees). Edges of the background give a
-# better estimate (focal_length.py). The body adds little (focal_fits.py), because it depends on the lifted points, and
+# better estimate, and the body adds little (focal_length.py), because it depends on the lifted points, and
 # these on the assumed focal length. In 19 clips of known focal length (four calibrated cameras of 59.4 to 60.1 degrees,
 # fifteen renders) the root mean square error of its logarithm is 0.33 by default, and 0.30 with both estimates: for the
 # renders 0.33 instead of 0.37, for the cameras 0.06 instead of 0.01. Assuming 50 or 70 degrees for the cameras moved
@@ -78,7 +78,6 @@ def choose_camera(
     :param width, height: of the footage in pixels.
     :param focal_mm: 35 mm equivalent focal length along the longer side, f_px = f_mm / 36 · max(width, height).
     :param fov_deg: field of view along the longer side, f_px = max(width, height) / (2 tan(fov / 2)).
-    :param calibration: JSON file; see `calibration`.
     :param metadata_focal_mm: as ``focal_mm``, from the file's own metadata.
     :raises UsageError: the user's values contradict each other, or one is impossible.
     :raises InputError: the calibration cannot be used for footage of this size.
@@ -126,7 +125,6 @@ def estimated_camera(width: int, height: int, focal_px: float, deviation: float,
     """Return the camera with an estimated focal length.
 
     :param width, height: of the footage in pixels.
-    :param focal_px: focal length in pixels.
     :param deviation: its relative error, one standard deviation.
     :param longer_px: as for `assumed_camera`.
     """

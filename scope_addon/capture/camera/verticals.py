@@ -68,7 +68,6 @@ class _Axes:
 def estimate_up_from_lines(lines: Lines, up: NDArray[np.float64]) -> UpEstimate:
     """Estimate the up direction and a horizontal direction; None for what the lines do not determine.
 
-    :param lines: of the background.
     :param up: (3,) unit vector, the body's up direction, in the lines' axes.
     """
     if not len(lines.lengths):

@@ -23,8 +23,7 @@ from ..camera.bars import longer_content_side
 from ..camera.camera_rotation import BackgroundTracker
 from ..camera.intrinsics import Camera, assumed_camera
 from ..perception.observation import Observation
-from .focal_fits import FocalFits
-from .focal_length import camera_by_edges, camera_by_fits
+from .focal_length import FocalFits, camera_by_edges, camera_by_fits
 from .live_body import LiveBody
 
 KERNELS = 85  # that fitting a clip compiles
@@ -61,7 +60,6 @@ class BackgroundEstimators:
     def add(self, time_s: float, largest: Observation | None, followed: BackgroundTracker | BackgroundRecord) -> None:
         """Use the frame before this one for the focal length, once a background was searched for edges.
 
-        :param largest: the largest person of the frame.
         :param followed: the background, at least of all frames before.
         """
         # The background of this very frame may be followed meanwhile. If it finds the first edges, it has set the bars
@@ -80,7 +78,6 @@ class BackgroundEstimators:
     def camera(self, record: BackgroundRecord, people: Iterable[tuple[float, Observation]]) -> Camera:
         """Return the clip's camera; an assumed focal length is replaced by the estimate from edges and fits.
 
-        :param record: the background of all frames.
         :param people: time and largest person of the frames from the first of the record's ``edge_frames`` on; those
             that have been added count once.
         """

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ....solver import Fit, Measurements, Options, State, Status, fit_tree, make_tree
 from ....solver.compiled.tree import with_fixed_shape
-from .hands.hand_measurements import smooth_fingers
+from .hand_measurements import smooth_fingers
 from .prepared_track import PreparedTrack
 from .weights import ROBUST, WEIGHTS, cold_stages, warm_stages
 

@@ -14,14 +14,12 @@ from ....solver.loaders.body_file import CHILD_BELOW_M
 from ...kinematics.body_surface import with_arm_points
 from ...kinematics.contact_points import CONTACT_POINTS, with_contact_points
 from ..camera.intrinsics import Camera
-from ..perception.lifter import Lifted, default_lifter
-from ..perception.lifter_window import windows_around
+from ..perception.lifter import Lifted, default_lifter, windows_around
 from ..tracking.face.head_direction import across_head, certainty
 from ..tracking.track import Track
 from .ablation import NO_ABLATION, Ablation
 from .frame_measurements import DEPTH_SIGMA_M, EARS, Measurer
-from .hands.hand_measurements import HandMeasurer, with_finger_limits
-from .hands.rigid_fingers import without_fingers
+from .hand_measurements import HandMeasurer, with_finger_limits, without_fingers
 from .keypoint_offsets import with_keypoint_offsets
 from .stature import with_population, with_stature, with_unknown_stature
 from .weights import WEIGHTS, joint_weights

@@ -32,7 +32,7 @@ def with_stature(priors: Priors, body: Body, height_m: float, sigma_m: float = S
 
     :param sigma_m: σ in Λ; the mean has this height in any case.
     """
-    _, h0, g = _shape_of(body, height_m)
+    h0, g = _extremes_at(body, height_m)
     population = _population(body, is_child=height_m < CHILD_BELOW_M)
     mean = g / population * (height_m - h0) / (SIGMA_M**2 + g @ (g / population))
     return replace(priors, shape_mean=mean, shape_information=np.diag(population) + np.outer(g, g) / sigma_m**2)
@@ -47,7 +47,7 @@ def with_unknown_stature(priors: Priors, body: Body) -> Priors:
     divides that pull by 1 + κ. The person is taken for an adult: growth is fixed at 0.
     """
     population = _population(body, is_child=False)
-    *_, g = _shape_of(body, body.stature())
+    _, g = _extremes_at(body, body.stature())
     along = g / population
     along /= max(float(np.linalg.norm(along)), 1e-12)
     return replace(priors, shape_information=np.diag(population) + STIFFNESS * np.outer(along, along))
@@ -128,14 +128,14 @@ def _population(body: Body, is_child: bool) -> NDArray[np.float64]:
     return information
 
 
-def _shape_of(body: Body, height_m: float) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]:
-    """Return the most probable shape (P,) of this height, and h₀ and g (P,) of its highest and lowest vertices."""
+def _extremes_at(body: Body, height_m: float) -> tuple[float, NDArray[np.float64]]:
+    """Return h₀ and g (P,) of the highest and the lowest vertex of the most probable shape of this height."""
     betas, h0, g = np.zeros(body.P), 0.0, np.zeros(body.P)
     population = _population(body, is_child=height_m < CHILD_BELOW_M)
     for _ in range(_ROUNDS):
         h0, g = _shape_at(body, betas)
         betas = g / population * (height_m - h0) / max(float(g @ (g / population)), 1e-12)
-    return betas, h0, g
+    return h0, g
 
 
 def _shape_at(body: Body, betas: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ....solver import ClipFit, Fit, State, fit_clip
 from .frame_measurements import NEAREST_M
 from .frame_sequence import FittedTrack, FrameSequence, is_usable
-from .outline.shape_fit import PRIOR_SHARE, fit_shape_to_outline, usable_masks
+from .outline import PRIOR_SHARE, fit_shape_to_outline, usable_masks
 from .prepared_track import PreparedTrack, Stance
 from .stature import stature_sigma, with_population
 from .weights import ROBUST, clip_weights, cold_stages
@@ -77,10 +77,7 @@ def ground(prepared: PreparedTrack, first: FittedTrack, stance: Stance) -> tuple
 def fit_each_frame(
     prepared: PreparedTrack, start: FittedTrack, progress: Callable[[str, int, int], None]
 ) -> FittedTrack:
-    """Fit every frame alone, from its state in another motion.
-
-    :param progress: called with the stage's name, the frames done and the total.
-    """
+    """Fit every frame alone, from its state in another motion."""
     frames = FrameSequence(replace(prepared, weights=clip_weights(prepared.weights)), start.betas)
     T = len(start.valid)
     for k in range(T):

@@ -39,6 +39,9 @@ _MIN_SEEK_S = 20.0  # start from which seeking is tried
 _DAMAGED_PACKETS = 4096  # in a row, after which no more are tried
 # Degrees clockwise by which an image has to be rotated to be upright.
 _ROTATIONS = {90: cv2.ROTATE_90_CLOCKWISE, 180: cv2.ROTATE_180, 270: cv2.ROTATE_90_COUNTERCLOCKWISE}
+DEFAULT_FPS = Fraction(30)  # where footage has no rate; the most common one
+_STANDARD_RATES = [Fraction(n) for n in (24, 25, 30, 48, 50, 60, 120, 240)]
+_STANDARD_RATES += [Fraction(n * 1000, 1001) for n in (24, 30, 48, 60, 120, 240)]
 
 
 def _size(width: float, height: float, aspect: float) -> tuple[int, int]:
@@ -69,7 +72,6 @@ def upright(
 ) -> NDArray[np.uint8]:
     """Stretch an image (H, W, 3) of a file or stream until its pixels are square; mirror it before and rotate it after.
 
-    :param path: its name, for messages.
     :param aspect: width of a pixel over its height.
     :param clockwise_deg: a multiple of 90; others do not rotate.
     :param is_mirrored: whether top and bottom are exchanged before the rotation, of which every mirroring consists.
@@ -122,13 +124,8 @@ def _film(path: Path, container: InputContainer) -> av.VideoStream:
         raise VideoError(f"{path} contains only audio; choose the file with the video")
     if film is None or not film.codec_context:
         raise _undecodable(path)
-    check_size(path, *_size(film.width, film.height, _aspect(film)))
+    check_size(path, *_size(film.width, film.height, float(film.sample_aspect_ratio or 1)))
     return film
-
-
-def _aspect(stream: av.VideoStream) -> float:
-    """Return the width of a stream's pixels over their height."""
-    return float(stream.sample_aspect_ratio or 1)
 
 
 def _undecodable(path: Path) -> VideoError:
@@ -170,7 +167,6 @@ def decode_items(path: Path, numbers: Collection[int], max_pixels: int) -> dict[
     PyAV's stream ids are the item numbers. Of several streams with one id, the first is the item; the others belong to
     an animation.
 
-    :param numbers: of the items to decode.
     :param max_pixels: the limit for all items together, beyond which nothing is returned.
     :return: (h, w, 3) uint8 RGB by item number; for a damaged file, the items that could be decoded.
     :raises VideoError: PyAV is not installed.
@@ -227,7 +223,7 @@ class PyavReader:
         self._frames = self._whole(self._decoded)
         self._start = self._stream.start_time or 0  # in units of the stream
         self.is_mirrored, self.clockwise_deg = False, 0
-        self._aspect = _aspect(self._stream)
+        self._aspect = float(self._stream.sample_aspect_ratio or 1)  # width of a pixel over its height
         self.rate = float(self._stream.guessed_rate or self._stream.average_rate or 0)
         duration_s = (container.duration or 0) / 1e6
         self.frame_count = float(self._stream.frames or round(duration_s * self.rate))
@@ -331,3 +327,30 @@ class PyavReader:
     def close(self) -> None:
         """Close the file."""
         self._container.close()
+
+
+def exact_fps(fps: float) -> Fraction | None:
+    """Convert a float frame rate to the rational that it stands for; None if it is not a rate (0, NaN, 90000).
+
+    A ratio of small integers survives the conversion to float and is returned as it is (30000/1001, 2997/100). A rate
+    averaged over a file's duration is not such a ratio; it becomes the standard rate within 0.001 %, if there is one.
+    """
+    if not 0.01 < fps <= 1000:  # also False for NaN
+        return None
+    simple = Fraction(fps).limit_denominator(1001)
+    if abs(simple - Fraction(fps)) < Fraction(fps) / 10**11:
+        return simple
+    nearest = min(_STANDARD_RATES, key=lambda rate: abs(rate - Fraction(fps)))
+    if abs(nearest - Fraction(fps)) < nearest / 10**5:
+        return nearest
+    return Fraction(fps).limit_denominator(100_000)
+
+
+def estimate_fps(reader: PyavReader) -> Fraction:
+    """Estimate the rate from the timestamps of the next 30 frames, for a container that does not report it."""
+    times: list[float] = []
+    while len(times) < 30 and (decoded := reader.read()) is not None:
+        times.append(decoded[0] or 0.0)
+    steps = np.diff(times)
+    steps = steps[steps > 0]
+    return (exact_fps(round(1 / float(np.median(steps)), 2)) if len(steps) else None) or DEFAULT_FPS

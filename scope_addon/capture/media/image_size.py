@@ -14,7 +14,6 @@ MAX_RATIO = 20.0  # of the longer side to the shorter: the search for people tak
 def check_size(path: Path, width: float, height: float) -> None:
     """Refuse an image that is too large or too long, from what its header says.
 
-    :param path: of the file, for the message.
     :param width, height: of the image, in square pixels.
     :raises VideoError: it has more than `MAX_PIXELS` pixels, or its sides differ by more than a factor of `MAX_RATIO`.
     """
@@ -31,9 +30,6 @@ def check_size(path: Path, width: float, height: float) -> None:
 def check_depth(path: Path, width: int, height: int, bits: int) -> None:
     """Refuse a still that takes more memory than one of `MAX_PIXELS` pixels with four channels of 16 bits: 2.2 GB.
 
-    :param path: of the file, for the message.
-    :param width, height: of the image, pixels.
-    :param bits: of one channel.
     :raises VideoError: it does.
     """
     cost = 2 * bits if bits > 16 else 16  # to decode the deeper ones, OpenCV takes three times their size, not twice

@@ -29,8 +29,7 @@ from numpy.typing import NDArray
 
 from ...errors import VideoError
 from .frame import Frame
-from .frame_rate import DEFAULT_FPS, estimate_fps, exact_fps
-from .frame_readers import PyavReader, next_time
+from .frame_readers import DEFAULT_FPS, PyavReader, estimate_fps, exact_fps, next_time
 from .image_sequence import PictureSequence, SequenceReader, find_sequence
 from .quicktime import focal_35mm
 from .stills.still_images import is_picture, read_picture
@@ -304,7 +303,6 @@ class _Decoder:
         """Warn if the file ended early, or was still being written.
 
         :param index: of the frame that would have come next.
-        :param time: of the last frame, seconds.
         """
         video = self._video
         # Both tests: a container that counts frames from its duration is wrong for a variable frame rate.

@@ -95,7 +95,6 @@ def painted_frames(
     """Generate some frames of the overlay: source frame index and (H, W, 3) RGB, at most 1920 pixels wide and high.
 
     :param indices: source frame indices; those that the footage does not have are left out.
-    :param wanted: the range of the footage that was captured.
     :raises VideoError: the footage cannot be read.
     :raises ShapeError: a motion does not have the joints of the body.
     """
@@ -137,11 +136,11 @@ def draw_overlay(
         colors = [colors]
     opacities = np.broadcast_to(np.asarray(opacity, float), (len(people),)).tolist()
     canvas = Canvas.blank(image_rgb.shape[1], image_rgb.shape[0])
-    draw_bodies(canvas, people, faces, intrinsics, dist, list(cast("Sequence[ArrayLike]", colors)), opacities)
+    _draw_bodies(canvas, people, faces, intrinsics, dist, list(cast("Sequence[ArrayLike]", colors)), opacities)
     return blended(image_rgb, canvas)
 
 
-def draw_bodies(
+def _draw_bodies(
     canvas: Canvas,
     vertices_cam: Sequence[NDArray[np.floating[Any]]],
     faces: NDArray[np.integer[Any]],
@@ -150,18 +149,8 @@ def draw_bodies(
     colors: Sequence[ArrayLike],
     opacities: Sequence[float],
 ) -> None:
-    """Draw the bodies of several people into a canvas.
-
-    As `draw_overlay`, but with a list element per person.
-
-    :param vertices_cam: (V, 3) each: metres, camera axes (OpenCV's).
-    :param faces: (F, 3) or (F, 4), counter-clockwise seen from outside.
-    :param intrinsics: (3, 3) K in pixels of the canvas.
-    :param dist: up to (5,) distortion coefficients; None for none.
-    :param colors: (3,) or (F, 3) each, sRGB in 0..1.
-    :param opacities: 0..1 each.
-    """
-    triangles = _triangles(faces)
+    """Draw the bodies of several people into a canvas; as `draw_overlay`, but with a list element per person."""
+    triangles = faces if faces.shape[1] == 3 else np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
     for vertices, color, opacity in zip(vertices_cam, colors, opacities, strict=True):
         per_face = np.asarray(color, np.float32)
         if per_face.ndim == 2 and len(per_face) != len(triangles):
@@ -200,12 +189,6 @@ def camera_vertices(motion: Motion, body: Body, row: int) -> NDArray[np.float64]
     T = motion.world_from_camera[row]
     R_camera_world = T[:3, :3].T
     return body.skin(R_camera_world @ R_world, (t_world - T[:3, 3]) @ T[:3, :3], betas)
-
-
-def _triangles(faces: NDArray[np.integer[Any]]) -> NDArray[np.integer[Any]]:
-    if faces.shape[1] == 3:
-        return faces
-    return np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
 
 
 @cached
@@ -257,7 +240,7 @@ class _Painter:
         # All people of one clip have the same camera.
         motion = self._people[shown[0][0]]
         self._canvas.clear()
-        draw_bodies(
+        _draw_bodies(
             self._canvas,
             [camera_vertices(self._people[i], self._body, row) for i, row in shown],
             self._body.faces,

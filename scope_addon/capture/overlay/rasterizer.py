@@ -25,7 +25,7 @@ from ....solver.compiled.kernel import cached
 NEAR = 0.05  # metres; the near plane, at which triangles are clipped
 _TO_LIGHT = np.array([-0.40, -0.66, -0.63]) / np.linalg.norm([-0.40, -0.66, -0.63])
 _AMBIENT, _DIFFUSE, _RIM = 0.42, 0.58, 0.30
-_IN_FRONT, _BEHIND, _OUTSIDE = 0, 1, 2  # vertex: visible, behind the near plane, beyond the distortion model
+_BEHIND, _OUTSIDE = 1, 2  # of a vertex: behind the near plane, beyond the distortion model; 0: visible
 
 
 @dataclass

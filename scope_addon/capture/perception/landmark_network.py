@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ....solver.names import BLAZEPOSE
 from .execution import Execution
-from .kept.kept_estimates import KeptEstimates
+from .kept_estimates import KeptEstimates
 from .region import MARGIN, Region, region_from_points
 from .sessions import network_path, open_session
 
@@ -204,10 +204,8 @@ def interpret(
     """Convert the network's raw outputs for one region to image and camera coordinates.
 
     :param landmarks: (195,): 39 × (x, y, z in crop pixels, visibility logit, in-frame logit).
-    :param presence: probability that there is a person.
     :param heatmaps: (39, 64, 64) logits.
     :param world: (117,): 39 × (x, y, z) metres in the crop's axes.
-    :param region: the network's input region.
     """
     rows = landmarks.reshape(_POINTS, 5).astype(float)
     points_px = region.image_from_crop(refine(rows[:, :2] / INPUT_SIZE, heatmaps))

@@ -41,8 +41,7 @@ def fit_in(
     """Resize the image to a network's input.
 
     :param image_rgb: (H, W, 3) uint8.
-    :param width: of the input, pixels.
-    :param height: of the input, pixels.
+    :param width, height: of the input, pixels.
     :param border: grey level around the image.
     :param centered: place the image in the middle rather than in the top left corner.
     :param stretched: fill the input regardless of the aspect ratio.

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from .execution import Execution
 from .letterbox import fit_in
-from .non_maximum_suppression import overlap_clusters
 from .region import Region, region_from_points
 from .sessions import network_path, open_session
 
@@ -66,9 +65,6 @@ class PersonDetector:
 
         Searches the whole image. If that finds nobody with a high score, or with ``closely``, the search continues in
         overlapping squares of an oblong image, which show people larger.
-
-        :param threshold: least score.
-        :param closely: search the squares in any case.
         """
         found = self._detect_in(image_rgb, threshold, (0, 0))
         if closely or not found or found[0].score < _SURE_SCORE:
@@ -173,7 +169,6 @@ def decode(
     :param boxes: (A, 4 + 2n): box centre relative to the anchor, box size, n points relative to the anchor.
     :param logits: (A,) of the scores.
     :param anchors: (A, 2), see `make_anchors`.
-    :param threshold: least score.
     :return: scores (N,) and values (N, 4 + 2n): left, top, right, bottom, n × (x, y) in input pixels; best first.
     """
     score = 1.0 / (1.0 + np.exp(-np.clip(logits.astype(float), -_SCORE_LIMIT, _SCORE_LIMIT)))
@@ -198,3 +193,24 @@ def merge_overlapping(
     merged = [score[cluster] @ values[cluster] / score[cluster].sum() for cluster in clusters]
     best = np.array([cluster[0] for cluster in clusters], int)
     return score[best], np.array(merged).reshape(-1, values.shape[1])
+
+
+def overlap_clusters(corners: NDArray[np.float64], threshold: float) -> list[NDArray[np.intp]]:
+    """Cluster boxes: the best remaining box and all whose intersection over union with it exceeds the threshold.
+
+    :param corners: (N, 4 + M) left, top, right, bottom and M more columns; best box first.
+    :return: indices of the boxes of each cluster, the best first.
+    """
+    low, high = corners[:, :2], corners[:, 2:4]
+    area = np.maximum(high - low, 0).prod(axis=1)
+    remaining = np.arange(len(corners))
+    clusters = []
+    while len(remaining):
+        best = remaining[0]
+        sides = np.minimum(high[best], high[remaining]) - np.maximum(low[best], low[remaining])
+        shared = np.maximum(sides, 0).prod(axis=1)
+        same = shared > threshold * (area[best] + area[remaining] - shared)
+        same[0] = True
+        clusters.append(remaining[same])
+        remaining = remaining[~same]
+    return clusters

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from ...options.capture import AUTO, LARGEST, OFF
 from ..options import CaptureOptions, most_people
 from ..perception.execution import Execution
-from ..perception.kept.kept_estimates import KeptEstimates
+from ..perception.kept_estimates import KeptEstimates
 from ..tracking.face.face_tracker import FaceTracker
 from ..tracking.hands.hand_tracker import LARGE_HAND_PX, SMALLEST_HAND_PX, HandTracker
 from ..tracking.tracker import PeopleTracker
@@ -34,10 +34,7 @@ def network_threads(wanted: int, execution: Execution) -> int:
 def open_trackers(
     options: CaptureOptions, threads: int, execution: Execution, kept: KeptEstimates | None = None
 ) -> Trackers:
-    """Open the networks for people, and for what is captured only on request.
-
-    :param kept: estimates of the landmark networks on disk.
-    """
+    """Open the networks for people, and for what is captured only on request."""
     people = PeopleTracker(
         options.quality,
         threads,

@@ -8,7 +8,7 @@ from pathlib import Path
 from ....solver.body import Body
 from ...errors import NoPersonError
 from ..fitting.background_estimators import BackgroundEstimators
-from ..fitting.focal_fits import FocalFits
+from ..fitting.focal_length import FocalFits
 from ..fitting.live_body import LiveBody
 from ..media.opencv_threads import opencv_in_one_thread
 from ..media.video import Video

@@ -16,14 +16,11 @@ from ..fitting.prepared_track import PreparedTrack, prepare_track
 from ..fitting.track_fit import fit_each_frame, fit_track, ground
 from ..tracking.track import Track
 from ..world.above_floor import raise_feet
-from ..world.assemble import assemble_motion
-from ..world.camera_path import CameraPath
-from ..world.camera_travel import camera_travel
+from ..world.assemble import FittedPerson, Shot, assemble_motion
+from ..world.camera_path import CameraPath, camera_travel
 from ..world.clip.clip_fit import fit_clip
-from ..world.placement import PlacedTrack, place_track
-from ..world.raw_motion import RawMotion
+from ..world.placement import PlacedTrack, RawMotion, place_track
 from ..world.relative_sizes import relative_sizes, stander
-from ..world.shot import FittedPerson, Shot
 from ..world.stance import stance_on_ground
 from ..world.world_frame import SharedWorld, find_world
 from .clock import Progress

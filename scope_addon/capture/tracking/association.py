@@ -76,8 +76,6 @@ def link(tracklets: Sequence[Tracklet], times: Sequence[float]) -> list[list[int
 def link_cost(end: End, start: End, appearance_distance: float) -> float:
     """Compute the cost of the module's equation.
 
-    :param end: of the earlier tracklet.
-    :param start: of the later tracklet.
     :param appearance_distance: 0..1, see `appearance.distance`.
     """
     gap = start.time - end.time

@@ -56,7 +56,6 @@ def find_keypoint_jumps(points: NDArray[np.floating[Any]], seen: NDArray[np.bool
 
     :param points: (T, J, n) metres.
     :param seen: (T,)
-    :param step_s: seconds between two frames.
     :return: (T, J)
     """
     T, J = points.shape[:2]

@@ -83,7 +83,6 @@ def _swap(track: Track, limbs: _Limbs, where: NDArray[np.bool_]) -> Track:
 def find_limb_swaps(track: Track, limbs: _Limbs) -> NDArray[np.bool_]:
     """Find the frames in which left and right of these limbs are swapped, see the module's equation.
 
-    :param limbs: LEGS or ARMS.
     :return: (T,)
     """
     where = np.zeros(len(track), bool)

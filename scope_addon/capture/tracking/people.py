@@ -62,7 +62,6 @@ def frames_before_merger(tracklet: Tracklet, others: Sequence[Tracklet], times: 
     parts of the person in front.
 
     :param others: all tracklets of the clip; it does not matter whether ``tracklet`` is among them.
-    :param times: seconds of each frame of the clip.
     """
     keep = len(tracklet.rows)
     if not keep:
@@ -87,8 +86,6 @@ def frames_before_flicker(tracklet: Tracklet, times: Sequence[float]) -> int:
     """Return how many frames of a tracklet come before final reappearances that are too short to be plausible.
 
     Their position would mislead the association of tracklets.
-
-    :param times: seconds of each frame of the clip.
     """
     end = len(tracklet.rows)
     while end:

@@ -28,7 +28,6 @@ class SearchSchedule:
 
     ``live`` are the people tracked in it, and ``lost`` those remembered.
 
-    :param clock: of the tracker.
     :param people: how many people are wanted; None: only the most prominent one of the clip.
     """
 

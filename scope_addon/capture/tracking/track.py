@@ -136,7 +136,6 @@ def make_track(frames: Sequence[int], times: Sequence[float], tracklets: Sequenc
     """Join one person's tracklets; waits for the reference network.
 
     :param frames: source frame index of each of the clip's T frames.
-    :param times: their times in seconds.
     :param tracklets: in order of time; their rows index ``frames``.
     """
     keypoints, confidence, world = (np.zeros((len(frames), KEYPOINT_COUNT, n), np.float32) for n in (2, 1, 3))

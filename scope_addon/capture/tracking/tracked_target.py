@@ -97,8 +97,6 @@ class TrackedTarget:
         """Take over the estimate of the next frame.
 
         :param swapped: whether left and right were swapped since the frame before.
-        :param time_s: when the frame is shown.
-        :param step_s: seconds since the frame before.
         """
         step = (estimate.keypoints_px - self.estimate.keypoints_px).mean(axis=0)
         memory = min(_VELOCITY_MEMORY, self.age / (self.age + 1))

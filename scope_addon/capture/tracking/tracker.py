@@ -11,25 +11,33 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.errors import ShapeError
+from ..perception.adapters.keypoint_network import KeypointNetwork
 from ..perception.execution import Execution
-from ..perception.kept.kept_estimates import KeptEstimates
+from ..perception.kept_estimates import KeptEstimates
 from ..perception.landmark_network import LandmarkNetwork, PoseEstimate
 from ..perception.observation import Observation, PendingReference, PersonMask
 from ..perception.person_detector import Detection
 from ..perception.region import Region
 from .appearance import appearance
 from .frame_clock import FRAME_S, FrameClock
-from .landmarks.landmark_estimator import LandmarkEstimator
-from .landmarks.plausibility import PRESENCE_THRESHOLD, is_in_image, is_plausible, is_same_body, share_within
-from .landmarks.redetection import redetect_rotated
-from .landmarks.reference_estimator import ReferenceEstimator
-from .landmarks.tracking_networks import open_networks
+from .landmarks.landmark_estimator import LandmarkEstimator, ReferenceEstimator, open_networks
+from .landmarks.plausibility import (
+    DISAGREEMENT_THRESHOLD,
+    PRESENCE_THRESHOLD,
+    is_center_in_image,
+    is_in_image,
+    is_plausible,
+    is_same_body,
+    share_in_image,
+    share_within,
+)
 from .left_right import looks_swapped, swap_ratio
 from .search_schedule import EAGER_S, SearchSchedule
 from .tracked_target import TrackedTarget
@@ -51,18 +59,23 @@ APPEARANCE_S = 4 * FRAME_S  # between two samples of the appearance
 _MIN_REDETECTION_AGE = 6  # frames for which somebody was tracked
 _JUST_LOST_FRAMES = 2  # within which a detected body at the prediction continues the tracklet
 _SAME_TARGET, _LOST_TARGET, _REPLACED_TARGET = 0.12, 0.5, 0.35  # distances of regions in sides, see `Region.resembles`
+# Of the regions in which somebody who was lost is looked for, see `redetect_rotated`, and of what is found there.
+_REDETECTION_ROTATIONS = tuple(k * math.pi / 6 for k in range(12))
+_REDETECTION_SCALES = (1.0, 1.35)
+_MIN_REDETECTION_PRESENCE = 0.9
+_MAX_REDETECTION_INNOVATION = 0.35
+CURLED_SPREAD = 0.25
+LEAVING_SHARE = 0.8  # a lost person with fewer of the keypoints in the image has left it
 
 
 class PeopleTracker:
     """Tracks the people of a video. Frames are given in order; call `reset` before another video.
 
     :param quality: ``fast``, ``balanced`` or ``best``.
-    :param threads: of each network.
     :param people: how many people are wanted at most; None: only the most prominent one of the clip. Then only those
         who may turn out to be that one are tracked.
     :param detector: an ONNX file of the user's that replaces the built-in detector; see `adapters`.
     :param keypoints: the same for the landmark network.
-    :param execution: what the networks run on.
     :param kept: estimates of the built-in landmark networks on disk; None: none.
     :raises UsageError: the quality is unknown.
     :raises SetupError: a built-in network is missing.
@@ -350,3 +363,37 @@ class PeopleTracker:
             reference_landmarks=reference,
             mask=None if e.mask is None else PersonMask(e.region, e.mask, (image_rgb.shape[1], image_rgb.shape[0])),
         )
+
+
+def redetect_rotated(
+    landmarks: LandmarkNetwork | KeypointNetwork,
+    image_rgb: NDArray[np.uint8],
+    lost: TrackedTarget,
+    live: Sequence[TrackedTarget],
+) -> PoseEstimate | None:
+    """Look for a lost person at the predicted position, in rotated regions.
+
+    A body that is curled up or upside down looks less like a body, so the estimate has to be near the prediction. An
+    occluded person is not looked for, because something else is visible there; neither is one who has walked out of
+    the image, or who is predicted near somebody else.
+
+    :param image_rgb: (H, W, 3).
+    :return: the estimate with the smallest innovation, or None.
+    """
+    if lost.is_occluded or share_in_image(lost.estimate, image_rgb) < LEAVING_SHARE:
+        return None
+    predicted = lost.predicted_region
+    if any(target.estimate.next_region.is_near(predicted) for target in live):
+        return None
+    candidates = [
+        replace(predicted, rotation=predicted.rotation + rotation, side_px=predicted.side_px * scale)
+        for scale in _REDETECTION_SCALES
+        for rotation in _REDETECTION_ROTATIONS
+    ]
+    regions = [region for region in candidates if is_in_image(region, image_rgb)]
+    found = [e for e in landmarks.estimate(image_rgb, regions) if e.presence >= _MIN_REDETECTION_PRESENCE]
+    found = [e for e in found if e.spread >= CURLED_SPREAD and e.disagreement <= DISAGREEMENT_THRESHOLD]
+    found = [e for e in found if is_center_in_image(e, image_rgb)]
+    found = [e for e in found if not any(is_same_body(e, target.estimate) for target in live)]
+    nearest = min(found, key=lost.innovation, default=None)
+    return nearest if nearest is not None and lost.innovation(nearest) <= _MAX_REDETECTION_INNOVATION else None

@@ -3,23 +3,28 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ....solver import rotations
+from ....solver.body import Body
 from ...kinematics.contact_points import SOLES
 from ...kinematics.frame_blocks import by_blocks
 from ...motion import Motion
-from ..fitting.hands.hand_measurements import HAND_KEYPOINT_NAMES
+from ..camera.intrinsics import Camera
+from ..camera.line_segments import Lines
+from ..fitting.ablation import NO_ABLATION, Ablation
+from ..fitting.hand_measurements import HAND_KEYPOINT_NAMES
 from ..perception.landmark_network import KEYPOINT_NAMES
+from ..tracking.face.expression_fit import with_expressions
 from ..tracking.face.expression_motion import expression_motion
-from ..tracking.face.expressions import with_expressions
+from ..tracking.track import Track
 from .camera_path import CameraPath
-from .placement import PlacedTrack
-from .raw_motion import rotation_vectors_of_joints
-from .shot import FittedPerson, Shot
+from .placement import PlacedTrack, RawMotion, rotation_vectors_of_joints
 
 MIN_CONFIDENCE = 0.5  # of keypoints that count in the reprojection error
 MIN_DEPTH_M = 1e-3
@@ -133,3 +138,33 @@ def reprojection_error(shot: Shot, person: FittedPerson, placed: PlacedTrack) ->
 
     rows = (track.keypoints_px, track.confidence, placed.valid, shot.path.R_first_camera, shot.path.center)
     return by_blocks(error, placed.rotations, placed.root, *rows)[0]
+
+
+@dataclass(frozen=True)
+class Shot:
+    """One continuous recording. Where a motion is in the axes of one camera, this is the first frame's camera."""
+
+    body: Body  # the one that the motion file names
+    camera: Camera
+    path: CameraPath  # of the camera, over all frames
+    lines: Lines  # of the background, in the first frame's axes
+    fps: Fraction
+    image_size: tuple[int, int]  # width and height, pixels
+    source: str  # name of the footage
+    smoothing: bool = True  # False: every frame is fitted alone
+    ablation: Ablation = NO_ABLATION
+    uneven_ground: bool = False  # True: feet rest at any height
+
+    @property
+    def is_still(self) -> bool:
+        """Whether there is only one frame."""
+        return len(self.path) == 1
+
+
+@dataclass(frozen=True)
+class FittedPerson:
+    """One person's track and the body fitted to each of its frames."""
+
+    track: Track
+    raw: RawMotion
+    body: Body  # with its keypoints where the network places them, for the reprojection error

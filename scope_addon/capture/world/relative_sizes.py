@@ -34,7 +34,7 @@ SHORTEST_M = 0.8  # S_min
 MIN_CAMERA_M = 0.4  # of a camera nearer to the floor, errors of depth are as large as h_k
 MIN_CONTACT_S = 0.2
 _STEPS = np.arange(-0.8, 0.8, 0.004)  # of log C
-_AS_ESTIMATED, _SMALL, _ELSEWHERE = range(3)  # rows of `_log_densities`
+_SMALL, _ELSEWHERE = 1, 2  # rows of `_log_densities`, after those who are as estimated
 
 
 @dataclass(frozen=True)
@@ -79,9 +79,7 @@ def _log_densities(person: Stander, log_r: NDArray[np.float64]) -> NDArray[np.fl
     adult = np.log(ADULTS / (sigma * np.sqrt(2 * np.pi))) - 0.5 * (log_r / sigma) ** 2
     stature = person.stature_m * np.exp(log_r)
     small = np.where((stature >= SHORTEST_M) & (log_r < 0) & (not person.is_known), np.log(SMALL), -np.inf)
-    densities = np.empty((3, len(log_r)))
-    densities[_AS_ESTIMATED], densities[_SMALL], densities[_ELSEWHERE] = adult, small, np.log(OTHER_FLOOR)
-    return densities
+    return np.stack([adult, small, np.full(len(log_r), np.log(OTHER_FLOOR))])
 
 
 def stander(placed: PlacedTrack, up: NDArray[np.floating[Any]], is_known: bool) -> Stander:

@@ -27,8 +27,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver import Body
-from ...capture.world.ground_plane import floor_probability
 from ...capture.world.placement import VISIBLE_CONFIDENCE
+from ...capture.world.stance import floor_probability
 from ...kinematics.contact_points import (
     CONTACT_POINTS,
     FOOT_PARTS,

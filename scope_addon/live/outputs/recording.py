@@ -21,11 +21,9 @@ from ...capture.camera.line_segments import Lines
 from ...capture.fitting.frame_sequence import FittedTrack
 from ...capture.perception.landmark_network import KEYPOINT_COUNT
 from ...capture.tracking.track import Track
-from ...capture.world.assemble import assemble_motion
+from ...capture.world.assemble import FittedPerson, Shot, assemble_motion
 from ...capture.world.camera_path import CameraPath
-from ...capture.world.placement import place_track
-from ...capture.world.raw_motion import RawMotion
-from ...capture.world.shot import FittedPerson, Shot
+from ...capture.world.placement import RawMotion, place_track
 from ...errors import NoPersonError
 from ...motion import Motion
 from ..pose import LivePose, Presence

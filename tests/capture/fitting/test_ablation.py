@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.intrinsics import Camera
 from scope.scope_addon.capture.fitting.ablation import NO_ABLATION, Ablation
-from scope.scope_addon.capture.fitting.outline.shape_fit import fit_shape_to_outline, usable_masks
+from scope.scope_addon.capture.fitting.outline import fit_shape_to_outline, usable_masks
 from scope.scope_addon.capture.fitting.prepared_track import prepare_track
 from scope.scope_addon.capture.fitting.track_fit import fit_track
 from scope.scope_addon.capture.world.camera_path import CameraPath
@@ -16,7 +16,7 @@ from scope.scope_addon.capture.world.clip import clip_fit
 from scope.scope_addon.errors import UsageError
 from scope.solver import Body, Weights
 
-from .outline.silhouettes import K, seen_in
+from ..silhouettes import K, seen_in
 
 WEIGHTS = Weights(keypoints2d=1e5, keypoints3d=100.0, orientation_field=400.0, joint_prior=3.0)
 

@@ -12,7 +12,7 @@ from scope.scope_addon.capture.camera.intrinsics import assumed_camera
 from scope.scope_addon.capture.camera.line_segments import Segments
 from scope.scope_addon.capture.fitting import background_estimators
 from scope.scope_addon.capture.fitting.background_estimators import BackgroundEstimators
-from scope.scope_addon.capture.fitting.focal_fits import LOG_RATIOS, FocalFits
+from scope.scope_addon.capture.fitting.focal_length import LOG_RATIOS, FocalFits
 
 
 class SlowBody:

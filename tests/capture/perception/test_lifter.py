@@ -14,8 +14,8 @@ from scope.scope_addon.capture.perception.lifter import (
     mixture,
     network_input,
     virtual_camera,
+    windows_around,
 )
-from scope.scope_addon.capture.perception.lifter_window import windows_around
 from scope.scope_addon.capture.perception.person_detector import PersonDetector
 from scope.scope_addon.capture.tracking.left_right import MIRROR_PARTNER
 from scope.scope_addon.errors import SetupError

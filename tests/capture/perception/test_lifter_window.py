@@ -2,7 +2,7 @@
 """Windows around frames, against samples calculated by hand."""
 
 import numpy as np
-from scope.scope_addon.capture.perception.lifter_window import (
+from scope.scope_addon.capture.perception.lifter import (
     LONGEST_GAP_S,
     MIDDLE,
     OFFSETS_S,

@@ -11,8 +11,8 @@ from scope.scope_addon.capture.camera.line_segments import Lines
 from scope.scope_addon.capture.fitting.ablation import Ablation
 from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
 from scope.scope_addon.capture.tracking.track import Track
+from scope.scope_addon.capture.world.assemble import Shot
 from scope.scope_addon.capture.world.camera_path import CameraPath
-from scope.scope_addon.capture.world.shot import Shot
 from scope.scope_addon.kinematics.axes import transform_points, world_from_level_camera
 from scope.solver.loaders.body_file import load_body
 from scope.solver.rotations import exp

@@ -12,7 +12,7 @@ import pytest
 from scope.scope_addon.capture.perception.landmark_network import PoseEstimate
 from scope.scope_addon.capture.perception.person_detector import Detection
 from scope.scope_addon.capture.perception.region import Region
-from scope.scope_addon.capture.tracking.landmarks import tracking_networks
+from scope.scope_addon.capture.tracking.landmarks import landmark_estimator
 from scope.scope_addon.capture.tracking.people import build_tracks, frames_before_flicker, frames_before_merger
 from scope.scope_addon.capture.tracking.track import Track, Tracklet
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker
@@ -31,9 +31,9 @@ def follow(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Track]]:
 
     def run(people: list[Person], count: int, wanted: int | None = None, fps: float = FPS) -> list[Track]:
         monkeypatch.setattr(
-            tracking_networks, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people, "heavy" in name)
+            landmark_estimator, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people, "heavy" in name)
         )
-        monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_: FakeDetector(people))
+        monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: FakeDetector(people))
         tracker, followed = PeopleTracker("fast", 1, wanted), FollowedPeople()
         for t, image in enumerate(pictures(people, count)):
             followed.add(t / fps, tracker.step(image, time_s=t / fps))
@@ -153,8 +153,8 @@ def test_the_networks_run_equally_often_at_any_rate(monkeypatch: pytest.MonkeyPa
     """The detector every 0.27 s, or in every frame; the reference network every second; the appearance every 0.13 s."""
     people = [Person(lambda t: (300, 200), BLUE)]
     detector = FakeDetector(people)
-    monkeypatch.setattr(tracking_networks, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people, "heavy" in name))
-    monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_: detector)
+    monkeypatch.setattr(landmark_estimator, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people, "heavy" in name))
+    monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: detector)
     tracker = PeopleTracker("fast", 1, 2)
     seen = [tracker.step(image, time_s=t / fps)[0][1] for t, image in enumerate(pictures(people, 4 * fps))]
     assert abs(detector.calls - 4 * fps / max(1, round(fps * 8 / 30))) <= 1
@@ -166,8 +166,8 @@ def test_searches_are_less_frequent_once_all_wanted_people_are_tracked(monkeypat
     """After the opening of two seconds every 0.67 s, as with one wanted person; at once when one is lost."""
     people = [Person(lambda t: (300, 200), BLUE), Person(lambda t: (900, 200) if t < 180 else None, RED)]
     detector = FakeDetector(people)
-    monkeypatch.setattr(tracking_networks, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people))
-    monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_: detector)
+    monkeypatch.setattr(landmark_estimator, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people))
+    monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: detector)
     tracker, calls = PeopleTracker("fast", 1, people=2), []
     for t, image in enumerate(pictures(people, 184)):
         before = detector.calls
@@ -181,8 +181,8 @@ def test_searches_are_less_frequent_once_all_wanted_people_are_tracked(monkeypat
 def test_searches_stay_frequent_while_fewer_than_wanted_are_tracked(monkeypatch: pytest.MonkeyPatch) -> None:
     people = [Person(standing(90 * k + 60), BLUE, size_px=30) for k in range(11)]
     detector = FakeDetector(people)
-    monkeypatch.setattr(tracking_networks, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people))
-    monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_: detector)
+    monkeypatch.setattr(landmark_estimator, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people))
+    monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: detector)
     tracker = PeopleTracker("fast", 1, people=12)
     for t, image in enumerate(pictures(people, 120)):
         assert len(tracker.step(image, time_s=t / FPS)) == 11
@@ -195,8 +195,8 @@ def test_every_search_for_a_person_who_was_just_lost_is_close(monkeypatch: pytes
     for fps, close_alone in ((30, True), (6, False)):
         leaves = Person(standing(900, fps), RED)
         detector = FakeDetector([stays, leaves])
-        monkeypatch.setattr(tracking_networks, "LandmarkNetwork", lambda *_, d=detector: FakeLandmarks(d.people))
-        monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_, d=detector: d)
+        monkeypatch.setattr(landmark_estimator, "LandmarkNetwork", lambda *_, d=detector: FakeLandmarks(d.people))
+        monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_, d=detector: d)
         tracker, searches = PeopleTracker("fast", 1, 2), []
         for t, image in enumerate(pictures([stays, leaves], 2 * fps)):
             before = detector.calls, detector.close_calls
@@ -239,8 +239,8 @@ def test_a_rival_at_the_start_is_searched_for_closely(monkeypatch: pytest.Monkey
             return super().detect(image, threshold)[: None if closely else 1]
 
     people = [leaves, stays]
-    monkeypatch.setattr(tracking_networks, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people))
-    monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_: Detector(people))
+    monkeypatch.setattr(landmark_estimator, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people))
+    monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: Detector(people))
     tracker, followed = PeopleTracker("best", 1), FollowedPeople()
     for t, image in enumerate(pictures(people, 240)):
         followed.add(t / FPS, tracker.step(image, time_s=t / FPS))
@@ -261,8 +261,8 @@ def test_small_people_are_looked_for_once_a_second_and_only_where_there_is_nobod
             looked.append(t)
             return []
 
-    monkeypatch.setattr(tracking_networks, "LandmarkNetwork", lambda name, *_: FakeLandmarks([person]))
-    monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_: Detector([person]))
+    monkeypatch.setattr(landmark_estimator, "LandmarkNetwork", lambda name, *_: FakeLandmarks([person]))
+    monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: Detector([person]))
     tracker = PeopleTracker("best", 1)
     for t, image in enumerate(pictures([person], 300)):
         tracker.step(image, time_s=t / FPS)
@@ -284,8 +284,8 @@ def test_people_beside_larger_ones_are_looked_for_more_and_more_rarely_and_only_
             looked.append(t)
             return []
 
-    monkeypatch.setattr(tracking_networks, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people))
-    monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_: Detector(people))
+    monkeypatch.setattr(landmark_estimator, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people))
+    monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: Detector(people))
     tracker = PeopleTracker("best", 1, wanted)
     for t, image in enumerate(pictures(people, 400)):
         tracker.step(image, time_s=t / FPS)
@@ -304,8 +304,8 @@ def test_people_beside_larger_ones_are_looked_for_more_and_more_rarely_and_only_
 def test_a_small_person_next_to_the_most_prominent_one_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     people = [Person(lambda t: (300, 200), BLUE), Person(lambda t: (900, 200), RED, size_px=40)]
     networks = FakeLandmarks(people)
-    monkeypatch.setattr(tracking_networks, "LandmarkNetwork", lambda name, *_: networks)
-    monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_: FakeDetector(people))
+    monkeypatch.setattr(landmark_estimator, "LandmarkNetwork", lambda name, *_: networks)
+    monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: FakeDetector(people))
     tracker = PeopleTracker("best", 1)
     for image in pictures(people, 100):
         assert len(tracker.step(image)) == 1
@@ -328,8 +328,8 @@ def test_pending_estimates_do_not_change_the_result(
     networks, strong = FakeLandmarks(people), FakeLandmarks(people)
     if quality == "best":
         strong = networks
-    monkeypatch.setattr(tracking_networks, "LandmarkNetwork", lambda name, *_: strong if "heavy" in name else networks)
-    monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_: FakeDetector(people))
+    monkeypatch.setattr(landmark_estimator, "LandmarkNetwork", lambda name, *_: strong if "heavy" in name else networks)
+    monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: FakeDetector(people))
     images = list(pictures(people, 60))
     plain, early = PeopleTracker(quality, 1), PeopleTracker(quality, 1)
     expected = [plain.step(image) for image in images]
@@ -388,8 +388,8 @@ def test_tracking_does_not_wait_for_the_reference_network(monkeypatch: pytest.Mo
             return super().estimate(image, regions)
 
     networks = {True: SlowNetwork([person], is_reliable=True), False: FakeLandmarks([person])}
-    monkeypatch.setattr(tracking_networks, "LandmarkNetwork", lambda name, *_: networks["heavy" in name])
-    monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_: FakeDetector([person]))
+    monkeypatch.setattr(landmark_estimator, "LandmarkNetwork", lambda name, *_: networks["heavy" in name])
+    monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: FakeDetector([person]))
     tracker, followed = PeopleTracker("fast", 1), FollowedPeople()
     for t, image in enumerate(pictures([person], 20)):
         followed.add(t / FPS, tracker.step(image))

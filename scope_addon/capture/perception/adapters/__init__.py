@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Adapters of the user's own networks: each kind of graph has a module that detects it and reads its outputs."""
+"""Adapters of the user's own networks: person detectors (exports of YOLO and MMDeploy) and keypoint networks."""

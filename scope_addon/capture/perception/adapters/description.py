@@ -48,7 +48,6 @@ def description_path(model: Path) -> Path:
 def read_description(model: Path, types: tuple[str, ...]) -> Description:
     """Read the JSON next to a model; a missing file is like an empty one.
 
-    :param types: the valid values of ``type``.
     :raises ModelFileError: it is not JSON, or has an unknown key or an invalid value.
     """
     path = description_path(model)

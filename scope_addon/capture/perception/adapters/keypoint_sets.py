@@ -27,10 +27,7 @@ _TOES = {"big_toe": 0.85, "small_toe": 0.15}  # weights of BlazePose's foot tip;
 
 # Our name: {index in the set: weight}.
 Mixture = dict[str, dict[int, float]]
-
-
-def _coco() -> Mixture:
-    return {name: {k: 1.0} for k, name in enumerate(COCO_17)}
+_COCO: Mixture = {name: {k: 1.0} for k, name in enumerate(COCO_17)}
 
 
 def _feet(indices: dict[str, int]) -> Mixture:
@@ -43,7 +40,7 @@ def _feet(indices: dict[str, int]) -> Mixture:
 def _halpe() -> Mixture:
     # 17 top of the head, 18 neck, 19 hip
     points = ("left_big_toe", "right_big_toe", "left_small_toe", "right_small_toe", "left_heel", "right_heel")
-    return _coco() | _feet({name: 20 + k for k, name in enumerate(points)})
+    return _COCO | _feet({name: 20 + k for k, name in enumerate(points)})
 
 
 def _wholebody() -> Mixture:
@@ -54,7 +51,7 @@ def _wholebody() -> Mixture:
     # hands of 21: wrist, then thumb, index, middle, ring, pinky, each from the base to the tip
     hand = {"thumb": 3, "index": 5, "pinky": 17}
     fingers = {f"{s}_{f}": {91 + 21 * i + n: 1.0} for i, s in enumerate(_SIDES) for f, n in hand.items()}
-    return _coco() | feet | {name: {23 + n: 1.0} for name, n in face.items()} | fingers
+    return _COCO | feet | {name: {23 + n: 1.0} for name, n in face.items()} | fingers
 
 
 @dataclass(frozen=True)
@@ -104,7 +101,7 @@ def _approximate(name: str, at: dict[str, NDArray[np.float64]]) -> NDArray[np.fl
 
 
 KEYPOINT_SETS = {
-    "coco17": KeypointSet("coco17", 17, _coco()),
+    "coco17": KeypointSet("coco17", 17, _COCO),
     "halpe26": KeypointSet("halpe26", 26, _halpe()),
     "wholebody133": KeypointSet("wholebody133", 133, _wholebody()),
 }

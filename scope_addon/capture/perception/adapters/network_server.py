@@ -52,7 +52,6 @@ def load_runtime() -> ModuleType:
 def make_session(runtime: ModuleType, path: str, threads: int, providers: list[str], mem_pattern: bool) -> Any:
     """Open an onnxruntime session, with the options of all our sessions.
 
-    :param runtime: the module onnxruntime.
     :param providers: onnxruntime's names.
     """
     options = runtime.SessionOptions()

@@ -7,7 +7,10 @@ window counts for nothing: the window is observed again.
 
 from __future__ import annotations
 
+import hashlib
 import json
+from contextlib import suppress
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +23,8 @@ from ....atomic_write import write_npz
 from ...camera.background_record import BackgroundRecord
 from ...camera.heading_drift import FrameEdges
 from ...camera.line_segments import Segments
+from ...options import CaptureOptions
+from ...perception.adapters.description import description_path
 from ...perception.face.face_record import RECORD
 from ...perception.landmark_network import KEYPOINT_COUNT
 from ...perception.observation import PersonMask
@@ -64,6 +69,8 @@ _ARRAYS: dict[str, tuple[type[Any], str, tuple[int, ...]]] = {
     "text": (np.uint8, "T", ()),
 }
 Arrays = dict[str, NDArray[Any]]
+LARGEST = 1 << 30  # bytes of the windows that are kept of one capture
+_UNIMPORTANT = ("threads",)  # options with which the result is the same, bit for bit
 
 
 def window_name(number: int) -> str:
@@ -271,3 +278,59 @@ def _text(encoded: NDArray[np.uint8]) -> tuple[str, tuple[str, ...]]:
         return str(read["execution"]), tuple(str(text) for text in read["warnings"])
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise InputError(f"the text of a window cannot be read: {error}") from error
+
+
+class KeptWindows:
+    """The files of finished windows, after which a capture that was killed goes on.
+
+    They depend on the footage, the program and the options: within the caller's folder, which is one of this footage
+    and this program, each set of options has a folder of its own. What cannot be read or written is not kept.
+
+    :param unfinished: folder of the capture, need not exist; None: nothing is kept.
+    """
+
+    def __init__(self, unfinished: Path | None, options: CaptureOptions, size: tuple[int, int]) -> None:
+        self._folder = None if unfinished is None else unfinished / f"windows-{_digest(options)}"
+        self._size, self._bytes = size, 0
+
+    def load(self, window: Window) -> WindowRecord | None:
+        """Return what was observed in a window; None if that is not known."""
+        if self._folder is None:
+            return None
+        with suppress(OSError):
+            self._bytes += (self._folder / window_name(window.number)).stat().st_size
+        return load_window(self._folder, window, self._size)
+
+    def save(self, record: WindowRecord) -> None:
+        """Keep a window; after a failure, or when there is too much, none any more."""
+        if self._folder is None:
+            return
+        try:
+            self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            self._bytes += save_window(self._folder, record, self._size).stat().st_size
+        except (OSError, ScopeError):
+            self._folder = None
+        if self._bytes > LARGEST:
+            self._folder = None
+
+
+def _digest(options: CaptureOptions) -> str:
+    """Return a name that differs where options, or the files that they name, may lead to another result."""
+    described = []
+    for field in fields(options):
+        if field.name in _UNIMPORTANT:
+            continue
+        value = getattr(options, field.name)
+        described.append(f"{field.name}={value!r}")
+        if isinstance(value, Path):
+            described += map(_state, (value, description_path(value)))
+    return hashlib.sha256("\n".join(described).encode("utf-8", "surrogateescape")).hexdigest()[:32]
+
+
+def _state(path: Path) -> str:
+    """Return what changes with a file."""
+    try:
+        status = path.stat()
+        return f"{path.resolve()} {status.st_size} {status.st_mtime_ns}"
+    except OSError:
+        return ""

@@ -27,7 +27,6 @@ from .window_record import WindowRecord
 class WindowRun:
     """Takes the frames of one window in order, from that in which its trackers begin; none is kept.
 
-    :param following: the next window, if there is one.
     :param trackers: that have seen nothing, as ``masks`` and ``background``.
     :param pool: in which the background is followed while the networks run on the next frame.
     """

@@ -14,22 +14,24 @@ window. The result is the same, because
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
-from ....errors import VideoError
+from ....errors import UsageError, VideoError
 from ...camera.camera_rotation import BackgroundTracker
 from ...fitting.background_estimators import KERNELS, BackgroundEstimators
 from ...fitting.live_body import LiveBody
 from ...media.frame import Frame
-from ...media.video import Video
+from ...media.opencv_threads import opencv_in_one_thread
+from ...media.video import Video, open_video
 from ...options import CaptureOptions, most_people
 from ...perception.execution import Execution
-from ...perception.kept.kept_estimates import KeptEstimates
+from ...perception.kept_estimates import KeptEstimates
 from ...perception.observation import Observation
 from ...perception.region import Region
 from ...tracking.landmarks.mask_schedule import MaskSchedule
@@ -38,18 +40,19 @@ from ..clock import COMPILING, FINDING, Progress, StageClock
 from ..footage import Footage, Listeners, given_camera
 from ..networks import Trackers, network_threads, open_trackers
 from .joined_windows import JoinedWindows
-from .kept_windows import KeptWindows
-from .plan import Window
-from .window_file import load_window, save_window
+from .plan import Window, plan_windows
+from .window_file import KeptWindows, load_window, save_window
 from .window_record import WindowRecord
 from .window_run import WindowRun
-from .window_sequence import frame_pairs, run_windows
+
+# Called when a window has ended, with its run and that of the next window; returns the run to go on with.
+Seam = Callable[[WindowRun, WindowRun | None], WindowRun | None]
+_THREADS = 2  # in which backgrounds are followed by `observe_windows`
 
 
 class WindowedClip:
     """A clip and its windows.
 
-    :param windows: all of them.
     :param pool: in which the background is followed.
     :param unfinished: folder with what an earlier capture that was killed has found, and in which to keep what this one
         finds; None: nothing is kept.
@@ -82,7 +85,6 @@ class WindowedClip:
     ) -> tuple[Footage, list[Track]]:
         """Observe all windows, and join them.
 
-        :param background: which loads the solver, and estimates the focal length.
         :param folder: with the files of windows that were observed before.
         :raises VideoError: there is no frame.
         """
@@ -285,3 +287,74 @@ def _up_to_begin(run: WindowRun, pairs: Iterator[tuple[Frame, Frame | None]]) ->
             return chain([pair], pairs)
         run.add(*pair)
     return pairs
+
+
+def frame_pairs(frames: Iterator[Frame], clock: StageClock) -> Iterator[tuple[Frame, Frame | None]]:
+    """Yield every frame with the one after it; each is decoded while the networks run on the previous one."""
+    with clock.stage("decode"):
+        upcoming = next(frames, None)
+    while upcoming is not None:
+        frame = upcoming
+        with clock.stage("decode"):
+            upcoming = next(frames, None)
+        yield frame, upcoming
+
+
+def run_windows(
+    windows: Sequence[Window],
+    begin: Callable[[Window], WindowRun],
+    pairs: Iterator[tuple[Frame, Frame | None]],
+    seam: Seam,
+    watch: Callable[[Frame, Observation | None], None],
+) -> None:
+    """Observe the windows until their frames end.
+
+    :param windows: at least one, in order.
+    :param pairs: from the first window's anchor on; see `frame_pairs`.
+    :param watch: called with each frame and its largest person.
+    """
+    left = deque(windows)
+    current: WindowRun | None = begin(left.popleft())
+    following: WindowRun | None = None
+    for frame, upcoming in pairs:
+        while current is not None and current.window.has_ended(frame.timestamp_s):
+            if following is None and left:
+                following = begin(left.popleft())
+            current, following = seam(current, following), None
+        if current is None:
+            return
+        if following is None and left and left[0].warms_up(frame.timestamp_s):
+            following = begin(left.popleft())
+        largest = current.add(frame, upcoming)
+        if following is not None:
+            following.add(frame, upcoming)
+        watch(frame, largest)
+    if current is not None:
+        seam(current, None)
+
+
+def count_windows(path: Path, options: CaptureOptions) -> int:
+    """Return into how many windows a clip can be divided; 1 if it is short, or frames of it are to be left out.
+
+    :raises VideoError: the footage cannot be used.
+    """
+    with open_video(path, options.wanted) as video:
+        return 1 if video.wanted.fps is not None else len(plan_windows(video, options.window_s))
+
+
+def observe_windows(
+    path: Path, options: CaptureOptions, numbers: range, folder: Path, progress: Progress = lambda *_: None
+) -> tuple[list[Path], int]:
+    """Observe some successive windows of a clip, and write each to a file of a folder.
+
+    :return: the files, and the number of frames in these windows.
+    :raises VideoError: the footage cannot be used.
+    :raises UsageError: there are no such windows.
+    :raises OSError: a file cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    with open_video(path, options.wanted) as video, opencv_in_one_thread(), ThreadPoolExecutor(_THREADS) as pool:
+        windows = plan_windows(video, options.window_s)
+        if not (numbers and 0 <= numbers.start < numbers.stop <= len(windows)):
+            raise UsageError(f"{path} has {len(windows)} windows, and none of the numbers {numbers}")
+        return WindowedClip(video, windows, options, StageClock(), pool).save(numbers, folder, progress)

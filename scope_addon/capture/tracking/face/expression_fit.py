@@ -20,15 +20,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .....solver.errors import ModelFileError
 from .....solver.loaders.npz import read_npz
-from ...perception.face.face_record import landmarks_of, parts, with_expression
-from .face_alignment import aligned, view_terms
+from .....solver.rotations import log
+from ...perception.face.face_landmarks import EXPRESSION_POINTS, ExpressionNetwork
+from ...perception.face.face_record import gaze, kept_landmarks, landmarks_of, parts, with_expression
 
 FILE = Path(__file__).resolve().parents[4] / "assets" / "face" / "response.npz"
 MIN_S, MIN_FRAMES = 2.0, 10  # of a face, from which a person's face at rest is known
@@ -41,6 +42,9 @@ _ROUNDS, _SWEEPS = 4, 30
 _STILL = 1e-6  # change of the weights in a sweep after which no other follows
 _TURN_RIDGE = 0.03  # on G, in squared radians
 _BLOCK = 2048  # frames that are solved at once: they fit into a processor's cache
+VIEW_TERMS = 10
+_STEEPEST = 0.9  # radians, component of a rotation beyond which the views' terms do not grow
+_Y_UP = np.array([1.0, -1.0, -1.0])  # from pixels and depth to axes with y up and z to the camera
 
 
 @dataclass(frozen=True)
@@ -179,3 +183,67 @@ def _directions(tangents: NDArray[np.float64]) -> NDArray[np.float64]:
     ahead = np.concatenate([tangents, np.ones((len(tangents), 1))], axis=1)
     ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
     return np.repeat(ahead[:, None], 2, axis=1)
+
+
+def with_expressions(rows: NDArray[np.floating[Any]], times: NDArray[np.float64]) -> NDArray[np.floating[Any]]:
+    """Return rows of one person with weights and gaze: fitted, or by the expression network of a face seen briefly.
+
+    They are found when all frames have been observed: only then is it known whether a face was seen for long enough,
+    and the expression network, which few captures need, does not run for the others.
+
+    :param rows: (T, RECORD) see `face_record`.
+    :param times: (T,) seconds.
+    :raises SetupError: the expression network is needed and has not been built.
+    :raises ModelFileError: what they are found with is damaged.
+    """
+    seen = np.flatnonzero(rows[:, 0] > 0)
+    if is_known(rows, times):
+        return fitted(rows, times)
+    if not len(seen):
+        return rows
+    network = ExpressionNetwork()  # on the CPU, whatever the other networks run on: it takes a millisecond
+    landmarks = landmarks_of(rows[seen], np.array(EXPRESSION_POINTS))[..., :2]
+    weights = np.array([network.estimate(face) for face in landmarks])
+    directions = np.array([gaze(kept_landmarks(row)) for row in rows[seen]])
+    out = rows.copy()
+    out[seen] = with_expression(rows[seen], weights, directions)
+    return out
+
+
+class AlignedFaces(NamedTuple):
+    """Landmarks (T, n, 3) in the reference's axes and size, and rotation vectors (T, 3) from the reference's axes."""
+
+    points: NDArray[np.float64]
+    turns: NDArray[np.float64]
+
+
+def aligned(
+    landmarks: NDArray[np.float64], reference: NDArray[np.float64], shares: NDArray[np.float64]
+) -> AlignedFaces:
+    """Align faces by the similarity transform with least squared distance from the reference.
+
+    With the weighted means removed, and the singular values of Σ_n a_n x_n y_nᵀ = U S Vᵀ: R = V diag(1, 1, ±1) Uᵀ and
+    s = tr(S diag(1, 1, ±1)) / Σ_n a_n |x_n|² (Umeyama: Least-squares estimation of transformation parameters, 1991).
+
+    :param landmarks: (T, n, 3) pixels, and depth in pixels.
+    :param reference: (n, 3).
+    :param shares: (n,) weights a of the points, with sum 1.
+    """
+    x = landmarks * _Y_UP
+    x = x - np.einsum("n,tnx->tx", shares, x)[:, None]
+    middle = shares @ reference
+    y = reference - middle
+    U, S, Vt = np.linalg.svd(np.einsum("n,tnx,ny->txy", shares, x, y))
+    signs = np.ones((len(x), 3))
+    signs[:, 2] = np.sign(np.linalg.det(U @ Vt))
+    R = np.einsum("tji,tj,tkj->tik", Vt, signs, U)
+    scale = (S * signs).sum(axis=1) / np.maximum(np.einsum("n,tnx->t", shares, x**2), 1e-12)
+    points = scale[:, None, None] * np.einsum("tij,tnj->tni", R, x) + middle
+    return AlignedFaces(points, log(R.transpose(0, 2, 1)))
+
+
+def view_terms(turns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the terms (T, VIEW_TERMS) of views (T, 3) in which the mean error of landmarks is expressed."""
+    v = np.clip(turns, -_STEEPEST, _STEEPEST)
+    x, y, z = v.T
+    return np.column_stack([v, v**2, x * y, y * z, x * z, abs(y)])

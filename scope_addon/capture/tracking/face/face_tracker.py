@@ -12,11 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...perception.execution import Execution
-from ...perception.face.expression_network import ExpressionNetwork
-from ...perception.face.eye_light import eye_light
-from ...perception.face.face_landmarks import FaceEstimate, FaceNetwork
+from ...perception.face.face_landmarks import (
+    HEAD,
+    ExpressionNetwork,
+    FaceEstimate,
+    FaceNetwork,
+    eye_light,
+    facing,
+    region_from_body,
+)
 from ...perception.face.face_record import record
-from ...perception.face.face_region import HEAD, facing, region_from_body
 from ...perception.observation import Observation
 from ...perception.region import Region
 from ..frame_clock import PATIENCE_S, is_search_due
@@ -44,8 +49,6 @@ class _Face:
 class FaceTracker:
     """Tracks the faces of the people whom `PeopleTracker` tracks; frames are given in order.
 
-    :param threads: of the network.
-    :param execution: what the network runs on.
     :raises SetupError: a network is missing.
     :raises ModelFileError: a network is damaged.
     """
@@ -71,7 +74,6 @@ class FaceTracker:
 
         :param image_rgb: (H, W, 3).
         :param observations: tracklet number and observation of each person.
-        :param time_s: when the frame is shown.
         """
         before, self._faces = self._faces, {}
         found = []

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The direction across the head, from the face's landmarks: they show how it turns and leans to the side best.
 
-With the rotation vector v of the landmarks against the reference face (`face_alignment`), in the axes of a camera that
+With the rotation vector v of the landmarks against the reference face (`aligned`), in the axes of a camera that
 looks at the face, and Y from y up to y down, the direction from the right to the left ear is
 
     d = R_camera_virtual Y exp(v) exp(c) (1, 0, 0)
@@ -21,8 +21,7 @@ from .....solver.rotations import exp
 from ...camera.intrinsics import Camera
 from ...perception.face.face_record import landmarks_of, parts, presence_of
 from ...perception.lifter import camera_towards
-from .expression_fit import load_response
-from .face_alignment import aligned
+from .expression_fit import aligned, load_response
 
 # Mean rotation vector from the reference's axes to the default body's head, over the hundred people of the set `poses`.
 _HEAD_FROM_REFERENCE = np.radians([5.3, -0.4, 0.7])

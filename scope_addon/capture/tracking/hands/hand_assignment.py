@@ -9,8 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...perception.hand_landmarks import HandEstimate
-from ...perception.hand_region import ELBOWS, HAND_LENGTH_M, WRISTS
+from ...perception.hand_landmarks import ELBOWS, HAND_LENGTH_M, WRISTS, HandEstimate
 from ...perception.observation import Observation
 
 WRIST_DISTANCE = 0.7  # largest distance between the hand's wrist and the body's, in hand lengths

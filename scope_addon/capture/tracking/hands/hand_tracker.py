@@ -13,10 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...perception.execution import Execution
-from ...perception.hand_landmarks import HAND_POINTS, HandEstimate, HandNetwork
-from ...perception.hand_region import SIDES, pixels_per_metre
+from ...perception.hand_landmarks import (
+    HAND_POINTS,
+    PALM_THRESHOLD,
+    SIDES,
+    HandEstimate,
+    HandNetwork,
+    PalmDetector,
+    pixels_per_metre,
+)
 from ...perception.observation import Observation
-from ...perception.palm_detector import SCORE_THRESHOLD, PalmDetector
 from ...perception.region import Region
 from ..frame_clock import EAGER_S, FRAME_S, PATIENCE_S, is_search_due
 from .hand_assignment import (
@@ -81,7 +87,6 @@ class HandTracker:
     run of these small networks takes twice the processor time.
 
     :param threads: number of hands that are looked for in parallel.
-    :param execution: what the networks run on.
     :param least_px: length of the smallest hands that are looked for, by the body's scale; pixels.
     :raises SetupError: a network is missing.
     """
@@ -226,7 +231,7 @@ class HandTracker:
         if sight.hand_px < self._least_px or not _is_in_image(predicted, sight.image_rgb):
             return None
         around = replace(predicted, side_px=SEARCH_SCALE * predicted.side_px)
-        palms = self._palms_near(sight, around, SCORE_THRESHOLD)
+        palms = self._palms_near(sight, around, PALM_THRESHOLD)
         found = self._first_sure(sight, [*((palm, DETECTED) for palm in palms), (predicted, PREDICTED)], TENTATIVE)
         if not look_again or (found is not None and found.is_sure) or sight.wrist_confidence < SURE_WRIST:
             return found

@@ -4,15 +4,28 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ....errors import SetupError
+from ...perception.adapters.box_detector import BoxDetector
+from ...perception.adapters.keypoint_network import KeypointNetwork
+from ...perception.execution import Execution
+from ...perception.kept_estimates import KeptEstimates
 from ...perception.landmark_network import LandmarkNetwork, PoseEstimate
+from ...perception.observation import PendingReference
+from ...perception.person_detector import PersonDetector
 from ...perception.region import Region
+from ...perception.sessions import landmark_network_name
 from ..tracked_target import MIN_VELOCITY_FRAMES, TrackedTarget
 from .plausibility import is_in_image, is_plausible, is_same_region
-from .tracking_networks import TrackingNetworks
+
+MAX_PENDING = 2  # calls that are not finished, each of which keeps its frame in memory
 
 
 class LandmarkEstimator:
@@ -90,3 +103,78 @@ class LandmarkEstimator:
         for f in live:
             if f.pending is None and is_in_image(f.estimate.next_region, upcoming_rgb):
                 f.pending = self._early.begin(upcoming_rgb, f.estimate.next_region, self._upcoming_with_masks)
+
+
+class ReferenceEstimator:
+    """Estimates world landmarks in the background; tracking does not depend on them, so it does not wait."""
+
+    def __init__(self, network: LandmarkNetwork) -> None:
+        self._network = network
+        self._pending: list[PendingReference] = []
+        self._pool = ThreadPoolExecutor(1, "scope-reference")
+
+    def submit(self, image_rgb: NDArray[np.uint8], region: Region) -> PendingReference:
+        """Start an estimate; wait first if too many are pending.
+
+        :param image_rgb: (H, W, 3), not to be changed until the result is there.
+        :return: world landmarks (33, 3) in metres, or None if they are not of a body.
+        """
+        self._pending = [call for call in self._pending if not call.done()]
+        if len(self._pending) >= MAX_PENDING:
+            self._pending[0].result()
+        call: PendingReference = self._pool.submit(self._estimate, image_rgb, region)
+        self._pending.append(call)
+        return call
+
+    def _estimate(self, image_rgb: NDArray[np.uint8], region: Region) -> NDArray[np.float64] | None:
+        (estimate,) = self._network.estimate(image_rgb, [region])
+        return estimate.world_landmarks if is_plausible(estimate) else None
+
+
+@dataclass(frozen=True)
+class TrackingNetworks:
+    """Opened networks.
+
+    ``begins_early`` is the network for landmarks if it can work on the next frame in the background; ``prefetches``
+    says whether it may do so in regions that are only predicted. Only the largest network does: the others are less
+    stable there, and save less time. ``reference`` is the largest network, which checks left and right, or None if it
+    estimates the landmarks itself. ``fallback`` replaces a smaller network for a while; a user's own network is not
+    replaced.
+    """
+
+    detector: PersonDetector | BoxDetector
+    landmarks: LandmarkNetwork | KeypointNetwork
+    begins_early: LandmarkNetwork | None
+    prefetches: bool
+    reference: LandmarkNetwork | None
+    fallback: LandmarkNetwork | None
+
+
+def open_networks(
+    quality: str,
+    threads: int,
+    detector: Path | None,
+    keypoints: Path | None,
+    execution: Execution | None,
+    kept: KeptEstimates | None = None,
+) -> TrackingNetworks:
+    """Open the networks, with the parameters of `PeopleTracker`.
+
+    :raises UsageError: the quality is unknown.
+    :raises SetupError: a built-in network is missing.
+    :raises ModelFileError: one of the user's networks cannot be used.
+    """
+    people: PersonDetector | BoxDetector = (
+        BoxDetector(detector, threads, execution) if detector else PersonDetector(threads, execution)
+    )
+    name, largest = landmark_network_name(quality), landmark_network_name("best")
+    reference: LandmarkNetwork | None = None
+    if keypoints:
+        own = KeypointNetwork(keypoints, threads, execution)
+        with suppress(SetupError):  # without the reference, left and right follow from continuity alone
+            reference = LandmarkNetwork(largest, 1, execution, kept)
+        return TrackingNetworks(people, own, None, False, reference, None)
+    landmarks = LandmarkNetwork(name, threads, execution, kept)
+    if name != largest:
+        reference = LandmarkNetwork(largest, 1, execution, kept)
+    return TrackingNetworks(people, landmarks, landmarks, reference is None, reference, reference)

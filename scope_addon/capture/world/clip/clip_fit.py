@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,13 +28,14 @@ from ...fitting.prepared_track import PreparedTrack
 from ...fitting.weights import motion_priors
 from ..camera_path import CameraPath
 from .clip_window import ClipWindow
-from .joint_sigma import joint_sigma
 from .limb_search import search_limbs
 
 WINDOW_UNKNOWNS = 36_000  # unknowns of a window, whose equations take some 120 MB: 480 frames of a body of 24 parts
 OVERLAP = 4_800  # unknowns; two windows differ by 2 to 4 mm where one of them has 1 s more to its end
 LONGEST_STEP = 2.5  # between two frames that are fitted together, in units of the median step
 _Progress = Callable[[str, int, int], None]
+ALONG, ACROSS, _RATE_HZ, _EXPONENT = 15.5, 11.5, 60.0, 0.3  # of the standard deviations, see `joint_sigma`
+_MIN_HZ = 10.0  # acceleration hardly couples frames that are further apart
 
 
 def fit_clip(
@@ -148,3 +150,37 @@ def windows(count: int, most: int, overlap: int) -> list[slice]:
 
 def _frames_of(prepared: PreparedTrack, unknowns: int) -> int:
     return unknowns // (3 * (prepared.body.K + 2))
+
+
+def joint_sigma(
+    pelvis: NDArray[np.float64],
+    from_pelvis: NDArray[np.float64],
+    joints: NDArray[np.floating[Any]],
+    times: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the (T, K+1, 2) standard deviations along the line of sight and across it, per axis, metres.
+
+    That of the pelvis is relative to the camera, those of the others relative to the pelvis. The covariance is that of
+    independent errors, but networks' errors in neighbouring frames and keypoints are alike, and their mean is not zero.
+    Positions are off by a multiple, which differs little from person to person and from joint to joint, and grows less
+    with the frame rate than smoothing lowers the covariance:
+
+        σ = c s (rate / 60 Hz)^0.3,   s of the covariance,   c = 15.5 along the line of sight and 11.5 across it
+
+    Fitted to the twelve limb joints of real clips and renders with ground truth (benchmarks/notebook/clip.md).
+
+    :param pelvis: (T, 3, 3) covariance of its position for independent errors, metres².
+    :param from_pelvis: (T, K+1, 3, 3) of the joints' positions relative to it; row 0 is not used.
+    :param joints: (T, K+1, 3) relative to the camera's centre, in the axes of the covariances.
+    :param times: (T,) seconds.
+    """
+    covariance = from_pelvis.copy()
+    covariance[:, 0] = pelvis
+    sight = joints / np.linalg.norm(joints, axis=-1, keepdims=True)
+    along = np.einsum("tki,tkij,tkj->tk", sight, covariance, sight)
+    across = 0.5 * (np.trace(covariance, axis1=-2, axis2=-1) - along)
+    rate = 1.0 / float(np.median(np.diff(times))) if len(times) > 1 else _MIN_HZ
+    inflation = (max(rate, _MIN_HZ) / _RATE_HZ) ** _EXPONENT
+    variance = np.maximum(np.stack([along, across], axis=-1), 0.0)
+    sigma: NDArray[np.float64] = inflation * np.sqrt(variance) * [ALONG, ACROSS]
+    return sigma

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from .....solver import (
     Fit,
+    Floor,
     FootContacts,
     Measurements,
     MotionFit,
@@ -29,11 +30,14 @@ from .....solver import (
 from .....solver.compiled.tree import Tree, with_fixed_shape
 from ....kinematics.body_surface import BodySurface
 from ....kinematics.contact_points import contact_point_positions
+from ....kinematics.runs import runs
 from ...fitting.prepared_track import PreparedTrack
 from ...fitting.weights import CLIP_STEPS, ROBUST, clip_stages
 from ..camera_path import CameraPath
-from .body_planes import ENTERS_M, with_planes
-from .resting_places import resting_places
+
+MIN_PROBABILITY, SPREAD_M = 0.5, 0.02  # of a rest; see `resting_places`
+ENTERS_M = 0.01  # depth from which on an arm counts as inside the body
+_INSIDE_WEIGHT = 1.0  # of a point inside the body, against one of a sole under the floor that is surely in contact
 
 
 @dataclass(frozen=True)
@@ -150,3 +154,49 @@ class ClipWindow:
         R = np.swapaxes(path.R_first_camera[frames], 1, 2)
         t = -np.einsum("fij,fj->fi", R, path.center[frames])
         return [[View(*seen)] for seen in zip(measured, R, t, strict=True)]
+
+
+def resting_places(
+    points: NDArray[np.floating[Any]], resting: NDArray[np.floating[Any]]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the places (T, C, 3) of points while they rest, and the probability (T, C) that they are there.
+
+    Where little speed is allowed, a point can still drift by centimetres in some seconds. One that has stayed within
+    `SPREAD_M` of its mean throughout a rest is therefore drawn to that mean; one that has strayed farther may not rest.
+
+    :param points: (T, C, 3) in axes that do not move, metres.
+    :param resting: (T, C) probability that each point rests.
+    """
+    places, probability = np.zeros(points.shape), np.zeros(resting.shape)
+    for c in range(resting.shape[1]):
+        for first, end in runs(resting[:, c] > MIN_PROBABILITY):
+            rest, p = points[first:end, c], resting[first:end, c]
+            place = p @ rest / p.sum()
+            if np.linalg.norm(rest - place, axis=1).max() < SPREAD_M:
+                places[first:end, c], probability[first:end, c] = place, p
+    return places, probability
+
+
+def with_planes(
+    floor: Floor | None, indices: NDArray[np.intp], normal: NDArray[np.float64], offset: NDArray[np.float64]
+) -> Floor | None:
+    """Add points that may not be below a plane each, and are free to be above it.
+
+    :param floor: with one plane for all of its points, or None.
+    :param indices: (n,) keypoints. :param normal, offset: (n, 3) unit, and (n,) metres, in the frame's camera.
+    """
+    count = len(indices)
+    if not count:
+        return floor
+    free, inside = np.zeros(count), np.full(count, _INSIDE_WEIGHT)
+    if floor is None:
+        return Floor(indices, normal, offset, free, below=inside)
+    soles = len(np.asarray(floor.indices))
+
+    def joined(first: Any, second: NDArray[Any], width: tuple[int, ...] = ()) -> NDArray[Any]:
+        return np.concatenate([np.broadcast_to(first, (soles, *width)), second])
+
+    return Floor(
+        joined(floor.indices, indices), joined(floor.normal, normal, (3,)), joined(floor.offset, offset),
+        joined(floor.contact, free), joined(1.0 if floor.below is None else floor.below, inside),
+    )  # fmt: skip

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scope.scope_addon.capture.perception.adapters import network_process
-from scope.scope_addon.capture.perception.adapters.keypoints.keypoint_network import KeypointNetwork
+from scope.scope_addon.capture.perception.adapters.keypoint_network import KeypointNetwork
 from scope.scope_addon.capture.perception.adapters.network_process import SERVER, NetworkProcess
 from scope.scope_addon.capture.perception.adapters.network_server import OUT_OF_MEMORY
 from scope.solver.errors import ModelFileError

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.intrinsics import Camera, assumed_camera
 from scope.scope_addon.capture.fitting.background_estimators import BackgroundEstimators
-from scope.scope_addon.capture.fitting.focal_fits import FocalFits
+from scope.scope_addon.capture.fitting.focal_length import FocalFits
 from scope.scope_addon.capture.media.frame import Frame
 from scope.scope_addon.capture.media.video import Video, open_video
 from scope.scope_addon.capture.options import CaptureOptions
@@ -25,7 +25,7 @@ from scope.scope_addon.capture.stages.footage import Listeners
 from scope.scope_addon.capture.stages.windows.plan import plan_windows
 from scope.scope_addon.capture.stages.windows.window_run import WindowRun
 from scope.scope_addon.capture.stages.windows.windowed_clip import WindowedClip
-from scope.scope_addon.capture.tracking.landmarks import tracking_networks
+from scope.scope_addon.capture.tracking.landmarks import landmark_estimator
 from scope.scope_addon.capture.tracking.track import Track
 from scope.scope_addon.errors import CancelledError
 from scope.solver import load_body
@@ -70,8 +70,8 @@ def windows_of(monkeypatch: pytest.MonkeyPatch, folder: Path, fitted: list[Obser
     They are joined from a folder of windows, or what is found is kept in a folder; cancelled at a frame.
     """
     people = [SMALL, LARGE]
-    monkeypatch.setattr(tracking_networks, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people, "heavy" in name))
-    monkeypatch.setattr(tracking_networks, "PersonDetector", lambda *_: FakeDetector(people))
+    monkeypatch.setattr(landmark_estimator, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people, "heavy" in name))
+    monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: FakeDetector(people))
 
     def observed(
         options: CaptureOptions, parts: Path | None = None, unfinished: Path | None = None, stop_at: float = np.inf

@@ -12,7 +12,7 @@ import pytest
 from scope.scope_addon.capture.media.frame import Frame
 from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.stages.windows import joined_windows
-from scope.scope_addon.capture.stages.windows.observe_part import count_windows, observe_windows
+from scope.scope_addon.capture.stages.windows.windowed_clip import count_windows, observe_windows
 from scope.scope_addon.capture.tracking.track import Track
 
 from .conftest import FRAMES, LARGE, SMALL, WINDOW_S, assert_same, frames_from, options

@@ -10,8 +10,7 @@ from scope.scope_addon.capture.perception.face.face_landmarks import FACE_POINTS
 from scope.scope_addon.capture.perception.face.face_record import parts, record
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.face import expression_fit
-from scope.scope_addon.capture.tracking.face.expression_fit import fitted, load_response
-from scope.scope_addon.capture.tracking.face.face_alignment import view_terms
+from scope.scope_addon.capture.tracking.face.expression_fit import fitted, load_response, view_terms
 from scope.solver.errors import ModelFileError
 from scope.solver.loaders.body_file import load_body
 from scope.solver.names import EXPRESSIONS

@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception.hand_landmarks import HandEstimate
-from scope.scope_addon.capture.perception.hand_region import HAND_LENGTH_M, WRISTS
+from scope.scope_addon.capture.perception.hand_landmarks import HAND_LENGTH_M, WRISTS, HandEstimate
 from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.hands.hand_assignment import (

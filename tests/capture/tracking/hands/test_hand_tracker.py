@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
-from scope.scope_addon.capture.perception.hand_landmarks import HandEstimate
-from scope.scope_addon.capture.perception.hand_region import HAND_LENGTH_M, pixels_per_metre
+from scope.scope_addon.capture.perception.hand_landmarks import HAND_LENGTH_M, HandEstimate, pixels_per_metre
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.perception.region import Region

@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The shape of a person from masks: rim points of a posed body, and the contour points that belong to them.
+
+The keypoints say how long limbs are, and little about breadth. The rim are points of the skin whose normal is at right
+angles to the view, and beside which the body's silhouette ends. From each, the mask is searched along the projected
+normal for the nearest place where its probability crosses one half; there the contour's own normal is taken from the
+mask's gradient. A crossing counts if it lies within the image, near enough, and if both normals agree. Hands and feet
+are left out: they are small, and what they hold or stand on is not.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ....solver import Body, ClipFit, Fit, fit_clip
+from ....solver.residuals.image.outline import FLOATS, INTS, pack
+from ...kinematics.added_keypoints import with_keypoints
+from ...kinematics.body_surface import one_per_cell
+from ..camera.intrinsics import Camera
+from ..overlay.rasterizer import fill_silhouette, vertex_normals
+from ..perception.observation import PersonMask
+from ..perception.region import Region
+from .frame_measurements import Measurer
+from .prepared_track import PreparedTrack
+from .weights import ROBUST, cold_stages, warm_stages
+
+SPACING_M = 0.03  # between candidates, at rest
+RIM_COS = 0.15  # of the angle between a rim point's normal and the view
+BESIDE_PX = 3.0  # of the mask: how far beside the rim the silhouette must have ended
+NEAR_M = 0.2  # from the camera's plane; what is nearer is not compared
+REACH = 20  # pixels of the mask searched to either side
+AGREEMENT_COS = 0.8  # of the angle between the two normals
+MAX_BLENDING_M = 0.02  # skin that blending moves further is not rigid
+BORDER_PX = 3.0  # of the image, within which contours are its edge
+_WIDTHS_M = {"head": 0.03, "neck": 0.03, "spine": 0.04, "pelvis": 0.04, "collar": 0.04, "hip": 0.03}
+_WIDTH_M = 0.02  # of limbs: how far clothes and hair reach beyond the body
+_LEFT_OUT = ("wrist", "hand", "ankle", "foot", "thumb", "index", "middle", "ring", "pinky")
+OUTSIDE_WEIGHT, INSIDE_WEIGHT = 1.0, 0.5
+OUTSIDE_SIGMA_M = 0.05
+SIZE = 256  # of the mask
+_NO_MAP = np.zeros(0, np.float32)  # the places are all in the first map
+_NOTHING = np.zeros((0, INTS), np.int64), np.zeros((0, FLOATS))
+MIN_MASKS, MAX_MASKS = 4, 32  # fewer, such as that of a still image, can mislead, and more add little
+ROUNDS = 3
+THREADS = 2
+# A rim point's inverse variance: 0.0018 in normalized coordinates, 7 mm at 4 m. The outline says more of the shape than
+# keypoints do, so the prior may weigh less. MPJPE-root on the four pose2sim cameras with other weights of outline and
+# prior: 72.7 mm with 0 and 10, 72.5 with 0 and 2, 72.1 with 5e4 and 10, 68.7 with 3e5 and 2, which are today's.
+OUTLINE_WEIGHT = 3e5
+PRIOR_SHARE = 2 / 3
+
+
+class OutlineMeasurer:
+    """Converts masks to rows of the residual "outline" of one body.
+
+    ``body`` is the given one with the candidates as its last keypoints.
+    """
+
+    def __init__(self, body: Body, camera: Camera) -> None:
+        self._source, self._camera = body, camera
+        self._shaped = np.full(body.P, np.nan), body
+        part = body.strongest_joints
+        names = [body.joint_names[i] for i in part]
+        usable = np.array([not any(key in name for key in _LEFT_OUT) for name in names])
+        usable &= np.bincount(body.faces.ravel(), minlength=len(part)) > 0
+        candidates = np.flatnonzero(usable)
+        self.vertices = candidates[one_per_cell(body.v_template[candidates], SPACING_M)]
+        self.part = part[self.vertices]
+        joints = [body.joint_names[i] for i in self.part]
+        widths_m = _WIDTHS_M.items()
+        self._width = np.array([next((w for key, w in widths_m if key in joint), _WIDTH_M) for joint in joints])
+        self._triangles = np.ascontiguousarray(body.triangles(), np.int32)
+        self._around = self._triangles[np.isin(self._triangles, self.vertices).any(axis=1)]
+        self.first = len(body.keypoint_names)
+        added = (f"outline/{v}" for v in self.vertices)
+        places, shapedirs = body.v_template[self.vertices], body.shapedirs[self.vertices]
+        self.body = with_keypoints(body, added, self.part, places, shapedirs)
+
+    def measure(self, fit: Fit, mask: PersonMask) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Return the residual's rows for the pose and shape of a fit: int64 (n, 1) and float64 (n, 11)."""
+        body, v = self._with_shape(fit.state.beta), self.vertices
+        R, t = fit.R_camera_part, fit.t_camera_part
+        skin = np.ascontiguousarray(body.skin(R, t))
+        normals, points = vertex_normals(skin, self._around)[v], skin[v]
+        local = body.v_template[v] - body.J_template[self.part]
+        delta = np.einsum("nji,nj->ni", R[self.part], points - t[self.part]) - local
+        facing = (normals * points).sum(axis=1) / np.linalg.norm(points, axis=1)
+        near = (np.abs(facing) < RIM_COS) & (points[:, 2] > NEAR_M) & (np.linalg.norm(delta, axis=1) < MAX_BLENDING_M)
+        rows = np.flatnonzero(near)
+        at = self._crop(mask.region, points[rows])
+        ahead = self._crop(mask.region, points[rows] + 0.01 * normals[rows]) - at
+        normal = ahead / np.maximum(np.linalg.norm(ahead, axis=1), 1e-9)[:, None]
+        beside = np.rint(at + BESIDE_PX * normal).astype(int)
+        inside = ((beside >= 0) & (beside < SIZE)).all(axis=1)
+        covered = self._coverage(skin, mask.region)
+        free = inside & ~covered[tuple(np.where(inside[:, None], beside, 0).T[::-1])]
+        rows, at, normal = rows[free], at[free], normal[free]
+        if not len(rows):
+            return _NOTHING
+        found, contour, outward = _crossings(mask.probability, at, normal)
+        rows = rows[found]
+        m_px = mask.region.image_from_crop((contour + 0.5) / SIZE)
+        visible = ((m_px > BORDER_PX) & (m_px < np.subtract(mask.image_size, 1 + BORDER_PX))).all(axis=1)
+        rows, contour, outward, m_px = rows[visible], contour[visible], outward[visible], m_px[visible]
+        if not len(rows):
+            return _NOTHING
+        m = self._camera.rays(m_px)[:, :2]
+        n = self._camera.rays(mask.region.image_from_crop((contour + outward + 0.5) / SIZE))[:, :2] - m
+        n /= np.linalg.norm(n, axis=1)[:, None]
+        depth = points[rows, 2]
+        sigmas = (OUTSIDE_SIGMA_M / depth) ** 2, (self._width[rows] / depth) ** 2
+        weights = np.full(len(rows), OUTSIDE_WEIGHT), np.full(len(rows), INSIDE_WEIGHT)
+        return pack(self.first + rows, delta[rows], m, n, weights, sigmas)
+
+    def _with_shape(self, betas: NDArray[np.float64]) -> Body:
+        """Return the body whose template has this shape, which the frames of a round share."""
+        known, shaped = self._shaped
+        if not np.array_equal(known, betas):
+            body = self._source
+            shaped = replace(body, v_template=body.rest_vertices(betas), J_template=body.rest_joints(betas))
+            self._shaped = betas.copy(), shaped
+        return shaped
+
+    def _crop(self, region: Region, points_cam: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Project points (n, 3) to pixels (n, 2) of the mask."""
+        if not len(points_cam):
+            return np.zeros((0, 2))
+        camera = self._camera
+        pixels = cv2.projectPoints(points_cam, np.zeros(3), np.zeros(3), camera.intrinsics, camera.dist)[0][:, 0]
+        return region.crop_from_image(pixels.astype(np.float64)) * SIZE - 0.5
+
+    def _coverage(self, skin: NDArray[np.float64], region: Region) -> NDArray[np.bool_]:
+        """Return (256, 256) bool: where in the mask's region the body is."""
+        at = np.full((len(skin), 2), np.nan)
+        front = skin[:, 2] > NEAR_M
+        at[front] = self._crop(region, skin[front])
+        covered = np.zeros((SIZE, SIZE), np.bool_)
+        fill_silhouette(covered, at, self._triangles)
+        return covered
+
+
+def _crossings(
+    probability: NDArray[np.floating[Any]], at: NDArray[np.float64], normal: NDArray[np.float64]
+) -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.float64]]:
+    """Find the nearest crossing of one half along each normal, outwards: rows (n,), places (n, 2), normals (n, 2)."""
+    picture = np.ascontiguousarray(probability, np.float32)
+    steps = np.arange(-REACH, REACH + 1.0)
+    path = (at[:, None] + steps[:, None] * normal[:, None]).astype(np.float32)
+    values = cv2.remap(picture, path, _NO_MAP, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
+    falls = (values[:, :-1] >= 0.5) & (values[:, 1:] < 0.5)
+    share = (values[:, :-1] - 0.5) / np.maximum(values[:, :-1] - values[:, 1:], 1e-6)
+    where = np.where(falls, steps[:-1] + share, np.inf)
+    best = np.abs(where).argmin(axis=1)
+    rows = np.flatnonzero(falls.any(axis=1))
+    place = at[rows] + where[rows, best[rows]][:, None] * normal[rows]
+    if not len(rows):
+        return rows, place, place
+    smooth = cv2.GaussianBlur(picture, (0, 0), 1.5)
+    slope = [cv2.Sobel(smooth, cv2.CV_32F, *order, ksize=3) for order in ((1, 0), (0, 1))]
+    spots = place.astype(np.float32)[:, None]
+    down = [-cv2.remap(image, spots, _NO_MAP, cv2.INTER_LINEAR)[:, 0] for image in slope]
+    outward = np.stack(down, axis=1).astype(float)
+    outward /= np.maximum(np.linalg.norm(outward, axis=1), 1e-9)[:, None]
+    agree = (outward * normal[rows]).sum(axis=1) > AGREEMENT_COS
+    return rows[agree], place[agree], outward[agree]
+
+
+def usable_masks(prepared: PreparedTrack) -> list[tuple[int, PersonMask]]:
+    """Return masks of the track, evenly spread over it, each with its row; none where there are too few."""
+    if prepared.camera is None:
+        return []
+    seen = [(row, mask) for row, mask in prepared.track.masks if prepared.track.seen[row]]
+    if len(seen) < MIN_MASKS:
+        return []
+    chosen = np.unique(np.linspace(0, len(seen) - 1, min(MAX_MASKS, len(seen))).round().astype(int))
+    return [seen[k] for k in chosen]
+
+
+def fit_shape_to_outline(
+    prepared: PreparedTrack, masks: list[tuple[int, PersonMask]], root_cam: NDArray[np.floating[Any]] | None
+) -> ClipFit:
+    """Estimate one shape from the frames of some masks, as `usable_masks` returns them.
+
+    A larger weight of few masks among many other frames moves the poses of their frames rather than the shape, so the
+    frames of the masks decide alone. A first fit without the outline places the body; then rim and contour are matched
+    and everything is fitted again, a few times.
+
+    :param masks: each with its row.
+    :param root_cam: (T, 3) known positions of the pelvis, camera frame, metres.
+    """
+    assert prepared.camera is not None
+    outline = OutlineMeasurer(prepared.body, prepared.camera)
+    measurer = Measurer(outline.body, prepared.measurer.intrinsics)
+    extended = replace(prepared, body=outline.body, measurer=measurer)
+    measured = [extended.measure(row, None if root_cam is None else root_cam[row]) for row, _ in masks]
+    base = prepared.weights
+    shape = PRIOR_SHARE * base.shape * len(masks)
+    weights = replace(base, shape=shape, tables={**base.tables, "outline": OUTLINE_WEIGHT})
+    cold, warm = (replace(ROBUST, stages=stages(weights)) for stages in (cold_stages, warm_stages))
+    found = fit_clip(outline.body, measured, priors=prepared.priors, options=cold)
+    with ThreadPoolExecutor(THREADS, "scope-outline") as pool:
+        for _ in range(ROUNDS):
+            tables = pool.map(outline.measure, found.frames, [mask for _, mask in masks])
+            matched = [replace(frame, tables={"outline": rows}) for frame, rows in zip(measured, tables, strict=True)]
+            states = [fit.state for fit in found.frames]
+            found = fit_clip(outline.body, matched, init=states, priors=prepared.priors, options=warm)
+    return found

@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Damaged and malicious network files: each gives one message."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import onnx
+import pytest
+from onnx import TensorProto, helper, numpy_helper
+from scope.scope_addon.capture.perception.adapters.box_detector import BoxDetector
+from scope.scope_addon.capture.perception.adapters.graph import check_onnx_file
+from scope.scope_addon.capture.perception.adapters.keypoint_network import KeypointNetwork
+from scope.scope_addon.cli import SAMPLE, main
+from scope.solver.errors import ModelFileError
+
+from ...small_graphs import fixed, picture_input, save, simcc
+
+Open = Callable[..., object]
+OPENERS = pytest.mark.parametrize("opens", [BoxDetector, KeypointNetwork])
+
+
+def refused(opens: Open, path: Path, says: str | None = None) -> None:
+    with pytest.raises(ModelFileError, match=says) as caught:
+        opens(path, threads=1)
+    text = str(caught.value)
+    assert "\n" not in text
+    assert path.stem in text
+
+
+@OPENERS
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 torch", b"\x80\x04 pickle", b"text\n" * 99, b"\xff" * 99])
+def test_files_that_are_not_onnx(tmp_path: Path, opens: Open, content: bytes) -> None:
+    (tmp_path / "m.onnx").write_bytes(content)
+    refused(opens, tmp_path / "m.onnx", "not an ONNX model")
+
+
+@OPENERS
+def test_missing_and_folder(tmp_path: Path, opens: Open) -> None:
+    refused(opens, tmp_path / "m.onnx", "cannot be read")
+    (tmp_path / "m.onnx").mkdir()
+    refused(opens, tmp_path / "m.onnx", "cannot be read")
+
+
+@OPENERS
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows has no named pipes in folders")
+def test_a_pipe_is_refused_without_waiting(tmp_path: Path, opens: Open) -> None:
+    pipe = tmp_path / "m.onnx"
+    os.mkfifo(pipe)
+    keeps_open = os.open(pipe, os.O_RDWR | os.O_NONBLOCK)
+    os.write(keeps_open, b"text")
+    try:
+        refused(opens, pipe, "m.onnx is a pipe or a device")
+    finally:
+        os.close(keeps_open)
+
+
+@OPENERS
+def test_a_file_larger_than_a_protocol_buffer_is_refused(tmp_path: Path, opens: Open) -> None:
+    path = tmp_path / "m.onnx"
+    with path.open("wb") as file:
+        file.truncate((2 << 30) + 1)
+    refused(opens, path, "too large for a network in one ONNX file")
+
+
+def boxes_and_scores(path: Path) -> Path:
+    """Write a detector with MMDeploy's outputs, with one person."""
+    path.with_suffix(".json").write_text('{"type": "detections", "mean": 0, "std": 1, "channel_order": "bgr"}')
+    boxes, label = np.array([[[4, 4, 28, 28, 0.9]]], np.float32), np.zeros((1, 1), np.int64)
+    return fixed(path, 32, 32, {"dets": boxes, "labels": label})
+
+
+@pytest.mark.parametrize(
+    ("opens", "make"), [(BoxDetector, boxes_and_scores), (KeypointNetwork, lambda path: simcc(path, 17, 32, 32))]
+)
+def test_every_truncation_and_some_flipped_bytes(tmp_path: Path, opens: Open, make: Callable[[Path], Path]) -> None:
+    path = make(tmp_path / "m.onnx")
+    opens(path, threads=1)
+    whole, harmed = path.read_bytes(), 0
+    for size in range(0, len(whole), len(whole) // 16):
+        path.write_bytes(whole[:size])
+        refused(opens, path)
+    rng = np.random.default_rng(0)
+    for _ in range(12):
+        data = bytearray(whole)
+        data[rng.integers(len(data))] ^= rng.integers(1, 256)
+        path.write_bytes(data)
+        try:
+            opens(path, threads=1)
+        except ModelFileError:  # some damage does no harm; nothing else may be raised
+            harmed += 1
+    assert harmed
+
+
+def with_external_data(path: Path, location: str, inside: str = "initializer") -> Path:
+    weight = numpy_helper.from_array(np.zeros((1, 17, 64), np.float32), "w")
+    weight.ClearField("raw_data")
+    weight.data_location = TensorProto.EXTERNAL
+    for key, value in {"location": location, "offset": "0", "length": "4352"}.items():
+        entry = weight.external_data.add()
+        entry.key, entry.value = key, value
+    if inside == "initializer":
+        node, weights = helper.make_node("Identity", ["w"], ["simcc_x"]), [weight]
+    else:
+        node, weights = helper.make_node("Constant", [], ["simcc_x"], value=weight), []
+    info = helper.make_tensor_value_info("simcc_x", TensorProto.FLOAT, [1, 17, 64])
+    graph = helper.make_graph([node], "ours", [picture_input(32, 32)], [info], weights)
+    path.write_bytes(helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)]).SerializeToString())
+    return path
+
+
+@OPENERS
+@pytest.mark.parametrize("inside", ["initializer", "constant"])
+@pytest.mark.parametrize("location", ["../secret.bin", "{tmp}/secret.bin", "a/../../secret.bin", "link"])
+def test_weights_outside_of_the_folder(tmp_path: Path, opens: Open, location: str, inside: str) -> None:
+    (tmp_path / "secret.bin").write_bytes(bytes(4352))
+    folder = tmp_path / "models"
+    folder.mkdir()
+    (folder / "link").symlink_to(tmp_path / "secret.bin")
+    path = with_external_data(folder / "m.onnx", location.format(tmp=tmp_path), inside)
+    refused(opens, path, "outside its own folder")
+
+
+def test_weights_in_the_same_folder_are_read(tmp_path: Path) -> None:
+    path = with_external_data(tmp_path / "m.onnx", "m.onnx.data")
+    refused(KeypointNetwork, path, "missing; put that file there")
+    (tmp_path / "m.onnx.data").write_bytes(bytes(4352))
+    check_onnx_file(path)
+
+
+@OPENERS
+def test_unknown_operators_are_refused(tmp_path: Path, opens: Open) -> None:
+    node = helper.make_node("Magic", ["images"], ["out"], domain="com.example")
+    info = helper.make_tensor_value_info("out", TensorProto.FLOAT, [1, 17, 64])
+    graph = helper.make_graph([node], "ours", [picture_input(32, 32)], [info])
+    opsets = [helper.make_opsetid("", 17), helper.make_opsetid("com.example", 1)]
+    path = tmp_path / "m.onnx"
+    path.write_bytes(helper.make_model(graph, opset_imports=opsets, ir_version=8).SerializeToString())
+    refused(opens, path, "onnxruntime cannot load.*standard operators")
+
+
+@OPENERS
+def test_a_too_new_opset_is_refused(tmp_path: Path, opens: Open) -> None:
+    path = fixed(tmp_path / "m.onnx", 32, 32, {"out": np.zeros((1, 17, 8, 8), np.float32)})
+    model = onnx.load(path)
+    model.opset_import[0].version = 99
+    onnx.save(model, path)
+    refused(opens, path, "onnxruntime cannot load.*Export it again, .* an opset that is not newer")
+
+
+@OPENERS
+@pytest.mark.parametrize(
+    ("shape", "kind", "says"),
+    [
+        ([1, 1, 32, 32], TensorProto.FLOAT, "colour"),
+        ([4, 3, 32, 32], TensorProto.FLOAT, "batch size 1"),
+        ([1, 3, 32], TensorProto.FLOAT, "batch size 1"),
+        ([1, 3, 2, 2], TensorProto.FLOAT, "16 to 4096"),
+        ([1, 3, 32, 32], TensorProto.INT64, "int64"),
+        ([1, 3, "h", "w"], TensorProto.FLOAT, "input_size"),
+    ],
+)
+def test_inputs_that_are_not_an_image_are_refused(
+    tmp_path: Path, opens: Open, shape: list, kind: int, says: str
+) -> None:
+    info = helper.make_tensor_value_info("images", kind, shape)
+    out = helper.make_tensor_value_info("out", kind, shape)
+    path = save(tmp_path / "m.onnx", [helper.make_node("Identity", ["images"], ["out"])], [info], [out])
+    refused(opens, path, says)
+
+
+@OPENERS
+def test_a_graph_that_fails_at_run_time_is_refused(tmp_path: Path, opens: Open) -> None:
+    nodes = [helper.make_node("Reshape", ["images", "wanted"], ["out"])]
+    out = helper.make_tensor_value_info("out", TensorProto.FLOAT, [7, 11])
+    shape = {"wanted": np.array([7, 11], np.int64)}
+    path = save(tmp_path / "m.onnx", nodes, [picture_input("w", "h")], [out], shape)
+    path.with_suffix(".json").write_text('{"input_size": [32, 32]}')
+    refused(opens, path, "cannot be run on an image of 32 x 32")
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("{", "is not JSON"),
+        ("[]", "not hold a JSON object"),
+        ("[" * 100_000, "is not JSON"),
+        ('{"colour": "rgb"}', "unknown entry 'colour'"),
+        ('{"type": "yolov99"}', "type must be one of simcc, heatmap"),
+        ('{"mean": [1, 2]}', "mean must be one number or three"),
+        ('{"std": 0}', "above 0"),
+        ('{"mean": NaN}', "mean must be"),
+        ('{"input_size": [640, 0]}', "input_size must be"),
+        ('{"input_size": 640}', "input_size must be"),
+        ('{"input_size": [640, 640]}', "specifies input_size"),
+        ('{"score_threshold": 3}', "between 0 and 1"),
+        ('{"type": ["simcc"]}', "type must be"),
+        ('{"keypoints": "mpii16"}', "coco17, halpe26, wholebody133"),
+        ('{"type": "heatmap"}', "not heatmap"),
+    ],
+)
+def test_an_invalid_json_is_refused(tmp_path: Path, text: str, says: str) -> None:
+    path = simcc(tmp_path / "m.onnx", 17, 32, 32)
+    path.with_suffix(".json").write_text(text)
+    refused(KeypointNetwork, path, says)
+
+
+@pytest.mark.parametrize("option", ["--detector", "--keypoints"])
+def test_the_command_line_prints_one_line(tmp_path: Path, capsys: pytest.CaptureFixture, option: str) -> None:
+    path = fixed(tmp_path / "m.onnx", 32, 32, {"what": np.zeros((1, 7), np.float32)})
+    assert main(["capture", str(SAMPLE), option, str(path), "-o", str(tmp_path / "out.npz")]) == 1
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert json.loads('"what [1, 7]"') in said
+    assert not (tmp_path / "out.npz").exists()

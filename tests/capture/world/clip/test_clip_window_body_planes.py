@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Planes of single points beside the one of the soles."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.world.clip.clip_window import with_planes
+from scope.solver import Floor
+
+UP = np.array([0.0, -1.0, 0.0])
+SOLES = np.array([90, 91])
+NORMALS = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 0.6, 0.8]])
+
+
+@pytest.mark.parametrize("below", [None, [0.25, 1.0]])
+def test_soles_keep_their_plane_and_weights_and_points_of_arms_are_free_above_theirs(below):
+    floor = Floor(SOLES, UP, -1.5, [0.25, 1.0], below=below)
+    joined = with_planes(floor, np.array([13, 15, 17]), NORMALS, np.array([0.1, -2.0, 3.0]))
+    np.testing.assert_array_equal(joined.indices, [90, 91, 13, 15, 17])
+    np.testing.assert_array_equal(joined.normal, [UP, UP, *NORMALS])
+    np.testing.assert_array_equal(joined.offset, [-1.5, -1.5, 0.1, -2.0, 3.0])
+    np.testing.assert_array_equal(joined.contact, [0.25, 1.0, 0.0, 0.0, 0.0])
+    np.testing.assert_array_equal(joined.below[:2], [1.0, 1.0] if below is None else below)
+    assert (joined.below[2:] > 0.0).all()
+
+
+def test_without_points_the_floor_stays_and_without_a_floor_the_planes_stand_alone():
+    floor = Floor(SOLES, UP, -1.5, [1.0, 1.0])
+    none = np.zeros(0, int)
+    assert with_planes(floor, none, np.zeros((0, 3)), np.zeros(0)) is floor
+    assert with_planes(None, none, np.zeros((0, 3)), np.zeros(0)) is None
+    alone = with_planes(None, np.array([13]), NORMALS[:1], np.array([0.1]))
+    np.testing.assert_array_equal(alone.normal, NORMALS[:1])
+    np.testing.assert_array_equal(alone.contact, [0.0])
