@@ -85,7 +85,7 @@ def room(module: str) -> str:
 def imported(module: str) -> frozenset[str]:
     """The modules of the product that a module imports, also inside functions and for type checking."""
     path = ROOT / module
-    package = path.is_dir()
+    package = (path / "__init__.py").is_file()
     base = module.split("/") if package else module.split("/")[:-1]
     found = set()
     for node in ast.walk(ast.parse((path / "__init__.py" if package else path.with_suffix(".py")).read_text("utf-8"))):
@@ -93,7 +93,8 @@ def imported(module: str) -> frozenset[str]:
             target = "/".join([*base[: len(base) - node.level + 1], *filter(None, (node.module or "").split("."))])
             for alias in node.names:
                 inner = f"{target}/{alias.name}"
-                is_module = (ROOT / inner).is_dir() or (ROOT / inner).with_suffix(".py").is_file()
+                # A folder alone may be left over from a package that was removed, with compiled modules in it.
+                is_module = (ROOT / inner / "__init__.py").is_file() or (ROOT / inner).with_suffix(".py").is_file()
                 found.add(inner if is_module else target)
     return frozenset(m for m in found if m.startswith(PRODUCT) and m != module)
 
