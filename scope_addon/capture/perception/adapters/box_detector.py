@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from ..execution import Execution
 from ..letterbox import fit_in
 from ..person_detector import Detection, overlap_clusters
 from .description import Description, description_path, read_description
-from .graph import PIXELS_BGR, UNIT, Graph, Normalization, finite
+from .graph import PIXELS_BGR, UNIT, Graph, Normalization, Outputs, finite
 
 SCORE_THRESHOLD = 0.4
 BORDER = 114  # the grey level that the YOLO family is trained with
@@ -36,9 +36,6 @@ class Boxes:
 
     corners: NDArray[np.float64]
     scores: NDArray[np.float64]
-
-
-Outputs = list[NDArray[Any]]
 
 
 class BoxFormat(NamedTuple):
@@ -235,7 +232,7 @@ class BoxDetector:
         """Return nothing for any (H, W, 3) image, as `detect_small`."""
         return []
 
-    def _boxes(self, outputs: list[NDArray[Any]]) -> Boxes:
+    def _boxes(self, outputs: Outputs) -> Boxes:
         try:
             boxes = self._format.decode(outputs, self._graph, self._description)
             if boxes.corners.shape != (*boxes.scores.shape, 4):

@@ -18,6 +18,8 @@ from ..sessions import open_session
 from .description import Description, description_path
 from .network_process import NetworkProcess
 
+Outputs = list[NDArray[Any]]
+
 _TYPES = {"tensor(float)": np.float32, "tensor(float16)": np.float16, "tensor(uint8)": np.uint8}
 _LARGEST_SIDE = 4096
 # Of an ONNX file; message: {field number: message in the field}.
@@ -87,7 +89,7 @@ class Graph:
         """Shapes of the outputs."""
         return [output.shape for output in self.trial_outputs]
 
-    def run(self, picture_rgb: NDArray[np.uint8], normalization: Normalization) -> list[NDArray[Any]]:
+    def run(self, picture_rgb: NDArray[np.uint8], normalization: Normalization) -> Outputs:
         """Run the graph.
 
         :param picture_rgb: (H, W, 3) uint8, of the input's size.

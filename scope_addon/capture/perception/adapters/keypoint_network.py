@@ -23,7 +23,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -34,7 +34,7 @@ from ..execution import Execution
 from ..landmark_network import KEYPOINT_NAMES, PoseEstimate
 from ..region import Region, box_along
 from .description import Description, description_path, read_description
-from .graph import IMAGENET, Graph, finite
+from .graph import IMAGENET, Graph, Outputs, finite
 from .keypoint_sets import COCO_17, KEYPOINT_SETS, KeypointSet
 
 SCORE_THRESHOLD = 0.3  # from which a keypoint counts as seen
@@ -50,7 +50,6 @@ _LEGS = [[KEYPOINT_NAMES.index(f"{side}_{joint}") for joint in ("hip", "knee", "
 _BLUR = 11  # cells; suits the Gaussians of 2 to 3 cells that these networks are trained with
 _MIN_HEAT = 1e-10
 
-Outputs = list[NDArray[Any]]
 Keypoints = tuple[NDArray[np.float64], NDArray[np.float64]]
 """(J, 2) pixels of the network's input, the top left pixel's centre at 0, and (J,) scores."""
 
