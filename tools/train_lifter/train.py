@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Train the lifting network: ``python -m scope.tools.train_lifter.train MOTIONS -o assets/lifter``.
 
-AdamW with a cosine schedule in bfloat16; the exponential mean of the weights is exported. Batches are drawn on the
-device of the training; on a GPU, drawing and training run as two CUDA graphs. Every tenth take and all takes of the
+AdamW with a cosine schedule; the exponential mean of the weights is exported. Batches are drawn on the device of the
+training. On a GPU, products are in bfloat16, and drawing and training run as two CUDA graphs; on a CPU, products are in
+single precision, which is as fast there or faster. Every tenth take and all takes of the
 joint prior's test performers are held out, to evaluate and to calibrate the uncertainties. The weights are kept next to
 the exported network, from which another training can continue (``--start``), as from an exported network itself.
 
@@ -17,6 +18,7 @@ import json
 import math
 import time
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -28,7 +30,7 @@ from ...scope_addon.capture.perception.lifter import MIDDLE
 from ...scope_addon.errors import MotionFileError
 from ...solver.body import Body
 from ...solver.loaders.body_file import load_body
-from .dataset import Dataset, Variety
+from .dataset import Batch, Dataset, Variety
 from .export import export, read_exported
 from .measure import COUNT, calibrate, held_out_batches, measure_all
 from .motions import Motions, load_motions
@@ -81,6 +83,12 @@ class Trainer:
         self.input, self.points = batch.input, batch.points
         self._draw, self._step = graphed(self._draw_batch, device), graphed(self._train_batch, device)
         self._forget_warm_up()
+        # On a CPU, the next batch is drawn beside the training, which keeps a second core busy.
+        self._drawing = None if device == "cuda" else ThreadPoolExecutor(1)
+        self._ahead = self._draw_ahead()
+
+    def _draw_ahead(self) -> Future[Batch] | None:
+        return self._drawing.submit(self.dataset.batch, self.settings.batch) if self._drawing else None
 
     def _optimizer(self) -> torch.optim.Optimizer:
         matrices = {"params": [p for p in self.parameters if p.ndim > 1], "weight_decay": DECAY}
@@ -106,7 +114,7 @@ class Trainer:
 
     def _train_batch(self) -> None:
         # Without the cache, whose casts of the weights would not be repeated when a graph is replayed.
-        with torch.autocast(self.device, torch.bfloat16, cache_enabled=False):
+        with torch.autocast(self.device, torch.bfloat16, enabled=self.device == "cuda", cache_enabled=False):
             points, log_sigma = self.network(self.input)
         value = loss(points, log_sigma, self.points)
         value.backward()
@@ -122,7 +130,12 @@ class Trainer:
         """Draw a batch and train on it, as step ``number`` of the training, from 0."""
         self.rate.fill_(self.settings.rate * schedule(number, self.settings.steps))
         self.mean_share.fill_(1 - min(MEAN_DECAY, (number + 1) / (number + 10)))
-        self._draw()
+        if self._ahead is None:
+            self._draw()
+        else:
+            batch = self._ahead.result()
+            self._ahead = self._draw_ahead()
+            self.input, self.points = batch.input, batch.points
         self._step()
 
     def take_loss(self) -> float:
