@@ -140,8 +140,8 @@ def _straight_hinges(body: Body, betas: NDArray[np.float64]) -> tuple[NDArray[np
     for row, joint in enumerate(joints[:, 0]):
         side, _, name = body.joint_names[joint].rpartition("_")
         if name == "knee":
-            leg = [rest[None, body.joint_names.index(f"{side}_{part}")] for part in LEG]
-            floats[row, LOWER] -= np.radians(flexion(*leg, np.array([[1.0, 0.0, 0.0]]))[0])
+            hip, knee, ankle = (rest[None, body.joint_names.index(f"{side}_{part}")] for part in LEG)
+            floats[row, LOWER] -= np.radians(flexion(hip, knee, ankle, np.array([[1.0, 0.0, 0.0]]))[0])
     return joints, floats
 
 

@@ -46,7 +46,7 @@ def test_standing_knees_get_the_flexion_of_people():
     after = straightened(before)
     flexed = knee_flexions(legs(after))
     assert np.percentile(flexed, 5) == pytest.approx(4.0, abs=0.1)
-    # A centimetre is about 2.7 degrees of a straight leg, and the same distance in all frames turns all by nearly as much.
+    # The same distance turns all knees by nearly as much.
     turned = knee_flexions(legs(before)) - flexed
     assert np.ptp(turned) < 1.5
     moved = before.joint("left_knee") - after.joint("left_knee")
