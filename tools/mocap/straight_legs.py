@@ -124,7 +124,7 @@ def _straight_legs(
     left = _unit(legs["left_hip"] - legs["right_hip"])  # hips that move alone leave it as it is
     for _ in range(ROUNDS):
         x = 0.5 * (least + most)
-        result = _with_knees_back(moved, left, x)
+        result = with_knees_back(moved, left, x)
         if np.percentile(knee_flexions(result), 5) > target:
             least = x
         else:
@@ -164,8 +164,12 @@ def _with_hips_back(legs: Mapping[str, Points], up: Points) -> dict[str, Points]
     return found
 
 
-def _with_knees_back(legs: Mapping[str, Points], left: Points, x: float) -> dict[str, Points]:
-    """Return the legs with knees moved back by ``x`` metres where they are straight."""
+def with_knees_back(legs: Mapping[str, Points], left: Points, x: float) -> dict[str, Points]:
+    """Return the legs with knees moved back by ``x`` metres where they are straight.
+
+    :param legs: (T, 3) metres, hip, knee and ankle of both sides by name, among others.
+    :param left: (T, 3) unit vectors to the person's left.
+    """
     found = dict(legs)
     for side in SIDES:
         hip, knee, ankle = _leg(legs, side)

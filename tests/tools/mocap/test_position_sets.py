@@ -24,9 +24,9 @@ MINUTES = {
 }
 
 
-def write_set(path, spine_behind_m=0.07, gaps=(), fps=30.0):
+def write_set(path, spine_behind_m=0.07, gaps=(), fps=30.0, knee_deg=3.0, name="a"):
     """Write a set of one take of somebody who stands facing +z, whose lower spine lies behind the hips."""
-    at = {name: np.resize(place, (T, 3)) for name, place in standing(knee_deg=3.0).items()}
+    at = {name: np.resize(place, (T, 3)) for name, place in standing(knee_deg=knee_deg).items()}
     at["spine1"], at["spine2"] = at["pelvis"] + [0.0, 0.1, -spine_behind_m], at["chest"] - [0.0, 0.0, spine_behind_m]
     for side in ("left", "right"):
         at[f"{side}_foot"] = at[f"{side}_foot_end"]
@@ -35,7 +35,7 @@ def write_set(path, spine_behind_m=0.07, gaps=(), fps=30.0):
     for frame, joint in gaps:
         positions[frame, names.index(joint)] = np.nan
     np.savez(
-        path, take_name=np.array(["a"]), subject=np.array(["s"]), fps=np.array([fps]), start=np.array([0, T]),
+        path, take_name=np.array([name]), subject=np.array(["s"]), fps=np.array([fps]), start=np.array([0, T]),
         joint_names=np.array(names), positions=positions.astype(np.float32),
     )  # fmt: skip
     return path
@@ -66,6 +66,16 @@ def test_sets_are_resampled_and_can_be_left_out(tmp_path):
     assert [(take.source, take.fps, len(take)) for take in found] == [("accad", 30.0, T // 2)]
     with pytest.raises(MotionFileError, match="none of the sets"):
         load_sets(tmp_path, without=("rocketbox", "accad"))
+
+
+@pytest.mark.parametrize(
+    ("name", "turned"), [("m_idle_breathe_01", 4.3), ("f_walk_slow_01", 4.3), ("f_idle_cough", 0.0)]
+)
+def test_bent_legs_of_rocketbox_are_straightened(tmp_path, name, turned):
+    plain = load_set(write_set(tmp_path / "accad.npz", knee_deg=10.0))
+    bent = load_set(write_set(tmp_path / "rocketbox.npz", knee_deg=10.0, name=name))
+    before, after = (knee_flexions({joint: take[0].joint(joint) for joint in LEGS}) for take in (plain, bent))
+    np.testing.assert_allclose(before - after, turned, atol=0.3)
 
 
 def test_unknown_and_malformed_sets_are_named(tmp_path):
