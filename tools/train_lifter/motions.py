@@ -27,7 +27,7 @@ KIND_SHARES = {"stand": 0.30, "walk": 0.25, "run": 0.08, "jump": 0.05, "sit": 0.
 # nearly straight ones, so they are no evidence, and the set is as long as all else of people who stand: it adds arms
 # and swaying.
 REPEATED = {
-    "style100": 20.0,
+    "style100": 15.0,
     "accad": 3.0,
     "mesh2motion": 3.0,
     "rocketbox": 2.0,
@@ -36,7 +36,7 @@ REPEATED = {
     "cmu_expmap": 0.7,
     "cmu_asf_amc": 0.7,
     "markers": 1.0,
-    "reactidle": 0.1,
+    "reactidle": 0.2,
 }
 # Kinds whose common poses are what they look like: their frames are drawn equally often. In the others, rare poses are
 # drawn more often than their number says.
