@@ -35,13 +35,20 @@ def _seed():
     torch.manual_seed(0)
 
 
+def motions_of(pose, take, fps):
+    """Frames of one performer, of one kind and set."""
+    n = len(pose)
+    same = (np.full(n, value) for value in (fps, "cmu_01", "other", "cmu_asf_amc"))
+    return Motions(exp(pose).astype(np.float32), take, *same)
+
+
 def made_motions(body, frames, takes):
     """Random poses with an upright root, at 30 fps, of performers who are not held out."""
     rng = np.random.default_rng(3)
     pose = rng.normal(0, 0.2, (frames, body.K + 1, 3))
     pose[:, 0] = 0
     take = np.repeat(np.arange(takes), frames // takes)
-    return Motions(exp(pose).astype(np.float32), take, np.full(frames, 30.0), np.full(frames, "cmu_01"))
+    return motions_of(pose, take, 30.0)
 
 
 @pytest.fixture(scope="module")
@@ -150,7 +157,7 @@ def test_a_window_is_a_recording_at_the_lifter_s_moments(body, monkeypatch):
     monkeypatch.setattr(augment, "SPEED_SPREAD", 0.0)
     pose = np.zeros((300, body.K + 1, 3))
     pose[:, 0, 1] = np.arange(300) / 30
-    turning = Motions(exp(pose).astype(np.float32), np.zeros(300, int), np.full(300, 30.0), np.full(300, "cmu_01"))
+    turning = motions_of(pose, np.zeros(300, int), 30.0)
     Omega = PoseSampler(body, turning).motion_windows(200)[:, :, 0].numpy()
     steps = np.linalg.norm(Omega[:, 1:] - Omega[:, :-1], axis=(-2, -1)) / np.sqrt(2)  # 2 sin(θ/2)
     expected = 2 * np.sin(SPACING_S / 2)
@@ -161,7 +168,7 @@ def test_a_window_is_a_recording_at_the_lifter_s_moments(body, monkeypatch):
 def test_windows_do_not_run_into_the_next_take(body):
     pose = np.zeros((20, body.K + 1, 3))
     pose[10:, 1:, 0] = 1.0
-    two = Motions(exp(pose).astype(np.float32), np.repeat([4, 7], 10), np.full(20, 10.0), np.full(20, "cmu_01"))
+    two = motions_of(pose, np.repeat([4, 7], 10), 10.0)
     Omega = PoseSampler(body, two, natural_share=1.0).motion_windows(50)[:, :, 1:]
     assert torch.equal(Omega, Omega[:, MIDDLE : MIDDLE + 1].expand_as(Omega))
     assert 0 < Omega[:, MIDDLE, 0, 2, 1].gt(0.5).float().mean() < 1  # both takes are drawn

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fit the default body to every take: ``python -m scope.tools.mocap.fit_body ARCHIVES -o build/mocap/motions.npz``.
 
+``--more SETS`` straightens the legs of CMU's takes, see ``straight_legs.py``, lets the body's knees be straight, and
+appends the takes of ``position_sets.py``, so that the archives' takes keep their numbers; ``--without`` leaves out a
+set, and ``--as-recorded`` leaves CMU's legs bent.
+
 For each performer, one shape from the bone lengths; then, for each frame, the solver minimizes
 
     24000 Σ_j c_j |t_j − p̂_j|² + Σ_i w_i |log(R̂_iᵀ R_i)|² + joint limits + rest-pose prior
@@ -13,7 +17,7 @@ from __future__ import annotations
 
 import argparse
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
 
@@ -26,16 +30,24 @@ from ...solver.body import Body
 from ...solver.loaders.body_file import load_body
 from ...solver.residuals import joint_limits
 from ...solver.rotations import log
+from .kinds import kind_of
 from .library import load_library
-from .retarget import Correspondence, Follow, correspond, segment_rotations, shape_from_lengths, targets
+from .position_sets import LAYOUTS, load_sets
+from .retarget import SIDES, Correspondence, Follow, correspond, segment_rotations, shape_from_lengths, targets
+from .straight_legs import flexion, knee_flexions, straightened
 from .take import Take
 
 FPS = 30.0
+CMU_ARCHIVES = ("cmu_asf_amc", "cmu_expmap")
 CALIBRATION_FRAMES = 200  # per performer, for the offsets
+EXTENDED_DEG = 30.0  # flexion of either knee in frames with straight legs
+FEWEST_EXTENDED = 30  # of these frames, for the offsets
+LEG = ("hip", "knee", "ankle")
 ROUNDS = 2
 FREE_JOINT_WEIGHT = 50.0  # per radian^2, towards rest: parts that the source does not have
 FOLLOWING_JOINT_WEIGHT = 0.5
 FLOOR_QUANTILE = 0.05  # of the frames, ordered by the height of the lowest point of the feet
+LOWER = 3  # column of a hinge's lower limit
 SOLES = ("heel", "foot_index")
 # Largest plausible angle of a joint, degrees; beyond, the recording is broken (as a reversed left foot in 01_12).
 MAX_DEGREES = {"ankle": 75.0, "foot": 70.0, "wrist": 85.0, "hand": 60.0, "head": 60.0, "neck": 75.0, "collar": 50.0}
@@ -61,7 +73,12 @@ class _Fitter:
     """The solver set up for one performer."""
 
     def __init__(
-        self, body: Body, betas: NDArray[np.float64], found: Correspondence, position_weight: float = 24000.0
+        self,
+        body: Body,
+        betas: NDArray[np.float64],
+        found: Correspondence,
+        position_weight: float = 24000.0,
+        straight_knees: bool = False,
     ) -> None:
         self.body, self.betas, self.found, self.tree = body, betas, found, make_tree(body)
         names = list(body.joint_names)
@@ -74,7 +91,7 @@ class _Fitter:
         self.priors = Priors(
             joint_weights=np.where(followed, FOLLOWING_JOINT_WEIGHT, FREE_JOINT_WEIGHT),
             shape_mean=betas,
-            limits=joint_limits.hinges_of(names),
+            limits=_straight_hinges(body, betas) if straight_knees else joint_limits.hinges_of(names),
         )
         weights = Weights(keypoints3d=position_weight, joint_prior=1.0, shape=1e8, pose_prior=1.0)
         stage = Stage(weights, tolerance=1e-4, max_iterations=20)
@@ -113,22 +130,46 @@ class _Fitter:
         return State(R[0], t[0] + (p_target - t[self.joints]).mean(axis=0), Omega[1:], self.betas)
 
 
-def fit_performer(body: Body, takes: list[Take]) -> list[FittedTake]:
-    """Fit all takes of one performer."""
+def _straight_hinges(body: Body, betas: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return the limits of the hinges with each knee's lower limit counted from the straight leg.
+
+    A body whose knees are bent at rest could not straighten its legs within the limits about rest.
+    """
+    joints, floats = joint_limits.hinges_of(list(body.joint_names))
+    rest = body.rest_joints(betas)
+    for row, joint in enumerate(joints[:, 0]):
+        side, _, name = body.joint_names[joint].rpartition("_")
+        if name == "knee":
+            hip, knee, ankle = (rest[None, body.joint_names.index(f"{side}_{part}")] for part in LEG)
+            floats[row, LOWER] -= np.radians(flexion(hip, knee, ankle, np.array([[1.0, 0.0, 0.0]]))[0])
+    return joints, floats
+
+
+def fit_performer(body: Body, takes: list[Take], straight_knees: bool = False) -> list[FittedTake]:
+    """Fit all takes of one performer; ``straight_knees`` counts the lower limits of the knees from the straight leg."""
     betas = shape_from_lengths(body, takes[0])
     found = correspond(body, betas, takes)
-    calibrate_offsets(body, betas, found, takes)
-    fitter = _Fitter(body, betas, found)
+    calibrate_offsets(body, betas, found, takes, straight_knees)
+    fitter = _Fitter(body, betas, found, straight_knees=straight_knees)
     return [_fitted(body, betas, take, fitter) for take in takes]
 
 
-def calibrate_offsets(body: Body, betas: NDArray[np.float64], found: Correspondence, takes: list[Take]) -> None:
-    """Set ``found.offset`` to the mean over frames of R_world_sᵀ (t_j − p_s), from fits on some frames of the takes."""
+def calibrate_offsets(
+    body: Body, betas: NDArray[np.float64], found: Correspondence, takes: list[Take], straight_knees: bool = False
+) -> None:
+    """Set ``found.offset`` to the mean over frames of R_world_sᵀ (t_j − p_s), from fits on some frames of the takes.
+
+    With ``straight_knees``, from frames with straight legs if there are enough: offsets decide there how far knees are
+    bent, and those of people who sit differ, because the pelvis of a source does not turn about the body's hips.
+    """
+    if straight_knees:
+        extended = [_selected(take, knee_flexions(_legs(take)).max(axis=0) < EXTENDED_DEG) for take in takes]
+        extended = [take for take in extended if len(take) > 0]
+        takes = extended if sum(map(len, extended)) >= FEWEST_EXTENDED else takes
     step = max(1, sum(map(len, takes)) // CALIBRATION_FRAMES)
-    some = [Take(t.name, t.subject, t.fps, t.joint_names, t.positions[::step], t.source,
-                 orientations=None if t.orientations is None else t.orientations[::step]) for t in takes]  # fmt: skip
+    some = [_selected(take, slice(None, None, step)) for take in takes]
     for k in range(ROUNDS):
-        fitter = _Fitter(body, betas, found, position_weight=24.0 if k == 0 else 2400.0)
+        fitter = _Fitter(body, betas, found, 24.0 if k == 0 else 2400.0, straight_knees)
         left_over: dict[str, list[NDArray[np.float64]]] = {joint: [] for joint in found.points}
         for take in some:
             _, t = fitter(*targets(take, found))
@@ -137,6 +178,16 @@ def calibrate_offsets(body: Body, betas: NDArray[np.float64], found: Corresponde
                 R = segment_rotations(take, Follow(point.segment))
                 left_over[joint].append(np.einsum("tji,tj->ti", R, gap))
         found.offset = {joint: np.concatenate(gaps).mean(axis=0) for joint, gaps in left_over.items()}
+
+
+def _selected(take: Take, frames: slice | NDArray[np.bool_]) -> Take:
+    R = None if take.orientations is None else take.orientations[frames]
+    return replace(take, positions=take.positions[frames], orientations=R)
+
+
+def _legs(take: Take) -> dict[str, NDArray[np.float64]]:
+    joints = [f"{side}_{part}" for side in SIDES for part in LEG]
+    return {joint: take.joint(joint) for joint in joints}
 
 
 def _fitted(body: Body, betas: NDArray[np.float64], take: Take, fitter: _Fitter) -> FittedTake:
@@ -164,10 +215,11 @@ def plausible(body: Body, Omega: NDArray[np.float64], fps: float) -> NDArray[np.
     return inside & np.append(True, slow) & np.append(slow, True)
 
 
-def fit_library(body: Body, takes: list[Take]) -> list[FittedTake]:
-    """Fit every take but mirror images, performer by performer."""
+def fit_library(body: Body, takes: list[Take], straight_knees: bool = False) -> list[FittedTake]:
+    """Fit every take but mirror images, performer by performer; see `fit_performer`."""
     chosen = sorted((t for t in takes if not t.mirrored), key=lambda t: (t.source, t.subject, t.name))
-    return [f for _, group in groupby(chosen, key=lambda t: t.subject) for f in fit_performer(body, list(group))]
+    performers = [list(group) for _, group in groupby(chosen, key=lambda t: t.subject)]
+    return [f for group in performers for f in fit_performer(body, group, straight_knees)]
 
 
 def save(path: Path, body: Body, fitted: list[FittedTake]) -> None:
@@ -175,7 +227,8 @@ def save(path: Path, body: Body, fitted: list[FittedTake]) -> None:
 
     poses (F, 3(K+1)) f32, trans (F, 3) f32, joint_error (F, K+1) f32 metres or NaN, valid (F,) bool (False where the
     recording is broken). Take k has the frames take_start[k]:take_start[k+1], take_name, take_source, take_subject,
-    take_fps and take_betas[k]; up is ``y``.
+    take_fps, take_betas[k], take_set, the archive or set that it comes from, and take_kind, one of ``kinds.KINDS``;
+    up is ``y``.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     with atomic_path(path) as temporary:
@@ -189,6 +242,8 @@ def save(path: Path, body: Body, fitted: list[FittedTake]) -> None:
             take_name=np.array([f.take.name for f in fitted]),
             take_source=np.array([f.take.source for f in fitted]),
             take_subject=np.array([f.take.subject for f in fitted]),
+            take_set=np.array([f.take.source for f in fitted]),
+            take_kind=np.array([kind_of(f.take) for f in fitted]),
             take_fps=np.array([f.take.fps for f in fitted]),
             take_betas=np.array([f.betas for f in fitted]),
             body_model=body.name,
@@ -217,11 +272,21 @@ def main() -> None:
     """Run the command line."""
     parser = argparse.ArgumentParser(description="Fit the default body to the motion archives.")
     parser.add_argument("archives", type=Path, help="folder with the three .tar.xz")
+    parser.add_argument("--more", type=Path, help="folder with sets of joint positions, .npz; straightens CMU's legs")
+    parser.add_argument("--without", action="append", default=[], choices=sorted(LAYOUTS), help="leave out a set")
+    parser.add_argument("--as-recorded", action="store_true", help="leave CMU's legs as they are, also with --more")
     parser.add_argument("-o", "--output", type=Path, default=Path("build/mocap/motions.npz"))
     arguments = parser.parse_args()
     start = time.perf_counter()
     body = load_body("scope")
-    fitted = fit_library(body, load_library(arguments.archives, FPS))
+    archived = load_library(arguments.archives, FPS)
+    more = []
+    if arguments.more is not None:
+        more = load_sets(arguments.more, tuple(arguments.without))
+        if not arguments.as_recorded:
+            archived = [straightened(t) if t.source in CMU_ARCHIVES else t for t in archived]
+    straight_knees = arguments.more is not None
+    fitted = fit_library(body, archived, straight_knees) + fit_library(body, more, straight_knees)
     save(arguments.output, body, fitted)
     print(report(body, fitted))
     print(f"{arguments.output}: {time.perf_counter() - start:.0f} s")

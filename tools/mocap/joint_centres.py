@@ -33,18 +33,28 @@ R_Y_UP_Z_UP = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])  # z
 
 
 def take_from_joints(
-    name: str, performer: str, source: str, fps: float, joints: Mapping[str, Points], head: Points | None = None
+    name: str,
+    performer: str,
+    source: str,
+    fps: float,
+    joints: Mapping[str, Points],
+    head: Points | None = None,
+    lefts: Mapping[str, Points] | None = None,
 ) -> Take:
     """Return a take of 30 frames/s from joint positions.
 
     :param joints: (T, 3) metres each, y up: ``pelvis``, ``chest`` (lower end of the rib cage), ``neck``, ``head_end``,
         and for ``left_`` and ``right_`` the ``hip``, ``knee``, ``ankle``, ``foot_end`` (toes), ``collar`` (a point on
         the shoulder girdle's line), ``shoulder``, ``elbow`` and ``wrist``; ``heel`` where it is known, and
-        ``pelvis_up``, the direction that is up in the pelvis.
+        ``pelvis_up`` and ``chest_up``, the directions that are up in pelvis and rib cage.
     :param head: (T, 3) metres, from the right to the left of the head; None: the head turns as the chest does.
+    :param lefts: (T, 3) directions to the left of segments, where they are known: of ``left_`` and ``right_`` ``hip``
+        and ``shoulder``, about which a straight limb would bend, and of ``ankle``, by which a foot turns apart from the
+        shank.
     """
     points = {key: resampled(value, fps) for key, value in joints.items()}
-    segments = _segments(points, None if head is None else resampled(head, fps))
+    turned = {key: resampled(value, fps) for key, value in (lefts or {}).items()}
+    segments = _segments(points, None if head is None else resampled(head, fps), turned)
     names = (*JOINTS, *TIPS)
     of_tip = {"head_end": "neck", "left_foot_end": "left_ankle", "right_foot_end": "right_ankle"}
     orientations = np.stack([segments[of_tip.get(n, n)] for n in names], axis=1)
@@ -60,26 +70,31 @@ def resampled(values: Points, fps: float) -> Points:
     return np.asarray((1 - share) * values[low] + share * values[low + 1])
 
 
-def _segments(points: Mapping[str, Points], head: Points | None) -> dict[str, Points]:
+def _segments(points: Mapping[str, Points], head: Points | None, lefts: Mapping[str, Points]) -> dict[str, Points]:
     """Return R_world_segment (T, 3, 3) of every joint's segment."""
     middle = 0.5 * (points["left_hip"] + points["right_hip"])
     pelvis = frame(
         points["left_hip"] - points["right_hip"],
         points["pelvis_up"] if "pelvis_up" in points else points["chest"] - middle,
     )
-    chest = frame(points["left_collar"] - points["right_collar"], points["neck"] - points["chest"])
+    chest = frame(
+        points["left_collar"] - points["right_collar"],
+        points["chest_up"] if "chest_up" in points else points["neck"] - points["chest"],
+    )
     found = {"pelvis": pelvis, "chest": chest}
     skull = along(points["head_end"] - points["neck"], chest[..., 0] if head is None else head)
     found["neck"] = _looking_ahead(skull)
     for side in SIDES:
         hip, knee, ankle = (points[f"{side}_{joint}"] for joint in ("hip", "knee", "ankle"))
-        hinge = _hinge(hip - knee, knee - ankle, pelvis[..., 0], 1.0)
+        hinge = _hinge(hip - knee, knee - ankle, lefts.get(f"{side}_hip", pelvis[..., 0]), 1.0)
         found[f"{side}_hip"], found[f"{side}_knee"] = along(hip - knee, hinge), along(knee - ankle, hinge)
         forward = points[f"{side}_foot_end"] - points.get(f"{side}_heel", ankle)
-        foot = frame(hinge, np.cross(forward, hinge))  # up: forward × left
-        found[f"{side}_ankle"] = foot
+        across = lefts.get(f"{side}_ankle", hinge)
+        found[f"{side}_ankle"] = frame(across, np.cross(forward, across))  # up: forward × left
         shoulder, elbow, wrist = (points[f"{side}_{joint}"] for joint in ("shoulder", "elbow", "wrist"))
-        hinge = _hinge(shoulder - elbow, elbow - wrist, _carried(chest, shoulder - elbow), -1.0)
+        straight = lefts.get(f"{side}_shoulder")
+        straight = _carried(chest, shoulder - elbow) if straight is None else straight
+        hinge = _hinge(shoulder - elbow, elbow - wrist, straight, -1.0)
         found[f"{side}_shoulder"], found[f"{side}_elbow"] = along(shoulder - elbow, hinge), along(elbow - wrist, hinge)
         found[f"{side}_wrist"] = found[f"{side}_elbow"]
     return found

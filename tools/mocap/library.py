@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scope_addon.errors import MotionFileError
-from . import asf_amc, deepmimic, expmap
-from .asf_amc import Skeleton
+from .formats import asf_amc, deepmimic, expmap
+from .formats.asf_amc import Skeleton
 from .take import Take
 
 ARCHIVES = ("cmu_asf_amc", "cmu_expmap", "deepmimic_humanoid")

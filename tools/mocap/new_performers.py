@@ -28,8 +28,9 @@ import numpy as np
 from ...scope_addon.errors import MotionFileError
 from ...solver.loaders.body_file import load_body
 from ..pinned_wheel import DOWNLOADS, PinnedDebian, PinnedSource, PinnedWheel
-from . import bvh, markers
+from . import markers
 from .fit_body import fit_library, report, save
+from .formats import bvh
 from .joint_centres import R_Y_UP_Z_UP, SIDES, Points, take_from_joints
 from .take import Take
 

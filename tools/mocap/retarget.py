@@ -107,7 +107,7 @@ DEEPMIMIC_POINTS = _sided({
 
 def correspond(body: Body, betas: NDArray[np.float64], takes: list[Take]) -> Correspondence:
     """Return the correspondence for one performer's takes, with level feet and upright heads, and zero offsets."""
-    cmu = takes[0].source.startswith("cmu_")
+    cmu = has_cmu_skeleton(takes[0])
     found = Correspondence(CMU_PARTS if cmu else DEEPMIMIC_PARTS, CMU_POINTS if cmu else DEEPMIMIC_POINTS)
     rest = body.rest_joints(betas)
     for part in found.parts:
@@ -121,6 +121,11 @@ def correspond(body: Body, betas: NDArray[np.float64], takes: list[Take]) -> Cor
         found.C["head"] = exp([np.clip(HEAD_PITCH - pitch, -MAX_HEAD_PITCH, MAX_HEAD_PITCH), 0.0, 0.0])
     found.offset = {joint: np.zeros(3) for joint in found.points}
     return found
+
+
+def has_cmu_skeleton(take: Take) -> bool:
+    """Return whether the take has the joints of CMU's skeleton, not those of DeepMimic's humanoid."""
+    return "left_knuckle" in take.joint_names
 
 
 def segment_rotations(take: Take, follow: Follow) -> NDArray[np.float64]:
@@ -147,7 +152,7 @@ def targets(take: Take, found: Correspondence) -> tuple[NDArray[np.float64], NDA
 
 def shape_from_lengths(body: Body, take: Take) -> NDArray[np.float64]:
     """Fit the shape (P,) to bone lengths and trunk height by Gauss-Newton on (length − measured)/σ and β/1."""
-    ours, theirs = ARM_LENGTHS["cmu" if take.source.startswith("cmu_") else "deepmimic"]
+    ours, theirs = ARM_LENGTHS["cmu" if has_cmu_skeleton(take) else "deepmimic"]
     pairs = [*LENGTHS, *((f"{s}_elbow", f"{s}_{ours}", f"{s}_elbow", f"{s}_{theirs}", 0.01) for s in SIDES)]
     index = {name: i for i, name in enumerate(body.joint_names)}
     rows = []  # (P + 1, 3) of the vector between two joints and its measured length
@@ -155,8 +160,8 @@ def shape_from_lengths(body: Body, take: Take) -> NDArray[np.float64]:
     affine = np.concatenate([body.J_template[..., None], body.J_shapedirs], axis=2)  # (K+1, 3, 1+P)
     for a, b, source_a, source_b, deviation in pairs:
         rows.append(affine[index[b]] - affine[index[a]])
-        bones = np.diff([take.joint(j)[0] for j in _chain(source_a, source_b)], axis=0)
-        measured.append(float(np.linalg.norm(bones, axis=1).sum()))
+        bones = np.diff([take.joint(j) for j in _chain(source_a, source_b)], axis=0)
+        measured.append(float(np.median(np.linalg.norm(bones, axis=2).sum(axis=0))))  # some sources' bones vary
         sigma.append(deviation)
     middle = [0.5 * (affine[index[f"left_{j}"]] + affine[index[f"right_{j}"]]) for j in ("hip", "shoulder")]
     trunk = np.mean([take.joint(f"{s}_shoulder") - take.joint(f"{s}_hip") for s in SIDES], axis=0)

@@ -27,7 +27,7 @@ class Take:
     fps: float
     joint_names: tuple[str, ...]
     positions: NDArray[np.float64]  # (T, J, 3) metres, world, y up
-    source: str  # cmu_asf_amc, cmu_expmap or deepmimic
+    source: str  # cmu_asf_amc, cmu_expmap, deepmimic or the name of a set
     mirrored: bool = False  # the mirror image of another take in the same source
     orientations: NDArray[np.float64] | None = None  # (T, J, 3, 3) R_world_segment
 

@@ -44,8 +44,7 @@ def held_out(prior: JointPrior, samples: dict[str, Samples]) -> list[Row]:
     rows = []
     for model in MODELS:
         s = samples[model]
-        test = ~s.is_training
-        states, group = s.rotations[test], s.group[test]
+        states, group = s.rotations[s.is_test], s.group[s.is_test]
         joint = model if model in TRUNK else f"left_{model}"
         flow = -prior.log_density(joint, states)
         if model not in TRUNK:  # the right joint on the mirror images is the same number

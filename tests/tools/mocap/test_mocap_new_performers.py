@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 from scope.scope_addon.errors import MotionFileError
 from scope.solver.rotations import exp
-from scope.tools.mocap import bvh, markers, new_performers
+from scope.tools.mocap import markers, new_performers
 from scope.tools.mocap.fit_body import fit_performer
+from scope.tools.mocap.formats import bvh
 from scope.tools.mocap.joint_centres import resampled, take_from_joints
 
 T = 40

@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.errors import MotionFileError
-from ...solver.rotations import exp
+from ....scope_addon.errors import MotionFileError
+from ....solver.rotations import exp
 
 INCH = 0.0254
 AXES = {"x": 0, "y": 1, "z": 2}

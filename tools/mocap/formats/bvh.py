@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.errors import MotionFileError
-from ...solver.rotations import exp
+from ....scope_addon.errors import MotionFileError
+from ....solver.rotations import exp
 
 AXES = {"X": 0, "Y": 1, "Z": 2}
 

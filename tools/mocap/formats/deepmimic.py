@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.errors import MotionFileError
-from ...solver.rotations import exp, matrix_from_quaternion
-from .take import Take
+from ....scope_addon.errors import MotionFileError
+from ....solver.rotations import exp, matrix_from_quaternion
+from ..take import Take
 
 # x forward, y up, z right -> x left, y up, z forward
 R_SHARED_DEEPMIMIC = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])

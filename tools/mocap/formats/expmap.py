@@ -19,8 +19,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.errors import MotionFileError
-from ...solver.rotations import exp
+from ....scope_addon.errors import MotionFileError
+from ....solver.rotations import exp
 from .asf_amc import Skeleton
 
 FPS = 120.0

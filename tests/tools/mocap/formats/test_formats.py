@@ -8,7 +8,7 @@ import pytest
 from scope.scope_addon.errors import MotionFileError
 from scope.solver.errors import ShapeError
 from scope.solver.rotations import exp
-from scope.tools.mocap import asf_amc, deepmimic, expmap
+from scope.tools.mocap.formats import asf_amc, deepmimic, expmap
 from scope.tools.mocap.take import Take
 
 ASF = """# made for this test

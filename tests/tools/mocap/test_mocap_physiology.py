@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The motion library against people: they stand and walk with nearly straight legs, and stand upright.
+
+The fitted body is held to it, not the recordings, because its joints are what networks and priors learn.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scope.tools.mocap import library
+from scope.tools.mocap.fit_body import fit_library
+from scope.tools.mocap.kinds import kind_of
+from scope.tools.mocap.position_sets import load_set
+from scope.tools.mocap.straight_legs import knee_flexions, straightened
+
+from ...required import missing
+from .archives import beginning
+
+STANDING_AND_WALKING = {
+    "accad": ("Female1_A01_Stand", "Female1_A02_Sway", "Female1_B03_Walk1"),
+    "cmu_more": ("07_01", "13_09"),
+    "rocketbox": ("f_idle_neutral_09", "f_walk_neutral", "m_idle_breathe_01", "m_walk_neutral"),
+    "style100": ("Neutral_FW", "Neutral_ID"),
+}
+MOST_FRAMES = 600
+STRAIGHTEST = 10  # per cent of the frames
+MOST_DEG = 8.0
+LEAN_DEG = 6.0
+STANDS_M_PER_S = 0.2
+JOINTS = tuple(f"{side}_{joint}" for side in ("left", "right") for joint in ("hip", "knee", "ankle"))
+
+
+@pytest.fixture(scope="module")
+def takes(shared):
+    """A straightened walk of CMU's, and some of each set that has legs to go by, cut to 20 seconds."""
+    folder = shared / "data" / "mocap2"
+    if not folder.is_dir():
+        missing(f"the tests on real sets need {folder}", allowed_by="SCOPE_WITHOUT_SHARED")
+    names = ("03/03.asf", "02/02.asf", "02/02_01.amc")
+    texts = beginning(shared / "data" / "mocap" / "cmu_asf_amc.tar.xz", names[-1])
+    walks, _ = library.load_asf_amc({name: texts[name] for name in names})
+    found = [straightened(walk.resampled(30)) for walk in walks]
+    for name, wanted in STANDING_AND_WALKING.items():
+        found += [take for take in load_set(folder / f"{name}.npz") if take.name in wanted]
+    return [replace(t, positions=t.positions[:MOST_FRAMES], orientations=t.orientations[:MOST_FRAMES]) for t in found]
+
+
+@pytest.fixture(scope="module")
+def fitted(takes, body):
+    return fit_library(body, takes, straight_knees=True)
+
+
+def at(fit, body, name):
+    return fit.t[:, body.joint_names.index(name)]
+
+
+def middle(fit, body, name):
+    return 0.5 * (at(fit, body, f"left_{name}") + at(fit, body, f"right_{name}"))
+
+
+def flexions(fit, body):
+    return knee_flexions({joint: at(fit, body, joint) for joint in JOINTS})
+
+
+def test_the_straightest_legs_of_people_who_stand_and_walk_are_nearly_straight(fitted, body):
+    for source in ("cmu_asf_amc", *STANDING_AND_WALKING):
+        for kind in ("stand", "walk"):
+            own = [flexions(fit, body) for fit in fitted if fit.take.source == source and kind_of(fit.take) == kind]
+            if own:
+                straighter = np.concatenate(own, axis=1).min(axis=0)
+                assert 0.0 <= np.percentile(straighter, STRAIGHTEST) <= MOST_DEG, (source, kind)
+
+
+def test_knees_bend_as_they_were_recorded(fitted, body):
+    for fit in fitted:
+        recorded = knee_flexions({joint: fit.take.joint(joint) for joint in JOINTS})
+        off = (flexions(fit, body) - recorded)[:, fit.valid]
+        assert abs(np.median(off)) < 1.5, fit.take.name
+        assert np.percentile(np.abs(off), 95) < 5.0, fit.take.name
+
+
+def test_people_stand_upright(fitted, body):
+    """The line from hips to shoulders against up, positive ahead, in frames in which the hips are still."""
+    stands = [fit for fit in fitted if kind_of(fit.take) == "stand"]
+    for source in {fit.take.source for fit in stands}:
+        leans = []
+        for fit in (fit for fit in stands if fit.take.source == source):
+            hips, shoulders = (middle(fit, body, joint) for joint in ("hip", "shoulder"))
+            is_still = np.linalg.norm(np.gradient(hips, axis=0)[:, [0, 2]], axis=1) * fit.take.fps < STANDS_M_PER_S
+            ahead = np.cross(at(fit, body, "left_hip") - at(fit, body, "right_hip"), [0.0, 1.0, 0.0])
+            ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+            trunk = shoulders - hips
+            lean = np.degrees(np.arctan2(np.einsum("ti,ti->t", trunk, ahead), trunk[:, 1]))
+            leans.append(lean[is_still])
+        assert abs(np.median(np.concatenate(leans))) < LEAN_DEG, source
