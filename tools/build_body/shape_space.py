@@ -7,8 +7,9 @@ in its slider, its weights summing to one (MakeHuman's rule):
     vertices(person) = base + Σ_t Π_f weight_f,t(person) · target_t
 
 MakeHuman's targets of single lengths (``source.LENGTHS``) are added, because the sliders alone give people of one
-stature the same upper arms and trunks, and an arm span of 0.99 of the stature. In measured adults it is 1.03 to 1.04,
-and upper arm and forearm are 0.16 and 0.15 of it (de Leva 1996; 0.145 and 0.140 with the sliders).
+stature the same upper arms and trunks, short trunks, and an arm span of 0.99 of the stature. In measured adults it is
+1.03 to 1.04, upper arm and forearm are 0.16 and 0.15 of it, and the line from mid-hip to mid-shoulder 0.29 (women) to
+0.30 (men; de Leva 1996). With the sliders alone, they are 0.155, 0.141 and 0.291.
 
 Every shape is shifted so that the pelvis joint stays at the origin.
 """
@@ -35,13 +36,14 @@ FACTORS = {  # factor -> its levels; the first and last levels lie at slider 0 a
 }
 RACES = ("african", "asian", "caucasian")
 STATURE = {"female": (1.625, 0.068), "male": (1.755, 0.071)}  # mean and standard deviation in metres
-# Length target -> relative mean and standard deviation of its change. The mean body's arm span becomes 1.03 of its
-# stature; the variation of limb lengths among people of one stature becomes about 3 %.
+# Length target -> relative mean and standard deviation of its change. The mean body's arm span becomes 1.035 of its
+# stature and its trunk 0.30. Among people of one stature, the lengths of limbs vary by about 3 %, and the ratio of
+# trunk to leg by 0.05; surveys say 0.046 (`anthropometry`).
 LENGTHENING = {
-    "arms/measure-upperarm-length": (0.076, 0.03),
-    "arms/measure-lowerarm-length": (0.076, 0.02),
-    "legs/measure-upperleg-height": (0.0, 0.03),
-    "torso/measure-napetowaist-dist": (0.0, 0.03),
+    "arms/measure-upperarm-length": (0.067, 0.03),
+    "arms/measure-lowerarm-length": (0.067, 0.02),
+    "legs/measure-upperleg-height": (0.0, 0.04),
+    "torso/measure-napetowaist-dist": (0.045, 0.06),
 }
 
 
