@@ -6,6 +6,10 @@ at the lifter's moments. Some motions run slower, faster or backwards, and half 
 samples, the joints are as recorded, up to that. In the others, torso, arms and legs sometimes come from different
 recordings, joints are rotated at random by a constant of the window, and the body leans further.
 
+Some people who stand sink into a squat, see `PoseSampler.squats`: recordings show few half squats, and seen from the
+front, knees bent by 60 degrees only shorten the legs, which a network that never saw them takes for a tall person's
+short legs.
+
 Everything here and in `dataset` and `detector_noise` is drawn by the device's default generator (`torch.manual_seed`)
 and copies nothing between host and device once the objects are made, so that a CUDA graph can record it.
 """
@@ -20,7 +24,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from ...scope_addon.capture.perception.lifter import OFFSETS_S
+from ...scope_addon.capture.perception.lifter import MIDDLE, OFFSETS_S
 from ...solver.body import Body
 from .motions import Motions
 
@@ -32,6 +36,11 @@ JOINT_NOISE |= {"ankle": 0.2, "foot": 0.1, "spine": 0.08, "neck": 0.15, "head": 
 UNTURNED_SHARE = 0.25  # of the samples that are not natural, those whose joints are not rotated
 LEAN, STRONG_LEAN, STRONG_LEAN_SHARE = math.radians(7.0), math.radians(45.0), 0.1
 NATURAL_LEAN = 0.4  # factor on the lean of natural samples
+SQUAT_SHARE = 0.35  # of the samples of people who stand, those who squat, ...
+SQUAT_DEG = (0.0, 80.0)  # ... whose thighs pitch forward by this in the middle of the window, ...
+SQUAT_SPEED_DEG_S = 40.0  # ... and turn by this per second, one standard deviation
+SHANK_PITCH, TRUNK_PITCH = (0.25, 0.75), (0.0, 0.8)  # forward, of the thigh's
+LEGS_DIFFER = 0.1  # spread of the factor between the pitches of the two legs
 SPEED_SPREAD = 0.2  # of the logarithm of a motion's speed
 SHAPE_LIMIT = 2.5  # in standard deviations
 BONE_SPREAD = 0.04  # of the logarithm of each bone's length, left and right alike
@@ -62,6 +71,8 @@ class PoseSampler:
         self._first, self._last = (on_device(ends, dtype=torch.long) for ends in motions.ends)
         self._fps = on_device(motions.fps)
         self._offsets_s = on_device(OFFSETS_S)
+        self._stands = on_device(motions.kinds == "stand", dtype=torch.bool)
+        self._squatting = [[names.index(f"{s}_{j}") for j in ("hip", "knee", "ankle")] for s in ("left", "right")]
         self.partner = on_device([names.index(_other_side(name)) for name in names], dtype=torch.long)
         self._joints = torch.arange(self.joint_count, device=device)
         self._alike = torch.minimum(self._joints, self.partner)
@@ -105,8 +116,33 @@ class PoseSampler:
         strength = (normal(self._fps, n).abs() * turned)[:, None, None]
         turn = normal(self._fps, n, self.joint_count, 3) * self._noise[:, None] * strength
         Omega = Omega @ rotation_matrices(turn)[:, None]
+        Omega = self.squats(Omega, self._stands[frames[:, MIDDLE, 0]])
         root = self._placement(natural)[:, None] @ Omega[:, :, 0]
         return torch.cat([root[:, :, None], Omega[:, :, 1:]], 2)
+
+    def squats(self, Omega: Tensor, stands: Tensor) -> Tensor:
+        """Let some people who stand squat: thighs pitch backwards under the trunk, which leans forward as they do.
+
+        With the pitches of thigh θ, shank φ and trunk τ in the world, hips flex by θ + τ, knees by θ + φ, and ankles by
+        φ, so that the feet stay as they were.
+
+        :param Omega: (n, WINDOW, 24, 3, 3) motions;  stands: (n,) whose recording shows standing.
+        """
+        n = len(Omega)
+        taken = stands & chance(self._fps, SQUAT_SHARE, n)
+        speed = SQUAT_SPEED_DEG_S * normal(self._fps, n, 1)
+        thigh = uniform(self._fps, SQUAT_DEG, n, 1) + speed * self._offsets_s
+        thigh = torch.deg2rad(thigh.clamp(*SQUAT_DEG)) * taken[:, None]
+        shank = uniform(self._fps, SHANK_PITCH, n, 1) * thigh
+        trunk = uniform(self._fps, TRUNK_PITCH, n, 1) * thigh
+        Omega = Omega.clone()
+        Omega[:, :, 0] = Omega[:, :, 0] @ about_x(trunk)
+        for joints in self._squatting:
+            share = torch.exp(LEGS_DIFFER * normal(self._fps, n, 1))
+            flexions = (-trunk - share * thigh, share * (thigh + shank), -share * shank)
+            for joint, angle in zip(joints, flexions, strict=True):
+                Omega[:, :, joint] = about_x(angle) @ Omega[:, :, joint]
+        return Omega
 
     def _placement(self, natural: Tensor) -> Tensor:
         """Draw rotations (n, 3, 3) of the world's people: a heading, then a lean, less of it where ``natural`` (n,)."""
@@ -162,6 +198,12 @@ def _from(body: Body, joint: str) -> NDArray[np.bool_]:
     for k, parent in enumerate(body.parents[1:], 1):
         inside[k] |= inside[int(parent)]
     return inside
+
+
+def about_x(angle: Tensor) -> Tensor:
+    """Return rotations (..., 3, 3) about x by angles (...), radians."""
+    zero = torch.zeros_like(angle)
+    return rotation_matrices(torch.stack([angle, zero, zero], -1))
 
 
 def rotation_matrices(phi: Tensor) -> Tensor:

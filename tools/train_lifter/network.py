@@ -77,7 +77,7 @@ class LiftingNetwork(nn.Module):
 
 
 def loss(points: Tensor, log_sigma: Tensor, truth: Tensor) -> Tensor:
-    """Return the mean −log of the Laplace density of the error e of a coordinate, and of the error of bones' directions.
+    """Return the mean −log of the Laplace density of the error e of a coordinate, and that of bones' directions.
 
     −log p(e) = √2 |e| / σ + log σ (+ const), with one σ for both coordinates across the line of sight. The error of a
     direction is the distance |d − d̂| of two unit vectors, with the weight DIRECTION_WEIGHT.
