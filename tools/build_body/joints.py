@@ -5,7 +5,7 @@ J = A V with A (K+1, N), whose rows sum to one, so that joints follow every shap
 
 MakeHuman's cubes are places that look right when a joint bends, not centres of joints: its hips lie 4 cm behind those
 that Harrington et al. (J. Biomechanics 40, 2007) find from the pelvis's bony landmarks, so that a person who stands
-upright has bent knees and leans forward. `CENTRES` moves hips, knees and shoulders to where anatomy has them:
+upright has bent knees and leans forward. `CENTRES` moves hips and shoulders to where anatomy has them:
 
     J = J_cube + a f + b u + c l,   f = mean of both feet's (ball − ankle), u = neck − pelvis, l = left hip − right hip
 
@@ -14,7 +14,6 @@ with the cubes' own f, u and l. They measure the skeleton, which fat does not ch
     joint      place in the mean body (stature 1.69 m, standing)                        after
     hip        4.8 cm behind and 9 cm below the front spines of the pelvis, 19.6 cm     Harrington: 4.5, 8.3 and
                apart                                                                    17 to 18; models of people 19 to 21
-    knee       57 % of its depth behind the kneecap's skin, 0.289 of the stature high   epicondyles; de Leva: 0.289
     shoulder   3 cm below the acromion's skin, 0.812 of the stature high                surveys: 0.812, de Leva: 0.827
 """
 
@@ -39,7 +38,6 @@ CUBES = {
 # Joint -> (a, b, c), the shares of forward, up and to the left by which its centre is displaced from its cube.
 CENTRES = {
     "hip": (0.357, 0.035, -0.041),
-    "knee": (-0.040, -0.005, -0.009),
     "shoulder": (-0.095, 0.033, 0.019),
 }
 
