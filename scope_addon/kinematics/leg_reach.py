@@ -45,9 +45,13 @@ def move_feet(
         if not len(moved):
             continue
         upper, lower = t[moved, knee] - t[moved, hip], t[moved, ankle] - t[moved, knee]
-        bend = _knee_turn(upper, lower, R[moved, hip, :, 0], upper + lower + shift[moved, side])
+        goal = upper + lower + shift[moved, side]
+        length = np.linalg.norm(upper, axis=1) + np.linalg.norm(lower, axis=1)
+        now, wanted = np.linalg.norm(upper + lower, axis=1), np.linalg.norm(goal, axis=1)
+        shortest, longest = np.minimum(now, SHORTEST * length), np.maximum(now, LONGEST * length)
+        bend = knee_turn(upper, lower, R[moved, hip, :, 0], np.clip(wanted, shortest, longest))
         reached = upper + np.einsum("tij,tj->ti", bend, lower)
-        swing = shortest_turn(reached, upper + lower + shift[moved, side])
+        swing = shortest_turn(reached, goal)
         thigh, shin = swing @ R[moved, hip], swing @ bend @ R[moved, knee]
         parent = R[moved, body.parents[hip]]
         out[moved, hip] = np.swapaxes(parent, 1, 2) @ thigh
@@ -56,28 +60,34 @@ def move_feet(
     return out
 
 
-def _knee_turn(
+def knee_turn(
     upper: NDArray[np.floating[Any]],
     lower: NDArray[np.floating[Any]],
     sideways: NDArray[np.floating[Any]],
-    goal: NDArray[np.floating[Any]],
+    wanted: NDArray[np.floating[Any]],
 ) -> NDArray[np.float64]:
-    """Return the rotations (n, 3, 3) of the shin about the knee that bring the ankle to the goal's distance.
+    """Return the turns (n, 3, 3) of the shin about the knee that bring the ankle to a distance.
+
+    A knee that is bent against ``sideways`` comes to the other side. What lies beyond the turn's
+    reach is approached as far as possible.
 
     :param upper, lower: (n, 3) from hip to knee, and from knee to ankle, metres.
     :param sideways: (n, 3) the thigh's unit axis about which a knee bends.
-    :param goal: (n, 3) of the ankle, from the hip, metres.
+    :param wanted: (n,) distance between hip and ankle, metres.
     """
     a, b = np.linalg.norm(upper, axis=1), np.linalg.norm(lower, axis=1)
-    now = np.linalg.norm(upper + lower, axis=1)
-    wanted = np.linalg.norm(goal, axis=1)
-    wanted = np.clip(wanted, np.minimum(now, SHORTEST * (a + b)), np.maximum(now, LONGEST * (a + b)))
-    axis = np.cross(upper, lower) / (a * b)[:, None] + HINGE * sideways
+    axis = cross(upper, lower) / (a * b)[:, None] + HINGE * sideways
     axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-9)
     along_u, along_l = (upper * axis).sum(1), (lower * axis).sum(1)
     fixed = along_u * along_l
-    cosine, sine = (upper * lower).sum(1) - fixed, (upper * np.cross(axis, lower)).sum(1)
+    cosine, sine = (upper * lower).sum(1) - fixed, (upper * cross(axis, lower)).sum(1)
     size = np.maximum(np.hypot(cosine, sine), 1e-12)
     target = np.clip((0.5 * (wanted**2 - a**2 - b**2) - fixed) / size, -1.0, 1.0)
     angle = np.arctan2(sine, cosine) + np.arccos(target)
     return exp(axis * angle[:, None])
+
+
+def cross(a: NDArray[np.floating[Any]], b: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+    """Return a × b (n, 3), for a single frame in a third of the time that numpy takes."""
+    (ax, ay, az), (bx, by, bz) = a.T, b.T
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)

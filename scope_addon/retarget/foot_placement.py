@@ -150,7 +150,9 @@ def place_feet(
         world[:, legs.toes] = flat @ (motion.alignment[legs.toes] @ rig.rotations[legs.toes])
     heads[..., 2] -= pelvis_drop(heads[:, legs.hips], goals, legs.lengths, times)[:, None]
     at = _rows(heads[:, legs.hips]), _rows(heads[:, legs.knees]), _rows(heads[:, legs.ankles])
-    solved = solve_leg(_rows(world[:, legs.hips]), _rows(world[:, legs.knees]), at, _rows(goals))
+    left = _rows(motion.turns[:, legs.hips, :, 0])  # about which the body's knees bend
+    thighs, shins = _rows(world[:, legs.hips]), _rows(world[:, legs.knees])
+    solved = solve_leg(thighs, shins, at, _rows(goals), left)
     world[:, legs.hips], world[:, legs.knees] = (R.reshape(len(world), -1, 3, 3) for R in solved)
     placed = head_positions(rig, world)
     first = legs.hips[0]

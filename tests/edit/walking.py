@@ -21,8 +21,11 @@ def angle(a, b):
     return np.linalg.norm(log(np.swapaxes(a, -1, -2) @ b), axis=-1)
 
 
-def walk(seconds=4.0, period=1.0, speed=1.2, rate=RATE):
-    """Return a walk along −y: hips swing, knees bend, the pelvis moves up and down."""
+def walk(seconds=4.0, period=1.0, speed=1.2, rate=RATE, bent=0.0):
+    """Return a walk along −y: hips swing, knees bend, the pelvis moves up and down.
+
+    :param bent: radians by which a knee is bent at least; without, legs are straight for a moment.
+    """
     t = np.arange(int(seconds * rate) + 1) / rate
     w = np.zeros((len(t), len(NAMES), 3))
     for name, value in ARMS_DOWN.items():
@@ -30,7 +33,7 @@ def walk(seconds=4.0, period=1.0, speed=1.2, rate=RATE):
     phase = 2 * np.pi * t / period
     for side, sign in (("left", 1.0), ("right", -1.0)):
         w[:, NAMES.index(f"{side}_hip"), 0] = -0.4 * sign * np.sin(phase)
-        w[:, NAMES.index(f"{side}_knee"), 0] = 0.4 * (1 + sign * np.cos(phase))
+        w[:, NAMES.index(f"{side}_knee"), 0] = bent + 0.4 * (1 + sign * np.cos(phase))
     rotations = exp(w)
     rotations[:, 0] = R_WORLD_MODEL
     root = np.stack([np.zeros_like(t), -speed * t, 0.95 + 0.02 * np.cos(2 * phase)], axis=1)

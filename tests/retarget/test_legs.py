@@ -34,7 +34,9 @@ def test_the_ankle_reaches_its_goal_and_no_bone_changes_its_length(legs):
     direction = np.random.default_rng(6).normal(size=(FRAMES, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     goal = hip + direction * np.random.default_rng(7).uniform(0.1, 0.79, (FRAMES, 1))
-    new_thigh, new_shin = solve_leg(thigh, shin, (hip, knee, ankle), goal)
+    # Whatever the knee's axis is said to be.
+    sideways = exp(np.random.default_rng(8).normal(size=(FRAMES, 3)))[:, 0]
+    new_thigh, new_shin = solve_leg(thigh, shin, (hip, knee, ankle), goal, sideways)
     new_knee = hip - 0.42 * new_thigh[:, :, 1]
     np.testing.assert_allclose(new_knee - 0.38 * new_shin[:, :, 1], goal, atol=1e-9)
     np.testing.assert_allclose(np.swapaxes(new_shin, 1, 2) @ new_shin, np.tile(np.eye(3), (FRAMES, 1, 1)), atol=1e-12)
@@ -45,7 +47,7 @@ def test_the_knee_bends_about_the_same_axis_of_the_bones_as_before(axis, other):
     """A knee that bends forward must not turn into one that bends sideways, nor the reverse."""
     thigh, shin, hip, knee, ankle = bent_legs(axis)
     goal = hip + 0.7 * (ankle - hip)
-    new_thigh, new_shin = solve_leg(thigh, shin, (hip, knee, ankle), goal)
+    new_thigh, new_shin = solve_leg(thigh, shin, (hip, knee, ankle), goal, thigh[:, :, axis])
     np.testing.assert_allclose(new_thigh[:, :, axis], new_shin[:, :, axis], atol=1e-9)
     bend = np.swapaxes(new_thigh, 1, 2) @ new_shin
     assert (bend[:, other[0], other[1]] > 0).all()  # and to the same side
@@ -53,7 +55,7 @@ def test_the_knee_bends_about_the_same_axis_of_the_bones_as_before(axis, other):
 
 def test_a_leg_that_is_where_it_should_be_stays(legs):
     thigh, shin, hip, knee, ankle = legs
-    new_thigh, new_shin = solve_leg(thigh, shin, (hip, knee, ankle), ankle)
+    new_thigh, new_shin = solve_leg(thigh, shin, (hip, knee, ankle), ankle, thigh[:, :, 0])
     np.testing.assert_allclose(new_thigh, thigh, atol=1e-6)
     np.testing.assert_allclose(new_shin, shin, atol=1e-6)
 
@@ -61,16 +63,27 @@ def test_a_leg_that_is_where_it_should_be_stays(legs):
 def test_a_goal_out_of_reach_is_pointed_at(legs):
     thigh, shin, hip, knee, ankle = legs
     goal = hip + [0.0, 0.0, -5.0]
-    new_thigh, new_shin = solve_leg(thigh, shin, (hip, knee, ankle), goal)
+    new_thigh, new_shin = solve_leg(thigh, shin, (hip, knee, ankle), goal, thigh[:, :, 0])
     reached = hip - 0.42 * new_thigh[:, :, 1] - 0.38 * new_shin[:, :, 1]
     np.testing.assert_allclose(reached - hip, np.tile([0.0, 0.0, -0.8], (FRAMES, 1)), atol=1e-4)
 
 
-def test_a_straight_leg_bends_with_the_knee_forward():
-    """Nothing tells its plane but the bone's own sideways axis, +x to the left; forward is -y of the world."""
-    hip, knee, ankle = (np.array([[0.0, 0.0, z]]) for z in (0.9, 0.5, 0.1))
-    hang = np.array([[[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]]])
-    thigh, _ = solve_leg(hang, hang, (hip, knee, ankle), np.array([[0.0, 0.0, 0.2]]))
-    new_knee = hip - 0.4 * thigh[:, :, 1]
-    assert new_knee[0, 1] < -0.1
-    assert abs(new_knee[0, 0]) < 1e-9
+OFF_THE_LINE = [(0.0, 0.0), (0.005, 0.005), (-0.01, 0.005), (-0.03, 0.0)]
+
+
+@pytest.mark.parametrize(("forward", "outward"), OFF_THE_LINE)
+def test_a_nearly_straight_or_overstretched_leg_bends_with_the_knee_forward(forward, outward):
+    """Its own plane is not that in which a knee bends. Forward is -y of the world, left +x.
+
+    :param forward: metres by which the knee lies before the line from hip to ankle; people's knees
+        overstretch a little.
+    :param outward: metres by which it lies beside this line.
+    """
+    hip, ankle = (np.array([[0.0, 0.0, z]]) for z in (0.9, 0.1))
+    knee = np.array([[outward, -forward, 0.5]])
+    bones = np.tile(np.eye(3), (2, 1, 1, 1))  # whose own axes tell nothing
+    goal = np.array([[0.0, 0.0, 0.2]])
+    thigh, _ = solve_leg(*bones, (hip, knee, ankle), goal, np.array([[1.0, 0.0, 0.0]]))
+    new_knee = hip + np.einsum("tij,tj->ti", thigh, knee - hip)
+    assert new_knee[0, 1] < -0.15
+    assert abs(new_knee[0, 0]) < 0.03

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scope.scope_addon.edit.clip import Clip
+from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
 from scope.scope_addon.retarget.transfer import Transfer
 from scope.solver.rotations import exp
 
@@ -14,7 +15,7 @@ from .made_skeletons import MAPPED, VERTICAL, body_rig, direction, same_names, t
 
 LIMBS = [(f"{s}_{a}", f"{s}_{b}") for s in ("left", "right") for a, b in
          (("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist"))]  # fmt: skip
-CLIP = walk(2.0)
+CLIP = walk(2.0, bent=0.1)  # where legs are straight, a rig's bend by a few degrees
 JOINTS = CLIP.joints(BODY, BETAS)[:, [NAMES.index(name) for name in MAPPED]]
 
 
@@ -22,8 +23,30 @@ JOINTS = CLIP.joints(BODY, BETAS)[:, [NAMES.index(name) for name in MAPPED]]
 @pytest.mark.parametrize("seed", range(3))
 def test_the_bodys_own_skeleton_moves_as_the_body_whatever_the_axes_of_its_bones(feet: bool, seed: int) -> None:
     pose = Transfer(BODY, BETAS, body_rig(seed=seed), same_names(), feet=feet).pose(CLIP)
-    np.testing.assert_allclose(pose.heads, JOINTS, atol=2e-3)  # a stretched leg is bent by a hair
+    np.testing.assert_allclose(pose.heads, JOINTS, atol=2e-3)
     assert pose.facing == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("overstretched", [0.0, 0.06, 0.1])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_straight_or_overstretched_knee_bends_forward_whatever_the_axes_of_its_bones(
+    overstretched: float, seed: int
+) -> None:
+    """A longer step than the body's lowers the hips, so that the leg that stands has to bend."""
+    turns = np.zeros((len(NAMES), 3))
+    turns[NAMES.index("right_hip"), 0] = -0.5
+    for side in ("left", "right"):
+        turns[NAMES.index(f"{side}_knee"), 0] = -overstretched
+    rotations = exp(turns)
+    rotations[0] = R_WORLD_MODEL
+    clip = Clip(np.zeros(1), rotations[None], np.array([[0.0, 0.0, 0.9]]))
+    pose = Transfer(BODY, BETAS, body_rig(seed=seed), same_names(), travel=1.3).pose(clip)
+    joints = [MAPPED.index(f"left_{part}") for part in ("hip", "knee", "ankle")]
+    hip, knee, ankle = pose.heads[0, joints]
+    along = (ankle - hip) / np.linalg.norm(ankle - hip)
+    across = (knee - hip) - along * ((knee - hip) @ along)
+    assert across[1] < -0.1  # the rig faces -y
+    assert abs(across[0]) < 0.03
 
 
 def test_a_rig_of_another_size_takes_steps_of_its_own_size() -> None:
