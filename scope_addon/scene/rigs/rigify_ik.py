@@ -20,8 +20,10 @@ from .rig_action import BoneKeys
 
 # Limb, middle bone, end and, of legs, toe.
 _LIMBS = (("thigh", "shin", "foot", "toe"), ("upper_arm", "forearm", "hand", ""))
-# Sine of the bend below which a limb counts as straight: noise would determine the roll of its base.
-_MIN_BEND = 0.01
+# Sine of the bend below which a limb counts as straight: the degree or two that people's legs are
+# bent sideways, and noise, would determine the roll of its base. Such a limb hardly rolls, and
+# Blender's solver moves its middle joint by a few millimetres.
+_MIN_BEND = 0.1
 
 
 @dataclass(frozen=True)

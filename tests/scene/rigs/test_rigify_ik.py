@@ -55,3 +55,35 @@ def test_ik_shows_the_pose_of_fk(rigify_rigs, root):
         cosine = (lines[0] * lines[1]).sum(-1) / np.linalg.norm(lines[0], axis=-1) / np.linalg.norm(lines[1], axis=-1)
         assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).max() < 2.0
     assert np.linalg.norm(by_fk[0] - by_fk[-1], axis=-1).max() > 0.1  # it moves
+
+
+def test_a_leg_that_is_straight_or_overstretched_does_not_turn_about_itself(rigify_rigs):
+    """Hip, knee and ankle nearly on one line have no plane that the hinge could be turned into."""
+    motion = motion_of(walk(1.0))
+    turns = motion.poses.reshape(len(motion), -1, 3)
+    bent = np.linspace(-0.06, 0.06, len(motion))
+    for side in ("left", "right"):
+        turns[:, NAMES.index(f"{side}_hip")] = 0.0
+        turns[:, NAMES.index(f"{side}_knee")] = bent[:, None] * [1.0, 0.0, 0.0]
+    rig = rigify_rigs[1][0]
+    source, options = captured(motion), RetargetOptions(feet=False)
+    retarget(source, BODY, np.zeros(BODY.P), rig, guess_bone_map(rig), RATE, options)
+    bones = [f"ORG-{bone}.{side}" for bone in ("thigh", "shin") for side in "LR"]
+    frames, axes, places = range(1, 31, 3), [], []
+    for fk in (1.0, 0.0):
+        switch(rig, IK_FK=fk)
+        places.append(posed(rig, frames))
+        axes.append(turned(rig, bones, frames))
+    assert np.linalg.norm(places[1] - places[0], axis=-1).max() < 0.01
+    cosine = (np.einsum("tbij,tbij->tb", *axes) - 1) / 2
+    assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).max() < 15.0
+
+
+def turned(rig, names, frames):
+    """Return the orientations (T, B, 3, 3) of bones in the armature's space."""
+    out = []
+    for frame in frames:
+        bpy.context.scene.frame_set(frame)
+        seen = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        out.append([np.array(seen.pose.bones[name].matrix.to_3x3().normalized()) for name in names])
+    return np.array(out)
