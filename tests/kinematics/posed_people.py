@@ -15,7 +15,10 @@ FPS = 30.0
 
 
 def stepping_person():
-    """Return a person who shifts the weight and raises the left foot for a second, 4 m from a camera 1.5 m high."""
+    """Return a person who raises the left foot for a second, 4 m from a camera 1.5 m high.
+
+    Both knees are always bent a little: straight legs turn far for any change of their length.
+    """
     body = load_body("scope")
     T = 90
     times = np.arange(T) / FPS
@@ -25,8 +28,10 @@ def stepping_person():
     omega = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
     names = body.joint_names
     x = np.array([1.0, 0, 0])
-    omega[:, names.index("left_hip")] = rotations.exp(-0.9 * lift[:, None] * x)
-    omega[:, names.index("left_knee")] = rotations.exp(1.2 * lift[:, None] * x)
+    for side, raised in (("left", lift[:, None]), ("right", 0.0 * lift[:, None])):
+        omega[:, names.index(f"{side}_hip")] = rotations.exp((-0.06 - 0.97 * raised) * x)
+        omega[:, names.index(f"{side}_knee")] = rotations.exp((0.12 + 1.27 * raised) * x)
+        omega[:, names.index(f"{side}_ankle")] = rotations.exp(-0.06 * x)
     facing = rotations.exp(np.array([np.pi / 2, 0, 0]))  # model y up to world z up
     omega[:, 0] = R_camera_world @ facing
     supported = with_contact_points(body, np.zeros(body.P))

@@ -24,7 +24,7 @@ def sides(body) -> dict[str, list[str]]:
 
 
 def test_rings_lie_around_the_limbs(body, make_motion):
-    """The ring is just outside the surface of the mesh in the middle of the thigh."""
+    """The ring is just outside the surface of the mesh in the middle of the bone."""
     person = build_scene([make_motion(body, 2)], body).people[0]
     rest = np.array([v.co for v in person.mesh.data.shape_keys.reference_key.data])
     for key in person.mesh.data.shape_keys.key_blocks[1:]:
@@ -37,7 +37,8 @@ def test_rings_lie_around_the_limbs(body, make_motion):
         mine = [any(g.group == groups and g.weight > 0.5 for g in v.groups) for v in person.mesh.data.vertices]
         offset = rest[mine] - head
         height = offset @ along
-        near = np.abs(height - 0.5 * bone.length) < 0.1 * bone.length
+        # In a shorter piece of the bone, a mesh of few faces has no vertices on some sides.
+        near = np.abs(height - 0.5 * bone.length) < 0.25 * bone.length
         reach = np.linalg.norm(offset[near] - np.outer(height[near], along), axis=1)
         ring = posed.custom_shape_scale_xyz[0]
         assert np.median(reach) < ring < 1.6 * reach.max(), name
