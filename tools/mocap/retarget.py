@@ -26,6 +26,7 @@ CMU_ELBOW_ROLL = np.radians(30.0)  # of CMU's elbow axis about the outstretched 
 HEAD_PITCH = np.radians(5.0)  # median forward pitch to which heads are set: people look slightly down
 MAX_HEAD_PITCH = np.radians(25.0)
 STANCE_SPEED = 0.12  # m/s: a foot slower than this stands
+TRUNK = ("pelvis", "spine1", "spine2", "spine3")
 LENGTHS = (  # joint, joint, source joint, source joint, standard deviation in metres
     *((f"{s}_{a}", f"{s}_{b}", f"{s}_{a}", f"{s}_{b}", 0.01)
       for s in SIDES for a, b in (("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"))),
@@ -187,7 +188,11 @@ def _chain(a: str, b: str) -> list[str]:
 
 
 def _rest_alignment(body: Body, rest: NDArray[np.float64], part: str, cmu: bool) -> NDArray[np.float64]:
-    """Return C, which takes a limb's rest bone and hinge axis to the source's; identity for upright parts."""
+    """Return C, which takes a part's rest bone and hinge axis to the source's.
+
+    It is the identity for parts whose up is the source's. DeepMimic's hips, chest and neck are one
+    vertical line at zero pose, while the body's hips lie before it, as people's do.
+    """
     side, _, name = part.rpartition("_")
     mirror = -1.0 if side == "right" else 1.0
     child = {"hip": "knee", "knee": "ankle", "shoulder": "elbow", "elbow": "wrist"}.get(name)
@@ -197,7 +202,7 @@ def _rest_alignment(body: Body, rest: NDArray[np.float64], part: str, cmu: bool)
     if name in ("wrist", "hand"):
         return np.eye(3) if cmu else _hanging(mirror)
     if child is None:
-        return np.eye(3)
+        return _upright_trunk(body, rest) if part in TRUNK and not cmu else np.eye(3)
     bone = rest[body.joint_names.index(f"{side}_{child}")] - rest[body.joint_names.index(part)]
     if name in ("hip", "knee"):
         return splay @ _frame([0.0, -1.0, 0.0], [1.0, 0.0, 0.0]) @ _frame(bone, [1.0, 0.0, 0.0]).T
@@ -208,6 +213,13 @@ def _rest_alignment(body: Body, rest: NDArray[np.float64], part: str, cmu: bool)
     if name == "elbow":  # follows halfway to the forearm, whose zero has no roll
         axis = mirror * np.array([0.0, -np.cos(0.5 * CMU_ELBOW_ROLL), np.sin(0.5 * CMU_ELBOW_ROLL)])
     return _frame([mirror, 0.0, 0.0], axis) @ ours.T
+
+
+def _upright_trunk(body: Body, rest: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the turn about the left that makes the line from the hips to the neck vertical."""
+    hips = [rest[body.joint_names.index(f"{side}_hip")] for side in SIDES]
+    _, up, ahead = rest[body.joint_names.index("neck")] - np.mean(hips, axis=0)
+    return exp([-np.arctan2(ahead, up), 0.0, 0.0])
 
 
 def _hanging(mirror: float) -> NDArray[np.float64]:

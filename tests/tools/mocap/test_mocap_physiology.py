@@ -80,17 +80,34 @@ def test_knees_bend_as_they_were_recorded(fitted, body):
         assert np.percentile(np.abs(off), 95) < 5.0, fit.take.name
 
 
+def lean(left, line):
+    """Degrees by which lines (T, 3) lean ahead of up; ``left`` (T, 3) is the person's left."""
+    ahead = np.cross(left, [0.0, 1.0, 0.0])
+    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+    return np.degrees(np.arctan2(np.einsum("ti,ti->t", line, ahead), line[:, 1]))
+
+
 def test_people_stand_upright(fitted, body):
-    """The line from hips to shoulders against up, positive ahead, in frames in which the hips are still."""
+    """The line from hips to shoulders against up, in frames in which the hips are still."""
     stands = [fit for fit in fitted if kind_of(fit.take) == "stand"]
     for source in {fit.take.source for fit in stands}:
         leans = []
         for fit in (fit for fit in stands if fit.take.source == source):
             hips, shoulders = (middle(fit, body, joint) for joint in ("hip", "shoulder"))
-            is_still = np.linalg.norm(np.gradient(hips, axis=0)[:, [0, 2]], axis=1) * fit.take.fps < STANDS_M_PER_S
-            ahead = np.cross(at(fit, body, "left_hip") - at(fit, body, "right_hip"), [0.0, 1.0, 0.0])
-            ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
-            trunk = shoulders - hips
-            lean = np.degrees(np.arctan2(np.einsum("ti,ti->t", trunk, ahead), trunk[:, 1]))
-            leans.append(lean[is_still])
+            speed = np.linalg.norm(np.gradient(hips, axis=0)[:, [0, 2]], axis=1) * fit.take.fps
+            left = at(fit, body, "left_hip") - at(fit, body, "right_hip")
+            leans.append(lean(left, shoulders - hips)[speed < STANDS_M_PER_S])
         assert abs(np.median(np.concatenate(leans))) < LEAN_DEG, source
+
+
+def test_trunks_lean_as_they_were_recorded(fitted, body):
+    """The line from hips to neck, which leans back in the body's rest pose, is the recorded one."""
+    for fit in fitted:
+        take = fit.take
+        neck = "neck2" if "neck2" in take.joint_names else "neck"
+        recorded = {joint: take.joint(joint) for joint in ("left_hip", "right_hip", neck)}
+        shown = {joint: at(fit, body, joint) for joint in ("left_hip", "right_hip", "neck")}
+        leans = []
+        for left, right, top in (recorded.values(), shown.values()):
+            leans.append(lean(left - right, top - 0.5 * (left + right)))
+        assert abs(np.median((leans[1] - leans[0])[fit.valid])) < 2.5, take.name
