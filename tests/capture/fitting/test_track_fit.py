@@ -143,7 +143,7 @@ def test_a_head_leans_as_its_face_does_although_the_bodys_keypoints_say_that_it_
 def test_a_confident_direction_corrects_a_limb_in_earlier_frames_as_well():
     """A leg in front of the body looks like one behind it, and the first frames are lifted to the wrong one."""
     body, camera = load_body("scope"), choose_camera(1080, 1920)
-    track = _standing_track(body, camera, (("right_hip", 0.3), ("right_knee", 0.9)))
+    track = _standing_track(body, camera, (("right_hip", 0.15), ("right_knee", 0.9)))
     prepared = prepare_track(body, track, camera)
     leg = [KEYPOINT_NAMES.index(f"right_{name}") for name in ("knee", "ankle", "heel", "foot_index")]
     hip = KEYPOINT_NAMES.index("right_hip")
@@ -183,7 +183,7 @@ def test_a_leg_at_a_wrong_depth_moves_to_the_floor_only_while_in_contact():
     lifted, sigma = track.world_landmarks.copy(), np.full((FRAMES, len(KEYPOINT_NAMES)), 0.1)
     good = track_fit.fit_track(replace(prepared, lifted=Lifted(lifted.copy(), sigma, sigma)), lambda *_: None)
     floor_m = (place_track(body, track, good, smoothing=False).soles @ up).min(axis=1)
-    lifted[:, leg, 2] -= [0.15, 0.3, 0.3, 0.3]
+    lifted[:, leg, 2] -= [0.2, 0.4, 0.4, 0.4]
     prepared = replace(prepared, lifted=Lifted(lifted, sigma, sigma))
     first = track_fit.fit_track(prepared, lambda *_: None)
 

@@ -8,8 +8,9 @@ from scope.solver import Keypoints2D, Measurements, Options, Stage, State, Weigh
 from scope.solver.examples import person
 
 
-def test_a_cost_as_low_in_fewer_steps():
-    body, rng = load_body("scope"), np.random.default_rng(0)
+def both_fits(seed):
+    """Fits of one clip, seen in 2D with noise, with the learned curvature and without it."""
+    body, rng = load_body("scope"), np.random.default_rng(seed)
     index = list(body.keypoint_set("blazepose").values())
     first = person.pose(body, seed=1)
     frames, starts, times = [], [], np.arange(6) / 30
@@ -17,14 +18,21 @@ def test_a_cost_as_low_in_fewer_steps():
         bent = first.Omega @ rotations.exp(2.0 * t * rng.standard_normal((1, 3)))
         state = State(first.R_camera_root, first.t_camera_root, bent, first.beta)
         R, joints = person.place(body, state)
-        pixels = person.project(body.keypoints(R, joints, state.beta, index)) + 4.0 * rng.standard_normal(
-            (len(index), 2)
-        )
-        frames.append(Measurements(person.INTRINSICS, Keypoints2D(index, pixels, np.ones(len(index)))))
+        pixels = person.project(body.keypoints(R, joints, state.beta, index))
+        pixels = pixels + 4.0 * rng.standard_normal(pixels.shape)
+        keypoints = Keypoints2D(index, pixels, np.ones(len(index)))
+        frames.append(Measurements(person.INTRINSICS, keypoints))
         starts.append(replace(state, Omega=first.Omega))
     options = Options(stages=[Stage(Weights(keypoints2d=1e5, joint_prior=4.0), 1e-9, 200)])
     given = {"init": starts, "shape": first.beta}
     learned = fit_motion(body, frames, times, options=options, **given)
     plain = fit_motion(body, frames, times, options=replace(options, curvature=False), **given)
-    assert learned.iterations < 0.7 * plain.iterations
-    assert learned.cost < (1.0 + 1e-5) * plain.cost
+    return learned, plain
+
+
+def test_a_cost_as_low_in_fewer_steps():
+    """In the median: depth is free in 2D, so that both may end in different minima of one clip."""
+    fits = [both_fits(seed) for seed in range(5)]
+    learned, plain = np.array([[fit.iterations for fit in pair] for pair in fits]).sum(axis=0)
+    assert learned < 0.7 * plain
+    assert np.median([learned.cost / plain.cost for learned, plain in fits]) < 1.0 + 1e-5

@@ -66,8 +66,9 @@ def test_a_standing_foot_stays_where_it_stands_although_it_is_seen_to_slide():
     off_free, off_held = (np.linalg.norm(points(f.state)[FEET[:2]] - p[FEET[:2]], axis=1).max() for f in (free, held))
     assert off_free > 0.025
     assert off_held < 0.25 * off_free
-    # the other foot goes on where it was seen
-    np.testing.assert_allclose(points(held.state)[FEET[2:]], p[FEET[2:]], atol=0.025)
+    # The other foot stays where the same points lead it without the contact.
+    other_held, other_free = (points(f.state)[FEET[2:]] for f in (held, free))
+    np.testing.assert_allclose(other_held, other_free, atol=0.015)
 
 
 def test_nobody_sinks_into_the_floor_and_nobody_in_the_air_is_pulled_down():
@@ -131,8 +132,9 @@ def test_the_floor_tells_the_depth_that_a_picture_does_not(size):
     height = float(np.mean(p[FEET] @ UP))
     ground = Floor(FEET, UP, height, np.ones(4))
     held = fit(BODY, Measurements(INTRINSICS, image, floor=ground), init=far, priors=priors)
-    error = [np.linalg.norm(f.state.t_camera_root - state.t_camera_root) for f in (only, held)]
-    assert error[1] < 0.2 * error[0]
+    # Of the feet: the rest of the body may lean towards the camera or away.
+    error = [np.linalg.norm((points(f.state) - p)[FEET].mean(axis=0)) for f in (only, held)]
+    assert error[1] < 0.1 * error[0]
 
 
 def test_contacts_hold_through_a_clip_with_one_shape():

@@ -49,8 +49,12 @@ def test_noise_of_single_frames_is_averaged_and_a_motion_keeps_its_amplitude():
     wrist = BODY.joint_names.index("left_wrist")
     truth = joints(true)
     one_by_one = np.array([joints(each)[k] for k, each in enumerate(alone)])
-    error, before = (np.linalg.norm(J - truth, axis=-1).mean() for J in (joints(together), one_by_one))
-    assert error < 0.6 * before
+    without_noise = joints(fit(prepare(track), true))  # its trunk leans more than the true one
+
+    def error(found):
+        return np.linalg.norm(found - without_noise, axis=-1).mean()
+
+    assert error(joints(together)) < 0.4 * error(one_by_one)
     assert abs(np.ptp(joints(together)[:, wrist, 1]) / np.ptp(truth[:, wrist, 1]) - 1) < 0.05
 
 
