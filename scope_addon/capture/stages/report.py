@@ -17,6 +17,7 @@ from ...motion import Motion
 from ...options.capture import ON
 from ..media.video import Video
 from ..options import CaptureOptions
+from ..world.world_frame import LINES, UP_DEVIATIONS_DEG
 from .clock import at_times
 from .footage import Footage
 from .solve import Solved
@@ -35,6 +36,7 @@ def make_report(
     :param rates: frames per second by stage.
     """
     motions, camera, motion = solved.motions, footage.camera, footage.camera_motion
+    is_still = len(footage.timestamps) == 1
     return {
         "source": str(video.path),
         "frames": len(footage.timestamps),
@@ -49,6 +51,8 @@ def make_report(
         "camera": camera.source,
         "camera_turns_deg": 0.0 if motion.is_static else round(motion.largest_turn_deg, 2),
         "camera_travels_m": round(float(np.linalg.norm(np.diff(solved.path.center, axis=0), axis=1).sum()), 2),
+        "up": solved.up_source,
+        "up_deviation_deg": UP_DEVIATIONS_DEG[solved.up_source][is_still],
         "focal_px": float(camera.intrinsics[0, 0]),
         "focal_deviation": round(camera.focal_deviation, 3),
         "frame_rate": [video.fps.numerator, video.fps.denominator],
@@ -57,6 +61,7 @@ def make_report(
         "iterations": solved.iterations,
         "cuts_s": [round(t, 3) for t in footage.cuts_s],
         "warnings": footage.warnings
+        + up_warnings(Path(video.path).name, solved.up_source, is_still)
         + capture_warnings(Path(video.path).name, options, footage.cuts_s, motions)
         + floor_warnings(Path(video.path).name, body, motions, len(options.heights_m)),
     }
@@ -88,6 +93,17 @@ def capture_warnings(name: str, options: CaptureOptions, cuts_s: list[float], mo
         if options.face and not face_frames(motion).get("face_frames"):
             warnings.append(f"{name}: the face of {who} was not found; come closer, and look towards the camera")
     return warnings
+
+
+def up_warnings(name: str, up_source: str, is_still: bool) -> list[str]:
+    """Say where the up direction is a guess: in a still image without edges of walls, doors or floors."""
+    if up_source == LINES or not is_still:
+        return []
+    deviation = UP_DEVIATIONS_DEG[up_source][is_still]
+    return [
+        f"{name}: no edges in this picture show which way is up, so it follows from the people's posture alone, and "
+        f"the result may lean by {deviation:.0f} degrees or more: check it from the side, and rotate it if it does"
+    ]
 
 
 def face_frames(motion: Motion) -> dict[str, Any]:

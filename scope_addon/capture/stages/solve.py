@@ -34,11 +34,15 @@ MIN_RESIZE = 0.03  # relative change of a size from which on a person is fitted 
 
 @dataclass(frozen=True)
 class Solved:
-    """Motions, the most prominent person first; the camera's path; the solver's mean iterations per frame."""
+    """Motions, the most prominent person first; the camera's path; the solver's mean iterations per frame.
+
+    ``up_source``: what the world's up direction follows from, see `SharedWorld`.
+    """
 
     motions: list[Motion]
     path: CameraPath
     iterations: float
+    up_source: str
 
 
 def solve(shot: Shot, tracks: Iterable[Track], progress: Progress, heights_m: Sequence[float] = ()) -> Solved:
@@ -75,7 +79,7 @@ def solve(shot: Shot, tracks: Iterable[Track], progress: Progress, heights_m: Se
     while people:
         return_freed_memory()
         motions.append(finish(shot, people.pop(0), placed.pop(0), world, len(motions)))
-    return Solved(motions, shot.path, iterations)
+    return Solved(motions, shot.path, iterations, world.up_source)
 
 
 def progress_of_person(progress: Progress, number: int, count: int) -> Progress:

@@ -7,7 +7,7 @@ import pytest
 from scope.scope_addon.capture.camera.intrinsics import Camera, choose_camera, pinhole
 from scope.scope_addon.capture.camera.line_segments import Lines, Segments, find_segments
 from scope.scope_addon.capture.camera.verticals import estimate_up_from_lines
-from scope.scope_addon.capture.world.world_frame import up_from_scene
+from scope.scope_addon.capture.world.world_frame import BODIES, up_from_scene
 from scope.solver.rotations import exp
 
 WIDTH, HEIGHT = 1280, 720
@@ -107,7 +107,9 @@ def test_a_fence_determines_a_horizontal_direction_but_not_up(turn):
     assert estimate_up_from_lines(lines, leaning).up is None
     assert abs(90 - angle_deg(estimate_up_from_lines(lines, leaning).level, R @ LEVEL_UP)) < 0.5
     feet = np.zeros((5, 4, 3))
-    off_deg = angle_deg(up_from_scene(leaning, feet, lines), R @ LEVEL_UP)
+    up, source = up_from_scene(leaning, feet, lines)
+    assert source == BODIES
+    off_deg = angle_deg(up, R @ LEVEL_UP)
     assert off_deg < 0.8 * angle_deg(leaning, R @ LEVEL_UP)
     assert off_deg == pytest.approx(np.degrees(0.1), abs=1.2)  # the pitch, which no edge determines, remains
 

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the report says of a face: counted by hand."""
+"""What the report says of a face, counted by hand, and of the up direction."""
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.stages.report import face_frames
+from scope.scope_addon.capture.stages.report import face_frames, up_warnings
+from scope.scope_addon.capture.world.world_frame import BODIES, LINES
 from scope.solver import load_body
 
 from ...made_motion import made_face, made_motion
@@ -40,3 +41,12 @@ def test_a_face_that_was_never_seen_has_no_rate(motion):
     motion.face = made_face(T)
     motion.face["expression_confidence"][:] = 0.0
     assert face_frames(motion) == {"face_frames": 0, "blinks": 0}
+
+
+def test_a_still_without_edges_says_that_up_is_a_guess():
+    """And how far it may be off; clips, and pictures with edges, say nothing."""
+    (warning,) = up_warnings("a.jpg", BODIES, is_still=True)
+    assert "a.jpg" in warning
+    assert "11 degrees" in warning
+    assert up_warnings("a.jpg", LINES, is_still=True) == []
+    assert up_warnings("a.mp4", BODIES, is_still=False) == []
