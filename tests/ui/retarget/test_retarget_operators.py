@@ -13,9 +13,20 @@ from scope.scope_addon.scene.visibility import hide_again, show
 from scope.scope_addon.ui.captured_person import captured_armature
 from scope.scope_addon.ui.retarget.retarget_properties import offered_parts
 
-from ...edit.walking import BODY, RATE, motion_of, walk
+from ...edit.walking import BODY, NAMES, RATE, motion_of, walk
+from ...retarget.naming_schemes import PLACES
 from ...scene.exported import read_back
 from ...scene.made_rigs import build_rig, captured, seen
+
+
+def leg_length(joints):
+    return np.linalg.norm(np.diff(joints, axis=0), axis=1).sum()
+
+
+LEG = ("hip", "knee", "ankle")
+# The legs of a rig of size 1 over those of the body.
+LEG_RATIO = leg_length([PLACES[joint] for joint in LEG])
+LEG_RATIO /= leg_length(BODY.rest_joints()[[NAMES.index(f"left_{joint}") for joint in LEG]])
 
 
 @pytest.fixture
@@ -51,7 +62,7 @@ def test_travel_scale_multiplies_the_path(rig):
         paths[scale] = seen(rig, ["pelvis"])[:, 0, :2]
     np.testing.assert_allclose(np.ptp(paths[1.0], axis=0), 2.0 * np.ptp(paths[0.5], axis=0), atol=0.01)
     legs = np.ptp(paths[0.0][:, 1]) / np.ptp(paths[1.0][:, 1])
-    assert legs == pytest.approx(1.3, abs=0.01)  # the size of this rig
+    assert legs == pytest.approx(1.3 * LEG_RATIO, abs=0.01)  # this rig has the size 1.3
 
 
 def two_people_who_meet():
@@ -98,10 +109,12 @@ def test_each_rigs_own_scale_parts_two_people(capfd):
         bpy.ops.scope.retarget()
     said = capfd.readouterr().out
     scales = [float(number) for number in re.findall(r"floor scaled by ([\d.]+)", said)]
-    assert scales == pytest.approx([1.5, 0.8], abs=0.02)
-    true = [seen(person, ["pelvis"])[:, 0, :2] for person in people]
-    for rig, hips, scale, path in zip(rigs, ("pelvis", "mixamorig:Hips"), scales, true, strict=True):
-        np.testing.assert_allclose(seen(rig, [hips])[:, 0, :2], scale * path, atol=0.03)
+    assert scales == pytest.approx([1.5 * LEG_RATIO, 0.8 * LEG_RATIO], abs=0.01)
+    hips_of = (("thigh_l", "thigh_r"), ("mixamorig:LeftUpLeg", "mixamorig:RightUpLeg"))
+    for rig, hips, scale, person in zip(rigs, hips_of, scales, people, strict=True):
+        path = seen(rig, hips)[..., :2].mean(axis=1)
+        true = seen(person, ("left_hip", "right_hip"))[..., :2].mean(axis=1)
+        np.testing.assert_allclose(path, scale * true, atol=0.01)
 
 
 def captured_armature_of(rig):
