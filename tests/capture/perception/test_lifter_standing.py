@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether the lifting network lets people stand straight, and sink into a squat: exact keypoints, analytic truth."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.perception.lifter import WINDOW, default_lifter
+from scope.solver.loaders.body_file import load_body
+
+from ..stages.standing_views import DISTANCE_M, knee_flexion, standing_views
+
+SHAPES = 3  # drawn people besides the mean one
+
+
+@pytest.fixture(scope="module")
+def body():
+    return load_body("scope")
+
+
+def lifted_flexion(view, with_world):
+    """The knees' flexion of what the network makes of nine equal frames."""
+    in_front = view.points + [0.0, 0.0, DISTANCE_M]
+    rays = np.repeat((in_front[:, :2] / in_front[:, 2:])[None], WINDOW, axis=0)
+    world = np.repeat(view.points[None], WINDOW, axis=0) if with_world else None
+    lifted = default_lifter().lift(rays, np.ones((WINDOW, len(view.points))), world)
+    return knee_flexion(lifted.points[WINDOW // 2])
+
+
+def errors(body, bend_deg, with_world, betas=None):
+    views = list(standing_views(body, bend_deg, betas))
+    return np.array([lifted_flexion(view, with_world) - knee_flexion(view.points) for view in views])
+
+
+@pytest.mark.parametrize("with_world", [False, True])
+def test_straight_legs_stay_straight(body, with_world):
+    """The network before this test answered 14.5° on average and 24° from the front."""
+    found = errors(body, 0.0, with_world)
+    assert found.mean() < 7.0
+    assert np.abs(found).max() < 11.0
+
+
+def test_straight_legs_of_other_proportions_stay_straight(body):
+    rng = np.random.default_rng(3)
+    found = [errors(body, 0.0, False, rng.normal(size=body.P)) for _ in range(SHAPES)]
+    assert np.mean(found) < 8.0
+
+
+def test_bent_legs_stay_bent(body):
+    """Seen from the front, bent knees only shorten the legs; with depth from the landmark network they are known."""
+    views = list(standing_views(body, 67.0))
+    from_the_side = [k for k, view in enumerate(views) if view.azimuth in (30, 60, 90, 150)]
+    found = errors(body, 67.0, True)
+    assert np.abs(found[from_the_side]).max() < 20.0
+    assert found.mean() > -15.0
