@@ -15,7 +15,7 @@ from scope.solver.rotations import exp, log
 from ..edit.walking import BODY, RATE, motion_of, walk
 
 FILE = Path("walk.npz")
-CLIP = walk(2.0)
+CLIP = walk(2.0, bent=0.1)  # as people walk: no leg is locked straight
 MOTION = motion_of(CLIP)
 # Axes written out: what z up in the world is in a file with y up, and with y down.
 R_FILE_WORLD = {

@@ -45,10 +45,10 @@ def test_a_beard_is_around_the_mouth_and_moves_with_the_jaw(body):
     jaw = next(k for k, e in enumerate(expressions_of(body)) if e.name == "jawOpen")
     weights = np.eye(52)[jaw]
     opened = beard.vertices(with_expression(body, weights).v_template).reshape(-1, 3, 3)
-    chin = (roots[:, 1] < 0.585) & (roots[:, 2] > 0.1)
+    chin = (roots[:, 1] < 0.601) & (roots[:, 2] > 0.1)
     assert chin.sum() > 500
     assert (at_rest - opened)[chin, 0, 1].mean() > 0.01
-    assert bearded(body)[body.v_template[:, 1] > 0.68].max() == 0  # at the height of the eyes
+    assert bearded(body)[body.v_template[:, 1] > 0.696].max() == 0  # at the height of the eyes
 
 
 def test_heads_are_turned_away_by_45_to_60_degrees():

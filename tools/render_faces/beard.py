@@ -18,8 +18,8 @@ HAIRS = 9000
 _LENGTH_M, _HALF_WIDTH_M = (0.006, 0.013), 0.00045
 _MOUSTACHE_SHORTER, _MOUSTACHE_DENSER = 0.75, 3.0
 # In the model frame, metres: the moustache between nose and mouth, and where the beard ends above, below and behind.
-_NOSE, _MOUTH, _CHIN, _CORNER, _CHEEK_SLOPE = 0.6335, 0.6265, 0.5945, 0.024, 0.75
-_MOUSTACHE_HALF, _LOWEST, _BACK, _EARS = 0.027, 0.548, 0.028, 0.069
+_NOSE, _MOUTH, _CHIN, _CORNER, _CHEEK_SLOPE = 0.6495, 0.6425, 0.6105, 0.024, 0.75
+_MOUSTACHE_HALF, _LOWEST, _BACK, _EARS = 0.027, 0.564, 0.028, 0.069
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def bearded(body: Body) -> NDArray[np.float64]:
     V = body.v_template
     x, y, z = abs(V[:, 0]), V[:, 1], V[:, 2]
     moustache = (x < _MOUSTACHE_HALF) & (y > _MOUTH - 0.5 * x) & (y < _NOSE - 0.3 * x) & (z > 0.11)
-    edge = np.where(x < _CORNER, _CHIN, 0.625 + _CHEEK_SLOPE * (x - _CORNER))
+    edge = np.where(x < _CORNER, _CHIN, 0.641 + _CHEEK_SLOPE * (x - _CORNER))
     beard = (y < edge) & (y > _LOWEST) & (z > _BACK) & (x < _EARS)
     lips, _, _ = masks(body)
     covered = (moustache | beard) & (lips < 0.5)

@@ -15,7 +15,7 @@ from ...solver.body import Body
 from .sequences import FaceClip
 
 FOLDER = Path(__file__).resolve().parents[2] / "build" / "faces"
-MIDDLE = np.array([0.0, 0.665, 0.11])  # of the face, in the model frame; the camera looks at it
+MIDDLE = np.array([0.0, 0.681, 0.11])  # of the face, in the model frame; the camera looks at it
 WIDTH_M = 0.27  # that the picture shows at the face
 SIZE = 256
 _NECK_M, _HALF_M = 0.08, 0.2  # below the neck joint and beside the body's middle, where the picture ends

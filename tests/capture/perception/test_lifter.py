@@ -212,14 +212,15 @@ def head_as_three_keypoints(confidence):
 
 
 @pytest.mark.parametrize(
-    ("cameras", "limit_mm"), [((1, 2, 3, 4), 30.0), ((1, 2, 3), 34.0), ((1, 2, 4), 34.0), ((1, 3, 4), 34.0)]
+    ("cameras", "limit_mm"), [((1, 2, 3, 4), 35.0), ((1, 2, 3), 39.0), ((1, 2, 4), 34.0), ((1, 3, 4), 34.0)]
 )
 def test_several_cameras_together_are_near_the_truth(estimates, cameras, limit_mm):
     """One frame in 20 of each camera, 2D keypoints alone, through `fit_motion`.
 
     The rig's calibration: intrinsics and distortion as published; a camera's place is where the true joints are the
-    same in its axes as in the first one's, to rounding. Measured: 28.4 mm, 29.8 in all frames of the captures, and
-    32.5, 27.7 and 29.2 with three cameras; captures of one camera have 57 to 74.
+    same in its axes as in the first one's, to rounding. Measured: 33.5 mm, and 37.2 with the first three cameras;
+    captures of one camera have 56 to 69. The true hips are keypoints; with the body's hip joints there instead of
+    where anatomy has them, 28.4 and 32.5 mm.
     """
     plain = load_body("scope")
     body, names = with_keypoint_offsets(plain), plain.joint_names

@@ -108,14 +108,14 @@ def test_a_pin_out_of_reach_is_said_with_its_distance_and_listed(rig, capfd):
 
 
 def test_a_pin_under_the_floor_is_said_with_its_depth(rig, tmp_path, capfd):
-    low = walk(3.0)
-    low.root[:, 2] -= 0.08  # 5 cm of the left foot are under the floor in frame 48
+    low = walk(3.0, bent=0.9)
+    low.root[:, 2] -= 0.23  # crouching, so that a foot can reach below the floor
     motion_of(low).save(tmp_path / "person1.npz")
     ankle = low.joints(BODY, BETAS)[48, ANKLE]
     bpy.ops.scope.smooth(strength=1.0)  # writes the keys of that motion
-    bpy.ops.scope.add_pin(joint="right_ankle", frame=49, location=[*ankle[:2], 0.04])
+    bpy.ops.scope.add_pin(joint="right_ankle", frame=49, location=[*ankle[:2], 0.08])
     assert "under the floor" not in capfd.readouterr().out
-    bpy.ops.scope.add_pin(joint="right_ankle", frame=49, location=[*ankle[:2], -0.06])
+    bpy.ops.scope.add_pin(joint="right_ankle", frame=49, location=[*ankle[:2], -0.03])
     heights = foot_heights(stored_motion_of(rig), BODY)[48, 2:]
     assert f"up to {-100 * heights.min():.0f} cm under the floor in 1 of 91 frames" in capfd.readouterr().out
 

