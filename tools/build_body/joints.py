@@ -11,10 +11,9 @@ upright has bent knees and leans forward. `CENTRES` moves hips and shoulders to 
 
 with the cubes' own f, u and l. They measure the skeleton, which fat does not change, and are linear in the vertices.
 
-    joint      place in the mean body (stature 1.69 m, standing)                        after
-    hip        4.8 cm behind and 9 cm below the front spines of the pelvis, 19.6 cm     Harrington: 4.5, 8.3 and
-               apart                                                                    17 to 18; models of people 19 to 21
-    shoulder   3 cm below the acromion's skin, 0.812 of the stature high                surveys: 0.812, de Leva: 0.827
+In the mean body (stature 1.69 m, standing), hips lie 4.8 cm behind and 9 cm below the front spines of the pelvis, 19.6
+cm apart (Harrington: 4.5, 8.3, and 17 to 18; models of people: 19 to 21), and shoulders 3 cm below the acromion's skin,
+0.812 of the stature high (surveys: 0.812, de Leva: 0.827).
 """
 
 from __future__ import annotations
