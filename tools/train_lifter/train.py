@@ -85,10 +85,13 @@ class Trainer:
         self._forget_warm_up()
         # On a CPU, the next batch is drawn beside the training, which keeps a second core busy.
         self._drawing = None if device == "cuda" else ThreadPoolExecutor(1)
-        self._ahead = self._draw_ahead()
+        self._ahead = self._draw_ahead(0)
 
-    def _draw_ahead(self) -> Future[Batch] | None:
-        return self._drawing.submit(self.dataset.batch, self.settings.batch) if self._drawing else None
+    def _draw_ahead(self, number: int) -> Future[Batch] | None:
+        """Begin to draw the batch of step ``number``, if there is one."""
+        if self._drawing is None or number >= self.settings.steps:
+            return None
+        return self._drawing.submit(self.dataset.batch, self.settings.batch)
 
     def _optimizer(self) -> torch.optim.Optimizer:
         matrices = {"params": [p for p in self.parameters if p.ndim > 1], "weight_decay": DECAY}
@@ -134,7 +137,7 @@ class Trainer:
             self._draw()
         else:
             batch = self._ahead.result()
-            self._ahead = self._draw_ahead()
+            self._ahead = self._draw_ahead(number + 1)
             self.input, self.points = batch.input, batch.points
         self._step()
 
