@@ -27,7 +27,9 @@ SAME_FLOOR_M = 0.4  # the feet of people on one floor may differ so much in heig
 UP_NOISE_RAD = np.radians(5.0)  # σ_up, error of an up direction estimated from bodies
 FIRST_S = 0.5  # on uneven ground, of the contact that determines the floor
 LEVEL_UP = (0.0, -1.0, 0.0)  # up in the axes of a level camera
-LINES, BODIES = "lines", "bodies"  # what the up direction follows from
+# What the up direction follows from: edges of the background, or how people stand and move.
+LINES = "lines"
+BODIES = "bodies"
 # Standard deviations of the up direction, degrees, in (clips, still images): the root mean square of its errors in five
 # clips and five pictures of people whose true up direction is known, most of them with lines.
 UP_DEVIATIONS_DEG = {LINES: (1.5, 4.0), BODIES: (3.5, 11.0)}
