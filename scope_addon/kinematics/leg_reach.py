@@ -47,8 +47,10 @@ def move_feet(
         upper, lower = t[moved, knee] - t[moved, hip], t[moved, ankle] - t[moved, knee]
         goal = upper + lower + shift[moved, side]
         length = np.linalg.norm(upper, axis=1) + np.linalg.norm(lower, axis=1)
-        now, wanted = np.linalg.norm(upper + lower, axis=1), np.linalg.norm(goal, axis=1)
-        shortest, longest = np.minimum(now, SHORTEST * length), np.maximum(now, LONGEST * length)
+        now = np.linalg.norm(upper + lower, axis=1)
+        wanted = np.linalg.norm(goal, axis=1)
+        shortest = np.minimum(now, SHORTEST * length)
+        longest = np.maximum(now, LONGEST * length)
         bend = knee_turn(upper, lower, R[moved, hip, :, 0], np.clip(wanted, shortest, longest))
         reached = upper + np.einsum("tij,tj->ti", bend, lower)
         swing = shortest_turn(reached, goal)
@@ -80,7 +82,8 @@ def knee_turn(
     axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-9)
     along_u, along_l = (upper * axis).sum(1), (lower * axis).sum(1)
     fixed = along_u * along_l
-    cosine, sine = (upper * lower).sum(1) - fixed, (upper * cross(axis, lower)).sum(1)
+    cosine = (upper * lower).sum(1) - fixed
+    sine = (upper * cross(axis, lower)).sum(1)
     size = np.maximum(np.hypot(cosine, sine), 1e-12)
     target = np.clip((0.5 * (wanted**2 - a**2 - b**2) - fixed) / size, -1.0, 1.0)
     angle = np.arctan2(sine, cosine) + np.arccos(target)

@@ -102,15 +102,15 @@ def _segments(points: Mapping[str, Points], head: Points | None, lefts: Mapping[
 
 def frame(left: Points, up: Points) -> Points:
     """Return rotations (T, 3, 3) whose x axis is ``left`` and whose y axis is ``up`` made perpendicular to it."""
-    x = _unit(left)
-    y = _unit(up - x * _dot(up, x))
+    x = unit(left)
+    y = unit(up - x * dot(up, x))
     return np.stack([x, y, np.cross(x, y)], axis=-1)
 
 
 def along(up: Points, left: Points) -> Points:
     """Return rotations (T, 3, 3) whose y axis is ``up`` and whose x axis is ``left`` made perpendicular to it."""
-    y = _unit(up)
-    x = _unit(left - y * _dot(left, y))
+    y = unit(up)
+    x = unit(left - y * dot(left, y))
     return np.stack([x, y, np.cross(x, y)], axis=-1)
 
 
@@ -120,21 +120,21 @@ def _hinge(upper: Points, lower: Points, straight: Points, sign: float) -> Point
     :param straight: the axis where the limb is straight; ``sign``: 1 for knees, -1 for elbows.
     """
     normal = sign * np.cross(upper, lower)
-    bend = np.arctan2(np.linalg.norm(normal, axis=1, keepdims=True), _dot(upper, lower))
+    bend = np.arctan2(np.linalg.norm(normal, axis=1, keepdims=True), dot(upper, lower))
     share = np.clip((bend - STRAIGHT) / (BENT - STRAIGHT), 0.0, 1.0)
     share = share * share * (3.0 - 2.0 * share)
-    y = _unit(upper)
-    rest = _unit(straight - y * _dot(straight, y))
+    y = unit(upper)
+    rest = unit(straight - y * dot(straight, y))
     mixed = share * normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12) + (1.0 - share) * rest
     return np.asarray(np.where(np.linalg.norm(mixed, axis=1, keepdims=True) > 1e-3, mixed, rest))
 
 
 def _carried(chest: Points, up: Points) -> Points:
     """Return the chest's x axis (T, 3) turned as the arm is from hanging, by the smallest rotation."""
-    y = _unit(up)
+    y = unit(up)
     axis = np.cross(chest[..., 1], y)
     sine = np.linalg.norm(axis, axis=1, keepdims=True)
-    angle = np.arctan2(sine, _dot(chest[..., 1], y))
+    angle = np.arctan2(sine, dot(chest[..., 1], y))
     turned: Points = np.einsum("tij,tj->ti", exp(axis / np.maximum(sine, 1e-9) * angle), chest[..., 0])
     return turned
 
@@ -145,9 +145,11 @@ def _looking_ahead(skull: Points) -> Points:
     return skull @ exp(np.array([np.clip(HEAD_PITCH + pitch, -2 * MAX_HEAD_PITCH, 2 * MAX_HEAD_PITCH), 0.0, 0.0]))
 
 
-def _unit(v: Points) -> Points:
+def unit(v: Points) -> Points:
+    """Return unit vectors (..., 3)."""
     return np.asarray(v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-12))
 
 
-def _dot(a: Points, b: Points) -> Points:
+def dot(a: Points, b: Points) -> Points:
+    """Return a · b (..., 1) of vectors (..., 3)."""
     return np.asarray((a * b).sum(axis=-1, keepdims=True))

@@ -33,7 +33,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.errors import ShapeError
-from .joint_centres import SIDES, Points
+from ...solver.rotations import shortest_turn
+from .joint_centres import SIDES, Points, dot, unit
 from .kinds import named_kind
 from .take import Take
 
@@ -80,7 +81,7 @@ def straightened(take: Take) -> Take:
     for side in SIDES:
         for upper, lower in (("hip", "knee"), ("knee", "ankle")):
             first, second = f"{side}_{upper}", f"{side}_{lower}"
-            turn = _smallest_rotation(before[first] - before[second], after[first] - after[second])
+            turn = shortest_turn(before[first] - before[second], after[first] - after[second])
             orientations[:, take.index(first)] = turn @ orientations[:, take.index(first)]
     return replace(take, positions=positions, orientations=orientations)
 
@@ -91,10 +92,10 @@ def flexion(hip: Points, knee: Points, ankle: Points, left: Points) -> NDArray[n
     :param hip: (T, 3) metres, as ``knee`` and ``ankle``.
     :param left: (T, 3) unit vectors to the person's left.
     """
-    thigh = _unit(hip - knee)
-    shank = _unit(knee - ankle)
+    thigh = unit(hip - knee)
+    shank = unit(knee - ankle)
     angle = np.degrees(np.arccos(np.clip((thigh * shank).sum(axis=-1), -1.0, 1.0)))
-    return np.asarray(np.where(_dot(np.cross(thigh, shank), left)[..., 0] < 0.0, -angle, angle))
+    return np.asarray(np.where(dot(np.cross(thigh, shank), left)[..., 0] < 0.0, -angle, angle))
 
 
 def knee_flexions(legs: Mapping[str, Points]) -> NDArray[np.float64]:
@@ -102,7 +103,7 @@ def knee_flexions(legs: Mapping[str, Points]) -> NDArray[np.float64]:
 
     :param legs: (T, 3) metres, hip, knee and ankle of both sides by name.
     """
-    left = _unit(legs["left_hip"] - legs["right_hip"])
+    left = unit(legs["left_hip"] - legs["right_hip"])
     found = np.array([flexion(*_leg(legs, side), left) for side in SIDES])
     return np.where(found < BACKWARDS_DEG, -found, found)
 
@@ -121,7 +122,7 @@ def _straight_legs(
         return moved
     least = 0.0
     most = MOST_M if kind in FLEXED_DEG else MEASURED_MOST_M.get(subject, OTHERS_MOST_M)
-    left = _unit(legs["left_hip"] - legs["right_hip"])  # hips that move alone leave it as it is
+    left = unit(legs["left_hip"] - legs["right_hip"])  # hips that move alone leave it as it is
     for _ in range(ROUNDS):
         x = 0.5 * (least + most)
         result = with_knees_back(moved, left, x)
@@ -134,11 +135,11 @@ def _straight_legs(
 
 def _with_measured_joints(legs: Mapping[str, Points], up: Points) -> dict[str, Points]:
     """Return the legs with hips and ankles where the markers say they are."""
-    left = _unit(legs["left_hip"] - legs["right_hip"])
+    left = unit(legs["left_hip"] - legs["right_hip"])
     found = dict(legs)
     for side in SIDES:
-        shank = _unit(legs[f"{side}_knee"] - legs[f"{side}_ankle"])
-        ahead = _unit(np.cross(left, shank))
+        shank = unit(legs[f"{side}_knee"] - legs[f"{side}_ankle"])
+        ahead = unit(np.cross(left, shank))
         found[f"{side}_hip"] = legs[f"{side}_hip"] + HIP_UP_M * up
         moved = ANKLE_AHEAD_M * ahead - ANKLE_DOWN_M * shank
         found[f"{side}_ankle"] = legs[f"{side}_ankle"] + moved
@@ -147,7 +148,7 @@ def _with_measured_joints(legs: Mapping[str, Points], up: Points) -> dict[str, P
 
 def _with_hips_back(legs: Mapping[str, Points], up: Points) -> dict[str, Points]:
     """Return the legs with hips further back, and knees from the lengths of the bones."""
-    left = _unit(legs["left_hip"] - legs["right_hip"])
+    left = unit(legs["left_hip"] - legs["right_hip"])
     found = dict(legs)
     for side in SIDES:
         hip, knee, ankle = _leg(legs, side)
@@ -159,7 +160,7 @@ def _with_hips_back(legs: Mapping[str, Points], up: Points) -> dict[str, Points]
         along = (reach**2 + thigh**2 - shank**2) / (2.0 * reach)
         ahead = np.sqrt(np.maximum(thigh**2 - along**2, 0.0))
         found[f"{side}_hip"] = hip
-        foot_of_knee = hip + along * distance / reach * _unit(ankle - hip)
+        foot_of_knee = hip + along * distance / reach * unit(ankle - hip)
         found[f"{side}_knee"] = foot_of_knee + ahead * _ahead_of_leg(hip, knee, ankle, left)
     return found
 
@@ -184,36 +185,15 @@ def _ahead_of_leg(hip: Points, knee: Points, ankle: Points, left: Points) -> Poi
     It lies in the leg's own plane when the knee is bent, and in the pelvis's sagittal plane when it
     is nearly straight.
     """
-    line = _unit(hip - ankle)
-    across = _unit(left - line * _dot(left, line))
+    line = unit(hip - ankle)
+    across = unit(left - line * dot(left, line))
     bend = np.abs(flexion(hip, knee, ankle, left))[:, None]
     own = np.cross(hip - knee, knee - ankle)
-    is_reversed = (_dot(own, across) < 0.0) & (bend < REVERSIBLE_DEG)
+    is_reversed = (dot(own, across) < 0.0) & (bend < REVERSIBLE_DEG)
     own = np.where(is_reversed, -own, own)
     share = np.clip((bend - STRAIGHT_DEG) / (BENT_DEG - STRAIGHT_DEG), 0.0, 1.0)
-    return np.asarray(np.cross(_unit(share * _unit(own) + (1.0 - share) * across), line))
+    return np.asarray(np.cross(unit(share * unit(own) + (1.0 - share) * across), line))
 
 
 def _leg(legs: Mapping[str, Points], side: str) -> tuple[Points, Points, Points]:
     return legs[f"{side}_hip"], legs[f"{side}_knee"], legs[f"{side}_ankle"]
-
-
-def _smallest_rotation(before: Points, after: Points) -> NDArray[np.float64]:
-    """Return the smallest rotations (T, 3, 3) that turn directions (T, 3) before to those after.
-
-    R = 1 + [v]ₓ + [v]ₓ² / (1 + c) with v = a × b and c = a · b of the unit vectors a and b.
-    """
-    a = _unit(before)
-    b = _unit(after)
-    v = np.cross(a, b)
-    K = np.cross(v[:, None, :], np.eye(3)).swapaxes(-1, -2)
-    c = _dot(a, b)[..., None]
-    return np.asarray(np.eye(3) + K + K @ K / (1.0 + c))
-
-
-def _unit(v: Points) -> Points:
-    return np.asarray(v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-9))
-
-
-def _dot(a: Points, b: Points) -> Points:
-    return np.asarray((a * b).sum(axis=-1, keepdims=True))
