@@ -39,13 +39,16 @@ JOINT_NOISE |= {"ankle": 0.2, "foot": 0.1, "spine": 0.08, "neck": 0.15, "head": 
 UNTURNED_SHARE = 0.25  # of the samples that are not natural, those whose joints are not rotated
 LEAN, STRONG_LEAN, STRONG_LEAN_SHARE = math.radians(7.0), math.radians(45.0), 0.1
 NATURAL_LEAN = 0.4  # factor on the lean of natural samples
-STRAIGHTENED_SHARE = 0.6  # of the samples of people who stand, those whose legs are straightened
+STRAIGHTENED_SHARE = 0.8  # of the samples of people who stand, those whose legs are straightened
+STRAIGHTENED_PART = (0.4, 1.0)  # of the flexion that is taken out
 STRAIGHTENED_DEG = 22.0  # up to which a knee is bent because of the recording, and not on purpose
 SQUAT_SHARE = 0.35  # of the samples of people who stand, those who squat, ...
 SQUAT_DEG = (0.0, 80.0)  # ... whose thighs pitch forward by this in the middle of the window, ...
 SQUAT_SPEED_DEG_S = 40.0  # ... and turn by this per second, one standard deviation
 SHANK_PITCH, TRUNK_PITCH = (0.25, 0.75), (0.0, 0.8)  # forward, of the thigh's
 LEGS_DIFFER = 0.1  # spread of the factor between the pitches of the two legs
+ARMS_AHEAD_SHARE = 0.4  # of the squats, those in which arms are stretched forward, as people do to keep their balance
+ARMS_DEG = {"elevation": 15.0, "azimuth": 12.0, "roll": 30.0, "elbow": 25.0, "sides": 5.0}  # standard deviations
 SPEED_SPREAD = 0.2  # of the logarithm of a motion's speed
 SHAPE_LIMIT = 2.5  # in standard deviations
 BONE_SPREAD = 0.04  # of the logarithm of each bone's length, left and right alike
@@ -78,6 +81,7 @@ class PoseSampler:
         self._offsets_s = on_device(OFFSETS_S)
         self._stands = on_device(motions.kinds == "stand", dtype=torch.bool)
         self._squatting = [[names.index(f"{s}_{j}") for j in ("hip", "knee", "ankle")] for s in ("left", "right")]
+        self._arms = [[names.index(f"{s}_{j}") for j in ("shoulder", "elbow")] for s in ("left", "right")]
         self.partner = on_device([names.index(_other_side(name)) for name in names], dtype=torch.long)
         self._joints = torch.arange(self.joint_count, device=device)
         self._alike = torch.minimum(self._joints, self.partner)
@@ -140,7 +144,7 @@ class PoseSampler:
             R = Omega[:, :, knee]
             bend = torch.atan2(R[..., 2, 1] - R[..., 1, 2], R[..., 1, 1] + R[..., 2, 2])
             slight = (bend > 0.0) & (bend < math.radians(STRAIGHTENED_DEG))
-            less = torch.where(slight, bend, 0.0) * uniform(self._fps, (0.4, 1.0), n, 1) * taken[:, None]
+            less = torch.where(slight, bend, 0.0) * uniform(self._fps, STRAIGHTENED_PART, n, 1) * taken[:, None]
             Omega[:, :, hip] = about_x(0.5 * less) @ Omega[:, :, hip]
             Omega[:, :, knee] = about_x(-less) @ R
             Omega[:, :, ankle] = about_x(0.5 * less) @ Omega[:, :, ankle]
@@ -168,6 +172,30 @@ class PoseSampler:
             flexions = (-trunk - share * thigh, share * (thigh + shank), -share * shank)
             for joint, angle in zip(joints, flexions, strict=True):
                 Omega[:, :, joint] = about_x(angle) @ Omega[:, :, joint]
+        return self._with_arms_ahead(Omega, trunk, taken & chance(self._fps, ARMS_AHEAD_SHARE, n))
+
+    def _with_arms_ahead(self, Omega: Tensor, trunk: Tensor, taken: Tensor) -> Tensor:
+        """Stretch both arms forward, about level in the world, where ``taken`` (n,).
+
+        An upper arm at rest points to its side, s x with s = 1 for the left. It points ahead after
+
+            R = R_x(−elevation) R_y(−s (90° − azimuth)) R_x(roll),
+
+        where the elevation makes up for the trunk's pitch (n, WINDOW) in radians.
+        """
+        n = len(Omega)
+        deviation = {name: math.radians(value) for name, value in ARMS_DEG.items()}
+        elevation = trunk + deviation["elevation"] * normal(self._fps, n, 1)
+        azimuth = deviation["azimuth"] * normal(self._fps, n, 1)
+        for sign, (shoulder, elbow) in zip((1.0, -1.0), self._arms, strict=True):
+            up = elevation + deviation["sides"] * normal(self._fps, n, 1)
+            outward = azimuth + deviation["sides"] * normal(self._fps, n, 1)
+            roll = deviation["roll"] * normal(self._fps, n, 1)
+            flexion = deviation["elbow"] * normal(self._fps, n, 1).abs()
+            ahead = about_x(-up) @ about_y(-sign * (0.5 * math.pi - outward)) @ about_x(roll)
+            bent = about_y(-sign * flexion)
+            for joint, R in ((shoulder, ahead), (elbow, bent)):
+                Omega[:, :, joint] = torch.where(taken[:, None, None, None], R, Omega[:, :, joint])
         return Omega
 
     def _placement(self, natural: Tensor) -> Tensor:
@@ -230,6 +258,12 @@ def about_x(angle: Tensor) -> Tensor:
     """Return rotations (..., 3, 3) about x by angles (...), radians."""
     zero = torch.zeros_like(angle)
     return rotation_matrices(torch.stack([angle, zero, zero], -1))
+
+
+def about_y(angle: Tensor) -> Tensor:
+    """Return rotations (..., 3, 3) about y by angles (...), radians."""
+    zero = torch.zeros_like(angle)
+    return rotation_matrices(torch.stack([zero, angle, zero], -1))
 
 
 def rotation_matrices(phi: Tensor) -> Tensor:
