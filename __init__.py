@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Scope: markerless motion capture. Imports nothing until it is asked to, so that ``scope.solver`` needs no bpy."""
+"""Scope: markerless motion capture. Imports nothing until it is asked to, so that ``scope.solver``
+needs no bpy.
+"""
 
 
 def register() -> None:
@@ -7,7 +9,8 @@ def register() -> None:
     import gc
 
     collects = gc.isenabled()
-    gc.disable()  # importing leaves no garbage, and to look for some among all of Blender's objects takes long
+    # importing leaves no garbage, and to look for some among all of Blender's objects takes long
+    gc.disable()
     try:
         from .scope_addon import ui
 

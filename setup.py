@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Find the packages of the wheel by rule; everything else about the distribution is in pyproject.toml.
+"""Find the packages of the wheel by rule; everything else about the distribution is in
+pyproject.toml.
 
-The root folder is the package `scope`, and setuptools' own search cannot put a prefix before the names it finds.
-Editable installations map the whole folder, so that `scope.benchmarks` and `scope.tools` are importable in these.
+The root folder is the package `scope`, and setuptools' own search cannot put a prefix before the
+names it finds. Editable installations map the whole folder, so that `scope.benchmarks` and
+`scope.tools` are importable in these.
 """
 
 from setuptools import find_packages, setup
@@ -16,7 +18,11 @@ class BuildProduct(build_py):
 
     def find_package_modules(self, package, package_dir):
         """Return (package, module, file) of every module of a package."""
-        return [found for found in super().find_package_modules(package, package_dir) if found[1] != "setup"]
+        return [
+            found
+            for found in super().find_package_modules(package, package_dir)
+            if found[1] != "setup"
+        ]
 
 
 setup(

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`./scripts/bench WHAT [--quick] [--json FILE]`: measure, print, write. `--help` lists what there is."""
+"""`./scripts/bench WHAT [--quick] [--json FILE]`: measure, print, write. `--help` lists what there
+is.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +48,9 @@ def solver(quick: bool) -> dict[str, Any]:
     experiments: dict[str, list[dict[str, float]]] = {}
     for number, terms in ((1, None), (2, None), (3, None), (3, 600)):
         suffix = f"_N{terms}" if terms else ""
-        rows = experiments[f"{number}{suffix}"] = steps.experiment(number, 5 if quick else 40, terms)
+        rows = experiments[f"{number}{suffix}"] = steps.experiment(
+            number, 5 if quick else 40, terms
+        )
         print(report.experiment_lines(number, rows), end="\n\n", flush=True)
         plots.plot_experiment(OUT, number, rows, suffix)
     figures["experiments"] = experiments
@@ -63,7 +67,9 @@ def solver(quick: bool) -> dict[str, Any]:
     if figures["peers"]:
         measured = list(figures["peers"].items())
         print(
-            report.table(("one iteration, K=23 P=10 N=120, µs", "measured, or the reason why not"), measured),
+            report.table(
+                ("one iteration, K=23 P=10 N=120, µs", "measured, or the reason why not"), measured
+            ),
             end="\n\n",
         )
     print(f"Plots are in {OUT}")
@@ -74,20 +80,28 @@ def _real_frames(quick: bool) -> dict[str, Any]:
     """Return cold_frame_ms, warm_frame_ms and the convergence report."""
     names = frames.QUICK_CLIPS if quick else frames.CLIPS
     if not frames.DATA.is_dir():
-        print(f"{frames.DATA} does not exist: no real frames were measured; put the clips there", file=sys.stderr)
+        print(
+            f"{frames.DATA} does not exist: no real frames were measured; put the clips there",
+            file=sys.stderr,
+        )
         return {"cold_frame_ms": None, "warm_frame_ms": None, "convergence": []}
     clips = frames.load_clips(names)
     rows, figures = [], {}
     settings = [(tolerance, 0.0) for tolerance in frames.TOLERANCES] + [(frames.REPORTED, 0.9)]
     for tolerance, triggs in settings:
-        for kind, outcome in frames.measure(clips, tolerance, triggs, every=5 if quick else 1).items():
-            rows.append({"kind": kind, "tolerance": tolerance, "triggs": triggs, **outcome.summary()})
+        for kind, outcome in frames.measure(
+            clips, tolerance, triggs, every=5 if quick else 1
+        ).items():
+            rows.append(
+                {"kind": kind, "tolerance": tolerance, "triggs": triggs, **outcome.summary()}
+            )
             if (tolerance, triggs) == (frames.REPORTED, 0.0):
                 figures[f"{kind}_frame_ms"] = rows[-1]["milliseconds"]
     print(report.frame_lines(rows), end="\n\n", flush=True)
     batch = frames.throughput(clips)
     print(
-        f"Batch of cold frames: {batch['one_thread']:.0f} per second in one thread, {batch['all_cores']:.0f} on "
+        f"Batch of cold frames: {batch['one_thread']:.0f} per second in one thread, "
+        f"{batch['all_cores']:.0f} on "
         f"{batch['cores']} cores, {batch['ratio']:.2f} x",
         end="\n\n",
     )
@@ -98,12 +112,22 @@ def main() -> int:
     """Run the command line; return the exit status."""
     parser = argparse.ArgumentParser(prog="bench")
     parser.add_argument("what", choices=["solver", *ELSEWHERE])
-    parser.add_argument("--quick", action="store_true", help="fewer repetitions, the default preset alone")
+    parser.add_argument(
+        "--quick", action="store_true", help="fewer repetitions, the default preset alone"
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures as JSON")
     alone = parser.add_argument_group("live alone")
-    alone.add_argument("--part", action="append", choices=LIVE_PARTS, help="what to measure; default: rate and offline")
     alone.add_argument(
-        "--minutes", type=float, default=60.0, help="of footage for the parts world and hour; default: 60"
+        "--part",
+        action="append",
+        choices=LIVE_PARTS,
+        help="what to measure; default: rate and offline",
+    )
+    alone.add_argument(
+        "--minutes",
+        type=float,
+        default=60.0,
+        help="of footage for the parts world and hour; default: 60",
     )
     args = parser.parse_args()
     if args.part and args.what != "live":

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`./scripts/bench ablation`: what each part of the pipeline brings, on Pose2Sim, rendered people and IoU with masks.
+"""`./scripts/bench ablation`: what each part of the pipeline brings, on Pose2Sim, rendered people
+and IoU with masks.
 
-Every clip is observed once, and solved again for each row from the same observations, so that what a part contributes
-to the camera's estimate is not in its row. The renders and the development scenes count as far as they have been made.
-IoU is of the captured body and the masks that the capture itself asks for, one in six frames or 16 for longer clips;
-the clips for it are the four cameras and those of `outline`. Scenes and other clips of less than four masks have none
-of the outline.
+Every clip is observed once, and solved again for each row from the same observations, so that what
+a part contributes to the camera's estimate is not in its row. The renders and the development
+scenes count as far as they have been made. IoU is of the captured body and the masks that the
+capture itself asks for, one in six frames or 16 for longer clips; the clips for it are the four
+cameras and those of `outline`. Scenes and other clips of less than four masks have none of the
+outline.
 """
 
 from __future__ import annotations
@@ -68,12 +70,15 @@ ROWS: dict[str, dict[str, Any]] = {
 }
 QUICK_ROWS = 3
 ERRORS = ("mpjpe_root", "pa_mpjpe")
-People = Sequence[Mapping[str, float] | None]  # the figures of a clip's people; None of who was not found
+# the figures of a clip's people; None of who was not found
+People = Sequence[Mapping[str, float] | None]
 
 
 @dataclass(frozen=True)
 class Observed:
-    """The observations of a clip: its people before any repair, and what is known of the footage."""
+    """The observations of a clip: its people before any repair, and what is known of the
+    footage.
+    """
 
     shot: Shot
     tracks: tuple[Track, ...]
@@ -88,19 +93,26 @@ class Observed:
         return [replace(motion, timestamps=self.timestamps) for motion in motions]
 
 
-def observe_clip(path: Path, body: Body, people: int | str = CaptureOptions().people) -> Observed | None:
+def observe_clip(
+    path: Path, body: Body, people: int | str = CaptureOptions().people
+) -> Observed | None:
     """Run the networks of the default preset over a clip; None if nobody was found."""
     options = CaptureOptions(people=people)
     with open_video(path, options.wanted) as video:
         try:
-            footage, tracks = observe(video, body, options, StageClock(), Listeners(lambda *_: None, lambda *_: None))
+            footage, tracks = observe(
+                video, body, options, StageClock(), Listeners(lambda *_: None, lambda *_: None)
+            )
         except NoPersonError:
             return None
         return Observed(shot_of(video, body, options, footage), tuple(tracks), footage.timestamps)
 
 
-def mask_iou(body: Body, motion: Motion, masks: Sequence[tuple[int, PersonMask]], size: tuple[int, int]) -> float:
-    """Return the median IoU of a captured body and the masks of its track, each with its row; NaN without masks.
+def mask_iou(
+    body: Body, motion: Motion, masks: Sequence[tuple[int, PersonMask]], size: tuple[int, int]
+) -> float:
+    """Return the median IoU of a captured body and the masks of its track, each with its row; NaN
+    without masks.
 
     :param size: of the image, width and height.
     """
@@ -114,7 +126,9 @@ def mask_iou(body: Body, motion: Motion, masks: Sequence[tuple[int, PersonMask]]
 
 
 def ablation(quick: bool) -> dict[str, Any]:
-    """Measure all rows (``quick``: the first three), print the table and return the figures of every clip."""
+    """Measure all rows (``quick``: the first three), print the table and return the figures of
+    every clip.
+    """
     if not DATA.is_dir():
         print(f"{DATA} does not exist: nothing was measured; put the clips there", file=sys.stderr)
         return {}
@@ -130,7 +144,8 @@ def ablation(quick: bool) -> dict[str, Any]:
 def measure_clip(
     body: Body, path: Path, truth: Path | None, rows: Mapping[str, Mapping[str, Any]]
 ) -> dict[str, People]:
-    """Return the figures of every person of a clip for every row; None for people who were not found.
+    """Return the figures of every person of a clip for every row; None for people who were not
+    found.
 
     A figure that the clip does not have is NaN.
 
@@ -149,22 +164,33 @@ def measure_clip(
         if scene:
             results = score_people(body, motions, path.stem, arrays)
             found[name] = [
-                {key: float(np.nanmean(getattr(r, key))) for key in ERRORS} if r.flips else None for r in results
+                {key: float(np.nanmean(getattr(r, key))) for key in ERRORS} if r.flips else None
+                for r in results
             ]
         elif observed is None:
             found[name] = [None]
         else:
-            figures = {"iou": mask_iou(body, motions[0], observed.tracks[0].masks, observed.shot.image_size)}
+            figures = {
+                "iou": mask_iou(
+                    body, motions[0], observed.tracks[0].masks, observed.shot.image_size
+                )
+            }
             if truth is not None:
                 errors = evaluate_motion(motions[0], truth)
                 # Feet that never stand do not slide.
-                figures |= {key: np.nan if errors[key] is None else float(errors[key]) for key in SHOWN}
+                figures |= {
+                    key: np.nan if errors[key] is None else float(errors[key]) for key in SHOWN
+                }
             found[name] = [figures]
     return found
 
 
-def ablation_table(clips: Mapping[str, Mapping[str, People]], rows: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return the means of Pose2Sim's cameras, renders and scenes, and the median IoU, as a Markdown table."""
+def ablation_table(
+    clips: Mapping[str, Mapping[str, People]], rows: Mapping[str, Mapping[str, Any]]
+) -> str:
+    """Return the means of Pose2Sim's cameras, renders and scenes, and the median IoU, as a Markdown
+    table.
+    """
     renders, scenes = (
         [name for name in clips if chosen(name)]
         for chosen in (lambda name: (RENDERS / f"{name}.mp4").is_file(), _of_scene)
@@ -205,8 +231,17 @@ def _of_scene(name: str) -> bool:
 
 
 def _mean(clips: Mapping[str, Any], row: str, names: Any) -> dict[str, float]:
-    people = [figures for name in names if name in clips for figures in clips[name][row] if figures is not None]
-    known = {key: [each[key] for each in people if not np.isnan(each[key])] for key in (people[0] if people else ())}
+    people = [
+        figures
+        for name in names
+        if name in clips
+        for figures in clips[name][row]
+        if figures is not None
+    ]
+    known = {
+        key: [each[key] for each in people if not np.isnan(each[key])]
+        for key in (people[0] if people else ())
+    }
     return {key: float(np.mean(values)) if values else np.nan for key, values in known.items()}
 
 
@@ -217,7 +252,9 @@ def _median_iou(clips: Mapping[str, Any], row: str, names: Any) -> str:
 
 
 def _more(clips: Mapping[str, Any], row: str, names: Sequence[str]) -> str:
-    """Return by how much MPJPE-root is larger than with all parts, with a 95 % interval by bootstrap over people."""
+    """Return by how much MPJPE-root is larger than with all parts, with a 95 % interval by
+    bootstrap over people.
+    """
     pairs = [
         (whole["mpjpe_root"], without["mpjpe_root"])
         for name in names

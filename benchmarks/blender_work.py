@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Time writing and editing keys with Blender's own module; runs in a separate process and prints JSON.
+"""Time writing and editing keys with Blender's own module; runs in a separate process and prints
+JSON.
 
-python -m scope.benchmarks.blender_work MOTION ROUNDS    MOTION: a captured .npz, which is played forwards and backwards
+python -m scope.benchmarks.blender_work MOTION ROUNDS    MOTION: a captured .npz, which is played
+                                                         forwards and backwards
 """
 
 from __future__ import annotations
@@ -39,10 +41,16 @@ def longer(motion: Motion, count: int) -> Motion:
     """Return the motion played forwards and backwards until it has ``count`` frames."""
     there = np.arange(len(motion))
     rows = np.resize(np.concatenate([there, there[-2:0:-1]]), count)
-    arrays = {f.name: v for f in fields(motion) if isinstance(v := getattr(motion, f.name), np.ndarray)}
-    per_frame = {name: values[rows] for name, values in arrays.items() if len(values) == len(motion)}
+    arrays = {
+        f.name: v for f in fields(motion) if isinstance(v := getattr(motion, f.name), np.ndarray)
+    }
+    per_frame = {
+        name: values[rows] for name, values in arrays.items() if len(values) == len(motion)
+    }
     numbers = np.arange(count)
-    return replace(motion, **per_frame | {"frames": numbers, "timestamps": numbers / motion.mocap_framerate})
+    return replace(
+        motion, **per_frame | {"frames": numbers, "timestamps": numbers / motion.mocap_framerate}
+    )
 
 
 def moving_face(count: int) -> dict[str, NDArray[Any]]:
@@ -58,8 +66,12 @@ def moving_face(count: int) -> dict[str, NDArray[Any]]:
     }
 
 
-def median_s(rounds: int, work: Callable[[], object], before: Callable[[], object] = lambda: None) -> float:
-    """Return the median duration of ``work`` in seconds; ``before`` is called before each round and not timed."""
+def median_s(
+    rounds: int, work: Callable[[], object], before: Callable[[], object] = lambda: None
+) -> float:
+    """Return the median duration of ``work`` in seconds; ``before`` is called before each round and
+    not timed.
+    """
     times = []
     for _ in range(rounds):
         before()
@@ -76,7 +88,9 @@ def fresh() -> None:
 
 
 def writing(motion: Motion, rounds: int) -> dict[str, float]:
-    """Time the keys alone, those of a face as well, and the whole scene: body, shape keys, camera, confidence."""
+    """Time the keys alone, those of a face as well, and the whole scene: body, shape keys, camera,
+    confidence.
+    """
     body = load_body("scope")
     long = longer(motion, WRITTEN)
     rest = rest_pose(body, long.betas)
@@ -104,7 +118,9 @@ def writing(motion: Motion, rounds: int) -> dict[str, float]:
         key_expressions(made["mesh"], channels, facing, frames)
 
     keys, both = median_s(rounds, write, prepare), median_s(rounds, write_both, prepare_face)
-    scene = median_s(rounds, lambda: build_scene([long], body, None, BuildOptions(start_frame=1.0)), fresh)
+    scene = median_s(
+        rounds, lambda: build_scene([long], body, None, BuildOptions(start_frame=1.0)), fresh
+    )
     return {"keys_s": keys, "keys_with_face_s": both, "whole_scene_s": scene}
 
 

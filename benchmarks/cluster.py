@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A batch on a cluster of worker processes of this machine: workers killed on the way, scaling, and what takes time."""
+"""A batch on a cluster of worker processes of this machine: workers killed on the way, scaling, and
+what takes time.
+"""
 
 from __future__ import annotations
 
@@ -54,7 +56,9 @@ def make_clips(folder: Path, count: int) -> list[Path]:
         first = k * 7 % (len(pictures) - FRAMES)
         path = folder / f"clip{k:04}.mp4"
         with av.open(str(path), "w", options={"movflags": "faststart"}) as target:
-            stream = target.add_stream("libx264", rate=FPS, options={"crf": "20", "preset": "ultrafast"})
+            stream = target.add_stream(
+                "libx264", rate=FPS, options={"crf": "20", "preset": "ultrafast"}
+            )
             stream.height, stream.width = pictures[0].shape[:2]
             stream.pix_fmt = "yuv420p"
             target.metadata["comment"] = str(k)  # makes each clip's content its own
@@ -82,7 +86,9 @@ def _run(clips: Path, workers: int, kills: int = 0) -> dict[str, Any]:
             ):
                 threads = ["--nthreads", "1"] if command[0] == "worker" else []
                 options = [*threads, "--scheduler-file", str(file), "--no-dashboard"]
-                started = subprocess.Popen([*dask, *command, *options], stdout=log, stderr=log, cwd=place)
+                started = subprocess.Popen(
+                    [*dask, *command, *options], stdout=log, stderr=log, cwd=place
+                )
                 stack.callback(started.wait)
                 stack.callback(started.terminate)
                 while not file.exists():
@@ -102,7 +108,9 @@ def _run(clips: Path, workers: int, kills: int = 0) -> dict[str, Any]:
             "--quiet",
         ]
         command += ["--formats", "npz", "--quality", "fast", "--scheduler", str(file)]
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        process = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        )
         total = len(list(clips.iterdir()))
         killed: list[str] = []
         while len(killed) < kills:
@@ -127,10 +135,14 @@ def _checked(report: dict[str, Any], out: Path, total: int, seconds: float) -> d
     assert {e["status"] for e in entries} == {"done"}, report["counts"]
     assert len({e["name"] for e in entries}) == len(entries) == total
     names = sorted(p.name for p in out.iterdir())
-    assert names == sorted([*(f"{e['name']}.npz" for e in entries), "scope-batch.json"]), "other files"
+    assert names == sorted([*(f"{e['name']}.npz" for e in entries), "scope-batch.json"]), (
+        "other files"
+    )
     assert all(Motion.load(out / f"{e['name']}.npz").frames.size == FRAMES for e in entries)
     clip_s = statistics.median(e["seconds"] for e in entries)
-    capture_s = statistics.median(e["report"]["frames"] / e["report"]["fps"]["total"] for e in entries)
+    capture_s = statistics.median(
+        e["report"]["frames"] / e["report"]["fps"]["total"] for e in entries
+    )
     return {
         "clips": total,
         "seconds": round(seconds, 1),

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Cold and warm fits of real frames: iterations, time, and how many converge.
 
-The measurements are those that the capture passes to the solver: its networks process the clips next to the checkout
-once, and the measurements are kept in build/bench. Weights, stages and robust scales are the capture's; the shape is
-unknown in every frame. Cold: without an earlier estimate, from `initial_state` through all stages. Warm: from the
-previous frame. Converged: cost within 0.1 % and joints within 1 mm of the result of the same start at a relative
-decrease of 1e-12.
+The measurements are those that the capture passes to the solver: its networks process the clips
+next to the checkout once, and the measurements are kept in build/bench. Weights, stages and robust
+scales are the capture's; the shape is unknown in every frame. Cold: without an earlier estimate,
+from `initial_state` through all stages. Warm: from the previous frame. Converged: cost within 0.1 %
+and joints within 1 mm of the result of the same start at a relative decrease of 1e-12.
 """
 
 from __future__ import annotations
@@ -40,7 +40,10 @@ ROOT = Path(__file__).resolve().parent.parent
 DATA, CACHE = ROOT.parent / "shared" / "data", ROOT / "build" / "bench"
 CLIPS = (
     *(f"pose2sim/cam{k}.mp4" for k in (1, 2, 3, 4)),
-    *(f"clips/{name}.mp4" for name in ("gesture_square", "squats_5fps", "run_moving_camera", "walk_side_static")),
+    *(
+        f"clips/{name}.mp4"
+        for name in ("gesture_square", "squats_5fps", "run_moving_camera", "walk_side_static")
+    ),
 )
 QUICK_CLIPS = CLIPS[:1]
 TOLERANCES = (1e-4, 1e-5, 1e-6)  # relative decrease at which the last stage stops
@@ -59,7 +62,9 @@ class Clip:
 
 
 def load_clips(names: Sequence[str]) -> list[Clip]:
-    """Read the clips' measurements, running the capture's networks where that has not been done yet."""
+    """Read the clips' measurements, running the capture's networks where that has not been done
+    yet.
+    """
     body = load_body("scope")
     clips = []
     for name in names:
@@ -83,9 +88,13 @@ def _record(video: Path, body: Body, path: Path) -> None:
             times.append(frame.timestamp_s)
     tracks = build_tracks(range(len(times)), times, list(tracklets.values()), 1)
     if not tracks:
-        raise NoPersonError(f"no person was found in {video}: the benchmark needs the clips of ../shared")
+        raise NoPersonError(
+            f"no person was found in {video}: the benchmark needs the clips of ../shared"
+        )
     prepared = prepare_track(body, repair_left_right(tracks[0], camera), camera)
-    calls = [(prepared.measure(int(k)), prepared.priors) for k in np.flatnonzero(prepared.track.seen)]
+    calls = [
+        (prepared.measure(int(k)), prepared.priors) for k in np.flatnonzero(prepared.track.seen)
+    ]
     write(path, calls)
 
 
@@ -165,8 +174,12 @@ class Outcome:
         }
 
 
-def measure(clips: Sequence[Clip], tolerance: float, triggs: float = 0.0, every: int = 1) -> dict[str, Outcome]:
-    """Fit every frame cold and warm; return the outcomes by kind. `every` k-th frame is judged, all are followed."""
+def measure(
+    clips: Sequence[Clip], tolerance: float, triggs: float = 0.0, every: int = 1
+) -> dict[str, Outcome]:
+    """Fit every frame cold and warm; return the outcomes by kind. `every` k-th frame is judged, all
+    are followed.
+    """
     body = load_body("scope")
     rows: dict[str, list[tuple[Any, ...]]] = {"cold": [], "warm": []}
     options = {kind: capture_options(kind == "cold", tolerance, triggs) for kind in rows}
@@ -185,8 +198,13 @@ def measure(clips: Sequence[Clip], tolerance: float, triggs: float = 0.0, every:
                     last = found.state
                 if number % every == 0 and number > 0:
                     best = solver.fit(m, init, None, tight[kind])
-                    rows[kind].append((elapsed * 1e3, found.iterations, same(found, best), found.cost))
-    return {kind: Outcome(*(np.array(column) for column in zip(*r, strict=True))) for kind, r in rows.items()}
+                    rows[kind].append(
+                        (elapsed * 1e3, found.iterations, same(found, best), found.cost)
+                    )
+    return {
+        kind: Outcome(*(np.array(column) for column in zip(*r, strict=True)))
+        for kind, r in rows.items()
+    }
 
 
 def same(found: Fit, best: Fit) -> bool:
@@ -208,4 +226,9 @@ def throughput(clips: Sequence[Clip], repeats: int = 5) -> dict[str, float]:
             fit_batch(body, frames, priors=priors, options=options, threads=threads)
             found.append(len(frames) / (time.perf_counter() - start))
     one, all_cores = float(np.median(rates[1])), float(np.median(rates[0]))
-    return {"one_thread": one, "all_cores": all_cores, "cores": os.cpu_count() or 1, "ratio": all_cores / one}
+    return {
+        "one_thread": one,
+        "all_cores": all_cores,
+        "cores": os.cpu_count() or 1,
+        "ratio": all_cores / one,
+    }

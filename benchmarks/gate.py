@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`./scripts/gate [--update] [--json FILE]`: fail where accuracy or speed is worse than recorded by more than noise.
+"""`./scripts/gate [--update] [--json FILE]`: fail where accuracy or speed is worse than recorded by
+more than noise.
 
-The record, `gate.json`, holds of every figure its value and its noise: of accuracy, twice the standard deviation over
-copies of the clip whose pixels differ by their encoding alone; of ratios of times, the larger of twice that over
-several runs and `MACHINES`. `--update` measures both again.
+The record, `gate.json`, holds of every figure its value and its noise: of accuracy, twice the
+standard deviation over copies of the clip whose pixels differ by their encoding alone; of ratios of
+times, the larger of twice that over several runs and `MACHINES`. `--update` measures both again.
 """
 
 from __future__ import annotations
@@ -37,8 +38,15 @@ from .solver.timing import take_turns  # noqa: E402
 
 RECORD = Path(__file__).with_name("gate.json")
 ACCURACY = ("mpjpe_root", "pa_mpjpe", "foot_slide_cm", "jitter_rel", "flipped")
-MIN_NOISE = {"mpjpe_root": 1.0, "pa_mpjpe": 1.0, "foot_slide_cm": 0.2, "jitter_rel": 2.0, "flipped": 0.02}
-MACHINES, MACHINES_OF_NETWORKS = 0.35, 0.6  # by which a ratio of times may differ between machines, of its value
+MIN_NOISE = {
+    "mpjpe_root": 1.0,
+    "pa_mpjpe": 1.0,
+    "foot_slide_cm": 0.2,
+    "jitter_rel": 2.0,
+    "flipped": 0.02,
+}
+# by which a ratio of times may differ between machines, of its value
+MACHINES, MACHINES_OF_NETWORKS = 0.35, 0.6
 TRIES = 3
 JPEG_QUALITIES = (80, 88, 96)  # of the copies
 
@@ -64,10 +72,13 @@ def read(path: Path = RECORD) -> dict[str, Figure]:
     return {name: Figure(**entry) for name, entry in json.loads(path.read_text("utf-8")).items()}
 
 
-def verdict(record: dict[str, Figure], found: dict[str, float]) -> tuple[list[tuple[Any, ...]], list[str]]:
+def verdict(
+    record: dict[str, Figure], found: dict[str, float]
+) -> tuple[list[tuple[Any, ...]], list[str]]:
     """Return the rows of the table, and the names of the figures that are worse than recorded.
 
-    A figure that was measured and is not in the record is one of them; one that could not be measured is not.
+    A figure that was measured and is not in the record is one of them; one that could not be
+    measured is not.
     """
     rows: list[tuple[Any, ...]] = []
     worse = []
@@ -84,9 +95,11 @@ def verdict(record: dict[str, Figure], found: dict[str, float]) -> tuple[list[tu
 
 
 def not_measured(record: dict[str, Figure], found: dict[str, float]) -> list[str]:
-    """Return the recorded figures that were not measured although they should be: in CI, all of them.
+    """Return the recorded figures that were not measured although they should be: in CI, all of
+    them.
 
-    A developer without the clips, or a CI that sets ``SCOPE_WITHOUT_SHARED`` as it cannot have them, checks the rest.
+    A developer without the clips, or a CI that sets ``SCOPE_WITHOUT_SHARED`` as it cannot have
+    them, checks the rest.
     """
     if not os.environ.get("CI") or os.environ.get("SCOPE_WITHOUT_SHARED"):
         return []
@@ -94,18 +107,29 @@ def not_measured(record: dict[str, Figure], found: dict[str, float]) -> list[str
 
 
 def clips() -> dict[str, tuple[Path, Path]]:
-    """Return the clips with ground truth, video and truth by name; none where the evaluation tool is missing."""
+    """Return the clips with ground truth, video and truth by name; none where the evaluation tool
+    is missing.
+    """
     folder = DATA / "pose2sim"
     if not folder.is_dir():
-        print(f"{folder} does not exist: accuracy is not measured; put the clips there", file=sys.stderr)
+        print(
+            f"{folder} does not exist: accuracy is not measured; put the clips there",
+            file=sys.stderr,
+        )
         return {}
-    found = {camera: (folder / f"{camera}.mp4", folder / f"truth_{camera}.npz") for camera in CAMERAS}
+    found = {
+        camera: (folder / f"{camera}.mp4", folder / f"truth_{camera}.npz") for camera in CAMERAS
+    }
     return found | {"sample": (SAMPLE, SAMPLE.with_name("sample_truth.npz"))}
 
 
 def accuracy(body: Body, videos: dict[str, tuple[Path, Path]]) -> dict[str, float]:
-    """Return the figures of `ACCURACY` of the default preset: means of the pose2sim cameras, and of our own clip."""
-    of_clip = {name: evaluate_clip(body, *files, CaptureOptions())[1] for name, files in videos.items()}
+    """Return the figures of `ACCURACY` of the default preset: means of the pose2sim cameras, and of
+    our own clip.
+    """
+    of_clip = {
+        name: evaluate_clip(body, *files, CaptureOptions())[1] for name, files in videos.items()
+    }
     found = {}
     for key in ACCURACY:
         cameras = [float(of_clip[camera][key]) for camera in CAMERAS if camera in of_clip]
@@ -119,8 +143,8 @@ def accuracy(body: Body, videos: dict[str, tuple[Path, Path]]) -> dict[str, floa
 def ratios(body: Body, rounds: int) -> dict[str, float]:
     """Return ratios of times of one run.
 
-    Those of the solver are between its own kernels: the dense step, by BLAS, takes from 10 to 18 times
-    as long as the sparse one, depending on the machine.
+    Those of the solver are between its own kernels: the dense step, by BLAS, takes from 10 to 18
+    times as long as the sparse one, depending on the machine.
     """
     sizes = {"step": (23, 10, 120), "K=51": (51, 10, 120), "N=600": (23, 10, 600)}
     runs = {name: sparse_run(make_problem(*size)) for name, size in sizes.items()}
@@ -133,14 +157,17 @@ def ratios(body: Body, rounds: int) -> dict[str, float]:
         "time of an iteration over a step's": times["iteration"] / times["step"],
         "time of a step, K=51 over K=23": times["K=51"] / times["step"],
         "time of a step, N=600 over N=120": times["N=600"] / times["step"],
-        "time of a capture over its networks', fast": float(np.median([f["networks"] / f["total"] for f in speeds])),
+        "time of a capture over its networks', fast": float(
+            np.median([f["networks"] / f["total"] for f in speeds])
+        ),
     }
 
 
 def unloaded_ratios(body: Body, record: dict[str, Figure]) -> dict[str, float]:
     """Return the least ratios of up to `TRIES` runs, where a run's ratios are worse than recorded.
 
-    What else the machine does can slow down one side of a ratio for a whole run; slower code is slower in all runs.
+    What else the machine does can slow down one side of a ratio for a whole run; slower code is
+    slower in all runs.
     """
     found = ratios(body, 30)
     for _ in range(TRIES - 1):
@@ -150,8 +177,12 @@ def unloaded_ratios(body: Body, record: dict[str, Figure]) -> dict[str, float]:
     return found
 
 
-def accuracy_and_noise(body: Body, videos: dict[str, tuple[Path, Path]], folder: Path) -> dict[str, Figure]:
-    """Return the figures of accuracy, each with twice its standard deviation over copies of the clips."""
+def accuracy_and_noise(
+    body: Body, videos: dict[str, tuple[Path, Path]], folder: Path
+) -> dict[str, Figure]:
+    """Return the figures of accuracy, each with twice its standard deviation over copies of the
+    clips.
+    """
     found = [accuracy(body, videos)]
     for quality in JPEG_QUALITIES:
         copies = {}
@@ -175,7 +206,9 @@ def _encode(video: Path, out: Path, quality: int) -> None:
 
     reader = cv2.VideoCapture(str(video))
     size = int(reader.get(cv2.CAP_PROP_FRAME_WIDTH)), int(reader.get(cv2.CAP_PROP_FRAME_HEIGHT))
-    writer = cv2.VideoWriter(str(out), cv2.VideoWriter.fourcc(*"MJPG"), reader.get(cv2.CAP_PROP_FPS), size)
+    writer = cv2.VideoWriter(
+        str(out), cv2.VideoWriter.fourcc(*"MJPG"), reader.get(cv2.CAP_PROP_FPS), size
+    )
     writer.set(cv2.VIDEOWRITER_PROP_QUALITY, quality)
     while (frame := reader.read())[0]:
         writer.write(frame[1])
@@ -194,13 +227,19 @@ def update(body: Body) -> None:
         share = MACHINES_OF_NETWORKS if "networks" in name else MACHINES
         record[name] = _figure(value, values, share * value)
     with atomic_path(RECORD) as temporary:
-        temporary.write_text(json.dumps({name: vars(figure) for name, figure in record.items()}, indent=1) + "\n")
+        temporary.write_text(
+            json.dumps({name: vars(figure) for name, figure in record.items()}, indent=1) + "\n"
+        )
 
 
 def main() -> int:
     """Run the command line; return 1 if a figure is worse than recorded."""
-    parser = argparse.ArgumentParser(prog="gate", description="Fail where accuracy or speed is worse than recorded.")
-    parser.add_argument("--update", action="store_true", help=f"measure the record, {RECORD.name}, again")
+    parser = argparse.ArgumentParser(
+        prog="gate", description="Fail where accuracy or speed is worse than recorded."
+    )
+    parser.add_argument(
+        "--update", action="store_true", help=f"measure the record, {RECORD.name}, again"
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures as JSON")
     args = parser.parse_args()
     body = load_body("scope")
@@ -213,10 +252,14 @@ def main() -> int:
         with atomic_path(args.json) as temporary:
             temporary.write_text(json.dumps({name: value for name, value, *_ in rows}, indent=1))
     if worse:
-        print(f"gate: worse than recorded: {', '.join(worse)}; mend it, or record it with ./scripts/gate --update")
+        print(
+            f"gate: worse than recorded: {', '.join(worse)}; mend it, or record it with "
+            "./scripts/gate --update"
+        )
     if absent := not_measured(read(), found):
         print(
-            f"gate: recorded, but not measured: {', '.join(absent)}; put the clips into {DATA}, or set "
+            f"gate: recorded, but not measured: {', '.join(absent)}; put the clips into {DATA}, or "
+            "set "
             "SCOPE_WITHOUT_SHARED where they cannot be had"
         )
     return 1 if worse or absent else 0

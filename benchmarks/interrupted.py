@@ -3,10 +3,10 @@
 
     python -m scope.benchmarks.interrupted [--minutes 60] [--kill-at 0.7] [--window-seconds S]
 
-Two people move there and back again, in a file of 1920 x 1080 at 30 frames a second: a shared clip, encoded once and
-its packets repeated. The process group is killed with SIGKILL, and the same command run again. Prints JSON: times,
-highest memory of all processes together, what was kept, and what is right or wrong with the motion. It needs ../shared,
-and Linux.
+Two people move there and back again, in a file of 1920 x 1080 at 30 frames a second: a shared clip,
+encoded once and its packets repeated. The process group is killed with SIGKILL, and the same
+command run again. Prints JSON: times, highest memory of all processes together, what was kept, and
+what is right or wrong with the motion. It needs ../shared, and Linux.
 """
 
 from __future__ import annotations
@@ -44,8 +44,13 @@ ROOT = Path(__file__).resolve().parents[1]
 CLIP = ROOT.parent / "shared" / "data" / "clips" / "walk_side_static.mp4"
 WHOLE = 150  # frames of it before one of the two people jumps off a roof
 WIDTH, HEIGHT, FPS = 1920, 1080, 30
-# So that packets can be repeated: no frame is predicted from a later one, and a round begins with a key frame.
-OPTIONS = {"preset": "ultrafast", "crf": "26", "x264-params": "bframes=0:keyint=120:scenecut=0:open-gop=0"}
+# So that packets can be repeated: no frame is predicted from a later one, and a round begins with a
+# key frame.
+OPTIONS = {
+    "preset": "ultrafast",
+    "crf": "26",
+    "x264-params": "bframes=0:keyint=120:scenecut=0:open-gop=0",
+}
 STAGE = "finding the person"
 _PROGRESS = re.compile(r"\r\x1b\[K(\w[\w ]*?) +\[[#.]*\] (\d+)/(\d+)(?=\r)")
 _INTERVAL_S = 0.5  # between two looks at the memory
@@ -53,10 +58,14 @@ _BLOCK = 4096  # frames whose soles are computed at a time
 
 
 def make_clip(path: Path, frames: int, source: Path = CLIP) -> None:
-    """Write some frames of a clip, there and back again: one round is encoded, and its packets are repeated."""
+    """Write some frames of a clip, there and back again: one round is encoded, and its packets are
+    repeated.
+    """
     with open_video(source) as video:
         images = [
-            cv2.resize(frame.image_rgb, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA).astype(np.uint8)
+            cv2.resize(frame.image_rgb, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA).astype(
+                np.uint8
+            )
             for frame in islice(video, WHOLE)
         ]
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -72,7 +81,9 @@ def make_clip(path: Path, frames: int, source: Path = CLIP) -> None:
 
 
 def _append(target: Any, stream: Any, round_: Any, numbers: range) -> None:
-    """Append the packets of a round, of which each is one frame, as the frames with these numbers."""
+    """Append the packets of a round, of which each is one frame, as the frames with these
+    numbers.
+    """
     packets = (packet for packet in round_.demux(video=0) if packet.size)
     for number, packet in zip(numbers, packets, strict=False):
         packet.stream, packet.time_base = stream, Fraction(1, FPS)
@@ -87,13 +98,17 @@ class Run:
     :param kill_at: share of the frames after which everything is killed with SIGKILL.
     """
 
-    def __init__(self, command: list[str], environment: dict[str, str], kill_at: float = np.inf) -> None:
+    def __init__(
+        self, command: list[str], environment: dict[str, str], kill_at: float = np.inf
+    ) -> None:
         self._kill_at, self.seen = kill_at, dict[str, tuple[float, int]]()
         self.peak_mib, self.said = 0.0, ""  # what was said besides the progress
         self._began = time.monotonic()
         main, terminal = pty.openpty()
         before_s = _children_s()
-        with subprocess.Popen(command, env=environment, stderr=terminal, start_new_session=True) as self._process:
+        with subprocess.Popen(
+            command, env=environment, stderr=terminal, start_new_session=True
+        ) as self._process:
             os.close(terminal)
             watcher = threading.Thread(target=self._watch_memory)
             watcher.start()
@@ -123,7 +138,8 @@ class Run:
         self.seen.setdefault(f"{stage} from", place)
         self.seen[stage] = place
         if stage == STAGE and done >= self._kill_at * total:
-            self._kill_at = np.inf  # what it had written before is still read, when its group may be gone
+            # what it had written before is still read, when its group may be gone
+            self._kill_at = np.inf
             os.killpg(self._process.pid, signal.SIGKILL)
 
     def _watch_memory(self) -> None:
@@ -133,7 +149,9 @@ class Run:
 
 
 def memory_mib(group: int) -> float:
-    """Return the memory that all processes of a group take, MiB: a page that n of them share counts 1/n for each."""
+    """Return the memory that all processes of a group take, MiB: a page that n of them share counts
+    1/n for each.
+    """
     kib = 0
     for folder in Path("/proc").glob("[0-9]*"):
         try:
@@ -159,11 +177,20 @@ def checked(path: Path, frames: int) -> dict[str, Any]:
         part = slice(begin, begin + _BLOCK)
         some = Clip(clip.times[part], clip.rotations[part], clip.root[part])
         lowest[part] = some.soles(body, motion.betas)[..., 2].min(axis=1)
-    arrays = (motion.poses, motion.trans, motion.poses_raw, motion.trans_raw, motion.betas, motion.joints_cam)
+    arrays = (
+        motion.poses,
+        motion.trans,
+        motion.poses_raw,
+        motion.trans_raw,
+        motion.betas,
+        motion.joints_cam,
+    )
     return {
         "frames": len(motion),
         "all_frames": motion.frames.tolist() == list(range(frames)),
-        "largest_error_of_times_s": float(np.abs(motion.timestamps - np.arange(len(motion)) / FPS).max()),
+        "largest_error_of_times_s": float(
+            np.abs(motion.timestamps - np.arange(len(motion)) / FPS).max()
+        ),
         "finite": all(bool(np.isfinite(array).all()) for array in arrays),
         "valid": float(motion.valid.mean()),
         "stature_m": float(body.stature(motion.betas)),
@@ -176,10 +203,17 @@ def checked(path: Path, frames: int) -> dict[str, Any]:
 
 def files_below(*folders: Path) -> dict[str, int]:
     """Return the files in folders, with their sizes in bytes."""
-    return {str(path): path.stat().st_size for each in folders for path in sorted(each.rglob("*")) if path.is_file()}
+    return {
+        str(path): path.stat().st_size
+        for each in folders
+        for path in sorted(each.rglob("*"))
+        if path.is_file()
+    }
 
 
-def interrupted(clip: Path, frames: int, kill_at: float, folder: Path, given: list[str]) -> dict[str, Any]:
+def interrupted(
+    clip: Path, frames: int, kill_at: float, folder: Path, given: list[str]
+) -> dict[str, Any]:
     """Capture a clip, killed on the way, and again; return the figures.
 
     :param given: further arguments.
@@ -189,7 +223,15 @@ def interrupted(clip: Path, frames: int, kill_at: float, folder: Path, given: li
         place.mkdir()
     environment = dict(os.environ, TMPDIR=str(places["tmp"]), XDG_CACHE_HOME=str(places["caches"]))
     out = places["out"] / "walk.npz"
-    command = [str(ROOT / "scripts" / "capture"), str(clip), "--quality", "fast", "-o", str(out), *given]
+    command = [
+        str(ROOT / "scripts" / "capture"),
+        str(clip),
+        "--quality",
+        "fast",
+        "-o",
+        str(out),
+        *given,
+    ]
     figures: dict[str, Any] = {"frames": frames, "load_at_start": os.getloadavg()}
     for name, share in (("killed", kill_at), ("again", np.inf)):
         run = Run(command, environment, share)
@@ -216,8 +258,12 @@ def main() -> None:
     """Run the command line."""
     parser = argparse.ArgumentParser(prog="interrupted")
     parser.add_argument("--minutes", type=float, default=60.0)
-    parser.add_argument("--kill-at", type=float, default=0.7, help="share of the frames that are tracked")
-    parser.add_argument("--window-seconds", type=float, help="for a short clip; two minutes by default")
+    parser.add_argument(
+        "--kill-at", type=float, default=0.7, help="share of the frames that are tracked"
+    )
+    parser.add_argument(
+        "--window-seconds", type=float, help="for a short clip; two minutes by default"
+    )
     args = parser.parse_args()
     given = [] if args.window_seconds is None else ["--window-seconds", f"{args.window_seconds:g}"]
     frames = round(60 * FPS * args.minutes)
@@ -225,7 +271,9 @@ def main() -> None:
     if not clip.exists():
         make_clip(clip, frames)
     with tempfile.TemporaryDirectory(dir=CACHE) as folder:
-        json.dump(interrupted(clip, frames, args.kill_at, Path(folder), given), sys.stdout, indent=1)
+        json.dump(
+            interrupted(clip, frames, args.kill_at, Path(folder), given), sys.stdout, indent=1
+        )
 
 
 if __name__ == "__main__":

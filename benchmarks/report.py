@@ -9,7 +9,12 @@ from typing import Any
 from .solver.problem import BODIES
 from .solver.steps import TARGETS, growth, growth_in_joints
 
-FRAME_TARGETS = {"iteration": 30.0, "prior_23_joints": 5.0, "cold_frame_ms": 0.8, "warm_frame_ms": 0.2}
+FRAME_TARGETS = {
+    "iteration": 30.0,
+    "prior_23_joints": 5.0,
+    "cold_frame_ms": 0.8,
+    "warm_frame_ms": 0.2,
+}
 STARTUP_TARGETS = {"first_call_s": 20.0, "cached_call_s": 0.3}
 NAMES = {  # of the figures in the table of targets
     "iteration": "whole iteration, all terms",
@@ -21,10 +26,12 @@ NAMES = {  # of the figures in the table of targets
 }
 CLIP_TABLES = {  # what the tables of whole clips show, by their keys in the figures
     "clip": "Linearization and step of a whole clip, K joints: ms per frame, two threads",
-    "clip_gradients": "Elimination over time and conjugate gradients, ms per frame; gap: frames that see nothing",
+    "clip_gradients": "Elimination over time and conjugate gradients, ms per frame; gap: frames "
+    "that see nothing",
     "clip_dense": "A clip's step by elimination and as one dense matrix, ms per step, one thread",
     "clip_frames": "All frames as one problem, and frames alone with smoothing, ms per frame",
-    "clip_outlines": "Linearization without outlines, with one in one frame in six, and in all, ms per frame",
+    "clip_outlines": "Linearization without outlines, with one in one frame in six, and in all, ms "
+    "per frame",
 }
 
 
@@ -40,7 +47,9 @@ def rows_table(rows: Sequence[dict[str, float]]) -> str:
 
 
 def _step_name(key: str) -> str:
-    """Return the name of a target step, such as "step K=23 P=10 N=52, with the joint prior" for K23_P10_N52_prior."""
+    """Return the name of a target step, such as "step K=23 P=10 N=52, with the joint prior" for
+    K23_P10_N52_prior.
+    """
     sizes = key.removesuffix("_prior")
     name = "step " + " ".join(f"{part[0]}={part[1:]}" for part in sizes.split("_"))
     return f"{name}, with the joint prior" if key != sizes else name
@@ -49,7 +58,13 @@ def _step_name(key: str) -> str:
 def _cell(x: object) -> str:
     if x is None:
         return ""
-    return f"{x:.3g}" if isinstance(x, float) and x < 100 else f"{x:.0f}" if isinstance(x, float) else str(x)
+    return (
+        f"{x:.3g}"
+        if isinstance(x, float) and x < 100
+        else f"{x:.0f}"
+        if isinstance(x, float)
+        else str(x)
+    )
 
 
 def target_lines(figures: dict[str, Any]) -> str:
@@ -66,7 +81,9 @@ def target_lines(figures: dict[str, Any]) -> str:
 
 
 def experiment_lines(number: int, rows: list[dict[str, float]]) -> str:
-    """Return one experiment on both bodies: sparse and dense times, speedup, and the larger body over the smaller."""
+    """Return one experiment on both bodies: sparse and dense times, speedup, and the larger body
+    over the smaller.
+    """
     key = "P" if number == 3 else "N"
     by_place = {(row["K"], row[key]): row for row in rows}
     lines: list[list[object]] = []
@@ -76,13 +93,20 @@ def experiment_lines(number: int, rows: list[dict[str, float]]) -> str:
         ratios = [b["sparse"] / a["sparse"], b["dense"] / a["dense"]]
         lines.append([at, a["sparse"], a["dense"], b["sparse"], b["dense"], *speedups, *ratios])
     small, large = BODIES[23], BODIES[51]
-    head = (key, f"{small} sparse", f"{small} dense", f"{large} sparse", f"{large} dense", f"speedup {small}",
-            f"speedup {large}", f"{large} / {small} sparse", f"{large} / {small} dense")  # fmt: skip
-    counts = " and ".join(str(N) for N in dict.fromkeys(row["N"] for row in rows)) if number == 3 else ""
+    head = (key, f"{small} "
+                 "sparse", f"{small} "
+                           "dense", f"{large} sparse", f"{large} dense", f"speedup {small}",
+            "speedup "
+            f"{large}", f"{large} / {small} sparse", f"{large} / {small} dense")  # fmt: skip
+    counts = (
+        " and ".join(str(N) for N in dict.fromkeys(row["N"] for row in rows)) if number == 3 else ""
+    )
     title = f"Experiment {number}{f', N = {counts}' if counts else ''}, µs per step"
     text = f"{title}\n\n" + table(head, lines)
     if number < 3:
-        fits = [f"{m} K={K}: N^{growth(rows, K, m):.2f}" for K in (23, 51) for m in ("sparse", "dense")]
+        fits = [
+            f"{m} K={K}: N^{growth(rows, K, m):.2f}" for K in (23, 51) for m in ("sparse", "dense")
+        ]
         text += "\n\nGrowth from N = 120 to 600: " + ", ".join(fits)
     joints = [f"{m}: K^{growth_in_joints(rows, m):.2f}" for m in ("sparse", "dense")]
     return text + "\n\nGrowth from K = 23 to 51: " + ", ".join(joints)
@@ -90,7 +114,16 @@ def experiment_lines(number: int, rows: list[dict[str, float]]) -> str:
 
 def frame_lines(convergence: list[dict[str, Any]]) -> str:
     """Return the convergence report on real frames."""
-    keys = ("kind", "tolerance", "triggs", "frames", "milliseconds", "iterations", "converged", "cost")
+    keys = (
+        "kind",
+        "tolerance",
+        "triggs",
+        "frames",
+        "milliseconds",
+        "iterations",
+        "converged",
+        "cost",
+    )
     return table(keys, [[_exact(row[k]) for k in keys] for row in convergence])
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`./scripts/bench stills`: captures of single frames of the clips with ground truth, each as an image by itself.
+"""`./scripts/bench stills`: captures of single frames of the clips with ground truth, each as an
+image by itself.
 
 Nothing before or after the image helps: no motion, no contact, no up direction of a whole clip.
 """
@@ -31,7 +32,8 @@ from .scenes.accuracy import score_people
 from .scenes.scene import FOLDER, SPLITS
 from .scenes.statistics import mean_over_people
 
-PER_CLIP, PER_SCENE, QUICK = 5, 1, 1  # images, evenly spaced in time, none of them the first or the last
+# images, evenly spaced in time, none of them the first or the last
+PER_CLIP, PER_SCENE, QUICK = 5, 1, 1
 Pair = tuple[float, float]  # MPJPE-root and PA-MPJPE in mm; NaN of people who are not found
 
 
@@ -44,10 +46,11 @@ class Clip(NamedTuple):
 
 
 def stills(quick: bool) -> dict[str, Any]:
-    """Capture and measure all images with every preset; print a table and return the errors of every person.
+    """Capture and measure all images with every preset; print a table and return the errors of
+    every person.
 
-    Rendered clips are measured as far as they are there: `renders` and `scenes` make them. ``quick``: one image of each
-    camera and the sample, and the default preset.
+    Rendered clips are measured as far as they are there: `renders` and `scenes` make them.
+    ``quick``: one image of each camera and the sample, and the default preset.
     """
     if not DATA.is_dir():
         print(f"{DATA} does not exist: nothing was measured; put the clips there", file=sys.stderr)
@@ -60,7 +63,9 @@ def stills(quick: bool) -> dict[str, Any]:
             for clip in clips:
                 count = QUICK if quick else PER_SCENE if clip.is_scene else PER_CLIP
                 print(f"{quality}: {clip.video.stem}", file=sys.stderr, flush=True)
-                figures[quality][group][clip.video.stem] = errors_of_clip(body, clip, count, quality)
+                figures[quality][group][clip.video.stem] = errors_of_clip(
+                    body, clip, count, quality
+                )
     print(errors_table(figures), end="\n\n", flush=True)
     return figures
 
@@ -75,15 +80,23 @@ def errors_of_clip(body: Body, clip: Clip, count: int, quality: str) -> list[Pai
     found: list[Pair] = []
     for frame, image in frames_as_images(clip.video, chosen.tolist()):
         try:
-            motions = [replace(each, frames=np.array([frame])) for each in capture(image, body, options).motions]
+            motions = [
+                replace(each, frames=np.array([frame]))
+                for each in capture(image, body, options).motions
+            ]
         except NoPersonError:
             motions = []
-        found += _scene_errors(body, motions, clip, truth, frame) if clip.is_scene else [_errors(motions, clip)]
+        found += (
+            _scene_errors(body, motions, clip, truth, frame)
+            if clip.is_scene
+            else [_errors(motions, clip)]
+        )
     return found
 
 
 def frames_as_images(video: Path, frames: Sequence[int]) -> Iterator[tuple[int, Path]]:
-    """Write some frames of a clip to lossless images, one at a time; yield their indices and the image's path.
+    """Write some frames of a clip to lossless images, one at a time; yield their indices and the
+    image's path.
 
     :raises ValueError: the clip has no such frame.
     """
@@ -100,7 +113,8 @@ def frames_as_images(video: Path, frames: Sequence[int]) -> Iterator[tuple[int, 
 
 
 def errors_table(figures: dict[str, dict[str, dict[str, list[Pair]]]]) -> str:
-    """Return means over clips with 95 % intervals, medians over people, and how many were not found.
+    """Return means over clips with 95 % intervals, medians over people, and how many were not
+    found.
 
     :param figures: by preset, group and clip.
     """
@@ -116,12 +130,19 @@ def errors_table(figures: dict[str, dict[str, dict[str, list[Pair]]]]) -> str:
 
 
 def _mean_and_median(clips: dict[str, list[Pair]], k: int) -> tuple[str, str]:
-    """Return the mean over clips of their people who were found, and the median over these people."""
-    found = [each[np.isfinite(each)] for each in (np.reshape(pairs, (-1, 2))[:, k] for pairs in clips.values())]
+    """Return the mean over clips of their people who were found, and the median over these
+    people.
+    """
+    found = [
+        each[np.isfinite(each)]
+        for each in (np.reshape(pairs, (-1, 2))[:, k] for pairs in clips.values())
+    ]
     found = [each for each in found if len(each)]
     if not found:
         return "", ""
-    return mean_over_people([float(each.mean()) for each in found]).text, f"{np.median(np.concatenate(found)):.1f}"
+    return mean_over_people(
+        [float(each.mean()) for each in found]
+    ).text, f"{np.median(np.concatenate(found)):.1f}"
 
 
 def _errors(motions: list[Motion], clip: Clip) -> Pair:
@@ -131,17 +152,25 @@ def _errors(motions: list[Motion], clip: Clip) -> Pair:
     return float(figures["mpjpe_root"]), float(figures["pa_mpjpe"])
 
 
-def _scene_errors(body: Body, motions: list[Motion], clip: Clip, truth: dict[str, Any], frame: int) -> list[Pair]:
+def _scene_errors(
+    body: Body, motions: list[Motion], clip: Clip, truth: dict[str, Any], frame: int
+) -> list[Pair]:
     """Return the errors of the people of a scene of whom something can be seen in a frame."""
     results = score_people(body, motions, clip.video.stem, truth)
-    visible = [r for r, hidden in zip(results, truth["hidden"][:, frame], strict=True) if not hidden.all()]
+    visible = [
+        r for r, hidden in zip(results, truth["hidden"][:, frame], strict=True) if not hidden.all()
+    ]
     return [(float(r.mpjpe_root[frame]), float(r.pa_mpjpe[frame])) for r in visible]
 
 
 def _groups() -> dict[str, list[Clip]]:
     """Return the clips of each group that are there."""
     pose2sim = DATA / "pose2sim"
-    groups = {"Pose2Sim": [Clip(pose2sim / f"{name}.mp4", pose2sim / f"truth_{name}.npz") for name in CAMERAS]}
+    groups = {
+        "Pose2Sim": [
+            Clip(pose2sim / f"{name}.mp4", pose2sim / f"truth_{name}.npz") for name in CAMERAS
+        ]
+    }
     groups["sample"] = _rendered([ASSETS / "sample" / "sample.mp4"])
     groups["renders"] = _rendered(RENDERS.glob("*.mp4"))
     for split in SPLITS:
@@ -151,5 +180,8 @@ def _groups() -> dict[str, list[Clip]]:
 
 def _rendered(videos: Iterable[Path], is_scene: bool = False) -> list[Clip]:
     """Return the videos that have ground truth beside them."""
-    clips = [Clip(video, video.with_name(f"{video.stem}_truth.npz"), is_scene) for video in sorted(videos)]
+    clips = [
+        Clip(video, video.with_name(f"{video.stem}_truth.npz"), is_scene)
+        for video in sorted(videos)
+    ]
     return [clip for clip in clips if clip.truth.is_file()]

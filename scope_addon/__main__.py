@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The command line as a process: ``python -m scope.scope_addon``. Even a signal while it is loaded leads to a message.
+"""The command line as a process: ``python -m scope.scope_addon``. Even a signal while it is loaded
+leads to a message.
 
-Loading takes a moment. Nothing has been written then, and Python would end with a traceback, or silently.
+Loading takes a moment. Nothing has been written then, and Python would end with a traceback, or
+silently.
 """
 
 from __future__ import annotations
@@ -13,7 +15,8 @@ from types import FrameType
 from .command_line.address_space import address_space_limit
 from .command_line.signals import stopping_signals
 
-_MIN_BYTES = 300_000_000  # bytes of address space; with less, numpy may load in part, and hang or fail later
+# bytes of address space; with less, numpy may load in part, and hang or fail later
+_MIN_BYTES = 300_000_000
 
 
 def main() -> None:
@@ -25,7 +28,8 @@ def main() -> None:
     try:
         from .cli import run
     except (MemoryError, ImportError, OSError) as error:
-        # A library that cannot be loaded may have met the shell's limit; each says so in its own words.
+        # A library that cannot be loaded may have met the shell's limit; each says so in its own
+        # words.
         if not (isinstance(error, MemoryError) or _memory_is_limited_to(1_000_000_000)):
             raise
         _stop_without_memory()
@@ -39,7 +43,9 @@ def _memory_is_limited_to(most: int) -> bool:
 
 
 def _stop_without_memory() -> None:
-    os.write(2, b"scope: there is too little memory to load the program; free memory and try again\n")
+    os.write(
+        2, b"scope: there is too little memory to load the program; free memory and try again\n"
+    )
     os._exit(1)
 
 

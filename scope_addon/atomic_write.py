@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Atomic writes: a file is written under a temporary name and renamed, so that it is complete or absent.
+"""Atomic writes: a file is written under a temporary name and renamed, so that it is complete or
+absent.
 
-A process that is killed leaves its temporary file, whose name contains the computer and the process. The next process
-that writes a file of that name there removes it.
+A process that is killed leaves its temporary file, whose name contains the computer and the
+process. The next process that writes a file of that name there removes it.
 """
 
 from __future__ import annotations
@@ -30,13 +31,14 @@ _temporary_files: set[Path] = set()
 
 @contextmanager
 def atomic_path(path: Path) -> Iterator[Path]:
-    """Create a temporary file in the folder of ``path``, and rename it to ``path`` when the block ends.
+    """Create a temporary file in the folder of ``path``, and rename it to ``path`` when the block
+    ends.
 
-    If the block is left by an exception, the temporary file is removed and ``path`` is unchanged. If ``path`` is a
-    link, its target is written and the link stays.
+    If the block is left by an exception, the temporary file is removed and ``path`` is unchanged.
+    If ``path`` is a link, its target is written and the link stays.
 
-    :return: context manager that gives the temporary file's path. The block may replace the file, which is empty at
-        first, but has to leave a file of that name.
+    :return: context manager that gives the temporary file's path. The block may replace the file,
+        which is empty at first, but has to leave a file of that name.
     :raises OSError: the file cannot be created or renamed.
     :raises OutputError: ``path`` exists and is not a regular file.
     """
@@ -44,8 +46,9 @@ def atomic_path(path: Path) -> Iterator[Path]:
     start, suffix = _temporary_name(path)
     _remove_abandoned(target.parent, start)
     temporary = target.parent / f"{start}{owner()}-{os.urandom(4).hex()}{suffix}"
-    # The system decides on the permissions of a new file, by the process's umask or the folder's list. To read the
-    # umask, one has to change it for a moment, in which other threads' files would be writable for everybody.
+    # The system decides on the permissions of a new file, by the process's umask or the folder's
+    # list. To read the umask, one has to change it for a moment, in which other threads' files
+    # would be writable for everybody.
     handle = os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666)
     _temporary_files.add(temporary)
     try:
@@ -62,8 +65,8 @@ def atomic_path(path: Path) -> Iterator[Path]:
 def write_npz(path: Path, arrays: Mapping[str, NDArray[Any]], compressed: bool = False) -> None:
     """Write arrays as an ``.npz``, complete or not at all: the same bytes as numpy's ``savez``.
 
-    They are packed in memory one by one, because a zip file that the disk refuses prints a traceback when it is
-    destroyed, and a motion of an hour takes 160 MB.
+    They are packed in memory one by one, because a zip file that the disk refuses prints a
+    traceback when it is destroyed, and a motion of an hour takes 160 MB.
 
     :param arrays: by their names, (...) each.
     :param compressed: as ``savez_compressed`` does.
@@ -86,7 +89,9 @@ def write_npz(path: Path, arrays: Mapping[str, NDArray[Any]], compressed: bool =
 
 
 class _MovedFile(io.BytesIO):
-    """A file in memory whose content is moved elsewhere from time to time; positions count from its first byte."""
+    """A file in memory whose content is moved elsewhere from time to time; positions count from its
+    first byte.
+    """
 
     _moved = 0
 
@@ -109,13 +114,17 @@ class _MovedFile(io.BytesIO):
 
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
         """Go to a position that is in memory, and return it."""
-        return self._moved + super().seek(offset - self._moved if whence == io.SEEK_SET else offset, whence)
+        return self._moved + super().seek(
+            offset - self._moved if whence == io.SEEK_SET else offset, whence
+        )
 
 
 def resolve_link(path: Path) -> Path:
-    """Return the file that writing to ``path`` changes: the target of a link, otherwise ``path``. It may not exist yet.
+    """Return the file that writing to ``path`` changes: the target of a link, otherwise ``path``.
+    It may not exist yet.
 
-    :raises OutputError: the file exists and is not a regular one, which renaming would replace; or links form a loop.
+    :raises OutputError: the file exists and is not a regular one, which renaming would replace; or
+        links form a loop.
     """
     target = Path(os.path.realpath(path)) if path.is_symlink() else path
     link = f"it is a link to {target}, and that" if target != path else "it"
@@ -123,11 +132,15 @@ def resolve_link(path: Path) -> Path:
         mode = target.stat().st_mode
     except OSError as error:
         if error.errno == errno.ELOOP:
-            raise OutputError(f"cannot write {path}: its symbolic links form a loop; choose another name") from error
+            raise OutputError(
+                f"cannot write {path}: its symbolic links form a loop; choose another name"
+            ) from error
         return target  # it does not exist; any other problem is reported when it is written
     if not stat.S_ISREG(mode):
         what = "a folder" if stat.S_ISDIR(mode) else "a device, a pipe or a socket"
-        raise OutputError(f"cannot write {path}: {link} is {what}, not a regular file; choose another name")
+        raise OutputError(
+            f"cannot write {path}: {link} is {what}, not a regular file; choose another name"
+        )
     return target
 
 
@@ -148,14 +161,16 @@ def remove_abandoned(path: Path) -> None:
 def _temporary_name(path: Path) -> tuple[str, str]:
     """Return the beginning of the temporary files' names and their suffix.
 
-    The name is short enough for the limit on file names, even where a letter takes several bytes, and without bytes
-    that are not UTF-8, at which exporters fail.
+    The name is short enough for the limit on file names, even where a letter takes several bytes,
+    and without bytes that are not UTF-8, at which exporters fail.
     """
     return f".{path.stem[:40].encode('utf-8', 'ignore').decode()}.scope-", path.suffix.lower()
 
 
 def _remove_abandoned(folder: Path, start: str) -> None:
-    """Remove temporary files of processes that do not run any more, and the drafts of their libraries."""
+    """Remove temporary files of processes that do not run any more, and the drafts of their
+    libraries.
+    """
     with contextlib.suppress(OSError):
         for path in folder.glob(f"{glob.escape(start)}*-*-*"):
             if is_abandoned(path, path.name.removeprefix(start)):
@@ -163,7 +178,9 @@ def _remove_abandoned(folder: Path, start: str) -> None:
 
 
 def remove_temporary_files() -> None:
-    """Remove the files that are being written, in a process that is about to exit without cleaning up."""
+    """Remove the files that are being written, in a process that is about to exit without cleaning
+    up.
+    """
     for temporary in list(_temporary_files):
         with contextlib.suppress(OSError):
             _remove_with_drafts(temporary)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The command line: one argparse tree, used by the shell and by Blender's ``--command scope``.
 
-Exit status: 0 done, 1 failed, 2 invalid arguments, 3 no person found. Progress and error messages go to stderr; with
-``--json``, stdout carries nothing but the report.
+Exit status: 0 done, 1 failed, 2 invalid arguments, 3 no person found. Progress and error messages
+go to stderr; with ``--json``, stdout carries nothing but the report.
 """
 
 from __future__ import annotations
@@ -41,7 +41,12 @@ from .command_line.outputs import (
     write_outputs,
 )
 from .command_line.signals import interrupted, stopped_by_signals
-from .command_line.terminal import ProgressBar, open_standard_streams, print_message, stdout_for_report
+from .command_line.terminal import (
+    ProgressBar,
+    open_standard_streams,
+    print_message,
+    stdout_for_report,
+)
 from .command_line.windows import (
     WINDOW_SECONDS,
     add_window_arguments,
@@ -78,7 +83,9 @@ class _Parser(argparse.ArgumentParser):
         super().__init__(**{"allow_abbrev": False, **settings})
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Parse the arguments, where some flags may come without a value; see `with_bare_values`."""
+        """Parse the arguments, where some flags may come without a value; see
+        `with_bare_values`.
+        """
         given = sys.argv[1:] if args is None else list(args)
         return super().parse_known_args(with_bare_values(given), namespace)
 
@@ -89,8 +96,12 @@ class _Parser(argparse.ArgumentParser):
 
 def build_parser() -> argparse.ArgumentParser:
     """Build the whole argparse tree."""
-    parser = _Parser(prog="scope", description="Markerless motion capture: video in, animated body out.")
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_Parser)
+    parser = _Parser(
+        prog="scope", description="Markerless motion capture: video in, animated body out."
+    )
+    commands = parser.add_subparsers(
+        dest="command", required=True, metavar="COMMAND", parser_class=_Parser
+    )
     capture = commands.add_parser("capture", help="capture the people in a video or image")
     capture.set_defaults(run=run_capture)
     _add_capture_files(capture)
@@ -99,8 +110,16 @@ def build_parser() -> argparse.ArgumentParser:
     batch.set_defaults(run=run_batch)
     _add_batch_files(batch)
     add_options(batch)
-    add_import(commands.add_parser("import", help="convert a motion file, of Scope or of another SMPL-based tool"))
-    add_live(commands.add_parser("live", help="capture a camera, a stream or a playing video while it runs"))
+    add_import(
+        commands.add_parser(
+            "import", help="convert a motion file, of Scope or of another SMPL-based tool"
+        )
+    )
+    add_live(
+        commands.add_parser(
+            "live", help="capture a camera, a stream or a playing video while it runs"
+        )
+    )
     return parser
 
 
@@ -123,13 +142,17 @@ def _add_capture_files(capture: argparse.ArgumentParser) -> None:
         " (default: .npz and .glb next to the video; in the current folder for the sample)",
     )
     capture.add_argument(
-        "--overlay", type=path_argument, metavar="FILE", help="draw the body over the footage: .mp4, .png, .jpg"
+        "--overlay",
+        type=path_argument,
+        metavar="FILE",
+        help="draw the body over the footage: .mp4, .png, .jpg",
     )
     capture.add_argument(
         "--report",
         type=path_argument,
         metavar="FILE",
-        help="one page about the capture to open in a browser: overlay, 3D view, plots, warnings: .html",
+        help="one page about the capture to open in a browser: overlay, 3D view, plots, warnings: "
+        ".html",
     )
     # Passed by a batch to its processes.
     capture.add_argument(STOP_WITH_STDIN, action="store_true", help=argparse.SUPPRESS)
@@ -145,29 +168,46 @@ def _add_batch_files(batch: argparse.ArgumentParser) -> None:
         metavar="FOLDER",
         help="folder of videos, images and image sequences, or its URL",
     )
-    batch.add_argument("--out", type=folder_argument, required=True, metavar="FOLDER", help="output folder, or its URL")
+    batch.add_argument(
+        "--out",
+        type=folder_argument,
+        required=True,
+        metavar="FOLDER",
+        help="output folder, or its URL",
+    )
     batch.add_argument(
         "--formats",
         default="npz,glb",
         metavar="LIST",
-        help=f"formats to write for every clip: {', '.join(s[1:] for s in SUFFIXES)} (default: npz,glb)",
+        help=f"formats to write for every clip: {', '.join(s[1:] for s in SUFFIXES)} (default: "
+        "npz,glb)",
     )
-    batch.add_argument("--overlays", action="store_true", help="also write NAME.overlay.mp4 for every video")
-    batch.add_argument("--reports", action="store_true", help="also write the page NAME.report.html for every clip")
+    batch.add_argument(
+        "--overlays", action="store_true", help="also write NAME.overlay.mp4 for every video"
+    )
+    batch.add_argument(
+        "--reports", action="store_true", help="also write the page NAME.report.html for every clip"
+    )
     batch.add_argument("--recursive", action="store_true", help="include subfolders")
-    batch.add_argument("--jobs", type=int, default=1, metavar="N", help="clips captured in parallel (default: 1)")
+    batch.add_argument(
+        "--jobs", type=int, default=1, metavar="N", help="clips captured in parallel (default: 1)"
+    )
     batch.add_argument(
         "--scheduler",
         metavar="ADDRESS",
-        help="capture on the Dask cluster of this scheduler (tcp://HOST:8786, or its scheduler file); --jobs then "
+        help="capture on the Dask cluster of this scheduler (tcp://HOST:8786, or its scheduler "
+        "file); --jobs then "
         "counts the clips of each worker",
     )
-    batch.add_argument("--again", action="store_true", help="capture every clip again, including finished ones")
+    batch.add_argument(
+        "--again", action="store_true", help="capture every clip again, including finished ones"
+    )
     add_window_seconds(batch)
 
 
 def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) -> int:
-    """Run the command line and return the exit status. Errors are printed, not raised, except with SCOPE_TRACEBACK set.
+    """Run the command line and return the exit status. Errors are printed, not raised, except with
+    SCOPE_TRACEBACK set.
 
     :param argv: arguments; those of the process if None.
     :param program: command that takes these arguments; a batch starts one such process per clip.
@@ -176,9 +216,13 @@ def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) ->
         args, unknown = build_parser().parse_known_args(argv)
         if unknown:
             advice = "; use scope batch for several clips" if not unknown[0].startswith("-") else ""
-            if file := next((each for each in unknown if each.startswith("-") and os.path.exists(each)), ""):
+            if file := next(
+                (each for each in unknown if each.startswith("-") and os.path.exists(each)), ""
+            ):
                 advice = f"; to capture the file of that name, write ./{file}"
-            raise UsageError(f"unknown arguments: {' '.join(unknown)} (see scope {args.command} --help{advice})")
+            raise UsageError(
+                f"unknown arguments: {' '.join(unknown)} (see scope {args.command} --help{advice})"
+            )
         args.program = list(program)
         given = [*program, *(sys.argv[1:] if argv is None else argv)]
         internal = STOP_WITH_STDIN, f"{FINISHED_FILE}="
@@ -203,7 +247,11 @@ def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) ->
     except Exception as error:
         if os.environ.get("SCOPE_TRACEBACK"):
             raise
-        text = system_error_message(MemoryError()) if lacks_memory(error) else internal_error_message(error)
+        text = (
+            system_error_message(MemoryError())
+            if lacks_memory(error)
+            else internal_error_message(error)
+        )
         print(f"scope: {text}", file=sys.stderr)
         return FAILED
 
@@ -219,7 +267,8 @@ def _print_report(report: dict[str, Any], stdout: TextIO) -> None:
         with suppress(OSError):
             stdout.close()  # would try again to write what it holds, when it is destroyed
         raise OutputError(
-            f"the report cannot be written to standard output ({error.strerror}); all results are complete"
+            f"the report cannot be written to standard output ({error.strerror}); all results are "
+            "complete"
         ) from error
 
 
@@ -231,11 +280,16 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
     check_installed(CAPTURE)
     video = args.video or SAMPLE
     if not args.video and not SAMPLE.is_file():
-        raise UsageError("the sample clip is only in the repository, not in this installation; give a VIDEO to capture")
+        raise UsageError(
+            "the sample clip is only in the repository, not in this installation; "
+            "give a VIDEO to capture"
+        )
     outputs = distinct_paths(args.output) or default_outputs(video)
     check_outputs(outputs, video, args.overlay, args.report)
     check_blender(outputs)
-    check_memory_limit(with_scene=any(path.suffix.lower() not in MOTION_SUFFIXES for path in outputs))
+    check_memory_limit(
+        with_scene=any(path.suffix.lower() not in MOTION_SUFFIXES for path in outputs)
+    )
     rig = checked_rig(args, outputs, args.hands != OFF)
 
     body, options = body_and_options(args)
@@ -250,7 +304,9 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
         if found := window_report(args, video, options, progress):
             return found
         unfinished = stack.enter_context(unfinished_capture(lasting_folder(), video))
-        result = capture(video, body, options, progress, unfinished=unfinished, windows=args.windows_folder)
+        result = capture(
+            video, body, options, progress, unfinished=unfinished, windows=args.windows_folder
+        )
         progress("writing", 0, 0)
         with interrupted("some results may have been written already, each of them complete"):
             written = write_outputs(outputs, result.motions, body, video, args, rig)
@@ -265,7 +321,9 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
                 )
                 written.append(args.overlay)
             if args.report:
-                clip = CapturedClip(video, result.motions, body, result.report, args.command_text, options.wanted)
+                clip = CapturedClip(
+                    video, result.motions, body, result.report, args.command_text, options.wanted
+                )
                 write_capture_page(args.report, clip, lambda i, n: progress("report", i, n))
                 written.append(args.report)
             report = dict(result.report, outputs=[str(p) for p in written])
@@ -281,7 +339,8 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
 def run_batch(args: argparse.Namespace) -> dict[str, Any]:
     """Run ``scope batch``: capture each clip in its own process; return the report on all of them.
 
-    :raises ScopeError: an argument is invalid, there is no footage, or the report cannot be written.
+    :raises ScopeError: an argument is invalid, there is no footage, or the report cannot be
+        written.
     """
     check_installed(CAPTURE)
     from .capture.options import check_networks
@@ -291,7 +350,9 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
     for suffix in formats or ["."]:
         if suffix not in SUFFIXES:
             known = ",".join(s[1:] for s in SUFFIXES)
-            raise UsageError(f"--formats must be a list of formats among {known}, not {args.formats!r}")
+            raise UsageError(
+                f"--formats must be a list of formats among {known}, not {args.formats!r}"
+            )
     if args.jobs < 1:
         raise UsageError(f"--jobs must be at least 1, not {args.jobs}")
     clips = [Path(args.out) / f"clip{suffix}" for suffix in formats]
@@ -311,23 +372,37 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
             given[WINDOW_SECONDS] = f"{args.window_seconds:g}"
         batch = Batch(folder, out, args.program, given, formats, extras)
         progress = stack.enter_context(ProgressBar(sys.stderr, show=not args.quiet))
-        stack.enter_context(interrupted("finished clips are kept; run the same command again to continue"))
+        stack.enter_context(
+            interrupted("finished clips are kept; run the same command again to continue")
+        )
         report = batch.run(
-            args.jobs, recursive=args.recursive, again=args.again, progress=progress, say=print_message, runner=runner
+            args.jobs,
+            recursive=args.recursive,
+            again=args.again,
+            progress=progress,
+            say=print_message,
+            runner=runner,
         )
     if not args.json:
         for line in worker_table(report):
             print_message(line)
-        counts = ", ".join(f"{count} {status.replace('_', ' ')}" for status, count in report["counts"].items() if count)
-        print_message(f"{counts or 'nothing to capture'}; report in {args.out}/{batch.report_file.name}")
+        counts = ", ".join(
+            f"{count} {status.replace('_', ' ')}"
+            for status, count in report["counts"].items()
+            if count
+        )
+        print_message(
+            f"{counts or 'nothing to capture'}; report in {args.out}/{batch.report_file.name}"
+        )
     return report
 
 
 def run() -> NoReturn:
     """Run ``main`` as the entry point of a process, and exit in a way that cannot hang.
 
-    When bpy is unloaded, it destroys a condition variable on which one of its own threads still waits, which blocks
-    forever. All our files are written and closed at this point, so the process exits without running destructors.
+    When bpy is unloaded, it destroys a condition variable on which one of its own threads still
+    waits, which blocks forever. All our files are written and closed at this point, so the process
+    exits without running destructors.
     """
     open_standard_streams()
     status = main()

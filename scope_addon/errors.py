@@ -35,7 +35,10 @@ class OfflineError(VideoError):
     """A stream, while Blender is not to go online."""
 
     def __init__(self) -> None:
-        super().__init__("a stream needs the network: switch on Allow Online Access in Blender's preferences, System")
+        super().__init__(
+            "a stream needs the network: switch on Allow Online Access in Blender's "
+            "preferences, System"
+        )
 
 
 class MotionFileError(InputError):
@@ -76,13 +79,18 @@ def exit_status(error: ScopeError) -> int:
 def internal_error_message(error: Exception) -> str:
     """Describe an error that Scope should not have, and what to do."""
     cause = " ".join(f"{type(error).__name__}: {error}".split())
-    return f"an internal error, {cause}; please report it (the environment variable SCOPE_TRACEBACK=1 shows where)"
+    return (
+        f"an internal error, {cause}; please report it (the environment variable SCOPE_TRACEBACK=1 "
+        f"shows where)"
+    )
 
 
 def system_error_message(error: OSError | MemoryError) -> str:
     """Describe an error of the operating system, and what to do."""
     if isinstance(error, PermissionError):
-        advice = "check the permissions of that file or folder, and whether another program has it open"
+        advice = (
+            "check the permissions of that file or folder, and whether another program has it open"
+        )
     elif isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
         advice = "choose a shorter name"
     else:
@@ -101,5 +109,7 @@ _WITHOUT_MEMORY = (
 
 
 def lacks_memory(error: BaseException) -> bool:
-    """Return whether an error means that there is too little memory; libraries have errors of their own for that."""
+    """Return whether an error means that there is too little memory; libraries have errors of their
+    own for that.
+    """
     return isinstance(error, MemoryError) or any(text in str(error) for text in _WITHOUT_MEMORY)

@@ -1,43 +1,83 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Recognize footage by file names, and show these. Standard library only: menus and command lines load it quickly."""
+"""Recognize footage by file names, and show these. Standard library only: menus and command lines
+load it quickly.
+"""
 
 import os
 import re
 from pathlib import Path
 
 VIDEO_SUFFIXES = (
-    *(".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".wmv", ".mts", ".m2ts", ".ts", ".3gp", ".gif"),
+    *(
+        ".mp4",
+        ".mov",
+        ".m4v",
+        ".avi",
+        ".mkv",
+        ".webm",
+        ".mpg",
+        ".mpeg",
+        ".wmv",
+        ".mts",
+        ".m2ts",
+        ".ts",
+        ".3gp",
+        ".gif",
+    ),
 )
-PICTURE_SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".bmp", ".avif", ".heic", ".heif")
+PICTURE_SUFFIXES = (
+    ".jpg",
+    ".jpeg",
+    ".png",
+    ".webp",
+    ".tif",
+    ".tiff",
+    ".bmp",
+    ".avif",
+    ".heic",
+    ".heif",
+)
 FOOTAGE_SUFFIXES = VIDEO_SUFFIXES + PICTURE_SUFFIXES
-MAX_PIXELS = 1 << 27  # of an image, 134 million: more than footage has; a few bytes of a file can declare any number
+# of an image, 134 million: more than footage has; a few bytes of a file can declare any number
+MAX_PIXELS = 1 << 27
 LAST_NUMBER = re.compile(r"(\d+)(?!.*\d)")
 
 
 def sequence_pattern(picture: Path) -> str:
-    """Return the picture's name with its last number replaced by #: the same for all pictures of a sequence."""
+    """Return the picture's name with its last number replaced by #: the same for all pictures of a
+    sequence.
+    """
     return LAST_NUMBER.sub("#", picture.stem) + picture.suffix.lower()
 
 
 def pictures_in(folder: Path) -> list[Path]:
     """Return the pictures in a folder in natural order: frame 10 comes after frame 9."""
-    found = [p for p in folder.iterdir() if p.suffix.lower() in PICTURE_SUFFIXES and not p.name.startswith(".")]
+    found = [
+        p
+        for p in folder.iterdir()
+        if p.suffix.lower() in PICTURE_SUFFIXES and not p.name.startswith(".")
+    ]
     return sorted((p for p in found if p.is_file()), key=_natural_order)
 
 
 def is_sequence(pictures: list[Path]) -> bool:
-    """Return whether these pictures are one numbered sequence: their names differ in the last number only."""
+    """Return whether these pictures are one numbered sequence: their names differ in the last
+    number only.
+    """
     return len(pictures) > 1 and len({sequence_pattern(p) for p in pictures}) == 1
 
 
 def numbered(folder: Path, before: str, after: str, first: int = 0) -> list[Path]:
-    """Return the pictures in a folder named ``before``, a number, ``after``, in order of the number.
+    """Return the pictures in a folder named ``before``, a number, ``after``, in order of the
+    number.
 
     :param first: smallest number.
     """
     name = re.compile(re.escape(before) + r"(\d+)" + re.escape(after))
     found = [(int(m.group(1)), p) for p in folder.iterdir() if (m := name.fullmatch(p.name))]
-    return [p for number, p in sorted(found) if number >= first and p.suffix.lower() in PICTURE_SUFFIXES]
+    return [
+        p for number, p in sorted(found) if number >= first and p.suffix.lower() in PICTURE_SUFFIXES
+    ]
 
 
 def numbered_from(first: Path) -> list[Path]:
@@ -50,15 +90,17 @@ def numbered_from(first: Path) -> list[Path]:
 
 
 def is_url(text: object) -> bool:
-    """Return whether a text is the address of a file or folder in a store, such as ``s3://bucket/clips``."""
+    """Return whether a text is the address of a file or folder in a store, such as
+    ``s3://bucket/clips``.
+    """
     return isinstance(text, str) and "://" in text
 
 
 def display_text(path: str | Path) -> str:
     """Return a path as text for people and other programs: bytes that are not UTF-8 become U+FFFD.
 
-    Old discs and archives hold such names, and Python keeps the bytes as lone surrogates. Text with them can name a
-    file, but cannot be printed, or be part of JSON or of Blender's names.
+    Old discs and archives hold such names, and Python keeps the bytes as lone surrogates. Text with
+    them can name a file, but cannot be printed, or be part of JSON or of Blender's names.
     """
     return os.fsencode(path).decode("utf-8", "replace") if not is_utf8(path) else str(path)
 
@@ -67,7 +109,9 @@ def json_text(value: object, indent: int | None = None) -> str:
     """Return JSON in ASCII, in which file names are as in `display_text`."""
     import json  # here, because Blender loads this module when it starts
 
-    return json.dumps(json.loads(display_text(json.dumps(value, ensure_ascii=False))), indent=indent)
+    return json.dumps(
+        json.loads(display_text(json.dumps(value, ensure_ascii=False))), indent=indent
+    )
 
 
 def is_utf8(path: str | Path) -> bool:
@@ -80,4 +124,7 @@ def is_utf8(path: str | Path) -> bool:
 
 
 def _natural_order(path: Path) -> list[tuple[int, int, str]]:
-    return [(0, int(part), "") if part.isdecimal() else (1, 0, part) for part in re.split(r"(\d+)", path.name)]
+    return [
+        (0, int(part), "") if part.isdecimal() else (1, 0, part)
+        for part in re.split(r"(\d+)", path.name)
+    ]

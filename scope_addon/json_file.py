@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reading JSON files that people have written or edited, and maps, which Scope writes as JSON files itself."""
+"""Reading JSON files that people have written or edited, and maps, which Scope writes as JSON files
+itself.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,8 @@ from .atomic_write import atomic_path, reason
 from .errors import OutputError
 
 LARGEST_JSON_BYTES = 1_000_000
-_LARGEST_WHOLE_NUMBER = 1 << 53  # that every reader of JSON holds exactly; 10**400 fits no float (RFC 7493, 2.2)
+# that every reader of JSON holds exactly; 10**400 fits no float (RFC 7493, 2.2)
+_LARGEST_WHOLE_NUMBER = 1 << 53
 
 
 def read_json_object(path: Path, error: type[InputError], what: str, advice: str) -> dict[str, Any]:
@@ -29,11 +32,17 @@ def read_json_object(path: Path, error: type[InputError], what: str, advice: str
         text = path.read_text("utf-8-sig")  # some editors write a byte order mark
         content = json.loads(text, parse_int=_parse_whole_number)
     except OSError as failure:
-        raise error(f"{path}: the {what} cannot be read ({failure.strerror}); choose another file") from failure
+        raise error(
+            f"{path}: the {what} cannot be read ({failure.strerror}); choose another file"
+        ) from failure
     except (ValueError, RecursionError) as failure:
-        raise error(f"{path} is not {_article(what)} {what}: it is not JSON ({failure}); {advice}") from failure
+        raise error(
+            f"{path} is not {_article(what)} {what}: it is not JSON ({failure}); {advice}"
+        ) from failure
     if not isinstance(content, dict):
-        raise error(f"{path} is not {_article(what)} {what}: it does not hold a JSON object; {advice}")
+        raise error(
+            f"{path} is not {_article(what)} {what}: it does not hold a JSON object; {advice}"
+        )
     return content
 
 
@@ -45,22 +54,30 @@ def load_map(path: Path, what: str) -> dict[str, Any]:
     """
     content = read_json_object(path, InputError, what, "choose one that Scope saved")
     if content.get("format") != f"scope {what}" or content.get("version") != 1:
-        raise InputError(f"{path}: this JSON file is not a Scope {what}, version 1; choose another file")
+        raise InputError(
+            f"{path}: this JSON file is not a Scope {what}, version 1; choose another file"
+        )
     return content
 
 
 def save_map(path: Path, what: str, **content: Any) -> None:
-    """Write a map as JSON, atomically. Only a map of its kind is overwritten, whatever it holds, or an empty file.
+    """Write a map as JSON, atomically. Only a map of its kind is overwritten, whatever it holds, or
+    an empty file.
 
     :param what: the map's kind, e.g. ``bone map``.
     :raises OutputError: the file cannot be written, or is something else.
     """
     if path.is_file() and not _is_map_or_empty(path, what):
-        raise OutputError(f"{path} is not {_article(what)} {what}, so it is not overwritten; choose another name")
-    text = json.dumps({"format": f"scope {what}", "version": 1, **content}, indent=2, ensure_ascii=False)
+        raise OutputError(
+            f"{path} is not {_article(what)} {what}, so it is not overwritten; choose another name"
+        )
+    text = json.dumps(
+        {"format": f"scope {what}", "version": 1, **content}, indent=2, ensure_ascii=False
+    )
     try:
         with atomic_path(path) as temporary:
-            # Half of a surrogate pair, which JSON's escapes can hold and UTF-8 cannot, is written as such an escape.
+            # Half of a surrogate pair, which JSON's escapes can hold and UTF-8 cannot, is written
+            # as such an escape.
             temporary.write_text(text + "\n", encoding="utf-8", errors="backslashreplace")
     except OSError as error:
         raise OutputError(f"cannot write {path}: {reason(error)}") from error
@@ -68,7 +85,10 @@ def save_map(path: Path, what: str, **content: Any) -> None:
 
 def _is_map_or_empty(path: Path, what: str) -> bool:
     try:
-        return path.stat().st_size == 0 or read_json_object(path, InputError, what, "")["format"] == f"scope {what}"
+        return (
+            path.stat().st_size == 0
+            or read_json_object(path, InputError, what, "")["format"] == f"scope {what}"
+        )
     except (OSError, InputError, KeyError):
         return False
 

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The motion file: the interface between capture, solver, scene and other tools.
 
-Plain arrays in a compressed .npz, AMASS-style keys, one row per source frame. Frames: world is z up with the floor
-at z = 0 (on uneven ground, that on which the first person stands at first); camera is OpenCV's (x right, y down, z
-forward). ``poses`` holds axis-angle vectors, the root's in the world frame and the others relative to their parents;
-``trans`` is SMPL's: pelvis = J_0(betas) + trans.
+Plain arrays in a compressed .npz, AMASS-style keys, one row per source frame. Frames: world is z up
+with the floor at z = 0 (on uneven ground, that on which the first person stands at first); camera
+is OpenCV's (x right, y down, z forward). ``poses`` holds axis-angle vectors, the root's in the
+world frame and the others relative to their parents; ``trans`` is SMPL's: pelvis = J_0(betas) +
+trans.
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ if TYPE_CHECKING:
 class Motion:
     """One person's motion over T frames. Fields are named like the keys of the file.
 
-    K + 1 joints including the root, P shape coefficients, J keypoints; lengths in metres, angles in radians.
+    K + 1 joints including the root, P shape coefficients, J keypoints; lengths in metres, angles in
+    radians.
 
     :raises MotionFileError: an array has the wrong shape.
     """
@@ -57,11 +59,14 @@ class Motion:
     residual_px: NDArray[np.floating[Any]]  # (T,)
     image_size: NDArray[np.int64]  # (2,) width, height of the decoded, upright frame
     source: str = ""  # file name of the footage
-    joint_sigma_m: NDArray[np.floating[Any]] | None = None  # (T, K+1), NaN where not known; always an array once made
+    # (T, K+1), NaN where not known; always an array once made
+    joint_sigma_m: NDArray[np.floating[Any]] | None = None
     joint_sigma_depth_m: NDArray[np.floating[Any]] | None = None  # (T, K+1), likewise
-    height_sigma_m: float = float("nan")  # standard deviation of the stature of `betas`; NaN where it is not known
+    # standard deviation of the stature of `betas`; NaN where it is not known
+    height_sigma_m: float = float("nan")
     uneven_ground: bool = False  # feet rest at any height, so none is under a floor
-    # What the user corrected, which `poses` and `joints_cam` contain: the arrays named CORRECTION_KEYS, or none.
+    # What the user corrected, which `poses` and `joints_cam` contain: the arrays named
+    # CORRECTION_KEYS, or none.
     corrections: dict[str, NDArray[Any]] = field(default_factory=dict)
     # The face, if it was looked for: the arrays named FACE_KEYS, or none.
     face: dict[str, NDArray[Any]] = field(default_factory=dict)
@@ -73,8 +78,13 @@ class Motion:
         for name, (_, dtype) in _SCHEMA.items():
             value = getattr(self, name)
             setattr(self, name, np.asarray(value, dtype) if dtype is not str else str(value))
-        self.face = {name: np.asarray(value, _FACE_SCHEMA[name][1]) for name, value in self.face.items()}
-        self.mocap_framerate, self.height_sigma_m = float(self.mocap_framerate), float(self.height_sigma_m)
+        self.face = {
+            name: np.asarray(value, _FACE_SCHEMA[name][1]) for name, value in self.face.items()
+        }
+        self.mocap_framerate, self.height_sigma_m = (
+            float(self.mocap_framerate),
+            float(self.height_sigma_m),
+        )
         self.uneven_ground = bool(self.uneven_ground)
         self.validate()
 
@@ -95,7 +105,12 @@ class Motion:
         T = len(self.frames)
         if self.joints_cam.ndim != 3 or self.keypoints2d.ndim != 3:
             raise MotionFileError(f"{where}: joints_cam and keypoints2d must have three dimensions")
-        sizes = {"T": T, "K1": self.joints_cam.shape[1], "J": self.keypoints2d.shape[1], "P": self.betas.size}
+        sizes = {
+            "T": T,
+            "K1": self.joints_cam.shape[1],
+            "J": self.keypoints2d.shape[1],
+            "P": self.betas.size,
+        }
         sizes["3K1"] = 3 * sizes["K1"]
         for name, (shape, dtype) in _SCHEMA.items():
             if dtype is str:
@@ -110,14 +125,24 @@ class Motion:
         if not self.face:
             return
         if missing := sorted(set(FACE_KEYS) - set(self.face)):
-            raise MotionFileError(f"{where} has a face, but lacks {', '.join(missing)}; capture again")
-        sizes = {"T": len(self.frames), "E": self.face["expression_names"].size, "F": self.face["face_landmarks"].size}
+            raise MotionFileError(
+                f"{where} has a face, but lacks {', '.join(missing)}; capture again"
+            )
+        sizes = {
+            "T": len(self.frames),
+            "E": self.face["expression_names"].size,
+            "F": self.face["face_landmarks"].size,
+        }
         for name, (shape, dtype) in _FACE_SCHEMA.items():
             expected = tuple(sizes[s] if isinstance(s, str) else s for s in shape)
             if self.face[name].shape != expected:
-                raise MotionFileError(f"{where}: {name} must have shape {expected}, but has {self.face[name].shape}")
+                raise MotionFileError(
+                    f"{where}: {name} must have shape {expected}, but has {self.face[name].shape}"
+                )
             if dtype is np.float32 and not np.isfinite(self.face[name]).all():
-                raise MotionFileError(f"{where}: {name} has values that are not finite; capture again")
+                raise MotionFileError(
+                    f"{where}: {name} has values that are not finite; capture again"
+                )
 
     def check_body(self, body: Body, where: str = "the motion") -> None:
         """Check that the motion has frames, and a body's joints and shape coefficients.
@@ -127,15 +152,20 @@ class Motion:
         """
         if self.joint_count != body.K + 1 or self.betas.size != body.P:
             raise MotionFileError(
-                f"{where} has {self.joint_count} joints and {self.betas.size} shape coefficients (body "
-                f"'{self.body_model}'), but body '{body.name}' has {body.K + 1} and {body.P}; choose the body it was "
+                f"{where} has {self.joint_count} joints and {self.betas.size} shape coefficients "
+                "(body "
+                f"'{self.body_model}'), but body '{body.name}' has {body.K + 1} and {body.P}; "
+                "choose the body it was "
                 "captured with"
             )
         if len(self) == 0:
-            raise MotionFileError(f"{where} has no frames; capture the video again, or choose another file")
+            raise MotionFileError(
+                f"{where} has no frames; capture the video again, or choose another file"
+            )
 
     def save(self, path: str | Path) -> None:
-        """Write the motion to an .npz file. The write is atomic, so that a failure never leaves a partial file.
+        """Write the motion to an .npz file. The write is atomic, so that a failure never leaves a
+        partial file.
 
         :raises OutputError: the file cannot be written.
         """
@@ -152,23 +182,31 @@ class Motion:
         return file.getvalue()
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
-        arrays = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self) if f.name not in _GROUPS}
+        arrays = {
+            f.name: np.asarray(getattr(self, f.name)) for f in fields(self) if f.name not in _GROUPS
+        }
         return arrays | self.corrections | self.face
 
     @classmethod
     def load(cls, path: str | Path, content: bytes | None = None) -> Motion:
         """Read and check a motion file. Nothing is unpickled.
 
-        :param content: the file's bytes if they are not on disk; ``path`` then only names them in messages.
-        :raises MotionFileError: the file is missing or damaged, or is not a motion file of this version.
+        :param content: the file's bytes if they are not on disk; ``path`` then only names them in
+            messages.
+        :raises MotionFileError: the file is missing or damaged, or is not a motion file of this
+            version.
         """
         path = Path(path)
         data = read_npz(path, MotionFileError, "motion file", content)
         known = {f.name for f in fields(cls)} - set(_GROUPS)
         missing = sorted(known - set(data) - OPTIONAL_KEYS)
         if missing:
-            raise MotionFileError(f"{path} lacks {', '.join(missing)}: it is not a motion file of this version")
-        values: dict[str, Any] = {k: v.item() if v.ndim == 0 else v for k, v in data.items() if k in known}
+            raise MotionFileError(
+                f"{path} lacks {', '.join(missing)}: it is not a motion file of this version"
+            )
+        values: dict[str, Any] = {
+            k: v.item() if v.ndim == 0 else v for k, v in data.items() if k in known
+        }
         corrections = {key: data[key] for key in CORRECTION_KEYS if key in data}
         face = {key: data[key] for key in FACE_KEYS if key in data}
         try:
@@ -181,20 +219,49 @@ class Motion:
             ) from error
 
 
-# Only in files with corrections. The first rows say what was corrected, the others how the changed frames were before.
+# Only in files with corrections. The first rows say what was corrected, the others how the changed
+# frames were before.
 CORRECTION_KEYS = (
     *("pin_frames", "pin_joints", "pin_uv", "pin_xyz", "pin_reach"),
     *("contact_spans", "contact_feet", "exchange_spans", "exchange_limbs", "upright"),
-    *("floor_frames", "floor_heights", "interpolated_spans", "snap_level", "snap_lift", "snap_heights"),
-    *("uncorrected_rows", "uncorrected_poses", "uncorrected_trans", "uncorrected_poses_raw", "uncorrected_trans_raw"),
+    *(
+        "floor_frames",
+        "floor_heights",
+        "interpolated_spans",
+        "snap_level",
+        "snap_lift",
+        "snap_heights",
+    ),
+    *(
+        "uncorrected_rows",
+        "uncorrected_poses",
+        "uncorrected_trans",
+        "uncorrected_poses_raw",
+        "uncorrected_trans_raw",
+    ),
     *("uncorrected_joints_cam", "uncorrected_world_from_camera"),
 )
 # Not in files of earlier versions; NaN where nothing is known.
 SIGMA_KEYS = ("joint_sigma_m", "joint_sigma_depth_m")
-# Only in files of captures that looked for the face: the first are what it expresses, the others where it was seen.
-FACE_KEYS = ("expressions", "expression_names", "expression_confidence", "gaze", "face_points", "face_landmarks")
+# Only in files of captures that looked for the face: the first are what it expresses, the others
+# where it was seen.
+FACE_KEYS = (
+    "expressions",
+    "expression_names",
+    "expression_confidence",
+    "gaze",
+    "face_points",
+    "face_landmarks",
+)
 _GROUPS = ("corrections", "face")  # fields that are not keys themselves
-OPTIONAL_KEYS = {"source", *SIGMA_KEYS, "height_sigma_m", "uneven_ground", *CORRECTION_KEYS, *FACE_KEYS}
+OPTIONAL_KEYS = {
+    "source",
+    *SIGMA_KEYS,
+    "height_sigma_m",
+    "uneven_ground",
+    *CORRECTION_KEYS,
+    *FACE_KEYS,
+}
 _FACE_SCHEMA: dict[str, tuple[tuple[str | int, ...], type]] = {
     "expressions": (("T", "E"), np.float32),
     "expression_names": (("E",), np.str_),

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Spans of frames that should be reviewed: filled in, far from the footage, unsure, or under the floor. Numpy only."""
+"""Spans of frames that should be reviewed: filled in, far from the footage, unsure, or under the
+floor. Numpy only.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,8 @@ from numpy.typing import NDArray
 from ..solver.names import BODY_JOINTS
 from .motion import Motion
 
-FAR_SHARE = 0.03  # reprojection error above which a frame should be reviewed, as a share of the image's longer side
+# reprojection error above which a frame should be reviewed, as a share of the image's longer side
+FAR_SHARE = 0.03
 LOW_CONFIDENCE = 0.35  # mean over the joints that keypoints determine
 REASONS = {
     "unseen": "not visible: the pose is filled in",
@@ -23,20 +26,24 @@ REASONS = {
 
 @dataclass(frozen=True)
 class Span:
-    """Rows ``first`` to ``last`` of a motion, inclusive, and why they should be reviewed: a key of ``REASONS``."""
+    """Rows ``first`` to ``last`` of a motion, inclusive, and why they should be reviewed: a key of
+    ``REASONS``.
+    """
 
     reason: str
     first: int
     last: int
 
 
-def find_review_spans(motion: Motion, gap_s: float = 0.0, under_floor: NDArray[np.bool_] | None = None) -> list[Span]:
+def find_review_spans(
+    motion: Motion, gap_s: float = 0.0, under_floor: NDArray[np.bool_] | None = None
+) -> list[Span]:
     """Find the spans of a motion that should be reviewed.
 
     :param gap_s: spans of the same reason that are less than this many seconds apart are merged.
     :param under_floor: (T,) frames in which a foot is under the floor; None: not known.
-    :return: the spans of each reason in turn, in chronological order; apart from the floor, a frame has at most one
-        reason.
+    :return: the spans of each reason in turn, in chronological order; apart from the floor, a frame
+        has at most one reason.
     """
     unseen = ~motion.valid
     far = ~unseen & (motion.residual_px > FAR_SHARE * motion.image_size.max())
@@ -44,11 +51,16 @@ def find_review_spans(motion: Motion, gap_s: float = 0.0, under_floor: NDArray[n
     masks = {"unseen": unseen, "far": far, "unsure": unsure}
     if under_floor is not None:
         masks["floor"] = under_floor
-    return [Span(why, *pair) for why, mask in masks.items() for pair in _spans(mask, motion.timestamps, gap_s)]
+    return [
+        Span(why, *pair)
+        for why, mask in masks.items()
+        for pair in _spans(mask, motion.timestamps, gap_s)
+    ]
 
 
 def body_confidence(motion: Motion) -> NDArray[np.float32] | NDArray[np.float64]:
-    """Return the mean confidence of each frame, (T,), over the body's joints that are seen in at least one frame.
+    """Return the mean confidence of each frame, (T,), over the body's joints that are seen in at
+    least one frame.
 
     Fingers, which are often occluded, do not count.
     """
@@ -57,7 +69,9 @@ def body_confidence(motion: Motion) -> NDArray[np.float32] | NDArray[np.float64]
     return confidence[:, shown].mean(axis=1) if shown.any() else np.zeros(len(motion))
 
 
-def _spans(mask: NDArray[np.bool_], timestamps: NDArray[np.float64], gap_s: float) -> list[tuple[int, int]]:
+def _spans(
+    mask: NDArray[np.bool_], timestamps: NDArray[np.float64], gap_s: float
+) -> list[tuple[int, int]]:
     """Return the first and last row of each run of True in ``mask``, (T,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(mask, int), [0]])))
     out: list[tuple[int, int]] = []

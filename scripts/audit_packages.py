@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Ask the package registry which vulnerabilities it knows of in the packages of the zips.
 
-PyPI states them for one version, or, where a mirror offers no more, for a project's newest. What was not answered for
-the shipped version is said to be unknown, rather than taken to be good.
+PyPI states them for one version, or, where a mirror offers no more, for a project's newest. What
+was not answered for the shipped version is said to be unknown, rather than taken to be good.
 """
 
 from __future__ import annotations
@@ -27,7 +27,9 @@ def ask(path: str) -> Any:
 
     :raises OSError: it cannot be reached.
     """
-    request = urllib.request.Request(f"{REGISTRY}/{path}/json", headers={"Accept": "application/json"})
+    request = urllib.request.Request(
+        f"{REGISTRY}/{path}/json", headers={"Accept": "application/json"}
+    )
     try:
         with urllib.request.urlopen(request, timeout=60) as answer:
             return json.load(answer)
@@ -48,7 +50,8 @@ def locked_versions() -> set[tuple[str, str]]:
 def audit(name: str, version: str, ask: Ask = ask) -> tuple[list[str] | None, str]:
     """Look up a package.
 
-    :return: its known vulnerabilities, each as a sentence, None if the registry does not say; and the newest version.
+    :return: its known vulnerabilities, each as a sentence, None if the registry does not say; and
+        the newest version.
     """
     answer = ask(f"{name}/{version}")
     newest = ask(name)
@@ -65,7 +68,9 @@ def _sentence(entry: dict[str, Any]) -> str:
     names = ", ".join([entry.get("id", "?"), *entry.get("aliases", [])])
     fixed = ", ".join(entry.get("fixed_in") or []) or "no version"
     return (
-        f"{names}: {' '.join(str(entry.get('summary') or entry.get('details') or '').split())[:200]} (fixed in {fixed})"
+        f"{names}: "
+        f"{' '.join(str(entry.get('summary') or entry.get('details') or '').split())[:200]} (fixed "
+        f"in {fixed})"
     )
 
 
@@ -81,10 +86,15 @@ def main(ask: Ask = ask) -> int:
         newer = f" (newest: {latest})" if latest not in ("", version) else ""
         if known is None:
             unknown = True
-            print(f"{name} {version}{newer}: unknown, the registry does not answer for this version")
+            print(
+                f"{name} {version}{newer}: unknown, the registry does not answer for this version"
+            )
         else:
             found = found or bool(known)
-            print(f"{name} {version}{newer}: {'; '.join(known) if known else 'no known vulnerability'}")
+            print(
+                f"{name} {version}{newer}: "
+                f"{'; '.join(known) if known else 'no known vulnerability'}"
+            )
     return 1 if found else 2 if unknown else 0
 
 

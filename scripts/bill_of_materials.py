@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A zip's bill of materials: every package, every library inside its wheels, and every network and body, with hashes.
+"""A zip's bill of materials: every package, every library inside its wheels, and every network and
+body, with hashes.
 
-The format is CycloneDX 1.6 in JSON. Wheels and their files are read; scripts/native_libraries.toml says what a library
-is and under which licence. A wheel with a library that is not listed there is refused, so that none enters unseen.
+The format is CycloneDX 1.6 in JSON. Wheels and their files are read; scripts/native_libraries.toml
+says what a library is and under which licence. A wheel with a library that is not listed there is
+refused, so that none enters unseen.
 """
 
 from __future__ import annotations
@@ -39,7 +41,8 @@ ASSETS = {
     "assets/body/*.npz": "CC0-1.0",
     "assets/sample/*.mp4": "CC0-1.0",
 }
-_NAMESPACE = uuid.UUID("5a3bb3f0-6b5e-4a5c-9d0e-0f3c5a9b1d27")  # of the serial numbers, each made from the content
+# of the serial numbers, each made from the content
+_NAMESPACE = uuid.UUID("5a3bb3f0-6b5e-4a5c-9d0e-0f3c5a9b1d27")
 _EXTENSION_MODULE = re.compile(r"(\.(abi3|cpython-[\w-]+)\.so|\.pyd)$")
 _SHORT = {"opencv-contrib-python-headless": "opencv"}  # in THIRD_PARTY.md
 _ROW = r"^\| ([^|]+) \| ([^|]+) \| ((?:\S+ [LMW]+(?:, )?)+) \|$"  # of the table of libraries there
@@ -51,7 +54,8 @@ class Library:
     """A library inside a wheel.
 
     :param project: its name in native_libraries.toml.
-    :param version: as its file states it, or the number in the file's name; empty if there is neither.
+    :param version: as its file states it, or the number in the file's name; empty if there is
+        neither.
     """
 
     project: str
@@ -64,13 +68,15 @@ class Library:
 def library_name(file: str) -> tuple[str, str] | None:
     """Split a file's name into a library's name and version; None for what is no library.
 
-    A Python package's own extension modules are none. Tools that repair wheels add digits of a hash to names.
+    A Python package's own extension modules are none. Tools that repair wheels add digits of a hash
+    to names.
     """
     match = _LIBRARY.match(PurePosixPath(file).name)
     if not match or _EXTENSION_MODULE.search(file):
         return None
     name = re.sub(r"-[0-9a-f]{8,32}(?=\.|$)", "", match["name"])
-    name = re.sub(r"\d{4}_64$", "", name)  # OpenCV's own version in the name of its FFmpeg for Windows
+    # OpenCV's own version in the name of its FFmpeg for Windows
+    name = re.sub(r"\d{4}_64$", "", name)
     number = re.search(r"[-.]r?(\d[\d.]*)$", name)
     stem = re.sub(r"([-.]r?\d[\d.]*)+$", "", name)
     if not name.startswith("lib") and match["end"] == "" and PurePosixPath(file).suffix == ".so":
@@ -84,11 +90,16 @@ def libraries(package: str, files: Iterable[tuple[str, bytes]]) -> list[Library]
     :param files: names and contents of all that it contains.
     :raises SystemExit: a library is not in native_libraries.toml.
     """
-    by_file = {name: project for project, entry in PROJECTS.items() for name in entry.get("files", ())}
+    by_file = {
+        name: project for project, entry in PROJECTS.items() for name in entry.get("files", ())
+    }
     found, stated = [], {}
     for file, content in files:
         digest = hashlib.sha256(content).hexdigest()
-        found += [(project, version, file, digest) for project, version in _inside_opencv(package, file, content)]
+        found += [
+            (project, version, file, digest)
+            for project, version in _inside_opencv(package, file, content)
+        ]
         parts = library_name(file)
         if parts is None:
             continue
@@ -109,7 +120,9 @@ def libraries(package: str, files: Iterable[tuple[str, bytes]]) -> list[Library]
 
 
 def _inside_opencv(package: str, file: str, content: bytes) -> Iterator[tuple[str, str]]:
-    """Yield the projects, with versions, that OpenCV's description of its build says are part of its own file."""
+    """Yield the projects, with versions, that OpenCV's description of its build says are part of
+    its own file.
+    """
     at = content.find(b"General configuration for OpenCV")
     if not PurePosixPath(file).name.startswith("cv2") or at < 0:
         return
@@ -127,7 +140,8 @@ def _inside_opencv(package: str, file: str, content: bytes) -> Iterator[tuple[st
 
 def _unlisted(package: str, what: str) -> SystemExit:
     return SystemExit(
-        f"build: {package} contains {what}, which is not in scripts/native_libraries.toml; add it there and to "
+        f"build: {package} contains {what}, which is not in scripts/native_libraries.toml; add it "
+        "there and to "
         "THIRD_PARTY.md, with its licence"
     )
 
@@ -144,12 +158,16 @@ def _licence(project: str, version: str, others: set[str]) -> str:
 
 
 def conflicts(found: Iterable[Library]) -> list[Library]:
-    """Return the libraries whose licences do not go together with the GPL's version 3 in one program."""
+    """Return the libraries whose licences do not go together with the GPL's version 3 in one
+    program.
+    """
     return [library for library in found if library.licence in TABLE["conflicts"]["licences"]]
 
 
 def shown_name(library: Library) -> str:
-    """Return the name of a library's project, whether it is a file of its own or part of another."""
+    """Return the name of a library's project, whether it is a file of its own or part of
+    another.
+    """
     return library.project.removesuffix(" in cv2")
 
 
@@ -161,7 +179,9 @@ def wheel_libraries(wheel: Path) -> tuple[Message, list[Library]]:
     """
     with zipfile.ZipFile(wheel) as file:
         names = sorted(file.namelist())
-        metadata = Parser().parsestr(file.read(next(n for n in names if n.endswith(".dist-info/METADATA"))).decode())
+        metadata = Parser().parsestr(
+            file.read(next(n for n in names if n.endswith(".dist-info/METADATA"))).decode()
+        )
         contents = ((name, file.read(name)) for name in names if not name.endswith("/"))
         return metadata, libraries(metadata["Name"], contents)
 
@@ -206,7 +226,8 @@ def bill_of_materials(folder: Path, wheels: Iterable[Path], platform: str, made:
     :param platform: that it is for, as in ``linux-x64``.
     :param made: time that the document states.
     :return: CycloneDX 1.6, JSON. The same content gives the same text.
-    :raises SystemExit: the wheels contain libraries that are not listed, or THIRD_PARTY.md states other ones.
+    :raises SystemExit: the wheels contain libraries that are not listed, or THIRD_PARTY.md states
+        other ones.
     """
     version = tomllib.loads((folder / "blender_manifest.toml").read_text("utf-8"))["version"]
     third_party = (folder / "THIRD_PARTY.md").read_text("utf-8")
@@ -226,17 +247,23 @@ def bill_of_materials(folder: Path, wheels: Iterable[Path], platform: str, made:
         raise SystemExit(f"build: {'; '.join(problems)}")
     for path in sorted(p for p in folder.rglob("*") if p.is_file()):
         name = path.relative_to(folder).as_posix()
-        licence = next((text for pattern, text in ASSETS.items() if fnmatch.fnmatch(name, pattern)), None)
+        licence = next(
+            (text for pattern, text in ASSETS.items() if fnmatch.fnmatch(name, pattern)), None
+        )
         if licence:
             parts.append(_asset_component(name, path, licence))
     bom = Bom(components=parts, metadata=BomMetaData(component=root, timestamp=made))
-    content = "".join(f"{part.name} {part.version} {next(iter(part.hashes)).content}\n" for part in parts)
+    content = "".join(
+        f"{part.name} {part.version} {next(iter(part.hashes)).content}\n" for part in parts
+    )
     bom.serial_number = uuid.uuid5(_NAMESPACE, f"{version}\n{content}")
     bom.register_dependency(root, parts)
     return JsonV1Dot6(bom).output_as_string(indent=2) + "\n"
 
 
-def check_third_party(package: str, platform: str, found: Iterable[Library], text: str) -> list[str]:
+def check_third_party(
+    package: str, platform: str, found: Iterable[Library], text: str
+) -> list[str]:
     """Compare the libraries of a package with those that THIRD_PARTY.md states.
 
     :param platform: of a zip, as in ``linux-x64``.
@@ -248,16 +275,24 @@ def check_third_party(package: str, platform: str, found: Iterable[Library], tex
     for name, licence, places in re.findall(
         r"^\| ([^|]+) \| ([^|]+) \| ((?:\S+ [LMW]+(?:, )?)+) \|$", text, flags=re.M
     ):
-        if any(place.split()[0] == short and letter in place.split()[1] for place in places.split(", ")):
+        if any(
+            place.split()[0] == short and letter in place.split()[1] for place in places.split(", ")
+        ):
             stated[name] = licence
     real = {shown_name(library): library.licence for library in found}
     problems = [
-        f"{package} contains {name}, which THIRD_PARTY.md lacks" for name in sorted(real.keys() - stated.keys())
+        f"{package} contains {name}, which THIRD_PARTY.md lacks"
+        for name in sorted(real.keys() - stated.keys())
     ]
-    problems += [f"THIRD_PARTY.md has {name}, which {package} lacks" for name in sorted(stated.keys() - real.keys())]
+    problems += [
+        f"THIRD_PARTY.md has {name}, which {package} lacks"
+        for name in sorted(stated.keys() - real.keys())
+    ]
     for name in sorted(real.keys() & stated.keys()):
         if real[name] not in stated[name].split(" / "):
-            problems.append(f"THIRD_PARTY.md states {stated[name]} for {name} of {package}, not {real[name]}")
+            problems.append(
+                f"THIRD_PARTY.md states {stated[name]} for {name} of {package}, not {real[name]}"
+            )
     return problems
 
 

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Build the extension: one zip for each platform and Python, validated and listed by Blender's own tool.
+"""Build the extension: one zip for each platform and Python, validated and listed by Blender's own
+tool.
 
-Blender's ``extension`` command is one Python file that needs no running Blender; PyPI's bpy carries it. What the
-Extensions Platform asks of a zip, and where the code answers, is in docs/publishing.md.
+Blender's ``extension`` command is one Python file that needs no running Blender; PyPI's bpy carries
+it. What the Extensions Platform asks of a zip, and where the code answers, is in
+docs/publishing.md.
 """
 
 from __future__ import annotations
@@ -30,24 +32,39 @@ from shipped_kernels import add_kernels
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build"
-WHEELS, STAGING, DIST, OTHER_DIST = BUILD / "wheels", BUILD / "staging", BUILD / "dist", BUILD / "dist_any_blender"
+WHEELS, STAGING, DIST, OTHER_DIST = (
+    BUILD / "wheels",
+    BUILD / "staging",
+    BUILD / "dist",
+    BUILD / "dist_any_blender",
+)
 
-# pip's platform tags, newest first, down to the oldest systems that onnxruntime and llvmlite support.
+# pip's platform tags, newest first, down to the oldest systems that onnxruntime and llvmlite
+# support.
 PLATFORMS = {
     "windows-x64": ["win_amd64"],
     "macos-arm64": ["macosx_14_0_arm64"],
-    "linux-x64": ["manylinux_2_28_x86_64", "manylinux_2_27_x86_64", "manylinux_2_17_x86_64", "manylinux2014_x86_64"],
+    "linux-x64": [
+        "manylinux_2_28_x86_64",
+        "manylinux_2_27_x86_64",
+        "manylinux_2_17_x86_64",
+        "manylinux2014_x86_64",
+    ],
 }
-# The Python of Blender's own builds: the first Blender with it, and the first after it. Distributions use others.
+# The Python of Blender's own builds: the first Blender with it, and the first after it.
+# Distributions use others.
 BLENDERS = {"3.11": ("4.2.0", "5.1.0"), "3.13": ("5.1.0", None)}
-# All imported packages. onnxruntime's metadata also requires flatbuffers, packaging and protobuf, but running a network
-# imports none of them. numpy is always Blender's own.
+# All imported packages. onnxruntime's metadata also requires flatbuffers, packaging and protobuf,
+# but running a network imports none of them. numpy is always Blender's own.
 PACKAGES = ("numba", "llvmlite", "onnxruntime", "opencv-contrib-python-headless", "av")
 CONTENT = ("__init__.py", "LICENSE", "THIRD_PARTY.md", "solver", "scope_addon", "assets")
-# Clusters use the network, and live captures send poses to other programs, from the shell only: nothing in the
-# extension opens a socket.
+# Clusters use the network, and live captures send poses to other programs, from the shell only:
+# nothing in the extension opens a socket.
 SENDERS = ("json_lines.py", "preview_page.py", "vmc.py")
-LEFT_OUT = (*("__pycache__", "*.pyc", ".*", "sample_truth.npz", "pictures", "examples", "cluster"), *SENDERS)
+LEFT_OUT = (
+    *("__pycache__", "*.pyc", ".*", "sample_truth.npz", "pictures", "examples", "cluster"),
+    *SENDERS,
+)
 BILL = "bill_of_materials.cdx.json"  # in the zip; a copy with the zip's name lies beside it
 GOAL_MB, LIMIT_MB = 200, 240
 _OLDEST = 315532800  # 1980-01-01, the first time that a zip can state
@@ -55,7 +72,9 @@ _OLDEST = 315532800  # 1980-01-01, the first time that a zip can state
 
 @dataclass(frozen=True)
 class Target:
-    """What a zip is made for: a platform, a Python, and Blender's own builds with that Python or any Blender."""
+    """What a zip is made for: a platform, a Python, and Blender's own builds with that Python or
+    any Blender.
+    """
 
     platform: str
     python: str
@@ -63,14 +82,18 @@ class Target:
 
     @property
     def blenders(self) -> tuple[str, str | None]:
-        """The first Blender that may install it, and the first that may not; None where there is no such."""
+        """The first Blender that may install it, and the first that may not; None where there is no
+        such.
+        """
         return (BLENDERS["3.11"][0], None) if self.any_blender else BLENDERS[self.python]
 
     def file_name(self, version: str) -> str:
         """Return the name of its zip, which says what it is for."""
         first, end = (text and text.removesuffix(".0") for text in self.blenders)
         blender = (
-            f"python_{self.python}" if self.any_blender else f"blender_{first}" + (f"_before_{end}" if end else "")
+            f"python_{self.python}"
+            if self.any_blender
+            else f"blender_{first}" + (f"_before_{end}" if end else "")
         )
         return f"scope-{version}-{blender}-{self.platform.replace('-', '_')}.zip"
 
@@ -78,32 +101,52 @@ class Target:
 def main() -> int:
     """Build the extension; return the exit status."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("platforms", nargs="*", metavar="PLATFORM", help=f"of {', '.join(PLATFORMS)} (default: all)")
-    parser.add_argument("--python", choices=sorted(BLENDERS), help="build for this Python alone (default: each)")
+    parser.add_argument(
+        "platforms", nargs="*", metavar="PLATFORM", help=f"of {', '.join(PLATFORMS)} (default: all)"
+    )
+    parser.add_argument(
+        "--python", choices=sorted(BLENDERS), help="build for this Python alone (default: each)"
+    )
     parser.add_argument(
         "--any-blender",
         action="store_true",
-        help="for a distribution's Blender, whose Python is not that of Blender's own build; any version from 4.2 on"
+        help="for a distribution's Blender, whose Python is not that of Blender's own build; any "
+        "version from 4.2 on"
         f" may install the zip, which is written to build/{OTHER_DIST.name}",
     )
     parser.add_argument(
-        "--no-kernels", action="store_true", help="leave the compiled solver out; it is compiled on first use"
+        "--no-kernels",
+        action="store_true",
+        help="leave the compiled solver out; it is compiled on first use",
     )
-    parser.add_argument("--website", metavar="URL", default="", help="page for users, written into the manifest")
+    parser.add_argument(
+        "--website", metavar="URL", default="", help="page for users, written into the manifest"
+    )
     args = parser.parse_args()
     unknown = sorted(set(args.platforms) - set(PLATFORMS))
     if unknown:
-        print(f"build: unknown platform {', '.join(unknown)}; choose of {', '.join(PLATFORMS)}", file=sys.stderr)
+        print(
+            f"build: unknown platform {', '.join(unknown)}; choose of {', '.join(PLATFORMS)}",
+            file=sys.stderr,
+        )
         return 2
     pythons = [args.python] if args.python else sorted(BLENDERS)
-    targets = [Target(p, python, args.any_blender) for p in args.platforms or PLATFORMS for python in pythons]
+    targets = [
+        Target(p, python, args.any_blender)
+        for p in args.platforms or PLATFORMS
+        for python in pythons
+    ]
     folder = OTHER_DIST if args.any_blender else DIST
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     for target in targets:
         archive = build(target, folder, args.website, kernels=not args.no_kernels)
         size = archive.stat().st_size / 1e6
-        print(f"{archive}  {size:.0f} MB{f', above the goal of {GOAL_MB} MB' if size > GOAL_MB else ''}", flush=True)
+        print(
+            f"{archive}  {size:.0f} "
+            f"MB{f', above the goal of {GOAL_MB} MB' if size > GOAL_MB else ''}",
+            flush=True,
+        )
     if not args.any_blender:
         check_listing(folder, targets)
     return 0
@@ -128,19 +171,24 @@ def build(target: Target, folder: Path, website: str = "", *, kernels: bool = Tr
 
 
 def source_time() -> datetime:
-    """Return the time that everything in a zip states: SOURCE_DATE_EPOCH, or that of the last commit."""
+    """Return the time that everything in a zip states: SOURCE_DATE_EPOCH, or that of the last
+    commit.
+    """
     stated = os.environ.get("SOURCE_DATE_EPOCH", "")
     if not stated:
         command = ["git", "-C", str(ROOT), "log", "-1", "--format=%ct"]
         try:
-            stated = subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip()
+            stated = subprocess.run(
+                command, capture_output=True, text=True, check=False
+            ).stdout.strip()
         except OSError:  # there is no git
             stated = ""
     return datetime.fromtimestamp(max(int(stated or 0), _OLDEST), UTC)
 
 
 def write_zip(folder: Path, archive: Path, made: datetime) -> None:
-    """Pack a folder so that the same content gives the same bytes: sorted, and with one time and mode.
+    """Pack a folder so that the same content gives the same bytes: sorted, and with one time and
+    mode.
 
     Blender's own tool packs in the order of the file system, and with the times of the files.
     """
@@ -148,7 +196,9 @@ def write_zip(folder: Path, archive: Path, made: datetime) -> None:
     with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as file:
         for path in sorted(p for p in folder.rglob("*") if p.is_file()):
             entry = zipfile.ZipInfo(path.relative_to(folder).as_posix(), made.timetuple()[:6])
-            entry.compress_type = zipfile.ZIP_STORED if path.suffix == ".whl" else zipfile.ZIP_DEFLATED
+            entry.compress_type = (
+                zipfile.ZIP_STORED if path.suffix == ".whl" else zipfile.ZIP_DEFLATED
+            )
             entry.create_system, entry.external_attr = 3, 0o644 << 16
             file.writestr(entry, path.read_bytes(), compresslevel=9)
     temporary.replace(archive)
@@ -160,12 +210,24 @@ def download_wheels(target: Target) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     pins = folder / "requirements.txt"
     wanted = locked(target.python)
-    if not pins.is_file() or pins.read_text("utf-8") != wanted or len(list(folder.glob("*.whl"))) != len(PACKAGES):
+    if (
+        not pins.is_file()
+        or pins.read_text("utf-8") != wanted
+        or len(list(folder.glob("*.whl"))) != len(PACKAGES)
+    ):
         for old in folder.iterdir():
             old.unlink()
         request = folder / "request.txt"
         request.write_text(wanted)
-        command = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps"]
+        command = [
+            sys.executable,
+            "-m",
+            "pip",
+            "download",
+            "--quiet",
+            "--disable-pip-version-check",
+            "--no-deps",
+        ]
         command += ["--only-binary=:all:", "--require-hashes", "--implementation", "cp"]
         command += ["--python-version", target.python]
         for tag in PLATFORMS[target.platform]:
@@ -182,16 +244,19 @@ def locked(python: str) -> str:
     found = {entry[1]: entry[0] for entry in entries if entry[1] in PACKAGES}
     missing = sorted(set(PACKAGES) - set(found))
     if missing:
-        raise SystemExit(f"build: the lock for Python {python} lacks {', '.join(missing)}; run ./scripts/lock")
+        raise SystemExit(
+            f"build: the lock for Python {python} lacks {', '.join(missing)}; run ./scripts/lock"
+        )
     return "\n".join(found[name] for name in PACKAGES) + "\n"
 
 
 def shipped_name(wheel: str, python: str) -> str:
-    """Return a wheel's file name in the zip: PyPI's, except where a Blender would then leave the wheel out.
+    """Return a wheel's file name in the zip: PyPI's, except where a Blender would then leave the
+    wheel out.
 
-    Blender 4.3, and the first updates of 4.2, compare a wheel's Python tag with their own Python also where the wheel
-    is for the stable ABI, and skip ``cp37-abi3``. In the zip for their Python, such a wheel's name also has the tag of
-    that Python. The wheel itself is unchanged.
+    Blender 4.3, and the first updates of 4.2, compare a wheel's Python tag with their own Python
+    also where the wheel is for the stable ABI, and skip ``cp37-abi3``. In the zip for their Python,
+    such a wheel's name also has the tag of that Python. The wheel itself is unchanged.
     """
     *head, tag, abi, platform = wheel.removesuffix(".whl").split("-")
     own = "cp" + python.replace(".", "")
@@ -221,10 +286,14 @@ def stage(target: Target, wheels: list[Path], website: str = "") -> None:
 
 
 def manifest(target: Target, wheels: list[str], website: str = "") -> str:
-    """Return the manifest of a target: that of the repository, with its Blenders, platform, wheels and website."""
+    """Return the manifest of a target: that of the repository, with its Blenders, platform, wheels
+    and website.
+    """
     top, tables = (ROOT / "blender_manifest.toml").read_text("utf-8").split("\n[", 1)
     first, end = target.blenders
-    limits = f'blender_version_min = "{first}"' + (f'\nblender_version_max = "{end}"' if end else "")
+    limits = f'blender_version_min = "{first}"' + (
+        f'\nblender_version_max = "{end}"' if end else ""
+    )
     top, count = re.subn(r'^blender_version_min = ".*"$', limits, top, flags=re.M)
     if count != 1:
         raise SystemExit("build: blender_manifest.toml must have one line blender_version_min")
@@ -242,24 +311,39 @@ def blender_extension(*arguments: str) -> str:
     package = Path(spec.origin).parent if spec and spec.origin else ROOT / "no bpy"
     found = sorted(package.glob("*/scripts/**/blender_ext.py"))
     if not found:
-        raise SystemExit("build: bpy, which contains Blender's extension tool, is not installed; run ./scripts/setup")
-    done = subprocess.run([sys.executable, str(found[0]), *arguments], capture_output=True, text=True, check=False)
+        raise SystemExit(
+            "build: bpy, which contains Blender's extension tool, is not installed; "
+            "run ./scripts/setup"
+        )
+    done = subprocess.run(
+        [sys.executable, str(found[0]), *arguments], capture_output=True, text=True, check=False
+    )
     if done.returncode:
         raise SystemExit(f"build: Blender's extension tool refused:\n{done.stdout}{done.stderr}")
     return done.stdout + done.stderr
 
 
 def check(archive: Path, target: Target) -> None:
-    """Check what Blender's tool cannot: the size, and that all that a capture needs is there, and not numpy."""
+    """Check what Blender's tool cannot: the size, and that all that a capture needs is there, and
+    not numpy.
+    """
     with zipfile.ZipFile(archive) as file:
         names = file.namelist()
-        wheels = {Path(n).name: hashlib.sha256(file.read(n)).hexdigest() for n in names if n.endswith(".whl")}
+        wheels = {
+            Path(n).name: hashlib.sha256(file.read(n)).hexdigest()
+            for n in names
+            if n.endswith(".whl")
+        }
         stated = tomllib.loads(file.read("blender_manifest.toml").decode())
     listed = [Path(w).name for w in stated["wheels"]]
     problems = [f"{w} is listed but not there" for w in listed if w not in wheels]
     problems += [f"{w} is there but not listed" for w in wheels if w not in listed]
     lock = locked(target.python)
-    problems += [f"{w} is not the locked file" for w, found in wheels.items() if f"sha256:{found}" not in lock]
+    problems += [
+        f"{w} is not the locked file"
+        for w, found in wheels.items()
+        if f"sha256:{found}" not in lock
+    ]
     for package in PACKAGES:
         count = sum(w.startswith(package.replace("-", "_") + "-") for w in listed)
         if count != 1:
@@ -269,21 +353,36 @@ def check(archive: Path, target: Target) -> None:
     networks = ("pose_detection", "pose_landmark_lite", "pose_landmark_full", "pose_landmark_heavy")
     networks += ("palm_detection", "hand_landmark", "face_landmark", "face_expression")
     wanted = [f"assets/networks/{n}.onnx" for n in networks]
-    wanted += ["assets/networks/LICENSE-mediapipe.txt", "assets/body/scope.npz", "assets/body/scope_h.npz"]
+    wanted += [
+        "assets/networks/LICENSE-mediapipe.txt",
+        "assets/body/scope.npz",
+        "assets/body/scope_h.npz",
+    ]
     wanted += ["assets/body/expressions.npz", "assets/body/growth.npz", "assets/body/mouth.npz"]
     wanted += ["assets/face/response.npz"]
     wanted += [f"assets/face/controls/{rig}.json" for rig in ("rigify", "rigify_skin", "mpfb")]
-    wanted += ["assets/lifter/lifter.onnx", "assets/prior/joint_prior.npz", "assets/sample/sample.mp4"]
+    wanted += [
+        "assets/lifter/lifter.onnx",
+        "assets/prior/joint_prior.npz",
+        "assets/sample/sample.mp4",
+    ]
     wanted += [f"assets/{folder}/LICENSE.md" for folder in ("body", "lifter", "sample")]
     wanted += ["LICENSE", "THIRD_PARTY.md", "scope_addon/ui/__init__.py", BILL, *GUIDE]
-    static = [path.relative_to(ROOT).as_posix() for path in (ROOT / "scope_addon" / "report" / "static").iterdir()]
+    static = [
+        path.relative_to(ROOT).as_posix()
+        for path in (ROOT / "scope_addon" / "report" / "static").iterdir()
+    ]
     wanted += static
     problems += [f"{w} is missing" for w in wanted if w not in names]
     if stated["platforms"] != [target.platform]:
         problems.append(f"made for {', '.join(stated['platforms'])}, not for {target.platform}")
     if (stated["blender_version_min"], stated.get("blender_version_max")) != target.blenders:
         problems.append(f"not made for Blender {' to '.join(str(b) for b in target.blenders)}")
-    problems += [f"{n} does not belong in" for n in names if "__pycache__" in n or n.endswith((".pyc", ".nbi", ".nbc"))]
+    problems += [
+        f"{n} does not belong in"
+        for n in names
+        if "__pycache__" in n or n.endswith((".pyc", ".nbi", ".nbc"))
+    ]
     size = archive.stat().st_size / 1e6
     if size > LIMIT_MB:
         problems.append(f"it has {size:.0f} MB, more than the limit of {LIMIT_MB} MB")
@@ -292,11 +391,15 @@ def check(archive: Path, target: Target) -> None:
 
 
 def check_listing(folder: Path, targets: list[Target]) -> None:
-    """List the zips as an extension repository does: every one must be listed, and no Blender may fit two."""
+    """List the zips as an extension repository does: every one must be listed, and no Blender may
+    fit two.
+    """
     said = blender_extension("server-generate", "--repo-dir", str(folder))
     listing = folder / "index.json"
     entries = json.loads(listing.read_text("utf-8"))["data"]
-    found = sorted((e["platforms"], e["blender_version_min"], e.get("blender_version_max")) for e in entries)
+    found = sorted(
+        (e["platforms"], e["blender_version_min"], e.get("blender_version_max")) for e in entries
+    )
     wanted = sorted(([target.platform], *target.blenders) for target in targets)
     if found != wanted or "duplicate" in said.lower() or "error" in said.lower():
         raise SystemExit(f"build: Blender's tool listed {found}, not {wanted}, and said:\n{said}")

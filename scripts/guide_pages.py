@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The guide as pages of HTML, which a browser shows without network: what the extension's Documentation button opens.
+"""The guide as pages of HTML, which a browser shows without network: what the extension's
+Documentation button opens.
 
-Converts the Markdown that the repository's pages use: headings, paragraphs, lists, tables, code, pictures, emphasis and
-links. A link to something that the extension does not contain becomes its text.
+Converts the Markdown that the repository's pages use: headings, paragraphs, lists, tables, code,
+pictures, emphasis and links. A link to something that the extension does not contain becomes its
+text.
 """
 
 from __future__ import annotations
@@ -19,17 +21,28 @@ PAGES = ("guide", "live", "retargeting", "command_line", "motion_file", "own_net
 FILES = tuple(f"docs/{name}.html" for name in PAGES)
 _PICTURES = (".jpg", ".png", ".webp")
 _STYLE = (
-    "body{max-width:52rem;margin:2rem auto;padding:0 1rem;font:1rem/1.5 sans-serif;color:#222;background:#fff}"
-    "img{max-width:100%}code,pre{background:#f2f2f2;border-radius:3px;padding:0 .2em}pre{padding:.6em;overflow:auto}"
-    "table{border-collapse:collapse}td,th{border:1px solid #ccc;padding:.3em .6em;text-align:left;vertical-align:top}"
+    "body{max-width:52rem;margin:2rem auto;padding:0 1rem;font:1rem/1.5 "
+    "sans-serif;color:#222;background:#fff}"
+    "img{max-width:100%}code,pre{background:#f2f2f2;border-radius:3px;padding:0 "
+    ".2em}pre{padding:.6em;overflow:auto}"
+    "table{border-collapse:collapse}td,th{border:1px solid #ccc;padding:.3em "
+    ".6em;text-align:left;vertical-align:top}"
 )
-_FENCE, _ITEM, _HEADING = re.compile(r"^```"), re.compile(r"^( *)(-|\d+\.) +(.*)"), re.compile(r"^(#+) (.*)")
+_FENCE, _ITEM, _HEADING = (
+    re.compile(r"^```"),
+    re.compile(
+        r"^( *)(-|\d+\.) "
+        r"+(.*)"
+    ),
+    re.compile(r"^(#+) (.*)"),
+)
 _RULE = re.compile(r"^\|[\s:|-]+\|$")
 Resolve = Callable[[str], str]
 
 
 def write_pages(root: Path, staging: Path) -> None:
-    """Write the pages of ``root``/docs to ``staging``/docs, with the pictures that ``staging`` lacks.
+    """Write the pages of ``root``/docs to ``staging``/docs, with the pictures that ``staging``
+    lacks.
 
     :param staging: the folder of an extension that has everything else already.
     """
@@ -38,7 +51,9 @@ def write_pages(root: Path, staging: Path) -> None:
     for name in PAGES:
         text = (root / "docs" / f"{name}.md").read_text("utf-8")
         title = text.splitlines()[0].lstrip("# ")
-        body = "\n".join(_blocks(text.splitlines(), lambda target: _resolved(target, root, staging)))
+        body = "\n".join(
+            _blocks(text.splitlines(), lambda target: _resolved(target, root, staging))
+        )
         back = "" if name == PAGES[0] else f'<p><a href="{PAGES[0]}.html">Guide</a></p>\n'
         head = f'<meta charset="utf-8"><title>{html.escape(title)}</title><style>{_STYLE}</style>'
         (docs / f"{name}.html").write_text(f"<!DOCTYPE html>\n{head}\n{back}{body}\n", "utf-8")
@@ -51,7 +66,11 @@ def _resolved(target: str, root: Path, staging: Path) -> str:
     path, _, anchor = target.partition("#")
     inside = os.path.normpath(Path("docs", path))
     anchor = f"#{anchor}" if anchor else ""
-    if Path(inside).suffix == ".md" and Path(inside).parent == Path("docs") and Path(inside).stem in PAGES:
+    if (
+        Path(inside).suffix == ".md"
+        and Path(inside).parent == Path("docs")
+        and Path(inside).stem in PAGES
+    ):
         return f"{Path(inside).stem}.html{anchor}"
     if (staging / inside).is_file():
         return path  # without an anchor: a browser shows it as plain text
@@ -72,7 +91,9 @@ def _blocks(lines: list[str], resolve: Resolve) -> Iterator[str]:
 
 
 def _end_of_block(lines: list[str], k: int) -> int:
-    """Return the number of the line after the block that begins at line ``k``; an empty line is one of its own."""
+    """Return the number of the line after the block that begins at line ``k``; an empty line is one
+    of its own.
+    """
     first = lines[k]
     if _FENCE.match(first):
         return next((n + 1 for n in range(k + 1, len(lines)) if _FENCE.match(lines[n])), len(lines))
@@ -83,7 +104,9 @@ def _end_of_block(lines: list[str], k: int) -> int:
         if first.startswith("|"):
             return lines[n].startswith("|")
         if _ITEM.match(first):
-            return _belongs(lines[n]) or (not lines[n].strip() and n + 1 < len(lines) and _belongs(lines[n + 1]))
+            return _belongs(lines[n]) or (
+                not lines[n].strip() and n + 1 < len(lines) and _belongs(lines[n + 1])
+            )
         return bool(lines[n].strip()) and not _starts_block(lines[n])
 
     return next((n for n in range(k + 1, len(lines)) if not goes_on(n)), len(lines))
@@ -109,7 +132,9 @@ def _belongs(line: str) -> bool:
 
 
 def _starts_block(line: str) -> bool:
-    return bool(_FENCE.match(line) or _HEADING.match(line) or _ITEM.match(line) or line.startswith("|"))
+    return bool(
+        _FENCE.match(line) or _HEADING.match(line) or _ITEM.match(line) or line.startswith("|")
+    )
 
 
 def _list(lines: list[str], resolve: Resolve) -> str:
@@ -125,7 +150,9 @@ def _list(lines: list[str], resolve: Resolve) -> str:
             items[-1].append(line)
     found = []
     for item_lines in items:
-        indent = min((len(each) - len(each.lstrip()) for each in item_lines[1:] if each.strip()), default=0)
+        indent = min(
+            (len(each) - len(each.lstrip()) for each in item_lines[1:] if each.strip()), default=0
+        )
         inner = list(_blocks([item_lines[0], *(each[indent:] for each in item_lines[1:])], resolve))
         text = inner[0].removeprefix("<p>").removesuffix("</p>") if inner else ""
         found.append("<li>" + "\n".join([text, *inner[1:]]) + "</li>")
@@ -133,7 +160,11 @@ def _list(lines: list[str], resolve: Resolve) -> str:
 
 
 def _table(lines: list[str], resolve: Resolve) -> str:
-    rows = [re.split(r"(?<!\\)\|", line.strip().strip("|")) for line in lines if not _RULE.match(line.strip())]
+    rows = [
+        re.split(r"(?<!\\)\|", line.strip().strip("|"))
+        for line in lines
+        if not _RULE.match(line.strip())
+    ]
     cells = [[_inline(cell.strip().replace("\\|", "|"), resolve) for cell in row] for row in rows]
     marked = [
         "<tr>" + "".join(f"<{tag}>{cell}</{tag}>" for cell in row) + "</tr>"
@@ -155,7 +186,9 @@ def _inline(text: str, resolve: Resolve) -> str:
         return f'<a href="{html.escape(target)}">{found[1]}</a>' if target else found[1]
 
     text = html.escape(re.sub(r"`([^`]+)`", keep, text), quote=False)
-    text = re.sub(r"!\[([^]]*)\]\(([^()\s]+)\)", lambda m: f'<img src="{resolve(m[2])}" alt="{m[1]}">', text)
+    text = re.sub(
+        r"!\[([^]]*)\]\(([^()\s]+)\)", lambda m: f'<img src="{resolve(m[2])}" alt="{m[1]}">', text
+    )
     text = re.sub(r"\[([^]]+)\]\(([^()\s]+)\)", link, text)
     text = re.sub(r"\*\*([^*]+)\*\*", r"<strong>\1</strong>", text)
     text = re.sub(r"(?<![\w*])\*([^*\s][^*]*)\*(?![\w*])", r"<em>\1</em>", text)

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The solver's machine code for a platform and a Python, to be shipped in an extension.
 
-It is made by the staged extension itself, with its own wheels in the Python of that Blender, for the processor that
-`solver/compiled/code_folders.py` names; so it can be made on a computer of that platform alone, by building there. It
-is kept in build/kernels/PLATFORM/PYTHON: a copy of that folder serves another computer, if the sources are the same.
-Where there is none, the extension works as well, and compiles the solver once on the user's computer.
+It is made by the staged extension itself, with its own wheels in the Python of that Blender, for
+the processor that `solver/compiled/code_folders.py` names; so it can be made on a computer of that
+platform alone, by building there. It is kept in build/kernels/PLATFORM/PYTHON: a copy of that
+folder serves another computer, if the sources are the same. Where there is none, the extension
+works as well, and compiles the solver once on the user's computer.
 """
 
 from __future__ import annotations
@@ -27,7 +28,11 @@ KEPT = ROOT / "build" / "kernels"
 DEBIAN_READY = ROOT / "build" / "blender" / "ready"
 MADE_FROM = "made_from"  # the file that says what the machine code was made from
 PROCESSORS = {"windows-x64": "x86-64-v3", "linux-x64": "x86-64-v3", "macos-arm64": "apple-m1"}
-_THIS = {("Windows", "AMD64"): "windows-x64", ("Linux", "x86_64"): "linux-x64", ("Darwin", "arm64"): "macos-arm64"}
+_THIS = {
+    ("Windows", "AMD64"): "windows-x64",
+    ("Linux", "x86_64"): "linux-x64",
+    ("Darwin", "arm64"): "macos-arm64",
+}
 _LIMIT_S = 1800
 
 
@@ -44,7 +49,8 @@ def add_kernels(staging: Path, target: str, python: str, wheels: Iterable[Path])
         is_here = _THIS.get((platform.system(), platform.machine())) == target
         if not is_here or not (find_python(python) or _has_debian(python)):
             print(
-                f"build: no compiled code for {target}, Python {python}: build on such a computer to have it",
+                f"build: no compiled code for {target}, Python {python}: build on such a computer "
+                "to have it",
                 file=sys.stderr,
             )
             return False
@@ -52,14 +58,20 @@ def add_kernels(staging: Path, target: str, python: str, wheels: Iterable[Path])
         stated.write_text(wanted)
     for folder in kept.iterdir():
         if folder.is_dir():
-            shutil.copytree(folder, staging / "assets" / "kernels" / folder.name, dirs_exist_ok=True)
+            shutil.copytree(
+                folder, staging / "assets" / "kernels" / folder.name, dirs_exist_ok=True
+            )
     return True
 
 
 def find_python(version: str) -> str | None:
     """Return a Python interpreter of a version; pyenv's are not on the PATH."""
     pyenv = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv")) / "versions"
-    names = [sys.executable, f"python{version}", *map(str, sorted(pyenv.glob(f"{version}*/bin/python")))]
+    names = [
+        sys.executable,
+        f"python{version}",
+        *map(str, sorted(pyenv.glob(f"{version}*/bin/python"))),
+    ]
     for name in names:
         ask = [name, "-c", "import sys; print('%d.%d' % sys.version_info[:2])"]
         try:
@@ -77,16 +89,23 @@ def _has_debian(python: str) -> bool:
 
 
 def _command(python: str, folders: list[Path], variables: dict[str, str]) -> list[str]:
-    """Return the start of the command line that runs a Python, with some folders, and environment variables."""
+    """Return the start of the command line that runs a Python, with some folders, and environment
+    variables.
+    """
     if own := find_python(python):
         return [own]
     binds = [part for folder in folders for part in ("--bind", str(folder))]
-    given = [f"{name}={value}" for name, value in variables.items()]  # it has an environment of its own
+    # it has an environment of its own
+    given = [f"{name}={value}" for name, value in variables.items()]
     return [str(ROOT / "scripts" / "debian"), *binds, "env", *given, f"python{python}"]
 
 
 def _compile(staging: Path, target: str, python: str, wheels: list[Path], kept: Path) -> None:
-    print(f"build: compiling the solver for {target}, Python {python}: one or two minutes", file=sys.stderr, flush=True)
+    print(
+        f"build: compiling the solver for {target}, Python {python}: one or two minutes",
+        file=sys.stderr,
+        flush=True,
+    )
     with tempfile.TemporaryDirectory(prefix="scope-kernels-") as name:
         packages, job = Path(name) / "packages", Path(name) / "job"
         job.mkdir()
@@ -94,16 +113,23 @@ def _compile(staging: Path, target: str, python: str, wheels: list[Path], kept: 
             with zipfile.ZipFile(wheel) as file:
                 file.extractall(packages)
         start = staging / "scope_addon" / "job" / "start_worker.py"
-        kernels = Path(name) / "kernels"  # with what has been made before, of which some may still be good
+        # with what has been made before, of which some may still be good
+        kernels = Path(name) / "kernels"
         if kept.is_dir():
             shutil.copytree(kept, kernels)
         for folder in kernels.glob("*"):
             os.utime(folder, (0, 0))
-        variables = {"NUMBA_CPU_NAME": PROCESSORS[target], "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": str(kernels)}
+        variables = {
+            "NUMBA_CPU_NAME": PROCESSORS[target],
+            "NUMBA_CPU_FEATURES": "",
+            "NUMBA_CACHE_DIR": str(kernels),
+        }
         command = _command(python, [staging, Path(name)], variables)
         command += ["-I", "-B", str(start), str(staging), str(job), str(packages)]
         environment, pipe = os.environ | variables, subprocess.PIPE
-        with subprocess.Popen(command, env=environment, stdin=pipe, stdout=pipe, text=True) as process:
+        with subprocess.Popen(
+            command, env=environment, stdin=pipe, stdout=pipe, text=True
+        ) as process:
             assert process.stdin is not None
             assert process.stdout is not None
             process.stdin.write(json.dumps({"warm_up": True}) + "\n")
@@ -130,8 +156,23 @@ def _numpy_wheel(python: str) -> Path:
         assert found, python
         request = folder / "request.txt"
         request.write_text(found[0] + "\n")
-        command = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps"]
-        command += ["--only-binary=:all:", "--require-hashes", "--python-version", python, "--dest", str(folder)]
+        command = [
+            sys.executable,
+            "-m",
+            "pip",
+            "download",
+            "--quiet",
+            "--disable-pip-version-check",
+            "--no-deps",
+        ]
+        command += [
+            "--only-binary=:all:",
+            "--require-hashes",
+            "--python-version",
+            python,
+            "--dest",
+            str(folder),
+        ]
         subprocess.run([*command, "--requirement", str(request)], check=True)
     return next(folder.glob("*.whl"))
 

@@ -4,8 +4,8 @@
 body = load_body("scope")
 fit(body, Measurements(intrinsics, keypoints2d=Keypoints2D(indices, pixels, confidence))) -> Fit
 
-A name's module is imported when the name is first used: numba takes a third of a second to load, and the errors, the
-body files and the command line do without it.
+A name's module is imported when the name is first used: numba takes a third of a second to load,
+and the errors, the body files and the command line do without it.
 """
 
 from importlib import import_module
@@ -30,7 +30,15 @@ if TYPE_CHECKING:
     from .fitting.residual_check import check_residual
     from .learned_prior import JointPrior, load_joint_prior
     from .loaders import load_body
-    from .measurements import Floor, FootContacts, Keypoints2D, Keypoints3D, Measurements, OrientationField, PosePriors
+    from .measurements import (
+        Floor,
+        FootContacts,
+        Keypoints2D,
+        Keypoints3D,
+        Measurements,
+        OrientationField,
+        PosePriors,
+    )
     from .motion.fit import MotionFit, fit_motion
     from .motion.prior import MotionPrior, StandingPoints
     from .motion.views import View
@@ -91,18 +99,21 @@ __all__ = [
     "with_previous",
 ]
 
-# What is imported from which module, as above. mypy compares the imports above with `__all__`, and a test these.
+# What is imported from which module, as above. mypy compares the imports above with `__all__`, and
+# a test these.
 _HOMES = {
     "body": "Body",
     "compiled.tree": "BodyArrays Tree make_tree",
-    "errors": "InputError InvalidValueError ModelFileError ScopeError ScopeWarning ShapeError UnitsWarning",
+    "errors": "InputError InvalidValueError ModelFileError ScopeError ScopeWarning ShapeError "
+    "UnitsWarning",
     "fitting.batch": "fit_batch fit_clips",
     "fitting.clip": "carry fit_clip",
     "fitting.frame_solver": "FrameSolver fit fit_tree",
     "fitting.residual_check": "check_residual",
     "learned_prior": "JointPrior load_joint_prior",
     "loaders": "load_body",
-    "measurements": "Floor FootContacts Keypoints2D Keypoints3D Measurements OrientationField PosePriors",
+    "measurements": "Floor FootContacts Keypoints2D Keypoints3D Measurements OrientationField "
+    "PosePriors",
     "motion.fit": "MotionFit fit_motion",
     "motion.prior": "MotionPrior StandingPoints",
     "motion.views": "View",
@@ -116,7 +127,9 @@ _MODULE_OF = {name: module for module, names in _HOMES.items() for name in names
 if not TYPE_CHECKING:  # or a name that does not exist would pass
 
     def __getattr__(name: str) -> Any:
-        """Import a name of `__all__`, or the module `rotations`, when it is first used (PEP 562)."""
+        """Import a name of `__all__`, or the module `rotations`, when it is first used (PEP
+        562).
+        """
         if name == "rotations":
             return import_module(f".{name}", __name__)
         if name not in _MODULE_OF:

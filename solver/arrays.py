@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Conversion of what comes in from outside to arrays of the expected shape; every message names the field.
+"""Conversion of what comes in from outside to arrays of the expected shape; every message names the
+field.
 
-`validation` checks their values with compiled kernels. This file needs no numba, which takes long to load: bodies are
-described and command lines read without it.
+`validation` checks their values with compiled kernels. This file needs no numba, which takes long
+to load: bodies are described and command lines read without it.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ _FLOAT64 = np.dtype(np.float64)
 def as_array(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Array:
     """Return `value` as contiguous float64.
 
-    :param value: an array, or lists of numbers, of `shape`; what numpy's masked arrays mask becomes NaN.
+    :param value: an array, or lists of numbers, of `shape`; what numpy's masked arrays mask becomes
+        NaN.
     :param shape: the expected one, for instance (None, 3) for (n, 3): None is any length.
     :param name: what the array is, as a message begins.
     :raises ShapeError: it has another shape, or is not an array of numbers.
@@ -31,8 +33,12 @@ def as_array(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Arra
     array = np.ascontiguousarray(_numbers(value, shape, name))
     if array.shape == shape and array.ndim:
         return array
-    if len(shape) != np.ndim(value) or any(n is not None and n != m for n, m in zip(shape, array.shape, strict=True)):
-        raise ShapeError(f"{name} must have shape {_written(shape)}, but got shape {np.shape(value)}.")
+    if len(shape) != np.ndim(value) or any(
+        n is not None and n != m for n, m in zip(shape, array.shape, strict=True)
+    ):
+        raise ShapeError(
+            f"{name} must have shape {_written(shape)}, but got shape {np.shape(value)}."
+        )
     return array
 
 
@@ -44,7 +50,9 @@ def as_arrays(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
     """
     array = _numbers(value, (..., *shape), name)
     if array.shape[-len(shape) :] != shape:
-        raise ShapeError(f"{name} must have shape {_written((..., *shape))}, but got shape {array.shape}.")
+        raise ShapeError(
+            f"{name} must have shape {_written((..., *shape))}, but got shape {array.shape}."
+        )
     return array
 
 
@@ -59,7 +67,9 @@ def as_integers(value: ArrayLike, name: str) -> Array:
         raise ShapeError(f"{name} must not be masked, but some are; leave these rows out.")
     array = np.asarray(value)
     if array.ndim != 1:
-        raise ShapeError(f"{name} must be integers of shape (n,), but got {array.dtype} of shape {array.shape}.")
+        raise ShapeError(
+            f"{name} must be integers of shape (n,), but got {array.dtype} of shape {array.shape}."
+        )
     return np.ascontiguousarray(array, dtype=np.int64)
 
 
@@ -69,11 +79,16 @@ def as_table(value: Any, ints: int, floats: int, name: str) -> tuple[Array, Arra
     :raises ShapeError: it is not a pair of such arrays.
     """
     if not isinstance(value, (tuple, list)) or len(value) != 2:
-        raise ShapeError(f"Tables of {name!r} must be a pair of arrays (ints, floats), but got {described(value)}.")
+        raise ShapeError(
+            f"Tables of {name!r} must be a pair of arrays (ints, floats), but got "
+            f"{described(value)}."
+        )
     _refuse_unless_numbers(value[0], "iu", "integers", (None, ints), f"Whole numbers of {name!r}")
     _refuse_unless_numbers(value[1], "fiub", "numbers", (None, floats), f"Numbers of {name!r}")
     table = np.asarray(value[0], dtype=np.int64), np.asarray(value[1], dtype=np.float64)
-    if (table[0].shape[1:], table[1].shape[1:]) != ((ints,), (floats,)) or len(table[0]) != len(table[1]):
+    if (table[0].shape[1:], table[1].shape[1:]) != ((ints,), (floats,)) or len(table[0]) != len(
+        table[1]
+    ):
         raise ShapeError(
             f"Tables of {name!r} must have shapes (n, {ints}) and (n, {floats}), "
             f"but got {table[0].shape} and {table[1].shape}."
@@ -102,24 +117,33 @@ def _numbers(value: ArrayLike, shape: _Shape, name: str) -> Array:
     """Return `value` as float64 of any shape; `shape` is for the message."""
     if type(value) is not np.ndarray or value.dtype is not _FLOAT64:
         _refuse_unless_numbers(value, "fiub", "numbers", shape, name)
-        if isinstance(value, np.ma.MaskedArray):  # whose masked values numpy's conversion would take for measured ones
+        # whose masked values numpy's conversion would take for measured ones
+        if isinstance(value, np.ma.MaskedArray):
             value = np.where(_masked(value), np.nan, value.data)
     return np.asarray(value, dtype=np.float64)
 
 
 def _refuse_unless_numbers(value: Any, kinds: str, what: str, shape: _Shape, name: str) -> None:
-    """Raise ShapeError for strings, None, ragged lists and numbers of another type; an empty list is of any type."""
+    """Raise ShapeError for strings, None, ragged lists and numbers of another type; an empty list
+    is of any type.
+    """
     try:
         array = np.asarray(value)
         if array.dtype.kind in kinds or (array.size == 0 and array.dtype.kind == "f"):
             return
-        found = f"{array.dtype} of shape {array.shape}" if array.dtype.kind in "fiubc" else described(value)
+        found = (
+            f"{array.dtype} of shape {array.shape}"
+            if array.dtype.kind in "fiubc"
+            else described(value)
+        )
     except ValueError:  # numpy's, for lists of different lengths
         found = "a ragged list"
     raise ShapeError(f"{name} must be {what} of shape {_written(shape)}, but got {found}.")
 
 
 def _written(shape: _Shape) -> str:
-    """Return a shape as numpy writes it, with n for any length and ... for any leading dimensions."""
+    """Return a shape as numpy writes it, with n for any length and ... for any leading
+    dimensions.
+    """
     lengths = ["n" if n is None else "..." if n is ... else str(n) for n in shape]
     return f"({', '.join(lengths)}{',' if len(shape) == 1 else ''})"

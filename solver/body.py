@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The body model: a kinematic tree with shape, a skinned mesh, and keypoints rigidly attached to body parts.
+"""The body model: a kinematic tree with shape, a skinned mesh, and keypoints rigidly attached to
+body parts.
 
-    J(β)   = J̄ + J_s β                         rest joints in the model frame (SMPL: y up, facing +z), metres
+    J(β)   = J̄ + J_s β                         rest joints in the model frame (SMPL: y up, facing
+                                                +z), metres
     T_0    = (R_0, J_0(β) + trans)              pose of the root part; trans as SMPL means it
-    T_i    = T_par · (Ω_i, J_i(β) − J_par(β))   relative pose (Ω_i, S_i β + l_i), Ω_i the state of joint i
+    T_i    = T_par · (Ω_i, J_i(β) − J_par(β))   relative pose (Ω_i, S_i β + l_i), Ω_i the state of
+                                                joint i
     v      = Σ_k w_vk T_k · (v̄(β) − J_k(β))     linear blend skinning
     p_j    = R_i (V_j β + v̄_j) + t_i            keypoint j on part i (the paper's Assumption 1)
 
@@ -44,7 +47,8 @@ class Body:
     skin_weights: Array  # (V, 4)
     faces: NDArray[np.int32]  # (F, 4) int32, or (F, 3)
     keypoint_names: tuple[str, ...] = ()
-    keypoint_part: NDArray[np.integer[Any]] = field(default_factory=lambda: np.zeros(0, np.int32))  # (M,)
+    # (M,)
+    keypoint_part: NDArray[np.integer[Any]] = field(default_factory=lambda: np.zeros(0, np.int32))
     keypoint_template: Array = field(default_factory=lambda: np.zeros((0, 3)))  # (M, 3)
     keypoint_shapedirs: Array = field(default_factory=lambda: np.zeros((0, 3, 0)))  # (M, 3, P)
     uv: Array | None = None  # (U, 2)
@@ -57,7 +61,9 @@ class Body:
     file: str = ""  # of the user's, absolute; empty for a built-in body
 
     def __repr__(self) -> str:
-        """Return name and sizes, not its arrays, which would fill a thousand lines of a notebook."""
+        """Return name and sizes, not its arrays, which would fill a thousand lines of a
+        notebook.
+        """
         sizes = f"K={self.K}, P={self.P}, V={len(self.v_template)}, M={len(self.keypoint_names)}"
         return f"Body({self.name!r}, {sizes})"
 
@@ -73,12 +79,16 @@ class Body:
 
     @cached_property
     def S(self) -> Array:
-        """(K+1, 3, P) shape derivative of each joint's offset from its parent; the root's is J_s of the root."""
+        """(K+1, 3, P) shape derivative of each joint's offset from its parent; the root's is J_s of
+        the root.
+        """
         return self._minus_parent(self.J_shapedirs)
 
     @cached_property
     def l(self) -> Array:  # noqa: E743 - the paper's symbol
-        """(K+1, 3) offset of each joint from its parent at β = 0; the root's is its rest position."""
+        """(K+1, 3) offset of each joint from its parent at β = 0; the root's is its rest
+        position.
+        """
         return self._minus_parent(self.J_template)
 
     @cached_property
@@ -106,17 +116,27 @@ class Body:
         return out
 
     def keypoint_set(self, prefix: str) -> dict[str, int]:
-        """Return the keypoints of one set, e.g. ``blazepose``: name without the prefix -> index, in file order.
+        """Return the keypoints of one set, e.g. ``blazepose``: name without the prefix -> index, in
+        file order.
 
         :raises ModelFileError: the body has no keypoints of that name.
         :raises InvalidValueError: the name is not a string.
         """
         if not isinstance(prefix, str):
-            raise InvalidValueError(f"prefix must be a name such as 'coco', but is {described(prefix)}.")
-        found = {n.split("/", 1)[1]: i for i, n in enumerate(self.keypoint_names) if n.startswith(prefix + "/")}
+            raise InvalidValueError(
+                f"prefix must be a name such as 'coco', but is {described(prefix)}."
+            )
+        found = {
+            n.split("/", 1)[1]: i
+            for i, n in enumerate(self.keypoint_names)
+            if n.startswith(prefix + "/")
+        }
         if not found:
             sets = sorted({n.split("/", 1)[0] for n in self.keypoint_names})
-            raise ModelFileError(f"body '{self.name}' has no keypoints '{prefix}'; it has {', '.join(sets) or 'none'}")
+            raise ModelFileError(
+                f"body '{self.name}' has no keypoints '{prefix}'; it has "
+                f"{', '.join(sets) or 'none'}"
+            )
         return found
 
     def rest_joints(self, betas: Array | None = None) -> Array:
@@ -125,7 +145,11 @@ class Body:
         :param betas: (P,); zeros if None.
         :raises ShapeError: betas have another shape.
         """
-        return self.J_template if betas is None else self.J_template + self.J_shapedirs @ self._betas(betas)
+        return (
+            self.J_template
+            if betas is None
+            else self.J_template + self.J_shapedirs @ self._betas(betas)
+        )
 
     def rest_vertices(self, betas: Array | None = None) -> Array:
         """v̄(β): (V, 3) metres, model frame.
@@ -133,10 +157,15 @@ class Body:
         :param betas: (P,); zeros if None.
         :raises ShapeError: betas have another shape.
         """
-        return self.v_template if betas is None else self.v_template + self.shapedirs @ self._betas(betas)
+        return (
+            self.v_template
+            if betas is None
+            else self.v_template + self.shapedirs @ self._betas(betas)
+        )
 
     def stature(self, betas: Array | None = None) -> float:
-        """Return the height of a person standing upright: from the lowest to the highest vertex of v̄(β), metres.
+        """Return the height of a person standing upright: from the lowest to the highest vertex of
+        v̄(β), metres.
 
         :param betas: (P,); zeros if None.
         :raises ShapeError: betas have another shape.
@@ -146,12 +175,15 @@ class Body:
     def _betas(self, betas: Array) -> Array:
         return as_array(betas, (self.P,), f"betas of body '{self.name}'")
 
-    def forward_kinematics(self, rotations: Array, trans: Array, betas: Array | None = None) -> tuple[Array, Array]:
+    def forward_kinematics(
+        self, rotations: Array, trans: Array, betas: Array | None = None
+    ) -> tuple[Array, Array]:
         """Return the pose of every part.
 
-        :param rotations: (..., K+1, 3, 3); row 0 the root's rotation into the target frame, the others Ω_i.
-        :param trans: (3,), or one row for each frame (..., 3): metres, target frame; the root joint comes to lie at
-            J_0(β) + trans.
+        :param rotations: (..., K+1, 3, 3); row 0 the root's rotation into the target frame, the
+            others Ω_i.
+        :param trans: (3,), or one row for each frame (..., 3): metres, target frame; the root joint
+            comes to lie at J_0(β) + trans.
         :param betas: (P,); zeros if None.
         :return: R (..., K+1, 3, 3) and t (..., K+1, 3): part to target frame; t are the joints.
         :raises ShapeError: rotations, trans or betas have another shape.
@@ -160,7 +192,10 @@ class Body:
         trans = as_arrays(trans, (3,), "trans")
         if trans.shape[:-1] and trans.shape[:-1] != rotations.shape[:-3]:
             wanted = (*rotations.shape[:-3], 3)
-            raise ShapeError(f"trans must have a row for each frame, shape {wanted} or (3,), but got {trans.shape}.")
+            raise ShapeError(
+                f"trans must have a row for each frame, shape {wanted} or (3,), but "
+                f"got {trans.shape}."
+            )
         J = self.rest_joints(betas)
         R = np.empty_like(rotations)
         t = np.empty(rotations.shape[:-1])
@@ -184,25 +219,39 @@ class Body:
         offset = t - np.einsum("kij,kj->ki", R, self.rest_joints(betas))
         A = np.concatenate([R, offset[..., None]], axis=2).reshape(len(R), 12)
         blended = np.einsum("vs,vsa->va", self.skin_weights, A[self.skin_joints]).reshape(-1, 3, 4)
-        v: Array = np.einsum("vij,vj->vi", blended[:, :, :3], self.rest_vertices(betas)) + blended[:, :, 3]
+        v: Array = (
+            np.einsum("vij,vj->vi", blended[:, :, :3], self.rest_vertices(betas)) + blended[:, :, 3]
+        )
         return v
 
     def keypoints(
-        self, R: Array, t: Array, betas: Array | None = None, which: Sequence[int] | slice = slice(None)
+        self,
+        R: Array,
+        t: Array,
+        betas: Array | None = None,
+        which: Sequence[int] | slice = slice(None),
     ) -> Array:
         """Return keypoints in metres.
 
         :param R, t: (..., K+1, 3, 3), (..., K+1, 3) part poses from ``forward_kinematics``.
         :param betas: (P,); zeros if None.
-        :param which: numbers (M',) of the keypoints, as ``keypoint_set`` returns them; all if left out.
+        :param which: numbers (M',) of the keypoints, as ``keypoint_set`` returns them; all if left
+            out.
         :return: (..., M', 3) in the frame of R and t.
-        :raises ShapeError: an array has another shape, or the body has no keypoint of such a number.
+        :raises ShapeError: an array has another shape, or the body has no keypoint of such a
+            number.
         """
         R, t = as_arrays(R, (self.K + 1, 3, 3), "R"), as_arrays(t, (self.K + 1, 3), "t")
         if R.shape[:-3] != t.shape[:-2]:
-            raise ShapeError(f"R and t must be of the same frames, but got shapes {R.shape} and {t.shape}.")
+            raise ShapeError(
+                f"R and t must be of the same frames, but got shapes {R.shape} and {t.shape}."
+            )
         chosen = which if isinstance(which, slice) else self._checked_numbers(which)
-        local = self.v_bar[chosen] if betas is None else self.v_bar[chosen] + self.V[chosen] @ self._betas(betas)
+        local = (
+            self.v_bar[chosen]
+            if betas is None
+            else self.v_bar[chosen] + self.V[chosen] @ self._betas(betas)
+        )
         part = self.keypoint_part[chosen]
         p: Array = np.einsum("...mij,mj->...mi", R[..., part, :, :], local) + t[..., part, :]
         return p
@@ -211,7 +260,9 @@ class Body:
         numbers = as_integers(which, "which, numbers of keypoints as keypoint_set returns them,")
         if numbers.size and not 0 <= numbers.min() <= numbers.max() < len(self.keypoint_part):
             last = len(self.keypoint_part) - 1
-            raise ShapeError(f"which must lie in 0..{last}, but goes from {numbers.min()} to {numbers.max()}.")
+            raise ShapeError(
+                f"which must lie in 0..{last}, but goes from {numbers.min()} to {numbers.max()}."
+            )
         return numbers
 
     def triangles(self) -> NDArray[np.int32]:
@@ -219,5 +270,7 @@ class Body:
         f = self.faces
         if f.shape[1] == 3:
             return f
-        halves: NDArray[np.int32] = np.concatenate([f[:, [0, 1, 2]], f[:, [0, 2, 3]]]).astype(np.int32, order="C")
+        halves: NDArray[np.int32] = np.concatenate([f[:, [0, 1, 2]], f[:, [0, 2, 3]]]).astype(
+            np.int32, order="C"
+        )
         return halves

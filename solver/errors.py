@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every error and warning the solver raises on purpose. One tree, so that one ``except ScopeError`` is enough.
+"""Every error and warning the solver raises on purpose. One tree, so that one ``except ScopeError``
+is enough.
 
     ScopeError
     └── InputError                  the user's file or value cannot be used
         ├── ModelFileError          a body file is missing or malformed
         ├── ShapeError              an array of the wrong shape or type
-        └── InvalidValueError       an array or option of the right shape with a value that cannot be used
+        └── InvalidValueError       an array or option of the right shape with a value that cannot
+                                    be used
 
     ScopeWarning                    what is probably a mistake, but can be used (a UserWarning)
     └── UnitsWarning                lengths that are probably not in metres, or times not in seconds

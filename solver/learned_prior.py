@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The joint-state prior learned from motion capture: one flow for each joint, by name, read from assets/prior."""
+"""The joint-state prior learned from motion capture: one flow for each joint, by name, read from
+assets/prior.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,9 @@ BUILT_IN = Path(__file__).resolve().parent.parent / "assets" / "prior" / "joint_
 
 @dataclass(frozen=True)
 class JointPrior:
-    """Parameters (n, SIZE) of residuals/joint_flow.py for the joints ``names`` (n,), in SMPL's rest axes."""
+    """Parameters (n, SIZE) of residuals/joint_flow.py for the joints ``names`` (n,), in SMPL's rest
+    axes.
+    """
 
     names: tuple[str, ...]
     parameters: Array
@@ -39,7 +43,9 @@ class JointPrior:
             check_type(name, str, f"Name {k} of the joint prior")
         object.__setattr__(self, "names", tuple(self.names))
         shape = len(self.names), joint_flow.SIZE
-        object.__setattr__(self, "parameters", as_array(self.parameters, shape, "Parameters of the joint prior"))
+        object.__setattr__(
+            self, "parameters", as_array(self.parameters, shape, "Parameters of the joint prior")
+        )
 
     def of(self, joint: str) -> Array:
         """Return the parameters (SIZE,) of a joint.
@@ -48,22 +54,28 @@ class JointPrior:
         """
         known = ", ".join(self.names)
         if not isinstance(joint, str):
-            raise InvalidValueError(f"joint must be a name, but is {described(joint)}; the prior has {known}.")
+            raise InvalidValueError(
+                f"joint must be a name, but is {described(joint)}; the prior has {known}."
+            )
         if joint not in self.names:
             raise InvalidValueError(f"The prior has no joint {joint!r}; it has {known}.")
         row: Array = self.parameters[self.names.index(joint)]
         return row
 
     def tables(
-        self, joint_names: Sequence[str], weights: Mapping[str, float] | None = None, log_det: float = 0.0
+        self,
+        joint_names: Sequence[str],
+        weights: Mapping[str, float] | None = None,
+        log_det: float = 0.0,
     ) -> tuple[Array, Array]:
-        """Return the tables of residuals/joint_flow.py for the joints of a body (K+1,) that have a prior.
+        """Return the tables of residuals/joint_flow.py for the joints of a body (K+1,) that have a
+        prior.
 
         :param weights: w by joint name, 1 for joints that are missing.
         :param log_det: h, one for the density's maximum, zero for the paper's 1/2 |z|^2.
         :return: (n, INTS) int64 and (n, FLOATS) float64.
-        :raises InvalidValueError: a weight or `log_det` is negative or not a number, or `joint_names` is not a list of
-            strings.
+        :raises InvalidValueError: a weight or `log_det` is negative or not a number, or
+            `joint_names` is not a list of strings.
         """
         check_list(joint_names, "joint_names", "part")
         check_type(weights, (Mapping, type(None)), "weights")
@@ -73,22 +85,27 @@ class JointPrior:
         for k, joint in enumerate(joint_names):
             check_type(joint, str, f"joint_names[{k}]")
         rows = [(i, name) for i, name in enumerate(joint_names) if i > 0 and name in self.names]
-        w = np.array([1.0 if weights is None else float(weights.get(name, 1.0)) for _, name in rows])
-        parameters = np.array([self.of(name) for _, name in rows]).reshape(len(rows), joint_flow.SIZE)
+        w = np.array(
+            [1.0 if weights is None else float(weights.get(name, 1.0)) for _, name in rows]
+        )
+        parameters = np.array([self.of(name) for _, name in rows]).reshape(
+            len(rows), joint_flow.SIZE
+        )
         return joint_flow.pack(np.array([i for i, _ in rows], np.int64), parameters, w, log_det)
 
     def sample(self, joint: str, count: int, rng: np.random.Generator) -> Array:
         """Return states (count, 3, 3) of a joint drawn from its prior.
 
-        :raises InvalidValueError: the prior has no joint of that name, `count` is not a whole number of at least 0,
-            or `rng` is not a numpy `Generator`.
+        :raises InvalidValueError: the prior has no joint of that name, `count` is not a whole
+            number of at least 0, or `rng` is not a numpy `Generator`.
         """
         check_count(count, "count", 0)
         check_type(rng, np.random.Generator, "rng")
         return joint_flow.invert(self.of(joint), rng.standard_normal((count, 3)))
 
     def log_density(self, joint: str, Omega: Array) -> Array:
-        """Return the log density (...) of states (..., 3, 3) against the normalized Haar measure, in nats.
+        """Return the log density (...) of states (..., 3, 3) against the normalized Haar measure,
+        in nats.
 
         :raises InvalidValueError: the prior has no joint of that name.
         :raises ShapeError: the states have another shape.
@@ -114,15 +131,21 @@ def _read(path: Path) -> JointPrior:
     expected = {"layers": joint_flow.LAYERS, "hidden": joint_flow.HIDDEN}
     for key in ("joint_names", "parameters", *expected):
         if key not in arrays:
-            raise ModelFileError(f"{path}: the joint prior has no array '{key}'; write it with tools/train_prior")
+            raise ModelFileError(
+                f"{path}: the joint prior has no array '{key}'; write it with tools/train_prior"
+            )
     for key, value in expected.items():
         if arrays[key].shape != () or int(arrays[key]) != value:
-            raise ModelFileError(f"{path}: the joint prior has {key} = {arrays[key]}, but the solver evaluates {value}")
+            raise ModelFileError(
+                f"{path}: the joint prior has {key} = {arrays[key]}, but the "
+                f"solver evaluates {value}"
+            )
     names = tuple(str(name) for name in np.ravel(arrays["joint_names"]))
     parameters = np.ascontiguousarray(arrays["parameters"], dtype=np.float64)
     if parameters.shape != (len(names), joint_flow.SIZE) or not np.isfinite(parameters).all():
         raise ModelFileError(
-            f"{path}: parameters of the joint prior must be finite and of shape ({len(names)}, {joint_flow.SIZE}), "
+            f"{path}: parameters of the joint prior must be finite and of shape ({len(names)}, "
+            f"{joint_flow.SIZE}), "
             f"but have shape {parameters.shape}"
         )
     return JointPrior(names, parameters)

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What was measured in one frame. Camera frame: OpenCV's (x right, y down, z forward), metres; image in pixels.
+"""What was measured in one frame. Camera frame: OpenCV's (x right, y down, z forward), metres;
+image in pixels.
 
-Points are numbered as in the body's keypoints, 0..M-1, followed by the joints: M + i is the origin of part i.
-A confidence multiplies the squared residual; zero, or a value that is not finite or beyond `LARGEST`, leaves the
-measurement out.
+Points are numbered as in the body's keypoints, 0..M-1, followed by the joints: M + i is the origin
+of part i. A confidence multiplies the squared residual; zero, or a value that is not finite or
+beyond `LARGEST`, leaves the measurement out.
 """
 
 from collections.abc import Mapping
@@ -27,8 +28,8 @@ from .validation import (
     warn_of_units,
 )
 
-# No length, coordinate or confidence is as large. What the solver multiplies of smaller ones stays finite; one pixel
-# whose square does not would else make the cost of a whole clip infinite.
+# No length, coordinate or confidence is as large. What the solver multiplies of smaller ones stays
+# finite; one pixel whose square does not would else make the cost of a whole clip infinite.
 LARGEST = 1e30
 
 
@@ -64,8 +65,9 @@ def _normalize(K: Array, pixels: Array, confidence: Array, out: Array) -> None:
 class Keypoints2D:
     """Points in the image: indices (n,), pixels (n, 2) without lens distortion, confidence (n,).
 
-    A row with NaN, or without a positive confidence, is left out, as of 3D keypoints and directions. Cameras have no
-    distortion coefficients: undistort pixels first, for instance with OpenCV's undistortPoints(pixels, K, dist, P=K).
+    A row with NaN, or without a positive confidence, is left out, as of 3D keypoints and
+    directions. Cameras have no distortion coefficients: undistort pixels first, for instance with
+    OpenCV's undistortPoints(pixels, K, dist, P=K).
     """
 
     indices: ArrayLike
@@ -75,7 +77,9 @@ class Keypoints2D:
 
 @dataclass
 class Keypoints3D:
-    """Points in space: indices (n,), points (n, 3) in metres in the camera frame, confidence (n,)."""
+    """Points in space: indices (n,), points (n, 3) in metres in the camera frame, confidence
+    (n,).
+    """
 
     indices: ArrayLike
     points: ArrayLike
@@ -84,10 +88,11 @@ class Keypoints3D:
 
 @dataclass
 class OrientationField:
-    """Directions between points of one part: starts (n,), ends (n,), directions (n, 3), confidence (n,).
+    """Directions between points of one part: starts (n,), ends (n,), directions (n, 3), confidence
+    (n,).
 
-    A bone is the direction from a joint M + par(i) to its child M + i. Directions are in the camera frame and need
-    not be normalized.
+    A bone is the direction from a joint M + par(i) to its child M + i. Directions are in the camera
+    frame and need not be normalized.
     """
 
     starts: ArrayLike
@@ -98,7 +103,8 @@ class OrientationField:
 
 @dataclass
 class PosePriors:
-    """Known estimates of part poses in the camera frame: parts (n,), R (n, 3, 3), t (n, 3), weights (n,) each.
+    """Known estimates of part poses in the camera frame: parts (n,), R (n, 3, 3), t (n, 3), weights
+    (n,) each.
 
     A row without a positive weight is left out.
     """
@@ -112,7 +118,9 @@ class PosePriors:
 
 @dataclass
 class FootContacts:
-    """Points that stand still: indices (n,), where (n, 3), in metres in this frame's camera, and probability (n,)."""
+    """Points that stand still: indices (n,), where (n, 3), in metres in this frame's camera, and
+    probability (n,).
+    """
 
     indices: ArrayLike
     points: ArrayLike
@@ -121,12 +129,14 @@ class FootContacts:
 
 @dataclass
 class Floor:
-    """The plane normal^T p = offset in this frame's camera, and points that touch it or may not be below it.
+    """The plane normal^T p = offset in this frame's camera, and points that touch it or may not be
+    below it.
 
-    indices (n,), normal (3,), a unit vector pointing up, offset in metres, contact (n,): the probability of touching
-    the floor, 0 where a point is free to be above; below (n,): the weight of a point that is below, one for all if
-    None, 0 where a point is free to be there, as on a stair. With normal (n, 3) and offset (n,), each point has a
-    plane of its own, such as the tangent plane of a surface that it may not enter.
+    indices (n,), normal (3,), a unit vector pointing up, offset in metres, contact (n,): the
+    probability of touching the floor, 0 where a point is free to be above; below (n,): the weight
+    of a point that is below, one for all if None, 0 where a point is free to be there, as on a
+    stair. With normal (n, 3) and offset (n,), each point has a plane of its own, such as the
+    tangent plane of a surface that it may not enter.
     """
 
     indices: ArrayLike
@@ -140,8 +150,9 @@ class Floor:
 class Measurements:
     """Everything measured in one frame. `intrinsics` (3, 3) is needed with 2D keypoints.
 
-    `tables` holds (ints, floats), int64 (n, columns) and float64 (n, columns), of further registered residuals by name;
-    see residuals/registry.py. Residuals that have a field of their own are given there alone.
+    `tables` holds (ints, floats), int64 (n, columns) and float64 (n, columns), of further
+    registered residuals by name; see residuals/registry.py. Residuals that have a field of their
+    own are given there alone.
     """
 
     intrinsics: ArrayLike | None = None
@@ -154,9 +165,11 @@ class Measurements:
     tables: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Check what kinds of measurements the fields hold; their arrays are checked against the body by a fit.
+        """Check what kinds of measurements the fields hold; their arrays are checked against the
+        body by a fit.
 
-        :raises InvalidValueError: a field holds another type, or `tables` holds a residual that has its own field.
+        :raises InvalidValueError: a field holds another type, or `tables` holds a residual that has
+            its own field.
         """
         for name, kind in _KINDS.items():
             value = getattr(self, name)
@@ -183,7 +196,9 @@ class Measurements:
         n = len(indices)
         pixels = as_array(m.pixels, (n, 2), "Pixels of 2D keypoints")
         if self.intrinsics is None:
-            raise ShapeError("2D keypoints need the camera's intrinsics, shape (3, 3), but got None.")
+            raise ShapeError(
+                "2D keypoints need the camera's intrinsics, shape (3, 3), but got None."
+            )
         K = as_array(self.intrinsics, (3, 3), "Intrinsics")
         check_intrinsics(K)
         out = np.empty((n, 3))
@@ -220,19 +235,23 @@ class Measurements:
         n = len(starts)
         ends = as_indices(m.ends, points, "Ends of the orientation field")
         if len(ends) != n:
-            raise ShapeError(f"Ends of the orientation field must have shape ({n},), but got shape {ends.shape}.")
+            raise ShapeError(
+                f"Ends of the orientation field must have shape ({n},), but got shape {ends.shape}."
+            )
         out = np.empty((n, 4))
         out[:, :3] = as_array(m.directions, (n, 3), "Directions of the orientation field")
         out[:, 3] = as_array(m.confidence, (n,), "Confidence of the orientation field")
         return starts, ends, out
 
     def packed_tables(self, K: int, points: int) -> dict[str, tuple[Array, Array]]:
-        """Return the tables of the residuals that have their own field; rows that are not usable are left out.
+        """Return the tables of the residuals that have their own field; rows that are not usable
+        are left out.
 
         :param K: how many joints the body has without the root.
         :param points: how many points it has, joints included.
         :raises ShapeError: an array has another shape, or an index lies outside.
-        :raises InvalidValueError: a weight is negative, a matrix is not a rotation, or the floor is not a plane.
+        :raises InvalidValueError: a weight is negative, a matrix is not a rotation, or the floor is
+            not a plane.
         """
         tables = {}
         if self.pose_priors is not None:
@@ -298,7 +317,9 @@ def _foot_contact_rows(m: FootContacts, points: int) -> tuple[Array, Array]:
 
 
 def _has_rows(value: ArrayLike) -> bool:
-    """Whether a value is a list of lists; a ragged one is, too, and is refused where it is converted."""
+    """Whether a value is a list of lists; a ragged one is, too, and is refused where it is
+    converted.
+    """
     try:
         return np.ndim(value) > 1
     except ValueError:
@@ -321,7 +342,8 @@ def _floor_rows(m: Floor, points: int) -> tuple[Array, Array]:
     if wrong.any():
         first = np.flatnonzero(wrong)[0]
         raise InvalidValueError(
-            f"The floor needs a finite offset and a normal of length 1, but got offset {offset.flat[first]} and a "
+            "The floor needs a finite offset and a normal of length 1, but got offset "
+            f"{offset.flat[first]} and a "
             f"normal of length {lengths.flat[first]:.6g}; divide both by that length."
         )
     return _usable_rows(floor.pack(indices, normal, offset, below, contact))

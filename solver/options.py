@@ -33,9 +33,10 @@ from .validation import (
 class Weights:
     """Weight of each kind of residual, on 1/2 |r|^2.
 
-    Units: per squared normalized image coordinate (pixels over focal length), per metre^2, per squared difference of
-    unit vectors, per radian^2; joint_flow multiplies a density's exponent, so that 1 is what was learned; the pose
-    prior's and the tables' weigh what their rows say. `tables`: of further registered residuals by name, 1 if left out.
+    Units: per squared normalized image coordinate (pixels over focal length), per metre^2, per
+    squared difference of unit vectors, per radian^2; joint_flow multiplies a density's exponent, so
+    that 1 is what was learned; the pose prior's and the tables' weigh what their rows say.
+    `tables`: of further registered residuals by name, 1 if left out.
     """
 
     keypoints2d: float = 1e6
@@ -53,7 +54,8 @@ class Weights:
     def __post_init__(self) -> None:
         """Check the weights.
 
-        :raises InvalidValueError: one is negative, infinite or no number, or `tables` names no registered residual.
+        :raises InvalidValueError: one is negative, infinite or no number, or `tables` names no
+            registered residual.
         """
         check_type(self.tables, Mapping, "Weights.tables")
         for own in fields(self):
@@ -92,15 +94,19 @@ class Stage:
     def __post_init__(self) -> None:
         """Check the values.
 
-        :raises InvalidValueError: the tolerance is negative or NaN, or the limit is negative or not a whole number.
+        :raises InvalidValueError: the tolerance is negative or NaN, or the limit is negative or not
+            a whole number.
         """
         check_type(self.weights, Weights, "Stage.weights")
         if not as_number(self.tolerance, "Stage.tolerance") >= 0.0:
-            raise InvalidValueError(f"Stage.tolerance must be a number of at least 0, but is {self.tolerance}.")
+            raise InvalidValueError(
+                f"Stage.tolerance must be a number of at least 0, but is {self.tolerance}."
+            )
         check_count(self.max_iterations, "Stage.max_iterations", 0)
 
 
-# From far away: directions first, which have no bad minimum nearby, positions in the image and in space joining in.
+# From far away: directions first, which have no bad minimum nearby, positions in the image and in
+# space joining in.
 _LAST = Weights()
 COLD_STAGES = (
     Stage(
@@ -117,7 +123,14 @@ COLD_STAGES = (
         10,
     ),
     Stage(
-        replace(_LAST, orientation_field=4000.0, keypoints2d=2e5, joint_prior=300.0, joint_flow=3.0, shape=400.0),
+        replace(
+            _LAST,
+            orientation_field=4000.0,
+            keypoints2d=2e5,
+            joint_prior=300.0,
+            joint_flow=3.0,
+            shape=400.0,
+        ),
         1e-2,
         15,
     ),
@@ -130,15 +143,15 @@ WARM_STAGES = (Stage(_LAST, 1e-6, 50),)
 class Options:
     """How the optimizer works.
 
-    robust_*: Geman-McClure sigma in the square of each residual's unit; infinity turns the kernel off.
-    triggs: 0 is first-order reweighting; up to 1, the second-order correction clamped at that share.
-    damping: Levenberg-Marquardt lambda at the start, on joint rotations in radians; root_length: metres of pelvis
-    motion that are damped like one radian.
-    stages: replaces the default schedule, which depends on whether an initial state is given.
-    curvature: estimate from the steps taken what Gauss-Newton leaves out of the joints' Hessians (curvature.py), in
-    every fit of one frame; without, each step is plain Levenberg-Marquardt's. It changes the steps, not the minimum.
-    report: also tell what the cost is made of (`Fit.cost_by_term`), which takes another evaluation for each kind of
-    residual.
+    robust_*: Geman-McClure sigma in the square of each residual's unit; infinity turns the kernel
+    off. triggs: 0 is first-order reweighting; up to 1, the second-order correction clamped at that
+    share. damping: Levenberg-Marquardt lambda at the start, on joint rotations in radians;
+    root_length: metres of pelvis motion that are damped like one radian. stages: replaces the
+    default schedule, which depends on whether an initial state is given. curvature: estimate from
+    the steps taken what Gauss-Newton leaves out of the joints' Hessians (curvature.py), in every
+    fit of one frame; without, each step is plain Levenberg-Marquardt's. It changes the steps, not
+    the minimum. report: also tell what the cost is made of (`Fit.cost_by_term`), which takes
+    another evaluation for each kind of residual.
     """
 
     stages: Sequence[Stage] | None = None
@@ -159,7 +172,9 @@ class Options:
         for name in ("damping", "root_length"):
             value = getattr(self, name)
             if not 0.0 < as_number(value, f"Options.{name}") < math.inf:
-                raise InvalidValueError(f"Options.{name} must be positive and finite, but is {value}.")
+                raise InvalidValueError(
+                    f"Options.{name} must be positive and finite, but is {value}."
+                )
         for name in ("robust_keypoints2d", "robust_keypoints3d", "robust_orientation_field"):
             check_robust(getattr(self, name), f"Options.{name}")
         if not 0.0 <= as_number(self.triggs, "Options.triggs") <= 1.0:
@@ -178,7 +193,9 @@ class Options:
         if self.stages is None:
             return COLD_STAGES if cold else WARM_STAGES
         if not self.stages:
-            raise InvalidValueError("A fit needs at least one stage, but Options.stages is empty; None is the default.")
+            raise InvalidValueError(
+                "A fit needs at least one stage, but Options.stages is empty; None is the default."
+            )
         return self.stages
 
     def stage_table(self, stages: Sequence[Stage]) -> tuple[Array, Array, Array]:
@@ -187,13 +204,19 @@ class Options:
         :raises InvalidValueError: an entry of `stages` is not a `Stage`.
         """
         table = np.zeros((len(stages), 2, COLUMNS))
-        sigmas = np.array([self.robust_keypoints2d, self.robust_keypoints3d, self.robust_orientation_field])
+        sigmas = np.array(
+            [self.robust_keypoints2d, self.robust_keypoints3d, self.robust_orientation_field]
+        )
         for k, stage in enumerate(stages):
             check_type(stage, Stage, f"Options.stages[{k}]")
             table[k, 0] = stage.weights.row()
         table[:, 1, :3] = 1.0 / sigmas
         tolerances = np.array([float(stage.tolerance) for stage in stages])
-        return table, tolerances, np.array([int(stage.max_iterations) for stage in stages], dtype=np.int64)
+        return (
+            table,
+            tolerances,
+            np.array([int(stage.max_iterations) for stage in stages], dtype=np.int64),
+        )
 
 
 @dataclass(frozen=True)
@@ -201,10 +224,10 @@ class Priors:
     """What is known before measuring. Everything may be left out.
 
     joint_mean (K, 3, 3) states of joints 1..K, rest pose if None; joint_weights (K,), ones if None.
-    shape_mean (P,), zeros if None; shape_information (P, P), identity if None: the prior's inverse covariance over
-    `Weights.shape`.
-    limits: tables of residuals/joint_limits.py, for instance `joint_limits.hinges_of(body.joint_names)`.
-    flow: tables of residuals/joint_flow.py, for instance `load_joint_prior().tables(body.joint_names)`.
+    shape_mean (P,), zeros if None; shape_information (P, P), identity if None: the prior's inverse
+    covariance over `Weights.shape`. limits: tables of residuals/joint_limits.py, for instance
+    `joint_limits.hinges_of(body.joint_names)`. flow: tables of residuals/joint_flow.py, for
+    instance `load_joint_prior().tables(body.joint_names)`.
     """
 
     joint_mean: ArrayLike | None = None
@@ -218,7 +241,8 @@ class Priors:
         """Return the tables of joint_prior, joint_limits and joint_flow for a body of K joints.
 
         :raises ShapeError: an array has another shape.
-        :raises InvalidValueError: a mean is not a rotation, or a weight is negative; both must be finite.
+        :raises InvalidValueError: a mean is not a rotation, or a weight is negative; both must be
+            finite.
         """
         mean = np.tile(np.eye(3), (K, 1, 1)) if self.joint_mean is None else self.joint_mean
         weights = np.ones(K) if self.joint_weights is None else self.joint_weights
@@ -239,27 +263,37 @@ class Priors:
         """Return the shape prior's mean (P,) and information (P, P).
 
         :raises ShapeError: an array has another shape.
-        :raises InvalidValueError: one is not finite, or the information is not symmetric positive semidefinite.
+        :raises InvalidValueError: one is not finite, or the information is not symmetric positive
+            semidefinite.
         """
-        mean = as_array(np.zeros(P) if self.shape_mean is None else self.shape_mean, (P,), "Mean of the shape prior")
+        mean = as_array(
+            np.zeros(P) if self.shape_mean is None else self.shape_mean,
+            (P,),
+            "Mean of the shape prior",
+        )
         information = np.eye(P) if self.shape_information is None else self.shape_information
         information = as_array(information, (P, P), "Information of the shape prior")
         check_finite(mean, "Mean of the shape prior")
         check_finite(information, "Information of the shape prior")
         if self.shape_information is not None:
-            check_information(information, "Information of the shape prior (Priors.shape_information)")
+            check_information(
+                information, "Information of the shape prior (Priors.shape_information)"
+            )
         return mean, 0.5 * (information + information.T)
 
 
 def default_priors(body: object, log_det: float = 0.0) -> Priors:
-    """Return what is known of any person: the learned prior of the joints that `body` names as SMPL does, the limits
-    of its knees and elbows, and the population's shape. Joints without a learned prior are drawn to the rest pose.
+    """Return what is known of any person: the learned prior of the joints that `body` names as SMPL
+    does, the limits of its knees and elbows, and the population's shape. Joints without a learned
+    prior are drawn to the rest pose.
 
-    :param body: `joint_names` (K+1,) are all that is read of it; without any, only the shape is known.
+    :param body: `joint_names` (K+1,) are all that is read of it; without any, only the shape is
+        known.
     :param log_det: 0 for the learned prior's 1/2 |z|^2, as in the paper; 1 for its whole -log p
         (residuals/joint_flow.py).
     :raises ModelFileError: the prior cannot be read.
-    :raises InvalidValueError: `log_det` is negative or not a number, or `joint_names` is not a list.
+    :raises InvalidValueError: `log_det` is negative or not a number, or `joint_names` is not a
+        list.
     """
     check_weight(log_det, "log_det")
     names = getattr(body, "joint_names", ())

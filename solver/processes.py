@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names of temporary files that tell whose they are, so that other processes can remove what a killed one has left.
+"""Names of temporary files that tell whose they are, so that other processes can remove what a
+killed one has left.
 
 Such a name contains ``owner()``: the computer and the process, ``1a2b3c4d-1234``.
 """
@@ -12,7 +13,8 @@ import time
 import zlib
 from pathlib import Path
 
-_ABANDONED_S = 24 * 3600.0  # age from which a temporary file is removed if its process cannot be asked about
+# age from which a temporary file is removed if its process cannot be asked about
+_ABANDONED_S = 24 * 3600.0
 
 
 def owner() -> str:
@@ -21,17 +23,19 @@ def owner() -> str:
 
 
 def has_ended(owned_by: str) -> bool:
-    """Return whether a temporary file's process was one of this computer, and does not run any more.
+    """Return whether a temporary file's process was one of this computer, and does not run any
+    more.
 
-    :param owned_by: the part of its name that `owner` gave, which may be followed by ``-`` and more; of any other name,
-        the answer is no.
+    :param owned_by: the part of its name that `owner` gave, which may be followed by ``-`` and
+        more; of any other name, the answer is no.
     """
     where, process = _parts(owned_by)
     return where == computer() and process.isdecimal() and not _runs(int(process))
 
 
 def is_abandoned(path: Path, owned_by: str) -> bool:
-    """Return whether a temporary file or folder belongs to no running process: it has ended, or the file is a day old.
+    """Return whether a temporary file or folder belongs to no running process: it has ended, or the
+    file is a day old.
 
     :param owned_by: see `has_ended`.
     :raises OSError: the file does not exist any more.

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rotations: so(3) and SO(3) exponential, logarithm, left Jacobian; unit quaternions.
 
-Conventions: a rotation vector phi (3,) in radians is angle times unit axis; exp(phi) turns right-handed about it;
-quaternions are (w, x, y, z). Perturbations are on the left, R <- exp(w) R, and the left Jacobian J satisfies
-exp(phi + d) = exp(J(phi) d) exp(phi) to first order, so log(exp(w) R) = log(R) + J^-1(log R) w.
+Conventions: a rotation vector phi (3,) in radians is angle times unit axis; exp(phi) turns
+right-handed about it; quaternions are (w, x, y, z). Perturbations are on the left, R <- exp(w) R,
+and the left Jacobian J satisfies exp(phi + d) = exp(J(phi) d) exp(phi) to first order, so
+log(exp(w) R) = log(R) + J^-1(log R) w.
 
-The upper half are scalar functions for compiled kernels: they take and return plain numbers, so that nothing is
-allocated. The lower half does the same on numpy arrays with any leading dimensions.
+The upper half are scalar functions for compiled kernels: they take and return plain numbers, so
+that nothing is allocated. The lower half does the same on numpy arrays with any leading dimensions.
 """
 
 import math
@@ -20,21 +21,25 @@ from .compiled.kernel import kernel
 
 Array = NDArray[Any]
 
-_PI_MARGIN = 1e-4  # above cos(angle) = -1 + this, the antisymmetric part of R still fixes the axis accurately
+# above cos(angle) = -1 + this, the antisymmetric part of R still fixes the axis accurately
+_PI_MARGIN = 1e-4
 
 
 @kernel
 def exp3(x: float, y: float, z: float) -> tuple[float, ...]:
     """Return the nine entries of exp((x, y, z)), row by row.
 
-    R = I + a [phi]x + b [phi]x^2 with a = sin(th)/th, b = (1 - cos(th))/th^2; below half a radian both are summed as
-    series to the last digit, which needs no trigonometric call.
+    R = I + a [phi]x + b [phi]x^2 with a = sin(th)/th, b = (1 - cos(th))/th^2; below half a radian
+    both are summed as series to the last digit, which needs no trigonometric call.
     """
     s = x * x + y * y + z * z
     if s < 0.25:
         a = 1.0 - s / 72.0 * (1.0 - s / 110.0 * (1.0 - s / 156.0))
         a = 1.0 - s / 6.0 * (1.0 - s / 20.0 * (1.0 - s / 42.0 * a))
-        b = 0.5 * (1.0 - s / 12.0 * (1.0 - s / 30.0 * (1.0 - s / 56.0 * (1.0 - s / 90.0 * (1.0 - s / 132.0)))))
+        b = 0.5 * (
+            1.0
+            - s / 12.0 * (1.0 - s / 30.0 * (1.0 - s / 56.0 * (1.0 - s / 90.0 * (1.0 - s / 132.0))))
+        )
     else:
         th = math.sqrt(s)
         a = math.sin(th) / th
@@ -49,10 +54,11 @@ def exp3(x: float, y: float, z: float) -> tuple[float, ...]:
 
 @kernel
 def log3(r00, r01, r02, r10, r11, r12, r20, r21, r22) -> tuple[float, ...]:  # type: ignore[no-untyped-def]
-    """Return the rotation vector (3 numbers) of the rotation matrix given row by row, of angle in [0, pi].
+    """Return the rotation vector (3 numbers) of the rotation matrix given row by row, of angle in
+    [0, pi].
 
-    Near pi, where the antisymmetric part vanishes, the axis is the largest column of the symmetric part; exactly at
-    pi the sign is arbitrary.
+    Near pi, where the antisymmetric part vanishes, the axis is the largest column of the symmetric
+    part; exactly at pi the sign is arbitrary.
     """
     x, y, z = 0.5 * (r21 - r12), 0.5 * (r02 - r20), 0.5 * (r10 - r01)  # sin(th) axis
     c = 0.5 * (r00 + r11 + r22 - 1.0)
@@ -71,7 +77,8 @@ def log3(r00, r01, r02, r10, r11, r12, r20, r21, r22) -> tuple[float, ...]:  # t
     if c > -1.0 + _PI_MARGIN:
         k = th / s
         return x * k, y * k, z * k
-    # R + R^T = 2 cos(th) I + 2 (1 - cos(th)) a a^T: take the column of the largest diagonal entry of a a^T
+    # R + R^T = 2 cos(th) I + 2 (1 - cos(th)) a a^T: take the column of the largest diagonal entry
+    # of a a^T
     if r00 >= r11 and r00 >= r22:
         ax, ay, az = r00 - c, 0.5 * (r01 + r10), 0.5 * (r02 + r20)
     elif r11 >= r22:
@@ -86,7 +93,9 @@ def log3(r00, r01, r02, r10, r11, r12, r20, r21, r22) -> tuple[float, ...]:  # t
 
 @kernel
 def left_jacobian_inverse3(x: float, y: float, z: float) -> tuple[float, ...]:
-    """Return the nine entries of J^-1 = I - [phi]x / 2 + k [phi]x^2, k = (1 - th/2 cot(th/2)) / th^2; finite at pi."""
+    """Return the nine entries of J^-1 = I - [phi]x / 2 + k [phi]x^2, k = (1 - th/2 cot(th/2)) /
+    th^2; finite at pi.
+    """
     s = x * x + y * y + z * z
     if s < 1e-2:
         k = (1.0 + s * (1.0 / 60.0 + s * (1.0 / 2520.0 + s / 100800.0))) / 12.0
@@ -126,12 +135,18 @@ def _sine(s: Array, small: Array, th: Array) -> Array:
 
 def _versine(s: Array, small: Array, th: Array) -> Array:
     """Return (1 - cos(th))/th^2."""
-    return np.where(small, 0.5 - s / 24.0 * (1.0 - s / 30.0 * (1.0 - s / 56.0)), 2.0 * (np.sin(0.5 * th) / th) ** 2)
+    return np.where(
+        small,
+        0.5 - s / 24.0 * (1.0 - s / 30.0 * (1.0 - s / 56.0)),
+        2.0 * (np.sin(0.5 * th) / th) ** 2,
+    )
 
 
 def _lag(s: Array, small: Array, th: Array) -> Array:
     """Return (th - sin(th))/th^3."""
-    return np.where(small, 1 / 6.0 - s / 120.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0)), (th - np.sin(th)) / th**3)
+    return np.where(
+        small, 1 / 6.0 - s / 120.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0)), (th - np.sin(th)) / th**3
+    )
 
 
 def exp(phi: ArrayLike) -> Array:
@@ -154,7 +169,9 @@ def log(rotation: ArrayLike) -> Array:
     n = np.linalg.norm(v, axis=-1, keepdims=True)
     small = n < 1e-6
     # w >= 0, so a small n means w = 1 to rounding: 2 atan(n / w) / n = 2 - 2 n^2 / 3
-    phi: Array = v * np.where(small, 2.0 - 2.0 / 3.0 * n * n, 2.0 * np.arctan2(n, w) / np.where(small, 1.0, n))
+    phi: Array = v * np.where(
+        small, 2.0 - 2.0 / 3.0 * n * n, 2.0 * np.arctan2(n, w) / np.where(small, 1.0, n)
+    )
     return phi
 
 
@@ -192,8 +209,14 @@ def quaternion_from_matrix(rotation: ArrayLike) -> Array:
     """
     r = as_arrays(rotation, (3, 3), "A rotation matrix")
     d = np.diagonal(r, axis1=-2, axis2=-1)
-    squares = np.concatenate([1.0 + d.sum(-1, keepdims=True), 1.0 + 2.0 * d - d.sum(-1, keepdims=True)], axis=-1)
-    antisymmetric = [r[..., 2, 1] - r[..., 1, 2], r[..., 0, 2] - r[..., 2, 0], r[..., 1, 0] - r[..., 0, 1]]
+    squares = np.concatenate(
+        [1.0 + d.sum(-1, keepdims=True), 1.0 + 2.0 * d - d.sum(-1, keepdims=True)], axis=-1
+    )
+    antisymmetric = [
+        r[..., 2, 1] - r[..., 1, 2],
+        r[..., 0, 2] - r[..., 2, 0],
+        r[..., 1, 0] - r[..., 0, 1],
+    ]
     outer = np.empty((*r.shape[:-2], 4, 4))  # 4 q q^T
     for i in range(4):
         outer[..., i, i] = squares[..., i]
@@ -208,7 +231,8 @@ def quaternion_from_matrix(rotation: ArrayLike) -> Array:
 
 
 def matrix_from_quaternion(quaternion: ArrayLike) -> Array:
-    """Return the rotation matrices (..., 3, 3) of quaternions (..., 4), which need not be normalized.
+    """Return the rotation matrices (..., 3, 3) of quaternions (..., 4), which need not be
+    normalized.
 
     :raises ShapeError: the quaternions have another shape.
     """
@@ -221,7 +245,9 @@ def matrix_from_quaternion(quaternion: ArrayLike) -> Array:
 
 @kernel
 def orthonormalize(R) -> bool:  # type: ignore[no-untyped-def]
-    """Make nearly orthonormal matrices (n, 3, 3) so to rounding, R <- R (3 I - RᵀR) / 2; False at one that is not."""
+    """Make nearly orthonormal matrices (n, 3, 3) so to rounding, R <- R (3 I - RᵀR) / 2; False at
+    one that is not.
+    """
     for k in range(R.shape[0]):
         M = R[k]
         n00 = M[0, 0] * M[0, 0] + M[1, 0] * M[1, 0] + M[2, 0] * M[2, 0] - 1.0
@@ -245,7 +271,8 @@ def orthonormalize(R) -> bool:  # type: ignore[no-untyped-def]
 
 
 def nearest_rotation(matrix: ArrayLike) -> Array:
-    """Return the rotations (..., 3, 3) nearest to matrices in the Frobenius norm; the identity for non-finite ones.
+    """Return the rotations (..., 3, 3) nearest to matrices in the Frobenius norm; the identity for
+    non-finite ones.
 
     :raises ShapeError: the matrices have another shape.
     """
@@ -260,7 +287,8 @@ def nearest_rotation(matrix: ArrayLike) -> Array:
 
 
 def shortest_turn(a: Array, b: Array) -> Array:
-    """Return the smallest rotations (..., 3, 3) that take directions a (..., 3) to b (..., 3); half a turn if opposite.
+    """Return the smallest rotations (..., 3, 3) that take directions a (..., 3) to b (..., 3); half
+    a turn if opposite.
 
     :raises ShapeError: the directions have another shape.
     """
@@ -269,7 +297,8 @@ def shortest_turn(a: Array, b: Array) -> Array:
     b = b / np.maximum(np.linalg.norm(b, axis=-1, keepdims=True), 1e-12)
     axis, cosine = np.cross(a, b), (a * b).sum(axis=-1)
     sine = np.linalg.norm(axis, axis=-1)
-    aside = np.cross(a, np.eye(3)[np.abs(a).argmin(axis=-1)])  # for opposite directions any perpendicular axis
+    # for opposite directions any perpendicular axis
+    aside = np.cross(a, np.eye(3)[np.abs(a).argmin(axis=-1)])
     axis = np.where(((sine < 1e-9) & (cosine < 0))[..., None], aside, axis)
     length = np.maximum(np.linalg.norm(axis, axis=-1), 1e-12)
     return exp(axis * (np.arctan2(sine, cosine) / length)[..., None])

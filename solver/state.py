@@ -22,8 +22,10 @@ class Status(Enum):
 
     CONVERGED = 0  # the last stage's relative decrease fell below its tolerance
     MAX_ITERATIONS = 1  # the last stage ran out of iterations
-    STALLED = 2  # no damping, however large, found a lower cost: a minimum to rounding, or a contradiction
-    NO_MEASUREMENTS = 3  # nothing that `Fit.measurements` counts was usable: the state is the initial one
+    # no damping, however large, found a lower cost: a minimum to rounding, or a contradiction
+    STALLED = 2
+    # nothing that `Fit.measurements` counts was usable: the state is the initial one
+    NO_MEASUREMENTS = 3
     NON_FINITE = 4  # the cost of the initial state is not finite: the state is the initial one
 
 
@@ -38,16 +40,23 @@ class State:
 
     @classmethod
     def rest(cls, K: int, P: int, distance: float = 3.0) -> "State":
-        """Return the rest pose of K joints, beta (P,) zero, upright and facing a camera `distance` metres away.
+        """Return the rest pose of K joints, beta (P,) zero, upright and facing a camera `distance`
+        metres away.
 
-        :raises InvalidValueError: K or P is not a whole number of at least 0, or the distance is not positive.
+        :raises InvalidValueError: K or P is not a whole number of at least 0, or the distance is
+            not positive.
         """
         check_count(K, "K", 0)
         check_count(P, "P", 0)
         if not 0.0 < as_number(distance, "distance") < math.inf:
             raise InvalidValueError(f"distance must be positive and finite, but is {distance}.")
         R_camera_root = np.diag([1.0, -1.0, -1.0])
-        return cls(R_camera_root, np.array([0.0, 0.0, distance]), np.tile(np.eye(3), (K, 1, 1)), np.zeros(P))
+        return cls(
+            R_camera_root,
+            np.array([0.0, 0.0, distance]),
+            np.tile(np.eye(3), (K, 1, 1)),
+            np.zeros(P),
+        )
 
     def pose(self, tree: Tree) -> Pose:
         """Return the state for the kernels, with rotations made orthonormal.
@@ -71,7 +80,12 @@ class State:
     @classmethod
     def from_pose(cls, tree: Tree, pose: Pose) -> "State":
         """Copy the state out of the kernels' arrays."""
-        return cls(pose.R[0].copy(), pose.t[0].copy(), pose.Omega[1:].copy(), pose.beta[: tree.shape].copy())
+        return cls(
+            pose.R[0].copy(),
+            pose.t[0].copy(),
+            pose.Omega[1:].copy(),
+            pose.beta[: tree.shape].copy(),
+        )
 
 
 def check_state_rotations(R_camera_root: Array, Omega: Array) -> None:
@@ -83,7 +97,9 @@ def check_state_rotations(R_camera_root: Array, Omega: Array) -> None:
     check_rotations(Omega, "Omega of the initial state")
 
 
-def check_states(init: Sequence[State | None], frames: int, kinds: type | tuple[type, ...] = State) -> None:
+def check_states(
+    init: Sequence[State | None], frames: int, kinds: type | tuple[type, ...] = State
+) -> None:
     """Check that there is an initial state for each frame.
 
     :param kinds: what an entry may be.
@@ -92,7 +108,9 @@ def check_states(init: Sequence[State | None], frames: int, kinds: type | tuple[
     """
     check_list(init, "init", "frame")
     if len(init) != frames:
-        raise ShapeError(f"There must be one initial state per frame, {frames}, but got {len(init)}.")
+        raise ShapeError(
+            f"There must be one initial state per frame, {frames}, but got {len(init)}."
+        )
     for k, state in enumerate(init):
         check_type(state, kinds, f"init[{k}]")
 
@@ -107,12 +125,14 @@ class Fit:
     iterations: int  # evaluations of the blocks after the first
     R_camera_part: Array  # (K+1, 3, 3)
     t_camera_part: Array  # (K+1, 3), the joints
-    beta_information: Array  # (P, P), of this frame's measurements alone, pose eliminated; shape prior not included
-    # usable points, directions and rows of pose priors, such as the pull of `Temporal`; contacts, the floor and further
-    # tables add to a fit, but alone they are no measurements
+    # (P, P), of this frame's measurements alone, pose eliminated; shape prior not included
+    beta_information: Array
+    # usable points, directions and rows of pose priors, such as the pull of `Temporal`; contacts,
+    # the floor and further tables add to a fit, but alone they are no measurements
     measurements: int
     rejected: int = 0  # of the iterations, those whose step did not lower the cost
-    cost_by_term: dict[str, float] = field(default_factory=dict)  # adds up to `cost`; with Options.report only
+    # adds up to `cost`; with Options.report only
+    cost_by_term: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass
@@ -122,9 +142,11 @@ class ClipFit:
     frames: list[Fit]
     beta: Array  # (P,)
     beta_information: Array  # (P, P), summed over the frames, shape prior included
-    focal_scale: float  # estimated focal length over that of the intrinsics; 1 if it was not estimated
+    # estimated focal length over that of the intrinsics; 1 if it was not estimated
+    focal_scale: float
     status: Status
     cost: float
     iterations: int
     rejected: int = 0
-    cost_by_term: dict[str, float] = field(default_factory=dict)  # adds up to `cost`; with Options.report only
+    # adds up to `cost`; with Options.report only
+    cost_by_term: dict[str, float] = field(default_factory=dict)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Causal temporal terms: the last frame's estimate is a constant, so it enters as priors of this frame's pose.
+"""Causal temporal terms: the last frame's estimate is a constant, so it enters as priors of this
+frame's pose.
 
-The root's pose becomes a row of the pose prior, each joint's state one of the joint prior with Omega_mean the last
-frame's. Two-sided windows would couple frames and break the linear cost.
+The root's pose becomes a row of the pose prior, each joint's state one of the joint prior with
+Omega_mean the last frame's. Two-sided windows would couple frames and break the linear cost.
 """
 
 from dataclasses import dataclass, replace
@@ -18,8 +19,8 @@ from .validation import check_rotations, check_type, check_weight
 
 @dataclass(frozen=True)
 class Temporal:
-    """Weights of the last frame's estimate: rotation per radian^2 and position per metre^2 of the root; joints in
-    multiples of `Weights.joint_prior`.
+    """Weights of the last frame's estimate: rotation per radian^2 and position per metre^2 of the
+    root; joints in multiples of `Weights.joint_prior`.
     """
 
     root_rotation: float = 100.0
@@ -36,11 +37,14 @@ class Temporal:
 
 
 def with_previous(measurements: Measurements, previous: State, temporal: Temporal) -> Measurements:
-    """Return the measurements with the pull towards `previous`, in the same camera frame, added to them.
+    """Return the measurements with the pull towards `previous`, in the same camera frame, added to
+    them.
 
-    :param previous: the last frame's state: R_camera_root (3, 3), t_camera_root (3,) in metres, Omega (K, 3, 3).
+    :param previous: the last frame's state: R_camera_root (3, 3), t_camera_root (3,) in metres,
+        Omega (K, 3, 3).
     :raises ShapeError: an array of the state or of the measurements has another shape.
-    :raises InvalidValueError: a matrix of the state is not a rotation, or an argument is of another type.
+    :raises InvalidValueError: a matrix of the state is not a rotation, or an argument is of another
+        type.
     """
     check_type(measurements, Measurements, "measurements")
     check_type(previous, State, "previous")
@@ -54,11 +58,17 @@ def with_previous(measurements: Measurements, previous: State, temporal: Tempora
     rows = joint_prior.pack(np.arange(1, K + 1), Omega, np.full(K, temporal.joints))
     tables = dict(measurements.tables)
     if "joint_prior" in tables:
-        ints, floats = as_table(tables["joint_prior"], joint_prior.INTS, joint_prior.FLOATS, "joint_prior")
+        ints, floats = as_table(
+            tables["joint_prior"], joint_prior.INTS, joint_prior.FLOATS, "joint_prior"
+        )
         rows = np.concatenate([ints, rows[0]]), np.concatenate([floats, rows[1]])
     tables["joint_prior"] = rows
-    own = measurements.pose_priors or PosePriors(np.zeros(0, int), np.zeros((0, 3, 3)), np.zeros((0, 3)), [], [])
+    own = measurements.pose_priors or PosePriors(
+        np.zeros(0, int), np.zeros((0, 3, 3)), np.zeros((0, 3)), [], []
+    )
     weights = np.array([temporal.root_rotation]), np.array([temporal.root_position])
     pull = (np.zeros(1, np.int64), R[None], t[None], *weights)
-    root = PosePriors(*(np.concatenate(both) for both in zip(pose_prior_arrays(own), pull, strict=True)))
+    root = PosePriors(
+        *(np.concatenate(both) for both in zip(pose_prior_arrays(own), pull, strict=True))
+    )
     return replace(measurements, pose_priors=root, tables=tables)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Checks of what comes in from outside, one for each kind of value; every message names the field.
 
-Two errors: ShapeError for what is no array of numbers of the expected shape, InvalidValueError for the right shape with
-values that no fit can use. The checks of arrays that come with every frame are compiled: numpy takes ten times as long
-for so few numbers.
+Two errors: ShapeError for what is no array of numbers of the expected shape, InvalidValueError for
+the right shape with values that no fit can use. The checks of arrays that come with every frame are
+compiled: numpy takes ten times as long for so few numbers.
 """
 
 from __future__ import annotations
@@ -23,8 +23,10 @@ from .compiled.kernel import allocating_kernel, kernel
 from .compiled.part import Array
 from .errors import InvalidValueError, ShapeError, UnitsWarning
 
-ROTATION_TOLERANCE = 0.01  # of the entries of R Rᵀ - I: rotations rounded to two decimals pass, scaled ones do not
-LARGEST_STEP = 10.0  # metres between two points or joints of one person, one after the other in a list
+# of the entries of R Rᵀ - I: rotations rounded to two decimals pass, scaled ones do not
+ROTATION_TOLERANCE = 0.01
+# metres between two points or joints of one person, one after the other in a list
+LARGEST_STEP = 10.0
 _FEWEST_TIMES = 5  # whole numbers that are no coincidence
 _NO_WEIGHTS = np.zeros(0)
 _UNITS = "Scope's unit is the metre; divide millimetres by 1000"
@@ -37,7 +39,9 @@ def as_indices(value: ArrayLike, limit: int, name: str) -> Array:
     """
     array = as_integers(value, name)
     if not all_within(array, 0, limit):
-        raise ShapeError(f"{name} must lie in 0..{limit - 1}, but go from {array.min()} to {array.max()}.")
+        raise ShapeError(
+            f"{name} must lie in 0..{limit - 1}, but go from {array.min()} to {array.max()}."
+        )
     return array
 
 
@@ -47,11 +51,14 @@ def as_number(value: Any, name: str) -> float:
     :raises InvalidValueError: it is none.
     """
     try:
-        if isinstance(value, (str, bytes)) or value is None or np.ndim(value) != 0:  # of a ragged list: ValueError
+        # of a ragged list: ValueError
+        if isinstance(value, (str, bytes)) or value is None or np.ndim(value) != 0:
             raise TypeError
         return float(value)
     except OverflowError:
-        raise InvalidValueError(f"{name} must be a number that fits in 64 bits, but is too large.") from None
+        raise InvalidValueError(
+            f"{name} must be a number that fits in 64 bits, but is too large."
+        ) from None
     except (TypeError, ValueError):
         raise InvalidValueError(f"{name} must be a number, but is {described(value)}.") from None
 
@@ -68,12 +75,17 @@ def check_weight(value: Any, name: str) -> None:
 def check_count(value: Any, name: str, least: int = 1) -> None:
     """Check how many there are of something.
 
-    :raises InvalidValueError: it is not a whole number, is less than `least`, or is too large for an index.
+    :raises InvalidValueError: it is not a whole number, is less than `least`, or is too large for
+        an index.
     """
     if isinstance(value, bool) or not isinstance(value, Integral) or value < least:
-        raise InvalidValueError(f"{name} must be a whole number of at least {least}, but is {value!r}.")
+        raise InvalidValueError(
+            f"{name} must be a whole number of at least {least}, but is {value!r}."
+        )
     if int(value) > sys.maxsize:
-        raise InvalidValueError(f"{name} must be a whole number of at most {sys.maxsize}, but is larger.")
+        raise InvalidValueError(
+            f"{name} must be a whole number of at most {sys.maxsize}, but is larger."
+        )
 
 
 def check_switch(value: Any, name: str) -> None:
@@ -116,14 +128,15 @@ def check_finite(values: Array, name: str) -> None:
 def check_rotations(R: Array, name: str, weights: Array | None = None) -> None:
     """Check matrices (n, 3, 3).
 
-    :param weights: (n,), of measurements: a matrix whose weight is not positive may be anything, and one that is not
-        finite leaves the measurement out. None checks all.
+    :param weights: (n,), of measurements: a matrix whose weight is not positive may be anything,
+        and one that is not finite leaves the measurement out. None checks all.
     :raises InvalidValueError: one is not a rotation.
     """
     k = _first_not_rotation(R, _NO_WEIGHTS if weights is None else weights, weights is None)
     if k >= 0:
         raise InvalidValueError(
-            f"{name} must be rotation matrices, orthonormal and of determinant 1, but number {k} is {R[k].tolist()}."
+            f"{name} must be rotation matrices, orthonormal and of determinant 1, but number {k} "
+            f"is {R[k].tolist()}."
         )
 
 
@@ -137,7 +150,8 @@ def check_information(information: Array, name: str) -> None:
     if _definiteness(information) == 2:
         least = np.linalg.eigvalsh(information).min()
         raise InvalidValueError(
-            f"{name} must be positive semidefinite, as an inverse covariance is, but has the eigenvalue {least:.6g}."
+            f"{name} must be positive semidefinite, as an inverse covariance is, but has the "
+            f"eigenvalue {least:.6g}."
         )
 
 
@@ -151,14 +165,17 @@ def check_intrinsics(intrinsics: Array) -> None:
         return
     K = intrinsics.tolist()
     if fault == 1:
-        raise InvalidValueError(f"Intrinsics must be finite with positive focal lengths, but got {K}.")
+        raise InvalidValueError(
+            f"Intrinsics must be finite with positive focal lengths, but got {K}."
+        )
     hint = ""
     if _fault_of_intrinsics(np.ascontiguousarray(intrinsics.T)) == 0:
         hint = "; transpose it"
     elif intrinsics[2, 2] and _fault_of_intrinsics(intrinsics / intrinsics[2, 2]) == 0:
         hint = f"; divide it by its last entry, {intrinsics[2, 2]:.6g}"
     raise InvalidValueError(
-        f"Intrinsics must be a camera matrix [[fx, s, cx], [0, fy, cy], [0, 0, 1]] in pixels, but got {K}{hint}."
+        "Intrinsics must be a camera matrix [[fx, s, cx], [0, fy, cy], [0, 0, 1]] in pixels, but "
+        f"got {K}{hint}."
     )
 
 
@@ -179,16 +196,23 @@ def check_list(value: Any, name: str, what: str) -> None:
     :param what: what each entry is of, for the message: "frame", "clip".
     :raises InvalidValueError: it is a single entry, or a generator, which can be read only once.
     """
-    is_single = isinstance(value, (str, bytes, Mapping, type)) or (isinstance(value, np.ndarray) and value.ndim == 0)
+    is_single = isinstance(value, (str, bytes, Mapping, type)) or (
+        isinstance(value, np.ndarray) and value.ndim == 0
+    )
     if is_single or not (hasattr(value, "__len__") and hasattr(value, "__getitem__")):
-        raise InvalidValueError(f"{name} must be a list with an entry for each {what}, but is {described(value)}.")
+        raise InvalidValueError(
+            f"{name} must be a list with an entry for each {what}, but is {described(value)}."
+        )
 
 
 def warn_of_units(points: Array, name: str) -> None:
-    """Warn of points (n, 3) of one person that lie too far apart to be in metres, with `UnitsWarning`."""
+    """Warn of points (n, 3) of one person that lie too far apart to be in metres, with
+    `UnitsWarning`.
+    """
     if _far_apart(points, LARGEST_STEP):
         warnings.warn(
-            f"{name} lie more than {LARGEST_STEP:g} m apart from one to the next, too far for a person; {_UNITS}.",
+            f"{name} lie more than {LARGEST_STEP:g} m apart from one to the next, too far for a "
+            f"person; {_UNITS}.",
             UnitsWarning,
             stacklevel=3,
         )
@@ -197,12 +221,15 @@ def warn_of_units(points: Array, name: str) -> None:
 def warn_of_frame_numbers(times: Array) -> None:
     """Warn of times (T,) of a motion's frames that are probably no seconds, with `UnitsWarning`.
 
-    Frame numbers are whole, and so are milliseconds; of frames that are seconds apart, few are captured.
+    Frame numbers are whole, and so are milliseconds; of frames that are seconds apart, few are
+    captured.
     """
     if len(times) >= _FEWEST_TIMES and not (times % 1.0).any():
         warnings.warn(
-            f"times are whole numbers, {times[0]:g}, {times[1]:g}, {times[2]:g}, …, probably frame numbers or "
-            "milliseconds instead of seconds; divide frame numbers by the frame rate, milliseconds by 1000. For frames "
+            f"times are whole numbers, {times[0]:g}, {times[1]:g}, {times[2]:g}, …, probably frame "
+            "numbers or "
+            "milliseconds instead of seconds; divide frame numbers by the frame rate, milliseconds "
+            "by 1000. For frames "
             "that are seconds apart, give smaller weights of acceleration than MotionPrior's.",
             UnitsWarning,
             stacklevel=3,
@@ -238,14 +265,21 @@ def _first_negative(values: Array) -> int:
 
 @kernel
 def _first_not_rotation(R: Array, weights: Array, every: bool) -> int:
-    """Return the index of the first of (n, 3, 3) that is no rotation, or -1; unless `every`, as `check_rotations`."""
+    """Return the index of the first of (n, 3, 3) that is no rotation, or -1; unless `every`, as
+    `check_rotations`.
+    """
     for k in range(R.shape[0]):
         if not every and not weights[k] > 0.0:
             continue
         M, off = R[k], 0.0
         for r in range(3):
             for c in range(3):
-                e = M[r, 0] * M[c, 0] + M[r, 1] * M[c, 1] + M[r, 2] * M[c, 2] - (1.0 if r == c else 0.0)
+                e = (
+                    M[r, 0] * M[c, 0]
+                    + M[r, 1] * M[c, 1]
+                    + M[r, 2] * M[c, 2]
+                    - (1.0 if r == c else 0.0)
+                )
                 off = max(off, abs(e))
         det = (
             M[0, 0] * (M[1, 1] * M[2, 2] - M[1, 2] * M[2, 1])
@@ -262,7 +296,8 @@ def _first_not_rotation(R: Array, weights: Array, every: bool) -> int:
 
 @allocating_kernel
 def _definiteness(A: Array) -> int:
-    """Return 0 if (P, P) is symmetric and positive semidefinite to rounding, 1 if not symmetric, 2 if indefinite.
+    """Return 0 if (P, P) is symmetric and positive semidefinite to rounding, 1 if not symmetric, 2
+    if indefinite.
 
     By the pivots of Cholesky's decomposition, with a millionth of the largest diagonal entry added.
     """
@@ -292,21 +327,30 @@ def _definiteness(A: Array) -> int:
 
 @kernel
 def _fault_of_intrinsics(K: Array) -> int:
-    """Return 0 for a camera matrix, 1 if not finite or a focal length is not positive, 2 if of another form."""
+    """Return 0 for a camera matrix, 1 if not finite or a focal length is not positive, 2 if of
+    another form.
+    """
     total = 0.0
     for r in range(3):
         for c in range(3):
             total += 0.0 * K[r, c]
     if total != 0.0:
         return 1
-    if abs(K[2, 0]) > 1e-9 or abs(K[2, 1]) > 1e-9 or abs(K[2, 2] - 1.0) > 1e-9 or abs(K[1, 0]) > 1e-9 * abs(K[0, 0]):
+    if (
+        abs(K[2, 0]) > 1e-9
+        or abs(K[2, 1]) > 1e-9
+        or abs(K[2, 2] - 1.0) > 1e-9
+        or abs(K[1, 0]) > 1e-9 * abs(K[0, 0])
+    ):
         return 2
     return 0 if K[0, 0] > 0.0 and K[1, 1] > 0.0 else 1
 
 
 @kernel
 def _far_apart(points: Array, most: float) -> bool:
-    """Whether more than half of the steps from one finite point of (n, 3) to the next are longer than `most`."""
+    """Whether more than half of the steps from one finite point of (n, 3) to the next are longer
+    than `most`.
+    """
     steps, far, before = 0, 0, -1
     for k in range(points.shape[0]):
         total = 0.0 * points[k, 0] + 0.0 * points[k, 1] + 0.0 * points[k, 2]

@@ -25,8 +25,8 @@ ROOT = Path(__file__).resolve().parent.parent
 SHARED = ROOT.parent / "shared"
 IS_SECOND = os.environ.get("PYTEST_XDIST_WORKER", "gw0")[-1] in "13579"
 
-# Blender reads this once, when bpy is first imported: tests must not write in the home folder. Processes that this one
-# starts use the same folder, and leave it.
+# Blender reads this once, when bpy is first imported: tests must not write in the home folder.
+# Processes that this one starts use the same folder, and leave it.
 OWN_BLENDER_FOLDER = None
 if "BLENDER_USER_RESOURCES" not in os.environ:
     OWN_BLENDER_FOLDER = tempfile.mkdtemp(prefix="scope-tests-blender-")
@@ -35,11 +35,12 @@ if "BLENDER_USER_RESOURCES" not in os.environ:
 # Tests that use onnxruntime itself, not through Scope, do not report to its makers either.
 os.environ["ORT_DISABLE_TELEMETRY"] = "1"
 
-# In this order, ahead of all others, so that two processes never compile the same. The first file compiles the solver,
-# and the second a version of its own, whose process then takes the third, which needs none. When the first is done, the
-# fourth compiles all other kernels of a capture, and the next six need none. A process is given another file when two
-# tests are left of its own: the long ones of these files come first in them. The rig that Rigify generates is shared in
-# the same way. Files that take long would otherwise end last, alone.
+# In this order, ahead of all others, so that two processes never compile the same. The first file
+# compiles the solver, and the second a version of its own, whose process then takes the third,
+# which needs none. When the first is done, the fourth compiles all other kernels of a capture, and
+# the next six need none. A process is given another file when two tests are left of its own: the
+# long ones of these files come first in them. The rig that Rigify generates is shared in the same
+# way. Files that take long would otherwise end last, alone.
 FIRST = (
     "solver/test_validation.py",
     "solver/residuals/test_registry.py",
@@ -81,8 +82,8 @@ def pytest_make_collect_report(
 ) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
     """Let every second process collect folders backwards.
 
-    Pytest compiles each file of tests for itself, which takes seconds, and keeps the code: two processes compile a half
-    each and find the other's.
+    Pytest compiles each file of tests for itself, which takes seconds, and keeps the code: two
+    processes compile a half each and find the other's.
     """
     report = yield
     if IS_SECOND and isinstance(collector, pytest.Directory):
@@ -98,7 +99,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Search for garbage less often, and never in what the collection made: it took a twentieth of the time."""
+    """Search for garbage less often, and never in what the collection made: it took a twentieth of
+    the time.
+    """
     gc.freeze()
     gc.set_threshold(10_000, 20, 20)
 
@@ -107,18 +110,26 @@ def pytest_collection_finish() -> None:
 def shared() -> Path:
     """The folder of real clips and motion data next to the checkout.
 
-    It is not public: a CI that cannot have it sets ``SCOPE_WITHOUT_SHARED``, and the tests on real clips are skipped.
+    It is not public: a CI that cannot have it sets ``SCOPE_WITHOUT_SHARED``, and the tests on real
+    clips are skipped.
     """
     if os.environ.get("SCOPE_WITHOUT_SHARED") or not (SHARED / "data").is_dir():
-        missing(f"the tests on real clips need {SHARED / 'data'}", allowed_by="SCOPE_WITHOUT_SHARED")
+        missing(
+            f"the tests on real clips need {SHARED / 'data'}", allowed_by="SCOPE_WITHOUT_SHARED"
+        )
     return SHARED
 
 
 @pytest.fixture(scope="session")
 def blender_module() -> None:
-    """Require Blender's module, which a CI that cannot have it says with ``SCOPE_WITHOUT_BLENDER``."""
+    """Require Blender's module, which a CI that cannot have it says with
+    ``SCOPE_WITHOUT_BLENDER``.
+    """
     if importlib.util.find_spec("bpy") is None:
-        missing("bpy is not installed, which writes scenes: pip install bpy", allowed_by="SCOPE_WITHOUT_BLENDER")
+        missing(
+            "bpy is not installed, which writes scenes: pip install bpy",
+            allowed_by="SCOPE_WITHOUT_BLENDER",
+        )
 
 
 @pytest.fixture(scope="session")
@@ -127,9 +138,16 @@ def networks() -> Path:
     from scope.scope_addon.capture.perception.sessions import NETWORKS_FOLDER
     from scope.tools.convert_networks.catalogue import NETWORKS
 
-    absent = [network.name for network in NETWORKS if not (NETWORKS_FOLDER / f"{network.name}.onnx").is_file()]
+    absent = [
+        network.name
+        for network in NETWORKS
+        if not (NETWORKS_FOLDER / f"{network.name}.onnx").is_file()
+    ]
     if absent:
-        missing(f"{NETWORKS_FOLDER} lacks {', '.join(absent)}; python -m scope.tools.convert_networks builds them")
+        missing(
+            f"{NETWORKS_FOLDER} lacks {', '.join(absent)}; python -m "
+            "scope.tools.convert_networks builds them"
+        )
     return NETWORKS_FOLDER
 
 
@@ -145,7 +163,11 @@ def sessions_are_opened_once() -> Iterator[None]:
     keep = cache(open_on)
 
     def opened(name: str, path: Path, threads: int) -> object:
-        return keep(name, path, 1) if path.parent == sessions.NETWORKS_FOLDER else open_on(name, path, threads)
+        return (
+            keep(name, path, 1)
+            if path.parent == sessions.NETWORKS_FOLDER
+            else open_on(name, path, threads)
+        )
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sessions, "_open_on", opened)
@@ -162,7 +184,9 @@ def body() -> Body:
 
 @pytest.hookimpl(trylast=True)
 def pytest_unconfigure(config: pytest.Config) -> None:
-    """Leave without Blender's exit handlers, which can wait forever for a thread of their own (see ``cli.run``)."""
+    """Leave without Blender's exit handlers, which can wait forever for a thread of their own (see
+    ``cli.run``).
+    """
     if OWN_BLENDER_FOLDER is not None:
         shutil.rmtree(OWN_BLENDER_FOLDER, ignore_errors=True)
     if "bpy" in sys.modules:

@@ -11,8 +11,11 @@ from scope.solver.body import Body
 from scope.solver.names import EXPRESSIONS
 
 
-def made_motion(body: Body, poses: np.ndarray, trans: np.ndarray, rate: float = 30.0, **given) -> Motion:
-    """Poses (T, 3(K+1)) or (T, K+1, 3) and trans (T, 3) of the mean shape, seen in every frame by a VGA camera.
+def made_motion(
+    body: Body, poses: np.ndarray, trans: np.ndarray, rate: float = 30.0, **given
+) -> Motion:
+    """Poses (T, 3(K+1)) or (T, K+1, 3) and trans (T, 3) of the mean shape, seen in every frame by a
+    VGA camera.
 
     :param given: other fields of `Motion`, in place of what stands below.
     """
@@ -46,7 +49,9 @@ def made_motion(body: Body, poses: np.ndarray, trans: np.ndarray, rate: float = 
 
 
 def made_face(T: int, **weights: np.ndarray | float) -> dict[str, np.ndarray]:
-    """The arrays of a face that is seen in T frames and looks ahead; ``weights`` of expressions, others are 0."""
+    """The arrays of a face that is seen in T frames and looks ahead; ``weights`` of expressions,
+    others are 0.
+    """
     expressions = np.zeros((T, len(EXPRESSIONS)))
     for name, values in weights.items():
         expressions[:, EXPRESSIONS.index(name)] = values

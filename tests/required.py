@@ -36,4 +36,6 @@ def need_encoder(codec: str) -> None:
     try:
         av.Codec(codec, "w")
     except av.codec.codec.UnknownCodecError:
-        missing(f"this build of PyAV has no encoder {codec}; ./scripts/setup installs one that does")
+        missing(
+            f"this build of PyAV has no encoder {codec}; ./scripts/setup installs one that does"
+        )

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files are complete or absent, links stay links, and what is not a regular file is not replaced."""
+"""Files are complete or absent, links stay links, and what is not a regular file is not
+replaced.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,9 @@ def write(path, text="new"):
 
 @pytest.fixture
 def link(tmp_path):
-    """A link to a file that does not exist yet, in another folder: results are to be stored on another disk."""
+    """A link to a file that does not exist yet, in another folder: results are to be stored on
+    another disk.
+    """
     (tmp_path / "disk").mkdir()
     path = tmp_path / "walk.npz"
     path.symlink_to("disk/kept.npz")
@@ -76,7 +80,9 @@ def test_a_failure_leaves_no_draft_either(tmp_path):
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no such permissions")
 @pytest.mark.parametrize("mask", [0o022, 0o077, 0o002])
 @pytest.mark.parametrize("replaces", [False, True])
-def test_a_file_has_the_permissions_of_any_new_one_and_the_umask_is_left_alone(tmp_path, monkeypatch, mask, replaces):
+def test_a_file_has_the_permissions_of_any_new_one_and_the_umask_is_left_alone(
+    tmp_path, monkeypatch, mask, replaces
+):
     """Every change of the umask affects the files that other threads create meanwhile."""
     before, changes = os.umask(mask), []
     try:
@@ -168,7 +174,9 @@ def make_socket(path):
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows keeps its pipes in no folder")
 @pytest.mark.parametrize("linked", [False, True])
 @pytest.mark.parametrize("make", [make_pipe, make_socket, os.mkdir])
-def test_folders_pipes_and_sockets_are_neither_written_nor_replaced(tmp_path, monkeypatch, make, linked):
+def test_folders_pipes_and_sockets_are_neither_written_nor_replaced(
+    tmp_path, monkeypatch, make, linked
+):
     monkeypatch.chdir(tmp_path)  # a socket's name has to be short
     other = tmp_path / "other"
     make(other.relative_to(tmp_path))
@@ -179,7 +187,9 @@ def test_folders_pipes_and_sockets_are_neither_written_nor_replaced(tmp_path, mo
         other.rename(path)
     before = path.stat()
     for refused in (check_output, write):
-        with pytest.raises(OutputError, match="is a device, a pipe or a socket|is a folder|a folder of that name"):
+        with pytest.raises(
+            OutputError, match="is a device, a pipe or a socket|is a folder|a folder of that name"
+        ):
             refused(path)
     assert path.stat() == before
     assert path.is_symlink() == linked
@@ -195,7 +205,9 @@ def test_writing_to_a_device_is_an_error(tmp_path):
 
 @pytest.mark.parametrize(("compressed", "save"), [(False, np.savez), (True, np.savez_compressed)])
 @pytest.mark.parametrize("piece", [1, 3000, 1 << 23])
-def test_an_archive_is_numpys_own_however_it_is_written(tmp_path, monkeypatch, compressed, save, piece):
+def test_an_archive_is_numpys_own_however_it_is_written(
+    tmp_path, monkeypatch, compressed, save, piece
+):
     monkeypatch.setattr(atomic_write, "_PIECE", piece)
     grid = np.arange(6000.0).reshape(60, 100)
     arrays = {

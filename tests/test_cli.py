@@ -14,7 +14,8 @@ from scope.scope_addon.cli import SAMPLE, main
 from scope.scope_addon.footage import display_text
 from scope.scope_addon.motion import Motion
 
-BRIEF = ["--quality", "fast", "--end", "0.1", "--threads", "1"]  # several would wait for each other in busy loops
+# several would wait for each other in busy loops
+BRIEF = ["--quality", "fast", "--end", "0.1", "--threads", "1"]
 
 
 def run(capsys, *argv):
@@ -45,7 +46,9 @@ def test_unreadable_footage_gives_one_sentence_status_1_and_no_file(tmp_path, ca
     if content is not None:
         (tmp_path / name).write_bytes(content)
     before = files_below(tmp_path)
-    status, out, err = run(capsys, "capture", tmp_path / name, "-o", tmp_path / "out.npz", "-o", tmp_path / "out.glb")
+    status, out, err = run(
+        capsys, "capture", tmp_path / name, "-o", tmp_path / "out.npz", "-o", tmp_path / "out.glb"
+    )
     assert status == 1
     assert out == ""
     assert name in err
@@ -78,20 +81,36 @@ def test_unreadable_footage_gives_one_sentence_status_1_and_no_file(tmp_path, ca
         (["capture", "--quality", "superb"], 2, "superb"),
         (["capture", "--fov", "60", "--focal-mm", "26", "-o", "{tmp}/a.npz"], 2, "contradict"),
         (["capture", "--fov", "wide"], 2, "wide"),
-        (["capture", "--height", "1,82", "-o", "{tmp}/a.npz"], 2, "a height of 1 cm is not plausible"),
+        (
+            ["capture", "--height", "1,82", "-o", "{tmp}/a.npz"],
+            2,
+            "a height of 1 cm is not plausible",
+        ),
         (["capture", "--height", "tall", "-o", "{tmp}/a.npz"], 2, "centimetres, such as 175"),
         (["capture", "--body", "nobody", "-o", "{tmp}/a.npz"], 1, "nobody"),
         (["capture", "--retarget", "{tmp}/rig.glb", "-o", "{tmp}/a.glb"], 1, "rig.glb"),
         (["capture", "--retarget", "{tmp}/rig.obj", "-o", "{tmp}/a.glb"], 2, ".obj"),
-        (["capture", "--retarget", str(SAMPLE.parent / "LICENSE.md"), "-o", "{tmp}/a.glb"], 2, ".md"),
+        (
+            ["capture", "--retarget", str(SAMPLE.parent / "LICENSE.md"), "-o", "{tmp}/a.glb"],
+            2,
+            ".md",
+        ),
         (["capture", "--bone-map", "{tmp}/map.json", "-o", "{tmp}/a.glb"], 2, "--retarget"),
         (["capture", "--rig-object", "Rig", "-o", "{tmp}/a.glb"], 2, "--retarget"),
-        (["capture", str(SAMPLE), "second.mp4"], 2, "second.mp4 (see scope capture --help; use scope batch"),
+        (
+            ["capture", str(SAMPLE), "second.mp4"],
+            2,
+            "second.mp4 (see scope capture --help; use scope batch",
+        ),
         (["capture", "--frobnicate"], 2, "--frobnicate (see scope capture --help)"),
         (["capture", "--threads", "-2", "-o", "{tmp}/a.npz"], 2, "--threads"),
         (["capture", "--start", "", "-o", "{tmp}/a.npz"], 2, "'' is not a valid time"),
         (["capture", "--fps", "", "-o", "{tmp}/a.npz"], 2, "'' is not a frame rate"),
-        (["capture", "--start", "00:00:00:99", "-o", "{tmp}/a.npz"], 2, "00:00:00:99 does not exist"),
+        (
+            ["capture", "--start", "00:00:00:99", "-o", "{tmp}/a.npz"],
+            2,
+            "00:00:00:99 does not exist",
+        ),
         (["capture", "https://example.com/walk.mp4", "-o", "{tmp}/a.npz"], 1, "download"),
         (["frobnicate"], 2, "frobnicate"),
         (["capture", "a.mp4", "--unknown=" + 300 * "x"], 2, "unknown arguments: --unknown=xxx"),
@@ -107,14 +126,16 @@ def test_bad_arguments(tmp_path, capsys, argv, status, says):
     assert files_below(tmp_path) == []
 
 
-def test_a_file_whose_name_begins_with_a_dash_is_given_with_its_folder(tmp_path, capsys, monkeypatch):
+def test_a_file_whose_name_begins_with_a_dash_is_given_with_its_folder(
+    tmp_path, capsys, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     Path("-walk.mp4").touch()
     status, _, err = run(capsys, "capture", "-walk.mp4")
     assert status == 2
     assert (
-        "unknown arguments: -walk.mp4 (see scope capture --help; to capture the file of that name, write ./-walk.mp4)"
-        in err
+        "unknown arguments: -walk.mp4 (see scope capture --help; to capture the file of that name, "
+        "write ./-walk.mp4)" in err
     )
     status, _, err = run(capsys, "capture", "./-walk.mp4", "-o", "out.npz")
     assert status == 1
@@ -155,7 +176,13 @@ def test_outputs_that_are_the_same_file_are_written_once(tmp_path, capfd, monkey
     monkeypatch.chdir(tmp_path)
     (tmp_path / "out").mkdir()
     (tmp_path / "linked").symlink_to("out")
-    names = ["out/case.npz", "out/../out/case.npz", tmp_path / "out" / "case.npz", "linked/case.npz", "case.npz"]
+    names = [
+        "out/case.npz",
+        "out/../out/case.npz",
+        tmp_path / "out" / "case.npz",
+        "linked/case.npz",
+        "case.npz",
+    ]
     options = [text for name in names for text in ("-o", name)]
     status, out, err = run(capfd, "capture", SAMPLE, *BRIEF, "--json", *options)
     assert status == 0, err
@@ -167,19 +194,27 @@ def test_an_interrupt_during_the_overlay_leaves_complete_files(tmp_path, capsys,
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("scope.scope_addon.capture.overlay.overlay_video.write_overlay", interrupted)
+    monkeypatch.setattr(
+        "scope.scope_addon.capture.overlay.overlay_video.write_overlay", interrupted
+    )
     motion = tmp_path / "a.npz"
     options = [*BRIEF, "-o", motion, "--overlay", tmp_path / "a.mp4"]
     status, _, err = run(capsys, "capture", SAMPLE, *options)
     assert status == 130
-    assert err == "scope: stopped; some results may have been written already, each of them complete\n"
+    assert (
+        err == "scope: stopped; some results may have been written already, each of them complete\n"
+    )
     assert files_below(tmp_path) == ["a.npz"]
 
 
 @pytest.mark.usefixtures("blender_module")
 def test_no_command_writes_into_scopes_own_folders(tmp_path, capfd, monkeypatch):
     def state():
-        files = [p for name in ("assets", "scope_addon", "solver") for p in (SAMPLE.parents[2] / name).rglob("*")]
+        files = [
+            p
+            for name in ("assets", "scope_addon", "solver")
+            for p in (SAMPLE.parents[2] / name).rglob("*")
+        ]
         kept = [p for p in files if p.is_file() and "__pycache__" not in p.parts]  # Python's own
         return {str(p): (p.stat().st_size, p.stat().st_mtime_ns) for p in kept}
 
@@ -193,11 +228,19 @@ def test_no_command_writes_into_scopes_own_folders(tmp_path, capfd, monkeypatch)
         status, _, err = run(capfd, *argv)
         assert status == 0, err
         assert state() == before
-    made = ["check.mp4", "motions", "motions/sample.npz", "motions/scope-batch.json", "sample.glb", "sample.npz"]
+    made = [
+        "check.mp4",
+        "motions",
+        "motions/sample.npz",
+        "motions/scope-batch.json",
+        "sample.glb",
+        "sample.npz",
+    ]
     assert files_below(tmp_path) == made
 
 
-ANY_NAME = os.fsdecode(b"person \xe9") if sys.platform == "linux" else "person"  # elsewhere, names are Unicode
+# elsewhere, names are Unicode
+ANY_NAME = os.fsdecode(b"person \xe9") if sys.platform == "linux" else "person"
 
 
 @pytest.mark.usefixtures("blender_module")
@@ -227,7 +270,9 @@ def test_a_picture_gives_a_motion_of_one_frame_and_only_json_on_stdout(tmp_path)
     ]
     for path in outputs:
         argv += ["-o", path]
-    done = subprocess.run(list(map(os.fsencode, argv)), capture_output=True, env=dict(os.environ), check=False)
+    done = subprocess.run(
+        list(map(os.fsencode, argv)), capture_output=True, env=dict(os.environ), check=False
+    )
     assert done.returncode == 0, done.stderr
     report = json.loads(done.stdout.decode())
     json.dumps(report, ensure_ascii=False).encode()  # no half characters
@@ -236,7 +281,9 @@ def test_a_picture_gives_a_motion_of_one_frame_and_only_json_on_stdout(tmp_path)
     assert set(report["outputs"]) == {
         display_text(p) for p in [*outputs, tmp_path / f"{name}.o.png", tmp_path / f"{name}.html"]
     }
-    assert f"<h1>{display_text(f'{name}.png')}</h1>" in (tmp_path / f"{name}.html").read_text("utf-8")
+    assert f"<h1>{display_text(f'{name}.png')}</h1>" in (tmp_path / f"{name}.html").read_text(
+        "utf-8"
+    )
     assert {"fps", "reprojection_px", "warnings"} <= set(report)
     motion = Motion.load(outputs[0])
     assert len(motion) == 1
@@ -258,7 +305,9 @@ def test_hands_need_a_body_with_fingers(tmp_path, capsys):
     from scope.solver.loaders.body_file import BUILT_IN
 
     out = tmp_path / "out.npz"
-    status, _, err = run(capsys, "capture", str(SAMPLE), "--hands", "--body", str(BUILT_IN["scope"]), "-o", str(out))
+    status, _, err = run(
+        capsys, "capture", str(SAMPLE), "--hands", "--body", str(BUILT_IN["scope"]), "-o", str(out)
+    )
     assert status == 2
     assert "no finger joints" in err
     assert not out.exists()
@@ -285,6 +334,8 @@ def test_too_little_memory_is_no_bug(tmp_path, capsys, monkeypatch, error):
 
 def test_the_start_loads_no_library_that_only_a_capture_needs():
     heavy = {"numba", "cv2", "onnxruntime", "bpy"}
-    code = f"import sys; from scope.scope_addon import cli; print(sorted({heavy} & set(sys.modules)))"
+    code = (
+        f"import sys; from scope.scope_addon import cli; print(sorted({heavy} & set(sys.modules)))"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

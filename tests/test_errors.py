@@ -32,7 +32,8 @@ def test_a_defect_is_not_lack_of_memory() -> None:
 
 def test_opencv_without_memory() -> None:
     with pytest.raises(cv2.error) as caught:
-        cv2.resize(np.zeros((2, 2), np.uint8), (2**30, 2**24))  # more than the addresses that a process has
+        # more than the addresses that a process has
+        cv2.resize(np.zeros((2, 2), np.uint8), (2**30, 2**24))
     assert lacks_memory(caught.value)
 
 
@@ -51,7 +52,10 @@ def test_libraries_that_cannot_be_loaded(tmp_path) -> None:
     ("number", "advice"),
     [
         (errno.ENOSPC, "free disk space or memory and try again"),
-        (errno.EACCES, "check the permissions of that file or folder, and whether another program has it open"),
+        (
+            errno.EACCES,
+            "check the permissions of that file or folder, and whether another program has it open",
+        ),
         (errno.ENAMETOOLONG, "choose a shorter name"),
     ],
 )

@@ -49,7 +49,17 @@ def test_a_sequence_differs_in_the_last_number_only(tmp_path: Path) -> None:
 
 
 def test_a_picture_is_continued_by_those_with_larger_numbers(tmp_path: Path) -> None:
-    made(tmp_path, "a_8.png", "a_9.png", "a_010.png", "a_11.jpg", "a_12.png.txt", "b_12.png", "a_7.png", "still.png")
+    made(
+        tmp_path,
+        "a_8.png",
+        "a_9.png",
+        "a_010.png",
+        "a_11.jpg",
+        "a_12.png.txt",
+        "b_12.png",
+        "a_7.png",
+        "still.png",
+    )
     assert names(numbered_from(tmp_path / "a_8.png")) == ["a_8.png", "a_9.png", "a_010.png"]
     assert names(numbered(tmp_path, "a_", ".png")) == ["a_7.png", "a_8.png", "a_9.png", "a_010.png"]
     assert numbered(tmp_path, "a_", ".png.txt") == []  # no picture
@@ -58,9 +68,10 @@ def test_a_picture_is_continued_by_those_with_larger_numbers(tmp_path: Path) -> 
 
 
 def test_addresses_are_told_from_paths() -> None:
-    assert [is_url(text) for text in ("s3://bucket/clips", "https://a/b.mp4", "clips/a.mp4", "C:\\a.mp4", 3, None)] == [
-        True, True, False, False, False, False
-    ]  # fmt: skip
+    assert [
+        is_url(text)
+        for text in ("s3://bucket/clips", "https://a/b.mp4", "clips/a.mp4", "C:\\a.mp4", 3, None)
+    ] == [True, True, False, False, False, False]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="file names are Unicode on this system")

@@ -23,7 +23,9 @@ def test_a_map_is_read_as_it_was_saved(tmp_path):
 
 def test_a_map_with_half_a_surrogate_pair_is_read_as_it_was_saved(tmp_path):
     path = tmp_path / "hero.json"
-    path.write_text('{"format": "scope bone map", "version": 1, "bones": {"hips": "a \\ud800 \\" b"}}')
+    path.write_text(
+        '{"format": "scope bone map", "version": 1, "bones": {"hips": "a \\ud800 \\" b"}}'
+    )
     bones = load_map(path, "bone map")["bones"]
     save_map(path, "bone map", bones=bones)
     assert load_map(path, "bone map")["bones"] == bones == {"hips": 'a \ud800 " b'}

@@ -54,10 +54,20 @@ def test_a_saved_motion_loads_the_same(tmp_path):
 def test_the_file_contains_plain_arrays_with_the_documented_names_and_types(tmp_path):
     make_motion().save(tmp_path / "a.npz")
     with np.load(tmp_path / "a.npz", allow_pickle=False) as file:
-        types = {k: file[k].dtype.kind + str(file[k].dtype.itemsize) for k in file.files if file[k].dtype.kind != "U"}
+        types = {
+            k: file[k].dtype.kind + str(file[k].dtype.itemsize)
+            for k in file.files
+            if file[k].dtype.kind != "U"
+        }
     assert types["poses"] == types["trans"] == types["betas"] == types["joints_cam"] == "f4"
     assert types["frames"] == "i8"
-    assert types["timestamps"] == types["mocap_framerate"] == types["world_from_camera"] == types["intrinsics"] == "f8"
+    assert (
+        types["timestamps"]
+        == types["mocap_framerate"]
+        == types["world_from_camera"]
+        == types["intrinsics"]
+        == "f8"
+    )
     assert types["valid"] == "b1"
 
 
@@ -98,7 +108,9 @@ def test_a_missing_key_is_named(tmp_path):
 def test_files_of_earlier_versions_have_unknown_deviations(tmp_path):
     make_motion().save(tmp_path / "a.npz")
     with np.load(tmp_path / "a.npz") as file:
-        np.savez(tmp_path / "old.npz", **{key: file[key] for key in file.files if "sigma" not in key})
+        np.savez(
+            tmp_path / "old.npz", **{key: file[key] for key in file.files if "sigma" not in key}
+        )
     old = Motion.load(tmp_path / "old.npz")
     assert old.joint_sigma_m.shape == old.joint_sigma_depth_m.shape == old.joint_confidence.shape
     assert np.isnan(old.joint_sigma_m).all()

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Solving, editing and retargeting change none of their arguments.
 
-Edits and transfers get arrays that cannot be written. For the solver these would be another type, for which it would
-have to be compiled, so its arguments are compared with copies.
+Edits and transfers get arrays that cannot be written. For the solver these would be another type,
+for which it would have to be compiled, so its arguments are compared with copies.
 """
 
 from __future__ import annotations
@@ -16,7 +16,11 @@ import pytest
 from scope.scope_addon.edit.clip import resample
 from scope.scope_addon.edit.floor import refloor
 from scope.scope_addon.edit.loop import best_cycle, close_cycle
-from scope.scope_addon.edit.root_motion import floor_trajectory, relative_to_trajectory, with_trajectory
+from scope.scope_addon.edit.root_motion import (
+    floor_trajectory,
+    relative_to_trajectory,
+    with_trajectory,
+)
 from scope.scope_addon.edit.smooth import smoothed
 from scope.scope_addon.edit.spans import interpolate, swap_sides
 from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
@@ -99,8 +103,12 @@ def test_a_transfer_keeps_clip_and_rig(clip):
     heads = BODY.rest_joints(BETAS) @ R_WORLD_MODEL.T
     names = list(BODY.joint_names)
     parents = np.array(BODY.parents)
-    rig = Skeleton(names, parents, parents, heads, heads + [0, 0, 0.1], np.tile(np.eye(3), (len(names), 1, 1)))
-    pose = Transfer(BODY, frozen(BETAS.copy()), frozen(rig), BoneMap({name: name for name in names})).pose(clip)
+    rig = Skeleton(
+        names, parents, parents, heads, heads + [0, 0, 0.1], np.tile(np.eye(3), (len(names), 1, 1))
+    )
+    pose = Transfer(
+        BODY, frozen(BETAS.copy()), frozen(rig), BoneMap({name: name for name in names})
+    ).pose(clip)
     assert len(list(arrays_in(pose))) > 0
 
 
@@ -116,5 +124,7 @@ def test_the_solver_keeps_measurements_and_initial_states():
     clip = noisy_clip(5)
     frames = clip.frames()
     with unchanged(clip.starts, frames, clip.stands, clip.times):
-        fit_motion(clip.body, frames, clip.times, init=clip.starts, options=FLAT, stands=clip.stands)
+        fit_motion(
+            clip.body, frames, clip.times, init=clip.starts, options=FLAT, stands=clip.stands
+        )
         fit(clip.body, frames[0][0].measurements, init=clip.starts[0], options=FLAT)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A missing requirement skips a test, fails it in CI, and skips it there too if that is requested."""
+"""A missing requirement skips a test, fails it in CI, and skips it there too if that is
+requested.
+"""
 
 from __future__ import annotations
 

@@ -13,7 +13,12 @@ from .made_motion import made_motion
 
 def motion(count: int = 30):
     body = load_body("scope")
-    m = made_motion(body, np.zeros((count, 3 * (body.K + 1))), np.zeros((count, 3)), residual_px=np.full(count, 2.0))
+    m = made_motion(
+        body,
+        np.zeros((count, 3 * (body.K + 1))),
+        np.zeros((count, 3)),
+        residual_px=np.full(count, 2.0),
+    )
     m.joint_confidence[:, 3] = 0.0  # a joint that nothing measures
     return m
 
@@ -27,7 +32,12 @@ def test_each_frame_has_one_reason():
     m.valid[[0, 1, 29]] = False
     m.residual_px[:5] = 100.0
     m.joint_confidence[:8] *= 0.1
-    expected = [Span("unseen", 0, 1), Span("unseen", 29, 29), Span("far", 2, 4), Span("unsure", 5, 7)]
+    expected = [
+        Span("unseen", 0, 1),
+        Span("unseen", 29, 29),
+        Span("far", 2, 4),
+        Span("unsure", 5, 7),
+    ]
     assert find_review_spans(m) == expected
 
 

@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``python -m scope.tools.mutation_sample FOLDER``: change the code at random and see whether its tests fail.
+"""``python -m scope.tools.mutation_sample FOLDER``: change the code at random and see whether its
+tests fail.
 
-A sample of the mutants that cosmic-ray's operators make of the modules in FOLDER, in proportion to their number in each
-file, is tried one at a time in a copy of the repository: with the test files named after the module, then with those in
-their folder. A mutant that no test kills is equivalent to the original, or a test is missing.
+A sample of the mutants that cosmic-ray's operators make of the modules in FOLDER, in proportion to
+their number in each file, is tried one at a time in a copy of the repository: with the test files
+named after the module, then with those in their folder. A mutant that no test kills is equivalent
+to the original, or a test is missing.
 
-Not sampled are the solver's examples, what only matters to compilation, decorators, annotations, and bitwise operators
-in place of arithmetic, which no float survives. ``pip install cosmic-ray==8.7.0`` first.
+Not sampled are the solver's examples, what only matters to compilation, decorators, annotations,
+and bitwise operators in place of arithmetic, which no float survives. ``pip install
+cosmic-ray==8.7.0`` first.
 """
 
 from __future__ import annotations
@@ -32,7 +35,9 @@ ROOT = Path(__file__).resolve().parents[1]
 LEFT_OUT = ("solver/examples/", "solver/compiled/kernel.py", "solver/compiled/simd.py")
 _NO_ARITHMETIC = ("BitOr", "BitAnd", "BitXor", "LShift", "RShift")
 # It compiles a second copy of the solver, for minutes.
-_TOO_SLOW = "tests/solver/residuals/test_registry.py::test_one_file_its_import_and_one_line_add_a_residual"
+_TOO_SLOW = (
+    "tests/solver/residuals/test_registry.py::test_one_file_its_import_and_one_line_add_a_residual"
+)
 
 Position = tuple[int, int]
 
@@ -47,7 +52,11 @@ def not_executed(text: str) -> list[tuple[Position, Position]]:
             nodes.append(node.returns)
         if isinstance(node, ast.arg | ast.AnnAssign):
             nodes.append(node.annotation)
-    return [((n.lineno, n.col_offset), (n.end_lineno or 0, n.end_col_offset or 0)) for n in nodes if n is not None]
+    return [
+        ((n.lineno, n.col_offset), (n.end_lineno or 0, n.end_col_offset or 0))
+        for n in nodes
+        if n is not None
+    ]
 
 
 def mutations_of(path: Path) -> list[Any]:
@@ -64,7 +73,9 @@ def mutations_of(path: Path) -> list[Any]:
 
 
 def sample(folder: str, count: int, seed: int) -> list[tuple[str, Any]]:
-    """Draw about ``count`` (file, mutation), at least one from each file in proportion, in random order."""
+    """Draw about ``count`` (file, mutation), at least one from each file in proportion, in random
+    order.
+    """
     files = [path.relative_to(ROOT).as_posix() for path in sorted((ROOT / folder).rglob("*.py"))]
     found = {file: mutations_of(ROOT / file) for file in files if not file.startswith(LEFT_OUT)}
     total, rng, drawn = sum(map(len, found.values())), random.Random(seed), []
@@ -79,10 +90,14 @@ def sample(folder: str, count: int, seed: int) -> list[tuple[str, Any]]:
 def tests_for(copy: Path, file: str) -> Iterator[list[str]]:
     """Yield the tests of a module: those named after it, then those of its folder."""
     module = Path(file)
-    below = module.parent if module.parts[0] == "solver" else module.parent.relative_to("scope_addon")
+    below = (
+        module.parent if module.parts[0] == "solver" else module.parent.relative_to("scope_addon")
+    )
     folder = copy / "tests" / below
     own = sorted({*folder.glob(f"test_{module.stem}.py"), *folder.glob(f"test_{module.stem}_*.py")})
-    yield from ([str(path) for path in paths] for paths in (own, sorted(folder.glob("test_*.py"))) if paths)
+    yield from (
+        [str(path) for path in paths] for paths in (own, sorted(folder.glob("test_*.py"))) if paths
+    )
 
 
 def outcome_of(copy: Path, file: str, limit_s: float) -> str:
@@ -101,7 +116,14 @@ def outcome_of(copy: Path, file: str, limit_s: float) -> str:
             *tests,
         ]
         try:
-            done = subprocess.run(command, cwd=copy, env=environment, capture_output=True, timeout=limit_s, check=False)
+            done = subprocess.run(
+                command,
+                cwd=copy,
+                env=environment,
+                capture_output=True,
+                timeout=limit_s,
+                check=False,
+            )
         except subprocess.TimeoutExpired:
             return "timeout"
         if done.returncode:
@@ -111,23 +133,39 @@ def outcome_of(copy: Path, file: str, limit_s: float) -> str:
 
 def main() -> None:
     """Try the mutants and write one line of JSON about each."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("folder", help="such as scope_addon/kinematics or solver")
     parser.add_argument("--count", type=int, default=150, help="mutants to try (default: 150)")
     parser.add_argument("--seed", type=int, default=1, help="of the sample (default: 1)")
-    parser.add_argument("--limit", type=float, default=300.0, metavar="S", help="seconds for the tests of a mutant")
+    parser.add_argument(
+        "--limit", type=float, default=300.0, metavar="S", help="seconds for the tests of a mutant"
+    )
     parser.add_argument("-o", "--output", type=Path, default=Path("mutants.jsonl"))
     args = parser.parse_args()
-    with tempfile.TemporaryDirectory() as scratch, args.output.open("w", encoding="utf-8") as output:
+    with (
+        tempfile.TemporaryDirectory() as scratch,
+        args.output.open("w", encoding="utf-8") as output,
+    ):
         copy = Path(scratch) / "scope"  # the name that the tests import
-        shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".venv", ".git", "build", "__pycache__"))
+        shutil.copytree(
+            ROOT, copy, ignore=shutil.ignore_patterns(".venv", ".git", "build", "__pycache__")
+        )
         for file, mutation in sample(args.folder, args.count, args.seed):
             original = (copy / file).read_text(encoding="utf-8")
-            mutant = mutate_code(original, get_operator(mutation.operator_name)(), mutation.occurrence)
+            mutant = mutate_code(
+                original, get_operator(mutation.operator_name)(), mutation.occurrence
+            )
             (copy / file).write_text(mutant, encoding="utf-8")
             outcome, line = outcome_of(copy, file, args.limit), mutation.start_pos[0]
             (copy / file).write_text(original, encoding="utf-8")
-            record = {"file": file, "line": line, "outcome": outcome, "mutant": mutant.splitlines()[line - 1].strip()}
+            record = {
+                "file": file,
+                "line": line,
+                "outcome": outcome,
+                "mutant": mutant.splitlines()[line - 1].strip(),
+            }
             output.write(json.dumps(record, ensure_ascii=False) + "\n")
             output.flush()
             print(f"{outcome:9}{file}:{line}  {record['mutant']}", flush=True)

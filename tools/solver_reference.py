@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """``python -m scope.tools.solver_reference``: write docs/solver_api.md from the solver's source.
 
-Every name of ``scope.solver.__all__`` appears exactly once, with its parameters and docstring. A test compares the page
-with this tool's output.
+Every name of ``scope.solver.__all__`` appears exactly once, with its parameters and docstring. A
+test compares the page with this tool's output.
 """
 
 from __future__ import annotations
@@ -22,15 +22,16 @@ PAGE = Path(__file__).resolve().parents[1] / "docs" / "solver_api.md"
 _INTRODUCTION = """\
 # The solver: API
 
-Everything here is importable from `scope.solver`, which needs numpy and numba only. `pip install CHECKOUT`, with the
-folder of this repository, installs it in an environment of your own (Python 3.11 or newer), with its bodies and joint
-prior; Scope is in no package index. The first fit compiles the solver, for a minute or two.
-[Mathematics](solver_mathematics.md) explains the equations, and the [glossary](glossary.md) the terms. This page is
-written by `python -m scope.tools.solver_reference` from the docstrings; edit those.
+Everything here is importable from `scope.solver`, which needs numpy and numba only. `pip install
+CHECKOUT`, with the folder of this repository, installs it in an environment of your own (Python
+3.11 or newer), with its bodies and joint prior; Scope is in no package index. The first fit
+compiles the solver, for a minute or two. [Mathematics](solver_mathematics.md) explains the
+equations, and the [glossary](glossary.md) the terms. This page is written by `python -m
+scope.tools.solver_reference` from the docstrings; edit those.
 
-Lengths are in metres and angles in radians. Camera axes are OpenCV's (x right, y down, z forward). Pixels are those of
-the image that the intrinsics belong to. There are K joints besides the root, P shape coefficients, M keypoints of the
-body and N measurements.
+Lengths are in metres and angles in radians. Camera axes are OpenCV's (x right, y down, z forward).
+Pixels are those of the image that the intrinsics belong to. There are K joints besides the root, P
+shape coefficients, M keypoints of the body and N measurements.
 
 ## Example
 
@@ -39,19 +40,21 @@ from scope import solver
 
 body = solver.load_body("scope")  # or your own SMPL.npz, SMPLH.pkl, …
 index = list(body.keypoint_set("coco").values())[:17]  # COCO's 17 points
-fit = solver.fit(body, solver.Measurements(K, keypoints2d=solver.Keypoints2D(index, pixels, confidence)))
+keypoints = solver.Keypoints2D(index, pixels, confidence)
+fit = solver.fit(body, solver.Measurements(K, keypoints2d=keypoints))
 fits = solver.fit_batch(body, frames)  # independent frames, on all cores
 clip = solver.fit_clip(body, frames)  # one shape for all frames
 motion = solver.fit_motion(body, frames, times)  # and little acceleration between them
 print(fit.status, fit.t_camera_part, fit.state.beta)  # why it stopped, joints in camera axes, shape
 ```
 
-`K` is the (3, 3) camera matrix, `pixels` (17, 2), `confidence` (17,), `frames` a list of `Measurements`
-and `times` their times in seconds. For several calibrated cameras, a frame is a list of one `View` for each.
-`fit_motion(body, [measurements], [0.0], covariance=True)` gives the covariance of the joints of a single frame. Results
-can be pickled, and their arrays saved with `np.savez`; `State(*arrays)` is where a later fit can start (`init`).
-`solver/examples/` fits 3D joints, 2D keypoints, a marker set, an SMPL+H hand and a clip from three cameras, and refines
-a regression network's output:
+`K` is the (3, 3) camera matrix, `pixels` (17, 2), `confidence` (17,), `frames` a list of
+`Measurements` and `times` their times in seconds. For several calibrated cameras, a frame is a list
+of one `View` for each. `fit_motion(body, [measurements], [0.0], covariance=True)` gives the
+covariance of the joints of a single frame. Results can be pickled, and their arrays saved with
+`np.savez`; `State(*arrays)` is where a later fit can start (`init`). `solver/examples/` fits 3D
+joints, 2D keypoints, a marker set, an SMPL+H hand and a clip from three cameras, and refines a
+regression network's output:
 
 ```sh
 .venv/bin/python -m scope.solver.examples.from_markers
@@ -61,17 +64,43 @@ a regression network's output:
 _SECTIONS = {
     "Body models": ("load_body", "Body", "BodyArrays", "Tree", "make_tree"),
     "Measurements": (
-        "Measurements", "Keypoints2D", "Keypoints3D", "OrientationField", "PosePriors", "FootContacts", "Floor",
-        "View", "StandingPoints",
+        "Measurements",
+        "Keypoints2D",
+        "Keypoints3D",
+        "OrientationField",
+        "PosePriors",
+        "FootContacts",
+        "Floor",
+        "View",
+        "StandingPoints",
     ),
-    "Fitting": ("fit", "fit_batch", "fit_clip", "fit_clips", "fit_motion", "FrameSolver", "fit_tree", "carry"),
+    "Fitting": (
+        "fit",
+        "fit_batch",
+        "fit_clip",
+        "fit_clips",
+        "fit_motion",
+        "FrameSolver",
+        "fit_tree",
+        "carry",
+    ),
     "Residuals of your own": ("register_residual", "check_residual"),
     "Options and priors": (
-        "Options", "Stage", "Weights", "COLD_STAGES", "WARM_STAGES", "Priors", "default_priors", "JointPrior",
-        "load_joint_prior", "Temporal", "with_previous", "MotionPrior",
+        "Options",
+        "Stage",
+        "Weights",
+        "COLD_STAGES",
+        "WARM_STAGES",
+        "Priors",
+        "default_priors",
+        "JointPrior",
+        "load_joint_prior",
+        "Temporal",
+        "with_previous",
+        "MotionPrior",
     ),
     "Results": ("Fit", "ClipFit", "MotionFit", "State", "Status"),
-}  # fmt: skip
+}
 _ERRORS, _ROTATIONS, _OTHER = "Errors", "Rotations", "Other names"
 
 
@@ -79,7 +108,9 @@ def reference() -> str:
     """Return the page as Markdown."""
     listed = [name for names in _SECTIONS.values() for name in names]
     errors = sorted(name for name in solver.__all__ if _is_error(getattr(solver, name)))
-    sections = {heading: [n for n in names if n in solver.__all__] for heading, names in _SECTIONS.items()}
+    sections = {
+        heading: [n for n in names if n in solver.__all__] for heading, names in _SECTIONS.items()
+    }
     sections[_ERRORS] = [name for name in errors if name not in listed]
     sections[_OTHER] = sorted(set(solver.__all__) - set(listed) - set(errors))
     parts = [_INTRODUCTION]
@@ -98,7 +129,11 @@ def _entry(name: str, value: Any) -> str:
     elif inspect.isfunction(inspect.unwrap(value)):
         lines = _function(inspect.unwrap(value))
     else:
-        kind = f"tuple of {len(value)} {type(value[0]).__name__}" if isinstance(value, tuple) else type(value).__name__
+        kind = (
+            f"tuple of {len(value)} {type(value[0]).__name__}"
+            if isinstance(value, tuple)
+            else type(value).__name__
+        )
         lines = [f"{name.split('.')[-1]}: {kind}"]
     text = "\n".join(lines).rstrip()
     return f"### {name}\n\n```text\n{text}\n```\n"
@@ -112,7 +147,9 @@ def _function(function: Any) -> list[str]:
 
 
 def _class(cls: type) -> list[str]:
-    """Return the docstring, fields with their comments, and public methods and properties that have a docstring."""
+    """Return the docstring, fields with their comments, and public methods and properties that have
+    a docstring.
+    """
     source = textwrap.dedent(inspect.getsource(cls)).splitlines()
     tree = ast.parse("\n".join(source)).body[0]
     assert isinstance(tree, ast.ClassDef)
@@ -123,7 +160,11 @@ def _class(cls: type) -> list[str]:
     for assignment in fields:
         lines += source[assignment.lineno - 1 : assignment.end_lineno]
     for node in tree.body:
-        if isinstance(node, ast.FunctionDef) and not node.name.startswith("_") and ast.get_docstring(node):
+        if (
+            isinstance(node, ast.FunctionDef)
+            and not node.name.startswith("_")
+            and ast.get_docstring(node)
+        ):
             lines += ["", *_indented(_signature(node)), *_indented(_documentation(node))]
     return lines
 
@@ -138,7 +179,9 @@ def _signature(node: ast.FunctionDef) -> list[str]:
     if "staticmethod" not in names and arguments.args and arguments.args[0].arg in ("self", "cls"):
         arguments.args = arguments.args[1:]
     line = f"{node.name}({ast.unparse(arguments)}){result}"
-    return textwrap.wrap(line, 112, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
+    return textwrap.wrap(
+        line, 112, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False
+    )
 
 
 def _documentation(node: ast.FunctionDef | ast.ClassDef) -> list[str]:
@@ -152,7 +195,9 @@ def _functions(module: Any) -> list[tuple[str, Any]]:
     return [
         (name, value)
         for name, value in vars(module).items()
-        if inspect.isfunction(value) and value.__module__ == module.__name__ and not name.startswith("_")
+        if inspect.isfunction(value)
+        and value.__module__ == module.__name__
+        and not name.startswith("_")
     ]
 
 

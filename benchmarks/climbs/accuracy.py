@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`./scripts/bench climbs`: people who climb onto boxes, captured on one floor and with `--uneven-ground`."""
+"""`./scripts/bench climbs`: people who climb onto boxes, captured on one floor and with
+`--uneven-ground`.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +38,8 @@ SHOWN = {
 
 
 def climbs(quick: bool) -> dict[str, Any]:
-    """Render what is missing, measure, print the tables as they come, return the figures by way and clip.
+    """Render what is missing, measure, print the tables as they come, return the figures by way and
+    clip.
 
     `quick` measures the clips that are there, without rendering.
     """
@@ -53,10 +56,15 @@ def climbs(quick: bool) -> dict[str, Any]:
     body, figures = load_body("scope"), dict[str, Any]()
     for way, uneven in WAYS.items():
         rows = {video.stem: measure(body, video, uneven) for video in videos}
-        rows["mean"] = {key: _mean([row[key] for row in rows.values() if key in row]) for key in SHOWN}
+        rows["mean"] = {
+            key: _mean([row[key] for row in rows.values() if key in row]) for key in SHOWN
+        }
         figures[way] = rows
         print(
-            table((way, *SHOWN.values()), [[name, *(row.get(key) for key in SHOWN)] for name, row in rows.items()]),
+            table(
+                (way, *SHOWN.values()),
+                [[name, *(row.get(key) for key in SHOWN)] for name, row in rows.items()],
+            ),
             end="\n\n",
             flush=True,
         )
@@ -97,7 +105,9 @@ def compare(body: Body, motion: Motion, clip: str, truth: Truth) -> dict[str, fl
 
 
 def world_mm(limbs: Points, true: Points) -> float:
-    """Return the mean distance of joints (T, J, 3), both z up, after one turn about z and one shift of the clip."""
+    """Return the mean distance of joints (T, J, 3), both z up, after one turn about z and one shift
+    of the clip.
+    """
     x, y = limbs - limbs.mean((0, 1)), true - true.mean((0, 1))
     H = np.einsum("tji,tjk->ik", x[..., :2], y[..., :2])
     angle = np.arctan2(H[0, 1] - H[1, 0], H[0, 0] + H[1, 1])

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Climbs, always the same: people who end higher than they began, in front of a camera at rest.
 
-They move as a performer of whom nothing was used for training (`tools.mocap.new_performers`). The boxes that they
-climb are not drawn: the capture has to tell from the people that they rise.
+They move as a performer of whom nothing was used for training (`tools.mocap.new_performers`). The
+boxes that they climb are not drawn: the capture has to tell from the people that they rise.
 """
 
 from __future__ import annotations
@@ -19,16 +19,27 @@ from ..scenes.people import LIMB_JOINTS, Points
 from ..scenes.scene import INDOORS, NEW_PERFORMERS, STATIC, Scene
 
 SECONDS, SEED = 4.0, 77
-DRAWS = (0, 3, 13, 16, 21, 23, 26, 27)  # in which somebody climbs: most sections of the recordings are level
+# in which somebody climbs: most sections of the recordings are level
+DRAWS = (0, 3, 13, 16, 21, 23, 26, 27)
 PERFORMERS = ("climber_a", "climber_b")
 ENDS = 8  # frames at each end of the clip: a rise is the difference of their means
 CAMERAS = 200  # that are drawn until one has the person in its picture
-KIND = Kind(0, (640, 480), STATIC, INDOORS, is_child=False, wears_loose=False, has_company=False, has_block=False)
+KIND = Kind(
+    0,
+    (640, 480),
+    STATIC,
+    INDOORS,
+    is_child=False,
+    wears_loose=False,
+    has_company=False,
+    has_block=False,
+)
 _ANKLES = [LIMB_JOINTS.index(f"{side}_ankle") for side in ("left", "right")]
 
 
 def draw_climb(body: Body, takes: Sequence[Take], number: int) -> Scene:
-    """Return the scene of a number, an index into `DRAWS`: one person, who moves as in one of the takes.
+    """Return the scene of a number, an index into `DRAWS`: one person, who moves as in one of the
+    takes.
 
     :param takes: the recordings of `PERFORMERS`.
     :raises ValueError: when its take has no section as long, or no camera was found.

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Render the climbs that build/bench/climbs lacks: ``python -m scope.benchmarks.climbs.render``.
 
-Runs as a separate process, because Blender's module prints on standard output and can hang at exit. A clip is kept
-until its ground truth changes.
+Runs as a separate process, because Blender's module prints on standard output and can hang at exit.
+A clip is kept until its ground truth changes.
 """
 
 from __future__ import annotations
@@ -26,7 +26,10 @@ def render_missing(body: Body) -> None:
     for number in range(len(DRAWS)):
         scene = draw_climb(body, takes, number)
         video = FOLDER / f"climb_{number}.mp4"
-        write, render = partial(write_truth, body=body, scene=scene), partial(render_scene, body, scene, 0)
+        write, render = (
+            partial(write_truth, body=body, scene=scene),
+            partial(render_scene, body, scene, 0),
+        )
         render_if_changed(video, truth_of(video), COMPARED, write, render)
 
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`./scripts/evaluate DATASET FOLDER [options]`: capture a data set, compare with its truth, print the tables."""
+"""`./scripts/evaluate DATASET FOLDER [options]`: capture a data set, compare with its truth, print
+the tables.
+"""
 
 from __future__ import annotations
 
@@ -46,20 +48,48 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="evaluate", description="Evaluate Scope on a public data set.")
+    parser = argparse.ArgumentParser(
+        prog="evaluate", description="Evaluate Scope on a public data set."
+    )
     parser.add_argument("dataset", choices=READERS, metavar="DATASET", help=", ".join(READERS))
-    parser.add_argument("folder", type=path_argument, metavar="FOLDER", help="of the data set (docs/evaluation.md)")
+    parser.add_argument(
+        "folder", type=path_argument, metavar="FOLDER", help="of the data set (docs/evaluation.md)"
+    )
     qualities = [choice.value for choice in QUALITIES]
-    parser.add_argument("--quality", choices=qualities, default="best", help="preset (default: best)")
-    parser.add_argument("--body", default="scope", metavar="BODY", help="that is captured: scope, or your SMPL file")
-    parser.add_argument("--smpl", type=path_argument, metavar="FOLDER", help="of your SMPL or SMPL-X files")
-    parser.add_argument("--regressor", type=path_argument, metavar="FILE", help="J_regressor_h36m.npy")
-    parser.add_argument("--given-camera", action="store_true", help="give the capture the data set's intrinsics")
-    parser.add_argument("--clips", default="*", metavar="PATTERN", help="names of clips, such as 'TS1' or 'S9 Walk*'")
-    parser.add_argument("--results", type=path_argument, metavar="FOLDER", help="(default: build/evaluation/DATASET)")
+    parser.add_argument(
+        "--quality", choices=qualities, default="best", help="preset (default: best)"
+    )
+    parser.add_argument(
+        "--body", default="scope", metavar="BODY", help="that is captured: scope, or your SMPL file"
+    )
+    parser.add_argument(
+        "--smpl", type=path_argument, metavar="FOLDER", help="of your SMPL or SMPL-X files"
+    )
+    parser.add_argument(
+        "--regressor", type=path_argument, metavar="FILE", help="J_regressor_h36m.npy"
+    )
+    parser.add_argument(
+        "--given-camera", action="store_true", help="give the capture the data set's intrinsics"
+    )
+    parser.add_argument(
+        "--clips",
+        default="*",
+        metavar="PATTERN",
+        help="names of clips, such as 'TS1' or 'S9 Walk*'",
+    )
+    parser.add_argument(
+        "--results",
+        type=path_argument,
+        metavar="FOLDER",
+        help="(default: build/evaluation/DATASET)",
+    )
     parser.add_argument("--threads", type=int, default=0, metavar="N", help="as of a capture")
-    parser.add_argument("--again", action="store_true", help="capture clips again that were captured before")
-    parser.add_argument("--json", type=path_argument, metavar="FILE", help="write the figures as JSON")
+    parser.add_argument(
+        "--again", action="store_true", help="capture clips again that were captured before"
+    )
+    parser.add_argument(
+        "--json", type=path_argument, metavar="FILE", help="write the figures as JSON"
+    )
     return parser
 
 
@@ -68,7 +98,11 @@ def _run(args: argparse.Namespace) -> int:
         raise UsageError(f"{args.folder} is not a folder; give the one with the data set")
     models = Models(args.smpl, args.regressor)
     body = load_body(args.body)
-    clips = [clip for clip in READERS[args.dataset](args.folder, models) if fnmatch.fnmatch(clip.name, args.clips)]
+    clips = [
+        clip
+        for clip in READERS[args.dataset](args.folder, models)
+        if fnmatch.fnmatch(clip.name, args.clips)
+    ]
     if not clips:
         raise UsageError(f"no clip of {args.folder} is named {args.clips}")
     settings = Settings(args.quality, args.body, args.given_camera, args.threads)
@@ -76,7 +110,12 @@ def _run(args: argparse.Namespace) -> int:
     scores, problems = _evaluate(clips, body, models, settings, results, args.again)
     figures = {name: _figures(each) for name, each in scores.items()}
     for name in figures:
-        print("\n".join(_lines(name, PROTOCOLS[name], figures[name], _joints_of(body, models), settings)), end="\n\n")
+        print(
+            "\n".join(
+                _lines(name, PROTOCOLS[name], figures[name], _joints_of(body, models), settings)
+            ),
+            end="\n\n",
+        )
     for problem in problems:
         print(f"scope: {display_text(problem)}", file=sys.stderr)
     if args.json:
@@ -103,42 +142,70 @@ def _evaluate(
             problems.append(f"{clip.name} is not in these figures: {captured.problem}")
             continue
         for name in clip.protocols:
-            scores[name].add(score_clip(clip, truth, body, captured.motions, PROTOCOLS[name], regressor))
+            scores[name].add(
+                score_clip(clip, truth, body, captured.motions, PROTOCOLS[name], regressor)
+            )
     if other:
-        _say(f"{other} of the clips were captured by another version of Scope; --again captures them again")
+        _say(
+            f"{other} of the clips were captured by another version of Scope; --again captures "
+            "them again"
+        )
     return scores, problems
 
 
 def _figures(scores: Scores) -> dict[str, Any]:
-    counts = {"frames": scores.frames, "frames_seen": scores.seen, "people": scores.people, "missed": scores.missed}
+    counts = {
+        "frames": scores.frames,
+        "frames_seen": scores.seen,
+        "people": scores.people,
+        "missed": scores.missed,
+    }
     return {"figures": scores.means(), **counts}
 
 
 def _joints_of(body: Body, models: Models) -> str:
     if models.regressor_for(body) is not None:
-        return f"regressed from the mesh of {body.name} where the ground truth is too, else those of its skeleton"
-    return f"those of the body '{body.name}'" + ("" if body.name == "smpl" else ", which is not SMPL")
+        return (
+            f"regressed from the mesh of {body.name} where the ground truth is too, else those of "
+            f"its skeleton"
+        )
+    return f"those of the body '{body.name}'" + (
+        "" if body.name == "smpl" else ", which is not SMPL"
+    )
 
 
-def _lines(name: str, protocol: Protocol, figures: dict[str, Any], joints: str, settings: Settings) -> list[str]:
-    """Return the table of a protocol: ours, the published rows, and what has to be known to compare them."""
+def _lines(
+    name: str, protocol: Protocol, figures: dict[str, Any], joints: str, settings: Settings
+) -> list[str]:
+    """Return the table of a protocol: ours, the published rows, and what has to be known to compare
+    them.
+    """
     means, rows = figures["figures"], PUBLISHED.get(name, [])
-    keys = [key for key in protocol.measures if key in means or any(key in row.figures for row in rows)]
+    keys = [
+        key for key in protocol.measures if key in means or any(key in row.figures for row in rows)
+    ]
     head = ["", *(MEASURES[key] for key in keys), "source"]
     table, sources = [head, ["---"] * len(head)], list(dict.fromkeys(row.source for row in rows))
     for row in rows:
         figures_of = [_cell(row.figures.get(key)) for key in keys]
         table.append([row.method, *figures_of, f"[{sources.index(row.source) + 1}]"])
-    table.append([f"Scope, {settings.quality}", *(_cell(means.get(key)) for key in keys), "this run"])
+    table.append(
+        [f"Scope, {settings.quality}", *(_cell(means.get(key)) for key in keys), "this run"]
+    )
     found = f"{figures['frames_seen']} of {figures['frames']} frames were captured"
-    missed = f"; {figures['missed']} of {figures['people']} people were not found" if figures["missed"] else ""
+    missed = (
+        f"; {figures['missed']} of {figures['people']} people were not found"
+        if figures["missed"]
+        else ""
+    )
     return [
         protocol.title,
         "",
         *("| " + " | ".join(row) + " |" for row in table),
         "",
         f"Follows {protocol.follows}.",
-        f"Scope: {found}{missed}; joints: {joints}; camera {'given' if settings.camera else 'unknown'}.",
+        f"Scope: {found}{missed}; joints: {joints}; camera "
+        f"{'given' if settings.camera else 'unknown'}.",
         *(f"[{number}] {source}" for number, source in enumerate(sources, 1)),
     ]
 

@@ -17,8 +17,9 @@ from .subjects import Subject
 class Person:
     """The ground truth of one person in the frames that are evaluated.
 
-    ``rows`` (T,): ascending positions of these frames in the footage; ``camera``: the person in the axes of each
-    frame's camera; ``world``: the same in the world, None where the data set has no world.
+    ``rows`` (T,): ascending positions of these frames in the footage; ``camera``: the person in the
+    axes of each frame's camera; ``world``: the same in the world, None where the data set has no
+    world.
     """
 
     name: str
@@ -29,7 +30,9 @@ class Person:
 
 @dataclass(frozen=True)
 class Truth:
-    """The people of a clip who have ground truth, and the camera's intrinsics (3, 3), where the data set has them."""
+    """The people of a clip who have ground truth, and the camera's intrinsics (3, 3), where the
+    data set has them.
+    """
 
     people: list[Person]
     intrinsics: NDArray[np.float64] | None = None
@@ -39,8 +42,8 @@ class Truth:
 class Clip:
     """Footage with ground truth, which is read on demand.
 
-    ``pictures``: the frames in order, or one video; ``rate``: frames per second; ``protocols``: those that the clip is
-    part of; ``alone``: nobody but the person with ground truth is in view.
+    ``pictures``: the frames in order, or one video; ``rate``: frames per second; ``protocols``:
+    those that the clip is part of; ``alone``: nobody but the person with ground truth is in view.
     """
 
     name: str

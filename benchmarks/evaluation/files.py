@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files of data sets: missing and damaged ones give one sentence, and nothing that they hold is run.
+"""Files of data sets: missing and damaged ones give one sentence, and nothing that they hold is
+run.
 
-Pickles go through the product's restricted unpickler. HDF5 (MATLAB 7.3) and CDF need packages that the product does
-not: they are imported on first use.
+Pickles go through the product's restricted unpickler. HDF5 (MATLAB 7.3) and CDF need packages that
+the product does not: they are imported on first use.
 """
 
 from __future__ import annotations
@@ -44,7 +45,10 @@ def existing_folder(path: Path, what: str) -> Path:
     :raises DatasetError: it does not exist.
     """
     if not path.is_dir():
-        raise DatasetError(f"{path} does not exist, where {what} are expected; docs/evaluation.md shows the folders")
+        raise DatasetError(
+            f"{path} does not exist, where {what} are expected; docs/evaluation.md "
+            "shows the folders"
+        )
     return path
 
 
@@ -55,7 +59,10 @@ def existing_files(folder: Path, pattern: str, what: str) -> list[Path]:
     """
     found = sorted(path for path in folder.glob(pattern) if path.is_file())
     if not found:
-        raise DatasetError(f"{folder / pattern} matches no file: {what} expected; docs/evaluation.md shows the folders")
+        raise DatasetError(
+            f"{folder / pattern} matches no file: {what} expected; "
+            "docs/evaluation.md shows the folders"
+        )
     return found
 
 
@@ -72,7 +79,8 @@ def frames_in(folder: Path) -> list[Path]:
 
 
 def read_table(path: Path) -> dict[str, Any]:
-    """Return the dictionary of a pickle of any protocol; of its values, only those asked for by `array` are looked at.
+    """Return the dictionary of a pickle of any protocol; of its values, only those asked for by
+    `array` are looked at.
 
     :raises DatasetError: missing, damaged, or asks for more than arrays; nothing has run then.
     """
@@ -83,7 +91,9 @@ def read_table(path: Path) -> dict[str, Any]:
         raise DatasetError(str(error)) from None
 
 
-def array(path: Path, table: Mapping[str, Any], key: str, shape: Shape, index: int | None = None) -> NDArray[Any]:
+def array(
+    path: Path, table: Mapping[str, Any], key: str, shape: Shape, index: int | None = None
+) -> NDArray[Any]:
     """Return an array of a pickle's table, or of a list in it.
 
     :param shape: that it must have; None for any extent.
@@ -95,7 +105,9 @@ def array(path: Path, table: Mapping[str, Any], key: str, shape: Shape, index: i
     if index is not None:
         value = value[index] if isinstance(value, list) and index < len(value) else None
     if value is None:
-        raise DatasetError(f"{path} lacks {key}: it is not a file of this data set; download it again")
+        raise DatasetError(
+            f"{path} lacks {key}: it is not a file of this data set; download it again"
+        )
     try:
         numbers = to_array(value)
     except ModelFileError as error:
@@ -110,10 +122,16 @@ def checked(path: Path, key: str, numbers: NDArray[Any], shape: Shape) -> NDArra
     :raises DatasetError: no numbers, not finite, or of another shape.
     """
     if numbers.dtype.kind not in "biuf":
-        raise DatasetError(f"{path}: {key} must hold numbers, but holds {numbers.dtype}; download it again")
-    if numbers.ndim != len(shape) or any(b not in (None, a) for a, b in zip(numbers.shape, shape, strict=True)):
+        raise DatasetError(
+            f"{path}: {key} must hold numbers, but holds {numbers.dtype}; download it again"
+        )
+    if numbers.ndim != len(shape) or any(
+        b not in (None, a) for a, b in zip(numbers.shape, shape, strict=True)
+    ):
         wanted = ", ".join("any" if b is None else str(b) for b in shape)
-        raise DatasetError(f"{path}: {key} must have shape ({wanted}), but has {numbers.shape}; download it again")
+        raise DatasetError(
+            f"{path}: {key} must have shape ({wanted}), but has {numbers.shape}; download it again"
+        )
     values: NDArray[np.float64] = numbers.astype(np.float64)
     if not np.isfinite(values).all():
         raise DatasetError(f"{path}: {key} contains NaN or infinity; download it again")
@@ -126,11 +144,15 @@ def metres(path: Path, key: str, points: NDArray[np.float64]) -> NDArray[np.floa
     :raises DatasetError: one is too far away.
     """
     if points.size and np.abs(points).max() > FARTHEST_M:
-        raise DatasetError(f"{path}: {key} is {np.abs(points).max():.3g} m from the origin, in another unit?")
+        raise DatasetError(
+            f"{path}: {key} is {np.abs(points).max():.3g} m from the origin, in another unit?"
+        )
     return points
 
 
-def read_arrays(path: Path, wanted: Mapping[str, Shape], text: tuple[str, ...] = ()) -> dict[str, NDArray[Any]]:
+def read_arrays(
+    path: Path, wanted: Mapping[str, Shape], text: tuple[str, ...] = ()
+) -> dict[str, NDArray[Any]]:
     """Return arrays of a .npz file, numbers as float64, and `text` as it is; nothing is unpickled.
 
     :raises DatasetError: missing, damaged, lacks one of them, or one of another shape or kind.
@@ -138,11 +160,14 @@ def read_arrays(path: Path, wanted: Mapping[str, Shape], text: tuple[str, ...] =
     _check(path)
     found = read_npz(path, DatasetError, "file of ground truth", wanted={*wanted, *text})
     _require(path, {*wanted, *text}, found)
-    return {key: checked(path, key, found[key], shape) for key, shape in wanted.items()} | {k: found[k] for k in text}
+    return {key: checked(path, key, found[key], shape) for key, shape in wanted.items()} | {
+        k: found[k] for k in text
+    }
 
 
 def read_matlab(path: Path, wanted: Mapping[str, Shape]) -> dict[str, NDArray[np.float64]]:
-    """Return arrays of a .mat file of MATLAB 7.3, which is HDF5: its axes are in the opposite order of MATLAB's.
+    """Return arrays of a .mat file of MATLAB 7.3, which is HDF5: its axes are in the opposite order
+    of MATLAB's.
 
     :raises DatasetError: missing, damaged, lacks one of them, or one of another shape or kind.
     :raises SetupError: the package h5py is not installed.
@@ -155,14 +180,22 @@ def read_matlab(path: Path, wanted: Mapping[str, Shape]) -> dict[str, NDArray[np
             _require(path, set(wanted), set(file))
             for key, shape in wanted.items():
                 # A link or a virtual data set may lead to other files of this computer.
-                stored = file[key] if isinstance(file.get(key, getlink=True), h5py.HardLink) else None
+                stored = (
+                    file[key] if isinstance(file.get(key, getlink=True), h5py.HardLink) else None
+                )
                 if not isinstance(stored, h5py.Dataset) or stored.is_virtual or stored.external:
-                    raise DatasetError(f"{path}: {key} is no array of the file itself; download it again")
+                    raise DatasetError(
+                        f"{path}: {key} is no array of the file itself; download it again"
+                    )
                 if stored.size is None or stored.size * stored.dtype.itemsize > LARGEST_BYTES:
-                    raise DatasetError(f"{path}: {key} claims shape {stored.shape}, too large; download it again")
+                    raise DatasetError(
+                        f"{path}: {key} claims shape {stored.shape}, too large; download it again"
+                    )
                 out[key] = checked(path, key, stored[()], shape)
     except (OSError, KeyError, ValueError, TypeError, RuntimeError, MemoryError) as error:
-        raise DatasetError(f"{path} is not a readable .mat file of MATLAB 7.3 ({error}); download it again") from error
+        raise DatasetError(
+            f"{path} is not a readable .mat file of MATLAB 7.3 ({error}); download it again"
+        ) from error
     return out
 
 
@@ -186,7 +219,9 @@ def read_poses(path: Path) -> NDArray[np.float64]:
         raise DatasetError(
             f"{path} is not a readable CDF file with a variable Pose ({error}); extract it again"
         ) from error
-    return checked(path, "Pose", pose[0] if pose.ndim == 3 and len(pose) == 1 else pose, (None, None))
+    return checked(
+        path, "Pose", pose[0] if pose.ndim == 3 and len(pose) == 1 else pose, (None, None)
+    )
 
 
 def read_matrix(path: Path, shape: Shape) -> NDArray[np.float64]:
@@ -197,26 +232,43 @@ def read_matrix(path: Path, shape: Shape) -> NDArray[np.float64]:
     _check(path, LARGEST_SMALL)
     try:
         found = np.lib.format.read_array(io.BytesIO(path.read_bytes()), allow_pickle=False)
-    except (OSError, ValueError, TypeError, EOFError, MemoryError, SyntaxError, tokenize.TokenError) as error:
-        raise DatasetError(f"{path} is not a readable .npy file ({error}); choose another") from error
+    except (
+        OSError,
+        ValueError,
+        TypeError,
+        EOFError,
+        MemoryError,
+        SyntaxError,
+        tokenize.TokenError,
+    ) as error:
+        raise DatasetError(
+            f"{path} is not a readable .npy file ({error}); choose another"
+        ) from error
     return checked(path, "the matrix", found, shape)
 
 
 def _check(path: Path, largest: int = LARGEST_BYTES) -> None:
     """Refuse what does not exist, and what reading would not end of."""
     if not path.exists():
-        raise DatasetError(f"{path} does not exist; docs/evaluation.md shows the files that are expected")
+        raise DatasetError(
+            f"{path} does not exist; docs/evaluation.md shows the files that are expected"
+        )
     check_regular(path, DatasetError, "file of ground truth", largest)
 
 
 def _require(path: Path, wanted: set[str], found: Any) -> None:
     missing = sorted(key for key in wanted if key not in found)
     if missing:
-        raise DatasetError(f"{path} lacks {', '.join(missing)}: it is not a file of this data set; download it again")
+        raise DatasetError(
+            f"{path} lacks {', '.join(missing)}: it is not a file of this data set; "
+            "download it again"
+        )
 
 
 def _package(name: str, path: Path) -> Any:
     try:
         return importlib.import_module(name)
     except ImportError as error:
-        raise SetupError(f"{path} cannot be read without the package {name}; ./scripts/setup installs it") from error
+        raise SetupError(
+            f"{path} cannot be read without the package {name}; ./scripts/setup installs it"
+        ) from error

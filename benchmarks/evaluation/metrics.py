@@ -1,19 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The measures of pose estimation, as equations: x̂ captured, x true, both in metres; errors in millimetres.
+"""The measures of pose estimation, as equations: x̂ captured, x true, both in metres; errors in
+millimetres.
 
-Points have shape (T, J, 3): T frames that the protocol evaluates, without those between them, and J joints or
-vertices. A measure has one value for each frame, so that the mean over all frames of all clips is the figure of a data
-set. Sources, by the names under which the measures were published:
+Points have shape (T, J, 3): T frames that the protocol evaluates, without those between them, and J
+joints or vertices. A measure has one value for each frame, so that the mean over all frames of all
+clips is the figure of a data set. Sources, by the names under which the measures were published:
 
-- MPJPE: Ionescu et al., *Human3.6M*, TPAMI 2014. PA-MPJPE (also "reconstruction error"): Zhou et al., *Sparse
-  Representation for 3D Shape Estimation*, TPAMI 2018, with the similarity of Umeyama, TPAMI 1991.
-- 3D PCK and its AUC: Mehta et al., *Monocular 3D Human Pose Estimation in the Wild*, 3DV 2017, and the evaluation
-  program of MPI-INF-3DHP: thresholds 0, 5, …, 150 mm, the first of which no error is below. PCK at 50 mm and its AUC up
-  to 199 mm: the evaluation program of the 3DPW challenge (ECCV 2020), where an error of just the threshold counts.
+- MPJPE: Ionescu et al., *Human3.6M*, TPAMI 2014. PA-MPJPE (also "reconstruction error"): Zhou et
+  al., *Sparse Representation for 3D Shape Estimation*, TPAMI 2018, with the similarity of Umeyama,
+  TPAMI 1991.
+- 3D PCK and its AUC: Mehta et al., *Monocular 3D Human Pose Estimation in the Wild*, 3DV 2017, and
+  the evaluation program of MPI-INF-3DHP: thresholds 0, 5, …, 150 mm, the first of which no error is
+  below. PCK at 50 mm and its AUC up to 199 mm: the evaluation program of the 3DPW challenge (ECCV
+  2020), where an error of just the threshold counts.
 - Acceleration error: Kanazawa et al., *Learning 3D Human Dynamics from Video*, CVPR 2019.
-- WA-MPJPE and W-MPJPE over segments of 100 frames: Ye et al., *SLAHMR*, CVPR 2023. RTE, jitter and foot sliding: Shin
-  et al., *WHAM*, CVPR 2024, whose evaluation program GVHMR and others use, and which decides what the papers leave
-  open: both segments are aligned by a similarity with scale, the last segment of a clip may be shorter.
+- WA-MPJPE and W-MPJPE over segments of 100 frames: Ye et al., *SLAHMR*, CVPR 2023. RTE, jitter and
+  foot sliding: Shin et al., *WHAM*, CVPR 2024, whose evaluation program GVHMR and others use, and
+  which decides what the papers leave open: both segments are aligned by a similarity with scale,
+  the last segment of a clip may be shorter.
 """
 
 from __future__ import annotations
@@ -26,16 +30,20 @@ Points = NDArray[np.float64]
 MM = 1000.0
 PCK_MM = 150.0
 AUC_MM = np.arange(0.0, 151.0, 5.0)
-CHALLENGE_PCK_MM, CHALLENGE_AUC_MM = 50.0, np.arange(0.0, 200.0)  # of 3DPW's challenge, which ends below 200
+# of 3DPW's challenge, which ends below 200
+CHALLENGE_PCK_MM, CHALLENGE_AUC_MM = 50.0, np.arange(0.0, 200.0)
 SEGMENT = 100  # frames
 STILL_M = 0.01  # per frame; a true foot point that moves less counts as standing
 
 
-def similarity(source: Points, target: Points, with_scale: bool = True) -> tuple[NDArray[np.float64], Points, Points]:
+def similarity(
+    source: Points, target: Points, with_scale: bool = True
+) -> tuple[NDArray[np.float64], Points, Points]:
     """Return s, R, t that minimize Σ_j ‖s R source_j + t − target_j‖², R a rotation (Umeyama 1991).
 
-    With Σ = Σ_j (target_j − mean)(source_j − mean)ᵀ = U D Vᵀ and S = diag(1, 1, det U det V):
-    R = U S Vᵀ, s = tr(D S) / Σ_j ‖source_j − mean‖² (1 if all source points coincide), t = mean − s R mean.
+    With Σ = Σ_j (target_j − mean)(source_j − mean)ᵀ = U D Vᵀ and S = diag(1, 1, det U det V): R = U
+    S Vᵀ, s = tr(D S) / Σ_j ‖source_j − mean‖² (1 if all source points coincide), t = mean − s R
+    mean.
 
     :param source, target: (..., J, 3).
     :param with_scale: False for s = 1.
@@ -62,7 +70,9 @@ def aligned(points: Points, transform: tuple[NDArray[np.float64], Points, Points
     :param transform: s (...), R (..., 3, 3), t (..., 3) of `similarity`.
     """
     scale, R, t = transform
-    moved: Points = scale[..., None, None] * np.einsum("...ij,...nj->...ni", R, points) + t[..., None, :]
+    moved: Points = (
+        scale[..., None, None] * np.einsum("...ij,...nj->...ni", R, points) + t[..., None, :]
+    )
     return moved
 
 
@@ -73,17 +83,23 @@ def joint_errors(captured: Points, true: Points) -> NDArray[np.float64]:
 
 
 def relative_to(points: Points, root: Points) -> Points:
-    """Return points (T, J, 3) relative to a root (T, 3), such as the pelvis or the middle between the hips."""
+    """Return points (T, J, 3) relative to a root (T, 3), such as the pelvis or the middle between
+    the hips.
+    """
     return points - root[:, None]
 
 
 def mpjpe(captured: Points, true: Points) -> NDArray[np.float64]:
-    """Return the mean joint error of each frame in mm, (T,); (T, J, 3) both, relative to their roots."""
+    """Return the mean joint error of each frame in mm, (T,); (T, J, 3) both, relative to their
+    roots.
+    """
     return joint_errors(captured, true).mean(axis=1)
 
 
 def pa_mpjpe(captured: Points, true: Points) -> NDArray[np.float64]:
-    """Return the mean joint error after each frame's best similarity in mm, (T,); (T, J, 3) both."""
+    """Return the mean joint error after each frame's best similarity in mm, (T,); (T, J, 3)
+    both.
+    """
     return mpjpe(aligned(captured, similarity(captured, true)), true)
 
 
@@ -98,16 +114,21 @@ def auc(errors_mm: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.mean([pck(errors_mm, threshold) for threshold in AUC_MM], axis=0)
 
 
-def challenge_pck(errors_mm: NDArray[np.float64], threshold_mm: float = CHALLENGE_PCK_MM) -> NDArray[np.float64]:
+def challenge_pck(
+    errors_mm: NDArray[np.float64], threshold_mm: float = CHALLENGE_PCK_MM
+) -> NDArray[np.float64]:
     """Return the percentage of joints with errors of at most the threshold, (T,); errors (T, J)."""
     share: NDArray[np.float64] = 100.0 * (errors_mm <= threshold_mm).mean(axis=1)
     return share
 
 
 def challenge_auc(errors_mm: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the mean of `challenge_pck` over the thresholds from 0 to 199 mm, in steps of 1, (T,); errors (T, J)."""
+    """Return the mean of `challenge_pck` over the thresholds from 0 to 199 mm, in steps of 1, (T,);
+    errors (T, J).
+    """
     shares = np.array([challenge_pck(errors_mm, threshold) for threshold in CHALLENGE_AUC_MM])
-    area: NDArray[np.float64] = (shares[:-1] + shares[1:]).mean(axis=0) / 2  # trapezoids of equal width
+    # trapezoids of equal width
+    area: NDArray[np.float64] = (shares[:-1] + shares[1:]).mean(axis=0) / 2
     return area
 
 
@@ -123,7 +144,8 @@ def acceleration_error(captured: Points, true: Points, rate: float) -> NDArray[n
 
 
 def wa_mpjpe(captured: Points, true: Points) -> NDArray[np.float64]:
-    """Return the mean joint error in the world after one similarity for each segment of 100 frames, mm, (T,).
+    """Return the mean joint error in the world after one similarity for each segment of 100 frames,
+    mm, (T,).
 
     :param captured, true: (T, J, 3) in the world.
     """
@@ -131,7 +153,8 @@ def wa_mpjpe(captured: Points, true: Points) -> NDArray[np.float64]:
 
 
 def w_mpjpe(captured: Points, true: Points) -> NDArray[np.float64]:
-    """Return the mean joint error in the world after each segment of 100 frames is aligned by its first two, mm, (T,).
+    """Return the mean joint error in the world after each segment of 100 frames is aligned by its
+    first two, mm, (T,).
 
     :param captured, true: (T, J, 3) in the world.
     """
@@ -148,7 +171,8 @@ def _segment_errors(captured: Points, true: Points, aligned_frames: int) -> NDAr
 
 
 def root_translation_error(captured: Points, true: Points) -> NDArray[np.float64]:
-    """Return 100 ‖R r̂_t + t − r_t‖ / Σ ‖r_{t+1} − r_t‖, (T,) in % of the distance that the true root travels.
+    """Return 100 ‖R r̂_t + t − r_t‖ / Σ ‖r_{t+1} − r_t‖, (T,) in % of the distance that the true
+    root travels.
 
     R and t are one rigid transform for the whole clip. NaN where the true root does not move.
 
@@ -168,12 +192,15 @@ def jitter(captured: Points, rate: float) -> NDArray[np.float64]:
     :param captured: (T, J, 3) in the world.
     :param rate: f, frames per second.
     """
-    third: NDArray[np.float64] = np.linalg.norm(np.diff(captured, n=3, axis=0), axis=-1).mean(axis=1)
+    third: NDArray[np.float64] = np.linalg.norm(np.diff(captured, n=3, axis=0), axis=-1).mean(
+        axis=1
+    )
     return third * rate**3 / 10.0
 
 
 def foot_slide(captured: Points, true: Points) -> NDArray[np.float64]:
-    """Return ‖Δx̂‖ in mm of every foot point and pair of frames between which the true point moves less than 1 cm, (n,).
+    """Return ‖Δx̂‖ in mm of every foot point and pair of frames between which the true point moves
+    less than 1 cm, (n,).
 
     :param captured, true: (T, F, 3) points under heels and toes in the world.
     """

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The user's own SMPL and SMPL-X files, by which data sets state ground truth, and the regressor of joints.
+"""The user's own SMPL and SMPL-X files, by which data sets state ground truth, and the regressor of
+joints.
 
-Like every body of Scope, they are used without pose correctives, on both sides of a comparison: these move vertices
-near bent joints, never the joints of the skeleton.
+Like every body of Scope, they are used without pose correctives, on both sides of a comparison:
+these move vertices near bent joints, never the joints of the skeleton.
 """
 
 from __future__ import annotations
@@ -27,7 +28,10 @@ _STEMS: dict[tuple[str, str], tuple[str, ...]] = {
     ("smplx", gender): (f"SMPLX_{gender.upper()}",) for gender in _LETTERS
 }
 for _gender, _letter in _LETTERS.items():
-    _old = tuple(f"basic{m}odel_{_letter}_lbs_10_207_0_v1.{v}" for m, v in (("M", "0.0"), ("m", "0.0"), ("m", "1.0")))
+    _old = tuple(
+        f"basic{m}odel_{_letter}_lbs_10_207_0_v1.{v}"
+        for m, v in (("M", "0.0"), ("m", "0.0"), ("m", "1.0"))
+    )
     _STEMS["smpl", _gender] = (f"SMPL_{_gender.upper()}", *_old)
 
 
@@ -35,15 +39,20 @@ class Models:
     """The user's body files and regressor.
 
     :param folder: of SMPL and SMPL-X files; None if the user has none.
-    :param regressor: a .npy file of 17 rows, which gives `REGRESSED17` from SMPL's vertices; None for none.
+    :param regressor: a .npy file of 17 rows, which gives `REGRESSED17` from SMPL's vertices; None
+        for none.
     :raises DatasetError: the folder does not exist, or the regressor cannot be used.
     """
 
     def __init__(self, folder: Path | None = None, regressor: Path | None = None) -> None:
         if folder is not None and not folder.is_dir():
-            raise DatasetError(f"{folder} is not a folder; give the one with the files of SMPL or SMPL-X")
+            raise DatasetError(
+                f"{folder} is not a folder; give the one with the files of SMPL or SMPL-X"
+            )
         self.folder = folder
-        self.regressor = None if regressor is None else read_matrix(regressor, (len(REGRESSED17), None))
+        self.regressor = (
+            None if regressor is None else read_matrix(regressor, (len(REGRESSED17), None))
+        )
         self._load = cache(load_body)
 
     def body(self, model: str, gender: str, dataset: str) -> Body:
@@ -57,12 +66,15 @@ class Models:
         names = [f"{stem}{suffix}" for stem in _STEMS[model, gender] for suffix in _SUFFIXES]
         if self.folder is None:
             raise DatasetError(
-                f"the ground truth of {dataset} is stated as parameters of {model.upper()}: give the folder of its "
+                f"the ground truth of {dataset} is stated as parameters of {model.upper()}: give "
+                "the folder of its "
                 f"files, with {names[0]} in it, as --smpl FOLDER"
             )
         found = [path for path in (self.folder / name for name in names) if path.is_file()]
         if not found:
-            raise DatasetError(f"{self.folder} holds none of {', '.join(names)}, which {dataset} needs")
+            raise DatasetError(
+                f"{self.folder} holds none of {', '.join(names)}, which {dataset} needs"
+            )
         return self._load(found[0])
 
     def regressor_for(self, body: Body) -> NDArray[np.float64] | None:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Protocols: which joints are compared, to which point they are relative, and which measures are taken."""
+"""Protocols: which joints are compared, to which point they are relative, and which measures are
+taken.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +34,8 @@ IN_WORLD = ("wa_mpjpe", "w_mpjpe", "rte", "jitter", "foot_slide")
 
 @dataclass(frozen=True)
 class Protocol:
-    """One protocol: ``joints`` that are compared, ``root`` to whose mean they are relative, ``measures`` by key.
+    """One protocol: ``joints`` that are compared, ``root`` to whose mean they are relative,
+    ``measures`` by key.
 
     ``pck_joints`` are those of PCK and AUC; ``follows`` names whose evaluation it repeats.
     """
@@ -65,7 +68,8 @@ PROTOCOLS = {
         TEST_3DHP,
         PELVIS,
         ("pck", "auc", "mpjpe", "pa_mpjpe"),
-        "the data set's mpii_evaluate_errors.m: 17 joints relative to the pelvis, PCK and AUC of the first 14",
+        "the data set's mpii_evaluate_errors.m: 17 joints relative to the pelvis, PCK and AUC of "
+        "the first 14",
         PCK_3DHP,
     ),
     "3dpw-mesh": Protocol(
@@ -80,7 +84,8 @@ PROTOCOLS = {
         SMPL24,
         PELVIS,
         ("mpjpe", "pa_mpjpe", "pck_50", "auc_200", "acceleration"),
-        "3DPW's own challenge, which adds the other splits: relative to the pelvis, PCK and AUC of the 12 limb joints, "
+        "3DPW's own challenge, which adds the other splits: relative to the pelvis, PCK and AUC of "
+        "the 12 limb joints, "
         "frames with a 2D pose; the joints of most publications need --smpl and --regressor",
         LIMBS,
     ),
@@ -92,14 +97,19 @@ PROTOCOLS = {
         "WHAM and GVHMR: relative to the middle of the hips",
     ),
     "emdb2": Protocol(
-        "EMDB 2, in the world: 24 joints", SMPL24, HIPS, IN_WORLD, "WHAM and GVHMR: segments of 100 frames"
+        "EMDB 2, in the world: 24 joints",
+        SMPL24,
+        HIPS,
+        IN_WORLD,
+        "WHAM and GVHMR: segments of 100 frames",
     ),
     "rich": Protocol(
         "RICH, test split, one person: 22 joints",
         SMPL22,
         HIPS,
         (*IN_CAMERA, *IN_WORLD),
-        "WHAM and GVHMR, but for the two hand joints that SMPL-X lacks, and without conversion to SMPL's mesh",
+        "WHAM and GVHMR, but for the two hand joints that SMPL-X lacks, and without conversion to "
+        "SMPL's mesh",
     ),
     "bedlam": Protocol(
         "BEDLAM, validation split: 22 joints",

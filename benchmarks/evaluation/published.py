@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Figures that others have published, each with the table that it is from.
 
-They were transcribed from summaries of these tables, and only those are listed for which one was found: look a figure
-up in its paper before citing it. Others evaluate with SMPL and with networks that were trained on the data sets'
-training splits; `docs/evaluation.md` says what differs.
+They were transcribed from summaries of these tables, and only those are listed for which one was
+found: look a figure up in its paper before citing it. Others evaluate with SMPL and with networks
+that were trained on the data sets' training splits; `docs/evaluation.md` says what differs.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-_HMR_P2 = "Kanazawa et al., HMR, CVPR 2018, table of protocol 2; repeated by Arnab et al., CVPR 2019, table 2"
+_HMR_P2 = (
+    "Kanazawa et al., HMR, CVPR 2018, table of protocol 2; repeated by Arnab et al., CVPR 2019, "
+    "table 2"
+)
 _GVHMR = "Shen et al., GVHMR, SIGGRAPH Asia 2024 (arXiv:2409.06662)"
 _GVHMR_CAMERA, _GVHMR_WORLD = f"{_GVHMR}, table 2", f"{_GVHMR}, table 1"
 _HUMAN3R = "Chen et al., Human3R (arXiv:2510.06219), table of 3DPW and EMDB-1"
@@ -18,8 +21,14 @@ _ONLINE_CAMERA = "OnlineHMR, table of EMDB-1 (there PHMR, offline, is PromptHMR-
 _ONLINE_WORLD = "OnlineHMR, table of EMDB-2 (there PHMR, offline, is PromptHMR-Vid)"
 _METRIC = "MetricHMSR, table of 3DPW"
 _SAM3D = "Yang et al., SAM 3D Body (arXiv:2602.15989), main table of accuracy, ViT-H"
-_HSMR = "Xia et al., HSMR, CVPR 2025 (arXiv:2503.21751), table 1, which does not state the protocol of Human3.6M"
-_VIBE_ISSUE = "issue 151 of github.com/mkocabas/VIBE, which quotes VIBE's paper and could not reproduce its figures"
+_HSMR = (
+    "Xia et al., HSMR, CVPR 2025 (arXiv:2503.21751), table 1, which does not state the protocol of "
+    "Human3.6M"
+)
+_VIBE_ISSUE = (
+    "issue 151 of github.com/mkocabas/VIBE, which quotes VIBE's paper and could not reproduce its "
+    "figures"
+)
 _GENMO = "GENMO, ICCV 2025, table of EMDB-2; the same in Human3R"
 
 
@@ -32,7 +41,9 @@ class Published:
     figures: dict[str, float] = field(default_factory=dict)
 
 
-def _mesh(pa_mpjpe: float, mpjpe: float, mpvpe: float, acceleration: float | None = None) -> dict[str, float]:
+def _mesh(
+    pa_mpjpe: float, mpjpe: float, mpvpe: float, acceleration: float | None = None
+) -> dict[str, float]:
     figures = {"mpjpe": mpjpe, "pa_mpjpe": pa_mpjpe, "mpvpe": mpvpe}
     return figures if acceleration is None else figures | {"acceleration": acceleration}
 
@@ -51,7 +62,11 @@ PUBLISHED: dict[str, list[Published]] = {
     "h36m-p2": [
         Published("SMPLify", _HMR_P2, {"pa_mpjpe": 82.3}),
         Published("HMR", _HMR_P2, {"pa_mpjpe": 56.8}),
-        Published("VIBE", "Kocabas et al., VIBE, CVPR 2020, table of Human3.6M", {"mpjpe": 65.6, "pa_mpjpe": 41.4}),
+        Published(
+            "VIBE",
+            "Kocabas et al., VIBE, CVPR 2020, table of Human3.6M",
+            {"mpjpe": 65.6, "pa_mpjpe": 41.4},
+        ),
         Published(
             "HMR 2.0a (4DHumans)",
             "Goel et al., Humans in 4D, ICCV 2023 (arXiv:2305.20091), table of 3DPW and Human3.6M",
@@ -74,7 +89,11 @@ PUBLISHED: dict[str, list[Published]] = {
         ),
     ],
     "3dpw-mesh": [
-        Published("SPIN", "Kolotouros et al., SPIN, ICCV 2019, table of 3DPW", {"mpjpe": 96.9, "pa_mpjpe": 59.2}),
+        Published(
+            "SPIN",
+            "Kolotouros et al., SPIN, ICCV 2019, table of 3DPW",
+            {"mpjpe": 96.9, "pa_mpjpe": 59.2},
+        ),
         Published("HMR 2.0a (4DHumans)", _GVHMR_CAMERA, _mesh(44.4, 69.8, 82.2, 18.1)),
         Published("WHAM", _GVHMR_CAMERA, _mesh(35.9, 57.8, 68.7, 6.6)),
         Published("TRAM", _METRIC, _mesh(35.6, 59.3, 69.6)),
@@ -101,8 +120,16 @@ PUBLISHED: dict[str, list[Published]] = {
     ],
     "rich": [
         Published("HMR 2.0 (4DHumans)", _GVHMR_CAMERA, {"mpjpe": 96.0}),
-        Published("WHAM", f"{_GVHMR}, tables 1 and 2", {"mpjpe": 80.0} | _world(109.9, 184.6, 4.1, 19.7, 3.3)),
-        Published("GVHMR", f"{_GVHMR}, tables 1 and 2", {"mpjpe": 66.0} | _world(78.8, 126.3, 2.4, 12.8, 3.0)),
+        Published(
+            "WHAM",
+            f"{_GVHMR}, tables 1 and 2",
+            {"mpjpe": 80.0} | _world(109.9, 184.6, 4.1, 19.7, 3.3),
+        ),
+        Published(
+            "GVHMR",
+            f"{_GVHMR}, tables 1 and 2",
+            {"mpjpe": 66.0} | _world(78.8, 126.3, 2.4, 12.8, 3.0),
+        ),
         Published("PromptHMR", _SAM3D, {"pa_mpjpe": 37.3}),
         Published("SAM 3D Body", _SAM3D, {"pa_mpjpe": 31.9}),
     ],

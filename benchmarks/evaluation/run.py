@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Captures the clips of a data set as a user would; what is done is kept, so that an interrupted run goes on.
+"""Captures the clips of a data set as a user would; what is done is kept, so that an interrupted
+run goes on.
 
-A clip's folder of results holds ``person1.npz``, …, and, written last, ``clip.json``: the options of the capture, how
-many people were found, or why there is none.
+A clip's folder of results holds ``person1.npz``, …, and, written last, ``clip.json``: the options
+of the capture, how many people were found, or why there is none.
 """
 
 from __future__ import annotations
@@ -38,7 +39,9 @@ _RECORD = "clip.json"
 
 @dataclass(frozen=True)
 class Settings:
-    """How clips are captured: ``body`` names it, or is its file; ``camera``: whether the intrinsics are given."""
+    """How clips are captured: ``body`` names it, or is its file; ``camera``: whether the intrinsics
+    are given.
+    """
 
     quality: str
     body: str
@@ -48,7 +51,9 @@ class Settings:
 
 @dataclass(frozen=True)
 class Captured:
-    """The people that were found in a clip, or ``problem``: why it could not be captured; ``program``: by which."""
+    """The people that were found in a clip, or ``problem``: why it could not be captured;
+    ``program``: by which.
+    """
 
     motions: list[Motion]
     problem: str = ""
@@ -63,7 +68,8 @@ def captured_clip(
     folder: Path,
     say: Callable[[str], None],
 ) -> Captured:
-    """Return the result of a clip: the one that is kept if the options are the same, else by capturing it.
+    """Return the result of a clip: the one that is kept if the options are the same, else by
+    capturing it.
 
     :param intrinsics: (3, 3), used if the settings say so.
     :param folder: of this clip's results.
@@ -77,7 +83,9 @@ def captured_clip(
         folder.mkdir(parents=True, exist_ok=True)
         forget(folder)
     except OSError as error:
-        raise OutputError(f"cannot write in {folder}: {reason(error)}; choose another with --results") from error
+        raise OutputError(
+            f"cannot write in {folder}: {reason(error)}; choose another with --results"
+        ) from error
     problem, motions = "", []
     try:
         motions = _capture(clip, intrinsics if settings.camera else None, body, settings)
@@ -88,12 +96,19 @@ def captured_clip(
     for number, motion in enumerate(motions, 1):
         motion.save(folder / f"person{number}.npz")
     program = code_version(_ROOT)
-    record = {"options": _options(settings), "people": len(motions), "problem": problem, "program": program}
+    record = {
+        "options": _options(settings),
+        "people": len(motions),
+        "problem": problem,
+        "program": program,
+    }
     try:
         with atomic_path(folder / _RECORD) as temporary:
             temporary.write_text(json.dumps(record, indent=1), encoding="utf-8")
     except OSError as error:
-        raise OutputError(f"cannot write {folder / _RECORD}: {reason(error)}; free some space") from error
+        raise OutputError(
+            f"cannot write {folder / _RECORD}: {reason(error)}; free some space"
+        ) from error
     return Captured(motions, problem, program)
 
 
@@ -107,7 +122,9 @@ def _options(settings: Settings) -> dict[str, Any]:
 
 
 def _read(folder: Path, settings: Settings) -> Captured | None:
-    """Return the result of an earlier run; None if there is none by these options, or it cannot be read."""
+    """Return the result of an earlier run; None if there is none by these options, or it cannot be
+    read.
+    """
     try:
         record = json.loads((folder / _RECORD).read_text(encoding="utf-8"))
         if record["options"] != _options(settings):
@@ -134,7 +151,9 @@ def forget(folder: Path) -> None:
         raise OutputError(f"cannot remove {folder / _RECORD}: {reason(error)}") from error
 
 
-def _capture(clip: Clip, intrinsics: NDArray[np.float64] | None, body: Body, settings: Settings) -> list[Motion]:
+def _capture(
+    clip: Clip, intrinsics: NDArray[np.float64] | None, body: Body, settings: Settings
+) -> list[Motion]:
     rate = Fraction(clip.rate).limit_denominator(1000)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -144,7 +163,9 @@ def _capture(clip: Clip, intrinsics: NDArray[np.float64] | None, body: Body, set
         options = CaptureOptions(
             quality=settings.quality,
             people="largest" if clip.alone else "all",
-            calibration=None if intrinsics is None else _calibration(intrinsics, folder / "camera.json"),
+            calibration=None
+            if intrinsics is None
+            else _calibration(intrinsics, folder / "camera.json"),
             wanted=wanted,
             threads=settings.threads,
         )
@@ -152,7 +173,9 @@ def _capture(clip: Clip, intrinsics: NDArray[np.float64] | None, body: Body, set
 
 
 def _numbered(pictures: list[Path], folder: Path) -> Path:
-    """Return a folder of links to pictures, whose names are numbers from 0: data sets name theirs in many ways."""
+    """Return a folder of links to pictures, whose names are numbers from 0: data sets name theirs
+    in many ways.
+    """
     folder.mkdir()
     for k, picture in enumerate(pictures):
         os.symlink(picture.resolve(), folder / f"{k:06d}{picture.suffix.lower()}")

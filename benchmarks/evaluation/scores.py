@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The figures of captured clips: who is who, frame by frame errors, and their means over a data set."""
+"""The figures of captured clips: who is who, frame by frame errors, and their means over a data
+set.
+"""
 
 from __future__ import annotations
 
@@ -23,12 +25,15 @@ _SHARES = {
     "pck_50": metrics.challenge_pck,
     "auc_200": metrics.challenge_auc,
 }
-NEAR = 0.5  # of the size of a person in the image: the farthest that a captured person may be from the true one
+# of the size of a person in the image: the farthest that a captured person may be from the true one
+NEAR = 0.5
 
 
 @dataclass
 class Scores:
-    """Values of all frames for each measure, and how many frames of the protocol there are and were captured."""
+    """Values of all frames for each measure, and how many frames of the protocol there are and were
+    captured.
+    """
 
     values: dict[str, list[NDArray[np.float64]]] = field(default_factory=dict)
     frames: int = 0
@@ -78,11 +83,12 @@ def score_clip(
 
 
 def assign(clip: Clip, truth: Truth, motions: Sequence[Motion]) -> list[Motion | None]:
-    """Return the captured motion of each person with ground truth, None where nobody was captured close enough.
+    """Return the captured motion of each person with ground truth, None where nobody was captured
+    close enough.
 
-    A person who is alone is the most prominent one that was captured. Else the distance is that of the limbs' joints
-    in the image, relative to the person's size there, its median over the frames that both have; the nearest pair is
-    assigned first.
+    A person who is alone is the most prominent one that was captured. Else the distance is that of
+    the limbs' joints in the image, relative to the person's size there, its median over the frames
+    that both have; the nearest pair is assigned first.
     """
     if clip.alone or truth.intrinsics is None:
         return [motions[0] if k == 0 and motions else None for k in range(len(truth.people))]
@@ -119,7 +125,9 @@ def _project(points: NDArray[np.float64], K: NDArray[np.float64]) -> NDArray[np.
 
 def _common(person: Person, motion: Motion) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the positions in the person's rows and in the motion of the frames that both have."""
-    _, true_rows, captured_rows = np.intersect1d(person.rows, motion.frames, assume_unique=True, return_indices=True)
+    _, true_rows, captured_rows = np.intersect1d(
+        person.rows, motion.frames, assume_unique=True, return_indices=True
+    )
     return true_rows, captured_rows
 
 
@@ -159,7 +167,9 @@ def _in_camera(
     if "acceleration" in protocol.measures:
         found["acceleration"] = metrics.acceleration_error(x, y, rate)
     if protocol.pck_joints:
-        errors = metrics.joint_errors(x, y)[:, [protocol.joints.index(name) for name in protocol.pck_joints]]
+        errors = metrics.joint_errors(x, y)[
+            :, [protocol.joints.index(name) for name in protocol.pck_joints]
+        ]
         found |= {key: share(errors) for key, share in _SHARES.items() if key in protocol.measures}
     if "mpvpe" in protocol.measures and isinstance(true, PosedBody) and _same_mesh(captured, true):
         found["mpvpe"] = _vertex_errors(captured, true, roots)
@@ -167,20 +177,32 @@ def _in_camera(
 
 
 def _same_mesh(captured: PosedBody, true: PosedBody) -> bool:
-    """Whether the vertices of both are the same points of a body: SMPL's own mesh on both sides, or SMPL-X's."""
-    return captured.body.faces.shape == true.body.faces.shape and bool((captured.body.faces == true.body.faces).all())
+    """Whether the vertices of both are the same points of a body: SMPL's own mesh on both sides, or
+    SMPL-X's.
+    """
+    return captured.body.faces.shape == true.body.faces.shape and bool(
+        (captured.body.faces == true.body.faces).all()
+    )
 
 
-def _vertex_errors(captured: PosedBody, true: PosedBody, roots: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+def _vertex_errors(
+    captured: PosedBody, true: PosedBody, roots: list[NDArray[np.float64]]
+) -> NDArray[np.float64]:
     errors, start = [], 0
     for x, y in zip(captured.vertex_blocks(), true.vertex_blocks(), strict=True):
         some = slice(start, start + len(x))
-        errors.append(metrics.mpjpe(metrics.relative_to(x, roots[0][some]), metrics.relative_to(y, roots[1][some])))
+        errors.append(
+            metrics.mpjpe(
+                metrics.relative_to(x, roots[0][some]), metrics.relative_to(y, roots[1][some])
+            )
+        )
         start += len(x)
     return np.concatenate(errors)
 
 
-def _in_world(captured: PosedBody, true: Subject, protocol: Protocol, rate: float) -> Mapping[str, NDArray[np.float64]]:
+def _in_world(
+    captured: PosedBody, true: Subject, protocol: Protocol, rate: float
+) -> Mapping[str, NDArray[np.float64]]:
     x, y = captured.joints(protocol.joints), true.joints(protocol.joints)
     pelvis = [subject.joints(("pelvis",))[:, 0] for subject in (captured, true)]
     found = {

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A person over time, captured or true: named points in one frame of reference, the camera's or the world's."""
+"""A person over time, captured or true: named points in one frame of reference, the camera's or the
+world's.
+"""
 
 from __future__ import annotations
 
@@ -47,9 +49,9 @@ class MeasuredJoints:
 class PosedBody:
     """A body with one shape, posed in T frames.
 
-    ``rotations`` (T, K+1, 3, 3): the root into the frame of reference, the others relative to their parents;
-    ``root`` (T, 3): position of the root joint, metres; ``betas`` (P,); ``regressor`` (17, V) or None: gives the joints
-    of `REGRESSED17` from the vertices.
+    ``rotations`` (T, K+1, 3, 3): the root into the frame of reference, the others relative to their
+    parents; ``root`` (T, 3): position of the root joint, metres; ``betas`` (P,); ``regressor`` (17,
+    V) or None: gives the joints of `REGRESSED17` from the vertices.
     """
 
     body: Body
@@ -63,7 +65,11 @@ class PosedBody:
 
     @classmethod
     def of_motion(
-        cls, body: Body, motion: Motion, regressor: NDArray[np.float64] | None = None, in_world: bool = False
+        cls,
+        body: Body,
+        motion: Motion,
+        regressor: NDArray[np.float64] | None = None,
+        in_world: bool = False,
     ) -> PosedBody:
         """Return a captured person, in the axes of each frame's camera or in the world.
 
@@ -76,11 +82,15 @@ class PosedBody:
         return posed if in_world else posed.moved(np.linalg.inv(motion.world_from_camera))
 
     def moved(self, T: NDArray[np.float64]) -> PosedBody:
-        """Return the person in another frame of reference; T (T, 4, 4) or (4, 4) rigid transforms."""
+        """Return the person in another frame of reference; T (T, 4, 4) or (4, 4) rigid
+        transforms.
+        """
         R, t = T[..., :3, :3], T[..., :3, 3]
         rotations = self.rotations.copy()
         rotations[:, 0] = R @ rotations[:, 0]
-        return replace(self, rotations=rotations, root=np.einsum("...ij,...j->...i", R, self.root) + t)
+        return replace(
+            self, rotations=rotations, root=np.einsum("...ij,...j->...i", R, self.root) + t
+        )
 
     def select(self, rows: NDArray[np.integer]) -> PosedBody:
         """Return the frames `rows` (n,) alone."""
@@ -92,28 +102,37 @@ class PosedBody:
         return len(self.body.v_template) == SMPL_VERTICES
 
     def joints(self, names: Sequence[str]) -> NDArray[np.float64]:
-        """Return the named joints, (T, J, 3): by the regressor if there is one for them, else those of the skeleton.
+        """Return the named joints, (T, J, 3): by the regressor if there is one for them, else those
+        of the skeleton.
 
         :raises KeyError: the body has no such joint.
         """
         if self.regressor is not None and set(names) <= set(REGRESSED17):
             matrix = self.regressor[[REGRESSED17.index(name) for name in names]]
-            return np.concatenate([np.zeros((0, len(names), 3)), *(matrix @ v for v in self.vertex_blocks())])
+            return np.concatenate(
+                [np.zeros((0, len(names), 3)), *(matrix @ v for v in self.vertex_blocks())]
+            )
         parts, offsets = on_body(self.body, tuple(names), self.betas)
         R, t = self._parts(slice(None))
         points: NDArray[np.float64] = np.einsum("tjab,jb->tja", R[:, parts], offsets) + t[:, parts]
         return points
 
     def vertex_blocks(self) -> Iterator[NDArray[np.float64]]:
-        """Yield the vertices of some frames at a time, (n, V, 3), by linear blend skinning without correctives."""
+        """Yield the vertices of some frames at a time, (n, V, 3), by linear blend skinning without
+        correctives.
+        """
         for start in range(0, len(self), _BLOCK):
             R, t = self._parts(slice(start, start + _BLOCK))
             yield np.stack([self.body.skin(R[k], t[k], self.betas) for k in range(len(R))])
 
     def feet(self) -> NDArray[np.float64]:
-        """Return points under toes and heels, (T, 4, 3): four vertices of SMPL's mesh, or a body's own keypoints."""
+        """Return points under toes and heels, (T, 4, 3): four vertices of SMPL's mesh, or a body's
+        own keypoints.
+        """
         if self.has_smpl_mesh:
-            return np.concatenate([np.zeros((0, 4, 3)), *(v[:, SMPL_FEET] for v in self.vertex_blocks())])
+            return np.concatenate(
+                [np.zeros((0, 4, 3)), *(v[:, SMPL_FEET] for v in self.vertex_blocks())]
+            )
         at = self.body.keypoint_set("blazepose")
         R, t = self._parts(slice(None))
         return self.body.keypoints(R, t, self.betas, [at[name] for name in _FEET])

@@ -24,7 +24,9 @@ FPS = 30
 OPTIONS = {"crf": "18", "preset": "veryfast"}  # of the encoder
 
 
-def there_and_back_clip(seconds: float, size: tuple[int, int] | None = None, source: Path = SAMPLE) -> Path:
+def there_and_back_clip(
+    seconds: float, size: tuple[int, int] | None = None, source: Path = SAMPLE
+) -> Path:
     """Return a clip, there and back again for some seconds, as a video; cached in build/bench.
 
     :param size: to which the pictures are enlarged; None: their own.
@@ -36,23 +38,37 @@ def there_and_back_clip(seconds: float, size: tuple[int, int] | None = None, sou
     with open_video(source) as video:
         pictures, fps = [frame.image_rgb for frame in video], video.fps
     if size is not None:
-        pictures = [cv2.resize(picture, size, interpolation=cv2.INTER_CUBIC).astype(np.uint8) for picture in pictures]
+        pictures = [
+            cv2.resize(picture, size, interpolation=cv2.INTER_CUBIC).astype(np.uint8)
+            for picture in pictures
+        ]
     order = there_and_back(len(pictures))
     CACHE.mkdir(parents=True, exist_ok=True)
     with atomic_path(target) as temporary:
-        write_video(temporary, [pictures[order[k % len(order)]] for k in range(round(seconds * fps))], fps, OPTIONS)
+        write_video(
+            temporary,
+            [pictures[order[k % len(order)]] for k in range(round(seconds * fps))],
+            fps,
+            OPTIONS,
+        )
     return target
 
 
 def there_and_back_truth(truth: Path, count: int, frames: int, target: Path) -> None:
-    """Write the ground truth of a clip of ``count`` frames for the ``frames`` of `there_and_back_clip`.
+    """Write the ground truth of a clip of ``count`` frames for the ``frames`` of
+    `there_and_back_clip`.
 
     :param truth: with a row for each of its ``frame_index`` in every array of that length.
     """
     with np.load(truth) as file:
         values = {key: file[key] for key in file.files}
-    row_of, order = {int(frame): row for row, frame in enumerate(values["frame_index"])}, there_and_back(count)
-    rows = {k: row_of[order[k % len(order)]] for k in range(frames) if order[k % len(order)] in row_of}
+    row_of, order = (
+        {int(frame): row for row, frame in enumerate(values["frame_index"])},
+        there_and_back(count),
+    )
+    rows = {
+        k: row_of[order[k % len(order)]] for k in range(frames) if order[k % len(order)] in row_of
+    }
     looped = {
         key: value[list(rows.values())] if value.ndim and len(value) == len(row_of) else value
         for key, value in values.items()
@@ -60,7 +76,9 @@ def there_and_back_truth(truth: Path, count: int, frames: int, target: Path) -> 
     np.savez(target, **(looped | {"frame_index": np.array(list(rows))}))
 
 
-def write_video(path: Path, pictures: list[NDArray[np.uint8]], fps: Fraction, options: dict[str, str]) -> None:
+def write_video(
+    path: Path, pictures: list[NDArray[np.uint8]], fps: Fraction, options: dict[str, str]
+) -> None:
     """Write RGB pictures as H.264 in an .mp4 file.
 
     :param options: of the encoder.
@@ -94,5 +112,7 @@ class RepeatedFile:
                     if time_s >= self._seconds:
                         return
                     clock.sleep(began_s + time_s - clock.now())
-                    yield Picture(index, time_s, max(began_s + time_s, clock.now()), frame.image_rgb)
+                    yield Picture(
+                        index, time_s, max(began_s + time_s, clock.now()), frame.image_rgb
+                    )
                     index += 1

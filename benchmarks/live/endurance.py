@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A long live capture: memory, the camera's height over the floor, size and dropped frames over time.
+"""A long live capture: memory, the camera's height over the floor, size and dropped frames over
+time.
 
-``played`` plays a repeated file in real time, with a client of the JSON lines, on this machine. ``observed`` goes
-through as many frames without waiting, from what the networks found in two rounds: whatever drifts is then the
-calibration's doing, also for a machine that processes only some frames per second.
+``played`` plays a repeated file in real time, with a client of the JSON lines, on this machine.
+``observed`` goes through as many frames without waiting, from what the networks found in two
+rounds: whatever drifts is then the calibration's doing, also for a machine that processes only some
+frames per second.
 """
 
 from __future__ import annotations
@@ -35,7 +37,8 @@ from .observed import Observing, Repeating, there_and_back
 QUALITY = "fast"
 SLOW_RATE = 4.8  # poses/s of a machine that is busy with other things
 UNEVEN = 0.25  # by how much its frames are apart, more or less
-TIMES_S = (3.5, 10.0, 60.0, 300.0, 900.0, 1800.0, 2700.0, 3600.0)  # of the rows of the table; 3.5 s: just settled
+# of the rows of the table; 3.5 s: just settled
+TIMES_S = (3.5, 10.0, 60.0, 300.0, 900.0, 1800.0, 2700.0, 3600.0)
 SETTLED_S = 5.0  # from which on nothing is to drift
 
 
@@ -83,11 +86,16 @@ class World:
             self._say(self._all[-1])
 
     def drift(self) -> dict[str, float]:
-        """Return by how much each of the values moved after the first seconds, and of the height after a minute."""
+        """Return by how much each of the values moved after the first seconds, and of the height
+        after a minute.
+        """
         late = [row for row in self._all if row["time_s"] >= SETTLED_S]
         if not late:
             return {}
-        spans = {key: float(np.ptp([row[key] for row in late])) for key in ("height_m", "tilt_deg", "stature_m")}
+        spans = {
+            key: float(np.ptp([row[key] for row in late]))
+            for key in ("height_m", "tilt_deg", "stature_m")
+        }
         minute = [row["height_m"] for row in late if row["time_s"] >= 60.0]
         return spans | {"height_after_a_minute_m": float(np.ptp(minute)) if minute else 0.0}
 
@@ -123,11 +131,18 @@ def played(body: Body, minutes: float, say: Callable[[dict[str, float]], None]) 
             [server, world],
             Listeners(progress=progress, camera=world.begin),
         )
-    return report | world.figures() | {"load": float(np.median(load)) if load else None, "cores": os.cpu_count()}
+    return (
+        report
+        | world.figures()
+        | {"load": float(np.median(load)) if load else None, "cores": os.cpu_count()}
+    )
 
 
 def observed(
-    body: Body, minutes: float, poses_per_second: float | None, say: Callable[[dict[str, float]], None]
+    body: Body,
+    minutes: float,
+    poses_per_second: float | None,
+    say: Callable[[dict[str, float]], None],
 ) -> dict[str, Any]:
     """Go through as many frames without waiting, and return the figures.
 
@@ -146,10 +161,19 @@ def observed(
     began_s = time.process_time()
     while frame < 60 * minutes * FPS:
         tracker.seek(frame)
-        world.send(people.step(Frame(frame, frame / FPS, pictures[order[frame % len(order)]]))[0], 0.0)
-        step = 1.0 if poses_per_second is None else FPS / poses_per_second * random.uniform(1 - UNEVEN, 1 + UNEVEN)
+        world.send(
+            people.step(Frame(frame, frame / FPS, pictures[order[frame % len(order)]]))[0], 0.0
+        )
+        step = (
+            1.0
+            if poses_per_second is None
+            else FPS / poses_per_second * random.uniform(1 - UNEVEN, 1 + UNEVEN)
+        )
         frame += max(round(step), 1)
-    return world.figures() | {"poses_per_second": poses_per_second, "cpu_s": time.process_time() - began_s}
+    return world.figures() | {
+        "poses_per_second": poses_per_second,
+        "cpu_s": time.process_time() - began_s,
+    }
 
 
 def _read(port: int) -> None:

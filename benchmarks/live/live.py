@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`./scripts/bench live [--part PART]... [--minutes M]`: what live captures cost, and how good their poses are."""
+"""`./scripts/bench live [--part PART]... [--minutes M]`: what live captures cost, and how good
+their poses are.
+"""
 
 from __future__ import annotations
 
@@ -24,13 +26,28 @@ MEASURES = {
     "poses": ("poses", None),
     "dropped": ("frames dropped", None),
 }
-WORLD = ("time_s", "poses", "not_seen", "memory_mb", "height_m", "tilt_deg", "stature_m", "focal_px")
+WORLD = (
+    "time_s",
+    "poses",
+    "not_seen",
+    "memory_mb",
+    "height_m",
+    "tilt_deg",
+    "stature_m",
+    "focal_px",
+)
 
 
 def live(quick: bool, parts: Sequence[str] = (), minutes: float = 60.0) -> dict[str, Any]:
     """Measure the parts, print their tables as they come, and return the figures."""
     body, figures = load_body("scope"), {}
-    measurements = {"rate": _rate, "offline": _offline, "simulated": _simulated, "world": _world, "hour": _hour}
+    measurements = {
+        "rate": _rate,
+        "offline": _offline,
+        "simulated": _simulated,
+        "world": _world,
+        "hour": _hour,
+    }
     for part in parts or USUAL:
         figures[part] = measurements[part](body, quick, minutes)
     return figures
@@ -40,13 +57,26 @@ def _rate(_body: Body, quick: bool, _minutes: float) -> dict[str, Any]:
     found = rate(quick)
     wanted = targets(found["offline_fast_fps"])
     rows = [
-        [preset, f["poses_per_second"], wanted[preset], f["median_ms"], f["p95_ms"], 100 * f["dropped_share"]]
+        [
+            preset,
+            f["poses_per_second"],
+            wanted[preset],
+            f["median_ms"],
+            f["p95_ms"],
+            100 * f["dropped_share"],
+        ]
         for preset, f in found["presets"].items()
     ]
-    head = ("720p at 30 fps", "poses/s", "target", f"latency ms, median (≤ {MEDIAN_MS:g} with fast)")
+    head = (
+        "720p at 30 fps",
+        "poses/s",
+        "target",
+        f"latency ms, median (≤ {MEDIAN_MS:g} with fast)",
+    )
     print(table((*head, f"95 % (≤ {P95_MS:g})", "dropped %"), rows), end="\n\n")
     print(
-        f"The same file captured offline with fast: {found['offline_fast_fps']:.1f} frames/s; {found['cores']} cores,"
+        f"The same file captured offline with fast: {found['offline_fast_fps']:.1f} frames/s; "
+        f"{found['cores']} cores,"
         f" load {found['load']:.1f}",
         end="\n\n",
         flush=True,
@@ -73,7 +103,9 @@ def _print_compared(found: dict[str, Any], ways: Sequence[str]) -> None:
         for how in ways
         if how in of_clip
     ]
-    head = [name + ("" if target is None else f" (≤ {target:g})") for name, target in MEASURES.values()]
+    head = [
+        name + ("" if target is None else f" (≤ {target:g})") for name, target in MEASURES.values()
+    ]
     print(table(("clip", *head), rows), end="\n\n", flush=True)
 
 
@@ -91,7 +123,8 @@ def _hour(body: Body, _quick: bool, minutes: float) -> dict[str, Any]:
     found = played(body, minutes, _say)
     _print_world(found)
     print(
-        f"{found['poses']} of {found['frames']} frames processed, {found['dropped']} counted as dropped;"
+        f"{found['poses']} of {found['frames']} frames processed, {found['dropped']} counted as "
+        "dropped;"
         f" {found['poses_per_second']} poses/s; {found['cores']} cores, load {found['load']:.1f}",
         end="\n\n",
     )
@@ -105,4 +138,8 @@ def _say(row: dict[str, float]) -> None:
 def _print_world(found: dict[str, Any]) -> None:
     rows = [[f"{row[key]:.6g}" for key in WORLD] for row in found["rows"]]
     print(table(WORLD, rows), end="\n\n")
-    print("Moved after the first seconds: " + ", ".join(f"{k} {v:.2g}" for k, v in found["drift"].items()), end="\n\n")
+    print(
+        "Moved after the first seconds: "
+        + ", ".join(f"{k} {v:.2g}" for k, v in found["drift"].items()),
+        end="\n\n",
+    )

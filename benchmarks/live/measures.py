@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How the motion of a live capture differs from the offline one of the same footage; rows are matched by frame number.
+"""How the motion of a live capture differs from the offline one of the same footage; rows are
+matched by frame number.
 
-Frames that a live capture has dropped are filled in between poses, and say nothing of it: only the frames that both
-motions contain and in which both are valid count.
+Frames that a live capture has dropped are filled in between poses, and say nothing of it: only the
+frames that both motions contain and in which both are valid count.
 """
 
 from __future__ import annotations
@@ -13,7 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.kinematics.contact_points import SOLES, contact_point_positions, with_contact_points
+from ...scope_addon.kinematics.contact_points import (
+    SOLES,
+    contact_point_positions,
+    with_contact_points,
+)
 from ...scope_addon.motion import Motion
 from ...solver import Body, rotations
 
@@ -30,13 +35,21 @@ def common_rows(live: Motion, offline: Motion) -> tuple[Rows, Rows]:
 def world_joints(motion: Motion) -> NDArray[np.float64]:
     """Return the joints (T, K+1, 3) in the world, whose camera may move, metres."""
     T = motion.world_from_camera
-    joints: NDArray[np.float64] = np.einsum("tij,tkj->tki", T[:, :3, :3], motion.joints_cam) + T[:, None, :3, 3]
+    joints: NDArray[np.float64] = (
+        np.einsum("tij,tkj->tki", T[:, :3, :3], motion.joints_cam) + T[:, None, :3, 3]
+    )
     return joints
 
 
 def seen_from_the_world(motion: Motion) -> Motion:
-    """Return the motion as seen by a camera at the world's origin, in which feet slide as they do in the world."""
-    return replace(motion, joints_cam=world_joints(motion), world_from_camera=np.tile(np.eye(4), (len(motion), 1, 1)))
+    """Return the motion as seen by a camera at the world's origin, in which feet slide as they do
+    in the world.
+    """
+    return replace(
+        motion,
+        joints_cam=world_joints(motion),
+        world_from_camera=np.tile(np.eye(4), (len(motion), 1, 1)),
+    )
 
 
 def jerk(joints: NDArray[np.floating[Any]], times_s: NDArray[np.floating[Any]]) -> float:
@@ -58,21 +71,28 @@ def lowest_sole_m(motion: Motion, rows: Rows, body: Body) -> float:
     with_points, lowest = with_contact_points(body, motion.betas), np.inf
     for row in rows:
         R = rotations.exp(motion.poses[row].reshape(-1, 3).astype(float))
-        R_parts, t_parts = with_points.forward_kinematics(R, motion.trans[row].astype(float), motion.betas)
-        lowest = min(lowest, contact_point_positions(with_points, R_parts, t_parts)[: len(SOLES), 2].min())
+        R_parts, t_parts = with_points.forward_kinematics(
+            R, motion.trans[row].astype(float), motion.betas
+        )
+        lowest = min(
+            lowest, contact_point_positions(with_points, R_parts, t_parts)[: len(SOLES), 2].min()
+        )
     return float(lowest)
 
 
 def compared(live: Motion, offline: Motion, body: Body) -> dict[str, float]:
     """Return the measures of two motions of the same footage; lengths in millimetres.
 
-    ``difference``: median over frames and joints of how far the joints are apart relative to the pelvis, camera axes;
-    ``jitter``, ``jitter_world``: jerk of the live motion over that of the offline one, relative to the pelvis and in
-    the world; ``lowest_sole``: of the live motion.
+    ``difference``: median over frames and joints of how far the joints are apart relative to the
+    pelvis, camera axes; ``jitter``, ``jitter_world``: jerk of the live motion over that of the
+    offline one, relative to the pelvis and in the world; ``lowest_sole``: of the live motion.
     """
     ours, theirs = common_rows(live, offline)
     times = live.timestamps[ours]
-    relative = [m.joints_cam[rows] - m.joints_cam[rows][:, :1] for m, rows in ((live, ours), (offline, theirs))]
+    relative = [
+        m.joints_cam[rows] - m.joints_cam[rows][:, :1]
+        for m, rows in ((live, ours), (offline, theirs))
+    ]
     world = [world_joints(m)[rows] for m, rows in ((live, ours), (offline, theirs))]
     return {
         "frames": len(ours),

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the networks find in a clip that is played there and back, for as many frames as are wanted.
 
-The networks look at two rounds. Every later round repeats the second one, which begins as each of them does: with the
-person being followed. A day of footage then takes no more of the networks' time than twenty seconds.
+The networks look at two rounds. Every later round repeats the second one, which begins as each of
+them does: with the person being followed. A day of footage then takes no more of the networks' time
+than twenty seconds.
 """
 
 from __future__ import annotations
@@ -21,7 +22,9 @@ Found = list[tuple[int, Observation]]
 
 
 def there_and_back(count: int) -> list[int]:
-    """Return the frame numbers of one round of a clip of ``count`` frames, whose end leads to its beginning."""
+    """Return the frame numbers of one round of a clip of ``count`` frames, whose end leads to its
+    beginning.
+    """
     return [*range(count), *range(count - 2, 0, -1)]
 
 
@@ -32,7 +35,9 @@ class Observing:
         self._tracker = PeopleTracker(quality, threads)
         self.found: list[Found] = []
 
-    def step(self, image_rgb: NDArray[np.uint8], upcoming_rgb: None = None, time_s: float | None = None) -> Found:
+    def step(
+        self, image_rgb: NDArray[np.uint8], upcoming_rgb: None = None, time_s: float | None = None
+    ) -> Found:
         """See `PeopleTracker.step`."""
         found = self._tracker.step(image_rgb, upcoming_rgb, time_s)
         self.found.append([(tracklet, _answered(observation)) for tracklet, observation in found])
@@ -49,7 +54,9 @@ class Repeating:
         self._found, self._next = found, 0
 
     def seek(self, frame: int) -> None:
-        """Continue with this frame, counted from the beginning of the first round: those before it were dropped."""
+        """Continue with this frame, counted from the beginning of the first round: those before it
+        were dropped.
+        """
         self._next = frame
 
     def step(self, *_: Any) -> Found:

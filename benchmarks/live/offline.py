@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Live captures against the offline one of the same footage and preset: with every frame, and played in real time.
+"""Live captures against the offline one of the same footage and preset: with every frame, and
+played in real time.
 
-Pose2Sim's clips end before the first estimates do, so they are also played there and back, in real time as well.
+Pose2Sim's clips end before the first estimates do, so they are also played there and back, in real
+time as well.
 """
 
 from __future__ import annotations
@@ -54,13 +56,17 @@ def against_offline(body: Body, quick: bool, say: Callable[[str], None]) -> dict
         motion, told = in_real_time(body, video)
         of_clip["real_time"] = _measured(motion, offline, body, truth) | told
         if offline.timestamps[-1] < SHORT_S:
-            of_clip["there_and_back"] = there_and_back_in_real_time(body, video, truth, len(offline))
+            of_clip["there_and_back"] = there_and_back_in_real_time(
+                body, video, truth, len(offline)
+            )
         say(f"{name}: {json.dumps(of_clip)}")
     return figures
 
 
 def _measured(live: Motion, offline: Motion, body: Body, truth: Path) -> dict[str, Any]:
-    """Return the figures of a live capture; nothing but their number if there are too few poses to say anything."""
+    """Return the figures of a live capture; nothing but their number if there are too few poses to
+    say anything.
+    """
     if (count := len(common_rows(live, offline)[0])) < FEWEST:
         return {"frames": count}
     return compared(live, offline, body) | _against_truth(live, truth)
@@ -82,35 +88,56 @@ def every_frame(body: Body, video: Path) -> Motion:
 
 
 def in_real_time(body: Body, video: Path) -> tuple[Motion, dict[str, Any]]:
-    """Return the recording of a video that is played in real time on this machine, and how many poses there were."""
+    """Return the recording of a video that is played in real time on this machine, and how many
+    poses there were.
+    """
     source = FileSource(video)
     recording, load = Recording(Path(), body, source), os.getloadavg()[0]
     listeners = Listeners(camera=lambda people, size: recording.begin(people.sessions[0], size))
     report = run_live(source, body, LiveOptions(quality=QUALITY), [recording], listeners)
     assert recording.camera is not None
-    told = {"load": load, "poses": report["poses"], "dropped": report["dropped"], "latency_ms": report["latency_ms"]}
+    told = {
+        "load": load,
+        "poses": report["poses"],
+        "dropped": report["dropped"],
+        "latency_ms": report["latency_ms"],
+    }
     return recording.motion(recording.camera), told
 
 
 def there_and_back_in_real_time(body: Body, video: Path, truth: Path, count: int) -> dict[str, Any]:
-    """Return the figures of a clip of ``count`` frames that is played there and back in real time."""
+    """Return the figures of a clip of ``count`` frames that is played there and back in real
+    time.
+    """
     with tempfile.TemporaryDirectory() as folder:
         clip, offline, looped = _there_and_back(body, video, truth, count, Path(folder))
         motion, told = in_real_time(body, clip)
         slide_offline = _against_truth(offline, looped)["foot_slide_cm"]
-        return _measured(motion, offline, body, looped) | told | {"offline_foot_slide_cm": slide_offline}
+        return (
+            _measured(motion, offline, body, looped)
+            | told
+            | {"offline_foot_slide_cm": slide_offline}
+        )
 
 
-def _there_and_back(body: Body, video: Path, truth: Path, count: int, folder: Path) -> tuple[Path, Motion, Path]:
-    """Return a clip of ``count`` frames there and back, its offline capture, and its truth, written to the folder."""
+def _there_and_back(
+    body: Body, video: Path, truth: Path, count: int, folder: Path
+) -> tuple[Path, Motion, Path]:
+    """Return a clip of ``count`` frames there and back, its offline capture, and its truth, written
+    to the folder.
+    """
     clip = there_and_back_clip(LONG_S, source=video)
-    offline, looped = capture(clip, body, CaptureOptions(quality=QUALITY)).motions[0], folder / "truth.npz"
+    offline, looped = (
+        capture(clip, body, CaptureOptions(quality=QUALITY)).motions[0],
+        folder / "truth.npz",
+    )
     there_and_back_truth(truth, count, len(offline), looped)
     return clip, offline, looped
 
 
 def on_a_simulated_machine(body: Body, quick: bool, say: Callable[[str], None]) -> dict[str, Any]:
-    """Measure clips there and back on a simulated machine, with its pace and without one; return the figures by clip.
+    """Measure clips there and back on a simulated machine, with its pace and without one; return
+    the figures by clip.
 
     :param say: is told of each result as it comes.
     """
@@ -133,8 +160,11 @@ def on_a_simulated_machine(body: Body, quick: bool, say: Callable[[str], None]) 
 def _against_truth(motion: Motion, truth: Path) -> dict[str, float]:
     """Return how far feet that stand by the truth slide in the world, and PA-MPJPE.
 
-    Frames that were dropped and filled in count for the first: with every second one alone, no foot would stand long.
+    Frames that were dropped and filled in count for the first: with every second one alone, no foot
+    would stand long.
     """
     world = seen_from_the_world(motion)
-    slide = evaluate_motion(replace(world, valid=np.ones_like(motion.valid)), truth)["foot_slide_cm"]
+    slide = evaluate_motion(replace(world, valid=np.ones_like(motion.valid)), truth)[
+        "foot_slide_cm"
+    ]
     return {"foot_slide_cm": slide, "pa_mpjpe_mm": evaluate_motion(world, truth)["pa_mpjpe"]}

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Live captures on a simulated machine, whose frames take a known time, whatever else this one does.
+"""Live captures on a simulated machine, whose frames take a known time, whatever else this one
+does.
 
-A frame comes when it is due, and the newest one is taken that the pace allows, as in a live capture. Its networks and
-fit then take `Costs.frame_s`, more or less, and each call of the largest network `Costs.largest_s` in addition. While
-estimates or the reference network run beside it, everything takes `Costs.shared` times as long, and what they find is
-known when they are done. So the pattern of processed frames is the same in every run; only the clock is simulated.
+A frame comes when it is due, and the newest one is taken that the pace allows, as in a live
+capture. Its networks and fit then take `Costs.frame_s`, more or less, and each call of the largest
+network `Costs.largest_s` in addition. While estimates or the reference network run beside it,
+everything takes `Costs.shared` times as long, and what they find is known when they are done. So
+the pattern of processed frames is the same in every run; only the clock is simulated.
 """
 
 from __future__ import annotations
@@ -35,7 +37,9 @@ from ...solver import Body
 
 @dataclass(frozen=True)
 class Costs:
-    """Seconds that a machine of two cores without a graphics card takes beside decoding 1080p at 60 frames/s."""
+    """Seconds that a machine of two cores without a graphics card takes beside decoding 1080p at 60
+    frames/s.
+    """
 
     frame_s: float = 0.0185
     spread: float = 0.12  # standard deviation of its logarithm
@@ -104,7 +108,9 @@ class _Counted:
     def __init__(self, network: LandmarkNetwork, machine: _Machine) -> None:
         self._network, self._machine = network, machine
 
-    def estimate(self, image_rgb: NDArray[np.uint8], regions: Sequence[Region]) -> list[PoseEstimate]:
+    def estimate(
+        self, image_rgb: NDArray[np.uint8], regions: Sequence[Region]
+    ) -> list[PoseEstimate]:
         self._machine.call_largest()
         return self._network.estimate(image_rgb, regions)
 
@@ -119,9 +125,13 @@ class _Tracker:
             tracker._networks = replace(networks, fallback=counted)
         self._tracker, self._machine, self._costs = tracker, machine, costs
 
-    def step(self, image_rgb: NDArray[np.uint8], upcoming_rgb: None, time_s: float) -> list[tuple[int, Observation]]:
+    def step(
+        self, image_rgb: NDArray[np.uint8], upcoming_rgb: None, time_s: float
+    ) -> list[tuple[int, Observation]]:
         """See `PeopleTracker.step`."""
-        return [(k, self._answered(o)) for k, o in self._tracker.step(image_rgb, upcoming_rgb, time_s)]
+        return [
+            (k, self._answered(o)) for k, o in self._tracker.step(image_rgb, upcoming_rgb, time_s)
+        ]
 
     def _answered(self, observation: Observation) -> Observation:
         if (reference := observation.reference_landmarks) is None:
@@ -131,9 +141,14 @@ class _Tracker:
 
 
 def simulated(
-    body: Body, video: Path, quality: str, make_pace: Callable[[], Pace] = Pace, costs: Costs | None = None
+    body: Body,
+    video: Path,
+    quality: str,
+    make_pace: Callable[[], Pace] = Pace,
+    costs: Costs | None = None,
 ) -> tuple[Motion, dict[str, Any]]:
-    """Return the recording of a video played in real time on a simulated machine, and how many poses there were.
+    """Return the recording of a video played in real time on a simulated machine, and how many
+    poses there were.
 
     :param make_pace: of the frames.
     """
@@ -156,7 +171,9 @@ def simulated(
                 statistics.add(newest.timestamp_s, machine.now_s)
                 newest = None
             received += 1
-            machine.now_s = max(machine.now_s, frame.timestamp_s) if newest is None else machine.now_s
+            machine.now_s = (
+                max(machine.now_s, frame.timestamp_s) if newest is None else machine.now_s
+            )
             newest = frame if pace.is_due(frame.timestamp_s) else newest
     assert recording.camera is not None
     median_ms, p95_ms = statistics.latency_ms()

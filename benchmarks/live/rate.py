@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Poses per second and latency of ./scripts/live on a paced 720p file, beside the rate of an offline capture of it.
+"""Poses per second and latency of ./scripts/live on a paced 720p file, beside the rate of an
+offline capture of it.
 
 Both run as commands, in turns, so that other load on the machine affects both alike.
 """
@@ -19,7 +20,8 @@ from .clips import there_and_back_clip
 
 SIZE, SECONDS = (1280, 720), 20.0
 PRESETS = ("fast", "balanced")
-FULL_RATE, OFFLINE_RATE, SHARE = 28.0, 45.0, 0.6  # poses/s where the file is captured at the second rate; else a share
+# poses/s where the file is captured at the second rate; else a share
+FULL_RATE, OFFLINE_RATE, SHARE = 28.0, 45.0, 0.6
 BALANCED_RATE, MEDIAN_MS, P95_MS = 20.0, 90.0, 140.0
 
 
@@ -31,7 +33,9 @@ def rate(quick: bool) -> dict[str, Any]:
     load = []
     for _ in range(rounds):
         with tempfile.TemporaryDirectory() as folder:
-            made = _command("capture", str(video), "--quality", "fast", "-o", str(Path(folder) / "motion.npz"))
+            made = _command(
+                "capture", str(video), "--quality", "fast", "-o", str(Path(folder) / "motion.npz")
+            )
         offline.append(float(made["fps"]["total"]))
         for preset in PRESETS:
             load.append(os.getloadavg()[0])
@@ -46,11 +50,16 @@ def rate(quick: bool) -> dict[str, Any]:
 
 def targets(offline_fps: float) -> dict[str, float]:
     """Return the poses per second that are to be reached, by preset."""
-    return {"fast": FULL_RATE if offline_fps >= OFFLINE_RATE else SHARE * offline_fps, "balanced": BALANCED_RATE}
+    return {
+        "fast": FULL_RATE if offline_fps >= OFFLINE_RATE else SHARE * offline_fps,
+        "balanced": BALANCED_RATE,
+    }
 
 
 def _median(reports: list[dict[str, Any]]) -> dict[str, float]:
-    """Return the medians of some captures; the poses are divided by the footage's length, start-up included."""
+    """Return the medians of some captures; the poses are divided by the footage's length, start-up
+    included.
+    """
     found = {
         "poses_per_second": [r["poses_per_second"] for r in reports],
         "poses_over_footage": [r["poses"] / SECONDS for r in reports],
@@ -63,7 +72,9 @@ def _median(reports: list[dict[str, Any]]) -> dict[str, float]:
 
 def _command(*arguments: str) -> dict[str, Any]:
     """Run a command of the shell and return its report; with the thread counts that users have."""
-    environment = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    environment = {
+        name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")
+    }
     command = [sys.executable, "-m", "scope.scope_addon", *arguments, "--json", "--quiet"]
     done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, text=True, check=True)
     report: dict[str, Any] = json.loads(done.stdout)

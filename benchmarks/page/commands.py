@@ -21,7 +21,13 @@ from ...scope_addon.capture.options import CaptureOptions
 from ..frames import CACHE, DATA, ROOT
 
 WITHOUT_TRUTH = (  # clips of people
-    *("run_moving_camera", "gesture_square", "squats_5fps", "sit_stand_close", "two_people_portrait"),
+    *(
+        "run_moving_camera",
+        "gesture_square",
+        "squats_5fps",
+        "sit_stand_close",
+        "two_people_portrait",
+    ),
     "walk_side_static",
 )
 LOAD_EVERY_S = 10.0
@@ -30,12 +36,18 @@ SCENES_OF = {  # of each split
     "test": "the test scenes",
     "new_performers": "the scenes of new performers",
 }
-SCRIPTS = {"bench": "scope.benchmarks", "gate": "scope.benchmarks.gate", "capture": "scope.scope_addon"}
+SCRIPTS = {
+    "bench": "scope.benchmarks",
+    "gate": "scope.benchmarks.gate",
+    "capture": "scope.scope_addon",
+}
 
 
 @dataclass(frozen=True)
 class Command:
-    """A script of the repository with its arguments, and the section of the page that its results are."""
+    """A script of the repository with its arguments, and the section of the page that its results
+    are.
+    """
 
     title: str
     script: str
@@ -51,9 +63,10 @@ class Command:
 class Outcome:
     """What a command printed, its figures, how long it took and its exit status.
 
-    ``processor_seconds`` are those of the command and all that it started, in all threads. ``load`` is the mean number
-    of processes that ran or waited for a core meanwhile, the command's own included. Both are None where the system
-    does not tell, and in runs recorded before they were measured.
+    ``processor_seconds`` are those of the command and all that it started, in all threads. ``load``
+    is the mean number of processes that ran or waited for a core meanwhile, the command's own
+    included. Both are None where the system does not tell, and in runs recorded before they were
+    measured.
     """
 
     command: Command
@@ -97,8 +110,15 @@ def clips(quick: bool) -> list[tuple[str, Path]]:
     from ...scope_addon.cli import SAMPLE
 
     with_truth = sorted((DATA / "pose2sim").glob("cam?.mp4"))
-    without = [] if quick else [path for name in WITHOUT_TRUTH if (path := DATA / "clips" / f"{name}.mp4").is_file()]
-    return [("sample", SAMPLE), *((path.stem, path) for path in (with_truth[:1] if quick else with_truth) + without)]
+    without = (
+        []
+        if quick
+        else [path for name in WITHOUT_TRUTH if (path := DATA / "clips" / f"{name}.mp4").is_file()]
+    )
+    return [
+        ("sample", SAMPLE),
+        *((path.stem, path) for path in (with_truth[:1] if quick else with_truth) + without),
+    ]
 
 
 def truth_of(video: Path) -> Path | None:
@@ -111,10 +131,11 @@ def truth_of(video: Path) -> Path | None:
 
 
 def worst_clips(measured: Sequence[Outcome]) -> list[tuple[str, Path, str]]:
-    """Return names and paths of the worst rendered clips and scenes of those measured, each once, and the reasons.
+    """Return names and paths of the worst rendered clips and scenes of those measured, each once,
+    and the reasons.
 
-    Two of the renders, and of each split the scene of the worst person and one in which somebody was never found, with
-    the default preset and nothing given.
+    Two of the renders, and of each split the scene of the worst person and one in which somebody
+    was never found, with the default preset and nothing given.
     """
     found: list[tuple[Path, str]] = []
     for outcome in measured:
@@ -123,16 +144,28 @@ def worst_clips(measured: Sequence[Outcome]) -> list[tuple[str, Path, str]]:
             shots = {name: row for name, row in clips.items() if name not in ("mean", "sample")}
             errors = {name: row["mpjpe_root"] for name, row in shots.items() if "mpjpe_root" in row}
             for name in sorted(errors, key=lambda k: -errors[k])[:2]:
-                why = f"One of the two worst of the rendered clips: MPJPE-root is {errors[name]:.1f} mm."
+                why = (
+                    f"One of the two worst of the rendered clips: MPJPE-root is {errors[name]:.1f} "
+                    f"mm."
+                )
                 found.append((CACHE / "renders" / f"{name}.mp4", why))
         if outcome.command.arguments[:1] == ("scenes",):
             for split, figures in outcome.figures.items():
-                people = [row for row in figures["people"]["default preset"] if np.isfinite(row["mpjpe_root"])]
+                people = [
+                    row
+                    for row in figures["people"]["default preset"]
+                    if np.isfinite(row["mpjpe_root"])
+                ]
                 if people:
                     worst = max(people, key=lambda row: row["mpjpe_root"])
-                    why = f"The worst person of {SCENES_OF[split]}: MPJPE-root is {worst['mpjpe_root']:.1f} mm."
+                    why = (
+                        f"The worst person of {SCENES_OF[split]}: MPJPE-root is "
+                        f"{worst['mpjpe_root']:.1f} mm."
+                    )
                     found.append((CACHE / "scenes" / f"{worst['clip']}.mp4", why))
-                for row in [row for row in figures["people"]["default preset"] if not row["found"]][:1]:
+                for row in [row for row in figures["people"]["default preset"] if not row["found"]][
+                    :1
+                ]:
                     why = f"A person of {SCENES_OF[split]} who was not found in any frame."
                     found.append((CACHE / "scenes" / f"{row['clip']}.mp4", why))
     reasons: dict[Path, list[str]] = {}
@@ -147,7 +180,9 @@ def motion_files(folder: Path, name: str) -> list[Path]:
     if one.is_file():
         return [one]
     numbered = re.compile(rf"{re.escape(name)}\.person(\d+)\.npz")
-    found = {int(match[1]): path for path in folder.iterdir() if (match := numbered.fullmatch(path.name))}
+    found = {
+        int(match[1]): path for path in folder.iterdir() if (match := numbered.fullmatch(path.name))
+    }
     return [found[number] for number in sorted(found)]
 
 
@@ -166,7 +201,8 @@ def run(command: Command, folder: Path, say: Callable[[str], None]) -> Outcome:
 def run_capture(video: Path, target: Path, say: Callable[[str], None]) -> Outcome:
     """Capture a clip into the motion file ``target``; the figures are the capture's report.
 
-    Of clips without ground truth everybody is captured, each into a file of their own: see `motion_files`.
+    Of clips without ground truth everybody is captured, each into a file of their own: see
+    `motion_files`.
     """
     people = () if truth_of(video) else ("--people", "all")
     files = (_from_root(video), "-o", _from_root(target))
@@ -180,16 +216,28 @@ def run_capture(video: Path, target: Path, say: Callable[[str], None]) -> Outcom
 
 
 def _from_root(path: Path) -> str:
-    """Return a path of the checkout or beside it as seen from the root folder, where commands run; others as given."""
-    return Path(os.path.relpath(path, ROOT)).as_posix() if path.is_relative_to(ROOT.parent) else str(path)
+    """Return a path of the checkout or beside it as seen from the root folder, where commands run;
+    others as given.
+    """
+    return (
+        Path(os.path.relpath(path, ROOT)).as_posix()
+        if path.is_relative_to(ROOT.parent)
+        else str(path)
+    )
 
 
 def timed(command: Command, arguments: Sequence[str]) -> Outcome:
-    """Run Python with arguments, from the root folder, as a command; return its outcome, without figures."""
+    """Run Python with arguments, from the root folder, as a command; return its outcome, without
+    figures.
+    """
     since, before = time.monotonic(), _processor_seconds()
     loads: list[float] = []
     with subprocess.Popen(
-        [sys.executable, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT
+        [sys.executable, *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=ROOT,
     ) as process:
         try:
             while True:
@@ -203,15 +251,28 @@ def timed(command: Command, arguments: Sequence[str]) -> Outcome:
             raise
     loads += _load()
     spent, load = _processor_seconds() - before, sum(loads) / len(loads) if loads else None
-    return Outcome(command, printed, said, {}, time.monotonic() - since, process.returncode, spent or None, load)
+    return Outcome(
+        command,
+        printed,
+        said,
+        {},
+        time.monotonic() - since,
+        process.returncode,
+        spent or None,
+        load,
+    )
 
 
 def _processor_seconds() -> float:
-    """Return the processor time of all processes that this one has waited for, and of theirs; 0 on Windows."""
+    """Return the processor time of all processes that this one has waited for, and of theirs; 0 on
+    Windows.
+    """
     times = os.times()
     return times.children_user + times.children_system
 
 
 def _load() -> list[float]:
-    """Return the load average over a minute, the shortest that there is, as one number; none on Windows."""
+    """Return the load average over a minute, the shortest that there is, as one number; none on
+    Windows.
+    """
     return [os.getloadavg()[0]] if hasattr(os, "getloadavg") else []

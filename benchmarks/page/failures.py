@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where captures are wrong: their worst moments against ground truth, and what is known to fail without one."""
+"""Where captures are wrong: their worst moments against ground truth, and what is known to fail
+without one.
+"""
 
 from __future__ import annotations
 
@@ -22,13 +24,16 @@ from ...tools.readme_pictures.view import View, from_around, from_the_camera
 from .shots import figures
 
 MOMENTS, APART_S = 2, 0.5  # how many are shown, and how far they are apart
-SIZE, SHOWN_M, FILL = (320, 380), 2.35, 0.76  # of a panel, in pixels; height of the view from the side; share of it
+# of a panel, in pixels; height of the view from the side; share of it
+SIZE, SHOWN_M, FILL = (320, 380), 2.35, 0.76
 _BOTH = [("Scope", OURS), ("ground truth", TRUTH)]
 
 
 @dataclass(frozen=True)
 class KnownFailure:
-    """What is wrong in a clip without ground truth, as seen by eye, and from when to when, in seconds."""
+    """What is wrong in a clip without ground truth, as seen by eye, and from when to when, in
+    seconds.
+    """
 
     first_s: float
     last_s: float
@@ -39,21 +44,29 @@ KNOWN = {  # by the clip's name; docs/limitations.md has more
     "walk_side_static": KnownFailure(
         3.3,
         7.2,
-        "Failure: there is one floor for the clip, the roof on which he stands at first. He lands two metres below it, "
-        "where feet are not held; while he is upside down he can be lost, and the pose is filled in.",
+        "Failure: there is one floor for the clip, the roof on which he stands at first. He lands "
+        "two metres below it, "
+        "where feet are not held; while he is upside down he can be lost, and the pose is filled "
+        "in.",
     ),
 }
 
 
 def limb_errors(motion: Motion, truth: Path) -> NDArray[np.float64]:
-    """Return the mean distance (T,) of the limb joints from ground truth, hips aligned, in mm; NaN without truth."""
+    """Return the mean distance (T,) of the limb joints from ground truth, hips aligned, in mm; NaN
+    without truth.
+    """
     with np.load(truth) as file:
         known = np.isin(motion.frames, file["frame_index"])
-    return np.array([error_mm(motion, row, truth) if known[row] else np.nan for row in range(len(motion))])
+    return np.array(
+        [error_mm(motion, row, truth) if known[row] else np.nan for row in range(len(motion))]
+    )
 
 
 def worst_rows(errors: NDArray[np.float64], timestamps: NDArray[np.float64]) -> list[int]:
-    """Return the rows of the largest errors that are above the mean, `APART_S` or more apart, the largest first."""
+    """Return the rows of the largest errors that are above the mean, `APART_S` or more apart, the
+    largest first.
+    """
     found: list[int] = []
     for row in np.argsort(-np.nan_to_num(errors, nan=-1.0)):
         if len(found) == MOMENTS or not errors[row] > np.nanmean(errors):
@@ -64,15 +77,20 @@ def worst_rows(errors: NDArray[np.float64], timestamps: NDArray[np.float64]) -> 
 
 
 def worst_moments(motion: Motion, truth: Path, body: Body) -> Markup:
-    """Return pictures of a capture's worst moments: from its camera and from the side, with the true joints."""
+    """Return pictures of a capture's worst moments: from its camera and from the side, with the
+    true joints.
+    """
     errors = limb_errors(motion, truth)
     pictures = []
     for row in worst_rows(errors, motion.timestamps):
-        image = next_to_each_other([_panel(motion, row, truth, body, side) for side in (False, True)])
+        image = next_to_each_other(
+            [_panel(motion, row, truth, body, side) for side in (False, True)]
+        )
         text = f"frame {motion.frames[row]}, {motion.timestamps[row]:.2f} s: {errors[row]:.0f} mm"
         pictures.append((image, text))
     note = (
-        "The worst moments, ground truth in red. The captions give the mean distance of the limb joints, hips aligned; "
+        "The worst moments, ground truth in red. The captions give the mean distance of the limb "
+        "joints, hips aligned; "
         f"its mean over the clip is {np.nanmean(errors):.0f} mm."
     )
     return captioned(pictures, note)
@@ -80,13 +98,19 @@ def worst_moments(motion: Motion, truth: Path, body: Body) -> Markup:
 
 def captioned(pictures: Sequence[tuple[NDArray[np.uint8], str]], note: str) -> Markup:
     """Return pictures with a caption each, below a note about all of them."""
-    images, captions = [small_picture(0, image) for image, _ in pictures], [text for _, text in pictures]
+    images, captions = (
+        [small_picture(0, image) for image, _ in pictures],
+        [text for _, text in pictures],
+    )
     return Markup(page.paragraph(note) + figures(images, captions, large=True))
 
 
 def _panel(motion: Motion, row: int, truth: Path, body: Body, side: bool) -> NDArray[np.uint8]:
     vertices, true = posed(motion, body, row), true_joints(motion, row, truth)
-    panel = Panel(_view(motion, row, np.concatenate([vertices, list(true.values())]), side), joints(motion, row)[0])
+    panel = Panel(
+        _view(motion, row, np.concatenate([vertices, list(true.values())]), side),
+        joints(motion, row)[0],
+    )
     panel.body(body, vertices)
     panel.sticks(true)
     panel.heading("turned by 90 degrees" if side else "as the camera sees it")

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the solver's paper states in words about its speed, beside what was measured here.
 
-Its curves (figures 5 to 7) and tables exist as pictures alone; of its text, the abstract was available when this was
-written (arXiv:2105.13965, and the page sites.google.com/view/scope-human). `curves` reads digitized curves.
+Its curves (figures 5 to 7) and tables exist as pictures alone; of its text, the abstract was
+available when this was written (arXiv:2105.13965, and the page sites.google.com/view/scope-human).
+`curves` reads digitized curves.
 """
 
 from __future__ import annotations
@@ -20,12 +21,14 @@ from ..solver.steps import growth, growth_in_joints
 
 SOURCE = "the paper's abstract (arXiv:2105.13965)"
 FRAME_MS = 4.0  # on average, until one frame has converged; the computer is not stated there
-LINEAR, CUBIC = 1.0, 3.0  # exponents of time in joints and measurements: the paper's, and earlier work's as it says
+# exponents of time in joints and measurements: the paper's, and earlier work's as it says
+LINEAR, CUBIC = 1.0, 3.0
 _KINDS = {"cold": "cold: no earlier estimate", "warm": "warm: from the frame before"}
 
 
 def stated_table(figures: Mapping[str, Any]) -> Markup:
-    """Return a table of what the paper states and of what ``bench solver`` measured; empty without its figures.
+    """Return a table of what the paper states and of what ``bench solver`` measured; empty without
+    its figures.
 
     :param figures: of ``bench solver``.
     """
@@ -33,10 +36,18 @@ def stated_table(figures: Mapping[str, Any]) -> Markup:
     converged = {row["kind"]: row for row in _frames(figures) if row["tolerance"] == REPORTED}
     if converged:
         found = ", ".join(f"{row['milliseconds']:.2f} {kind}" for kind, row in converged.items())
-        rows.append(("one frame to convergence, ms", f"{FRAME_MS:g} on average", f"{found} (medians)"))
+        rows.append(
+            ("one frame to convergence, ms", f"{FRAME_MS:g} on average", f"{found} (medians)")
+        )
     if steps := figures.get("experiments", {}).get("1"):  # P = 0, growing N
         by_terms = " and ".join(f"{growth(steps, K, 'sparse'):.2f}" for K in (23, 51))
-        rows.append(("exponent of a step's time in measurements", f"{LINEAR:g}", f"{by_terms} (23 and 51 joints)"))
+        rows.append(
+            (
+                "exponent of a step's time in measurements",
+                f"{LINEAR:g}",
+                f"{by_terms} (23 and 51 joints)",
+            )
+        )
         sparse, dense = (f"{growth_in_joints(steps, method):.2f}" for method in ("sparse", "dense"))
         rows.append(("exponent of a step's time in joints", f"{LINEAR:g}", sparse))
         rows.append(("exponent of a dense step's time in joints", f"{CUBIC:g}", dense))
@@ -46,21 +57,40 @@ def stated_table(figures: Mapping[str, Any]) -> Markup:
 
 
 def convergence_plot(figures: Mapping[str, Any]) -> Markup:
-    """Return milliseconds of a frame by the relative decrease at which it stops, below the paper's time; or nothing."""
+    """Return milliseconds of a frame by the relative decrease at which it stops, below the paper's
+    time; or nothing.
+    """
     rows, curves = _frames(figures), []
     for n, (kind, name) in enumerate(_KINDS.items()):
-        chosen = sorted((row["tolerance"], row["milliseconds"]) for row in rows if row["kind"] == kind)
+        chosen = sorted(
+            (row["tolerance"], row["milliseconds"]) for row in rows if row["kind"] == kind
+        )
         if chosen:
             x, y = np.array(chosen, float).T
             curves.append(Curve(x, y, page.person_color(n), name, with_points=True))
     if not curves:
         return Markup("")
-    ends = np.array([min(curve.x.min() for curve in curves), max(curve.x.max() for curve in curves)])
-    curves.append(Curve(ends, np.full(2, FRAME_MS), page.person_color(len(curves)), f"{FRAME_MS:g} ms: {SOURCE}"))
+    ends = np.array(
+        [min(curve.x.min() for curve in curves), max(curve.x.max() for curve in curves)]
+    )
+    curves.append(
+        Curve(
+            ends, np.full(2, FRAME_MS), page.person_color(len(curves)), f"{FRAME_MS:g} ms: {SOURCE}"
+        )
+    )
     lowest = min(float(curve.y.min()) for curve in curves)
     x_axis = Axis(float(ends[0]) / 1.2, float(ends[1]) * 1.2, logarithmic=True)
-    title = "Milliseconds until a frame has converged, by the relative decrease at which it stops; both logarithmic"
-    svg = line_plot(curves, x_axis, Axis(lowest / 1.3, 1.3 * FRAME_MS, logarithmic=True), label=title, timed=False)
+    title = (
+        "Milliseconds until a frame has converged, by the relative decrease at which it stops; "
+        "both logarithmic"
+    )
+    svg = line_plot(
+        curves,
+        x_axis,
+        Axis(lowest / 1.3, 1.3 * FRAME_MS, logarithmic=True),
+        label=title,
+        timed=False,
+    )
     return page.plot_figure(title, svg, {curve.name: curve.color for curve in curves})
 
 

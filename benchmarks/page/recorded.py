@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A run of the report as a file, from which its page can be made again without measuring anything."""
+"""A run of the report as a file, from which its page can be made again without measuring
+anything.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,8 @@ PREVIOUS = "run.previous.json"  # the run before it, whose motion files may be g
 
 @dataclass(frozen=True)
 class Run:
-    """What the commands gave: clips with names and videos, and measurements; when; facts about the machine.
+    """What the commands gave: clips with names and videos, and measurements; when; facts about the
+    machine.
 
     ``quick``: whether it leaves out what takes long.
     """
@@ -41,7 +44,8 @@ def write_run(folder: Path, run: Run) -> None:
     :raises OSError: the file cannot be written.
     """
     captured = [
-        {"name": name, "video": str(video), "outcome": asdict(outcome)} for name, video, outcome in run.captured
+        {"name": name, "video": str(video), "outcome": asdict(outcome)}
+        for name, video, outcome in run.captured
     ]
     measured = [asdict(outcome) for outcome in run.measured]
     content = {"time": run.time, "facts": run.facts, "quick": run.quick}
@@ -51,7 +55,8 @@ def write_run(folder: Path, run: Run) -> None:
 
 
 def set_aside(folder: Path) -> None:
-    """Rename the run in a folder, if there is one, to `PREVIOUS`: one that starts is not to be mistaken for it.
+    """Rename the run in a folder, if there is one, to `PREVIOUS`: one that starts is not to be
+    mistaken for it.
 
     :raises OSError: the file cannot be renamed.
     """
@@ -71,13 +76,25 @@ def read_run(folder: Path) -> Run:
     except ValueError as error:
         raise InputError(f"{folder / FILE} is no JSON: {error}") from error
     try:
-        captured = [(each["name"], Path(each["video"]), _outcome(each["outcome"])) for each in content["captured"]]
+        captured = [
+            (each["name"], Path(each["video"]), _outcome(each["outcome"]))
+            for each in content["captured"]
+        ]
         measured = [_outcome(each) for each in content["measured"]]
-        return Run(captured, measured, content["time"], content["facts"], content.get("quick", False))
+        return Run(
+            captured, measured, content["time"], content["facts"], content.get("quick", False)
+        )
     except (KeyError, TypeError) as error:
-        raise InputError(f"{folder / FILE} is not of this version; run ./scripts/report again") from error
+        raise InputError(
+            f"{folder / FILE} is not of this version; run ./scripts/report again"
+        ) from error
 
 
 def _outcome(entry: dict[str, Any]) -> Outcome:
     command = entry["command"]
-    return Outcome(**{**entry, "command": Command(command["title"], command["script"], tuple(command["arguments"]))})
+    return Outcome(
+        **{
+            **entry,
+            "command": Command(command["title"], command["script"], tuple(command["arguments"])),
+        }
+    )

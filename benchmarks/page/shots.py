@@ -21,24 +21,34 @@ from ...solver.body import Body
 from ...solver.rotations import exp
 from ...tools.readme_pictures.view import level_camera
 
-SHOTS, SIDE_PX, SHOWN_M = 6, 360, 2.4  # of a strip; of a picture; height of what the view from the side shows
-_FILLED, _NEAREST_M = 0.95, 0.3  # share of the picture that may be covered; what is nearer is not looked at
+# of a strip; of a picture; height of what the view from the side shows
+SHOTS, SIDE_PX, SHOWN_M = 6, 360, 2.4
+# share of the picture that may be covered; what is nearer is not looked at
+_FILLED, _NEAREST_M = 0.95, 0.3
 _GROUND, _FAINT = 236, 0.35  # grey behind the body; opacity of a pose that is filled in
 
 Image = NDArray[np.uint8]
 
 
 def strips(
-    video: Path, motions: Sequence[Motion], body: Body, first_s: float = 0.0, last_s: float = math.inf
+    video: Path,
+    motions: Sequence[Motion],
+    body: Body,
+    first_s: float = 0.0,
+    last_s: float = math.inf,
 ) -> Markup:
-    """Return three rows of pictures at the same frames, spread over a part of the clip, each with a caption."""
+    """Return three rows of pictures at the same frames, spread over a part of the clip, each with a
+    caption.
+    """
     times = motions[0].timestamps
     part = np.flatnonzero((times >= first_s) & (times <= last_s))
     rows = part[spread_rows(len(part), SHOTS)]
     wanted = motions[0].frames[rows].tolist()
     footage = frames_of(video, wanted)
     overlay = dict(painted_frames(video, motions, body, wanted))
-    side = {frame: side_view(motions, body, int(row)) for frame, row in zip(wanted, rows, strict=True)}
+    side = {
+        frame: side_view(motions, body, int(row)) for frame, row in zip(wanted, rows, strict=True)
+    }
     at = dict(zip(wanted, times[rows].tolist(), strict=True))
     parts = []
     for name, pictures in (("footage", footage), ("overlay", overlay), ("turned by 90°", side)):
@@ -50,7 +60,10 @@ def strips(
 
 
 def figures(
-    pictures: Sequence[Picture], captions: Sequence[str], descriptions: Sequence[str] | None = None, large: bool = False
+    pictures: Sequence[Picture],
+    captions: Sequence[str],
+    descriptions: Sequence[str] | None = None,
+    large: bool = False,
 ) -> Markup:
     """Return pictures next to each other, each above its caption.
 
@@ -60,7 +73,9 @@ def figures(
     shown = "".join(
         f'<figure><img src="{picture.url}" width="{picture.width}" height="{picture.height}" '
         f'alt="{escape(description)}"><figcaption>{escape(caption)}</figcaption></figure>'
-        for picture, caption, description in zip(pictures, captions, descriptions or captions, strict=True)
+        for picture, caption, description in zip(
+            pictures, captions, descriptions or captions, strict=True
+        )
     )
     return Markup(f'<div class="shots{" large" if large else ""}">{shown}</div>\n')
 
@@ -72,15 +87,19 @@ def frames_of(video: Path, wanted: Sequence[int]) -> dict[int, Image]:
 
 
 def side_view(motions: Sequence[Motion], body: Body, row: int) -> Image:
-    """Return the bodies of a row as a camera sees them that went a quarter turn around their middle, at its height.
+    """Return the bodies of a row as a camera sees them that went a quarter turn around their
+    middle, at its height.
 
-    People who were not seen are faint. What is shown is `SHOWN_M` high, more where that does not hold everybody.
+    People who were not seen are faint. What is shown is `SHOWN_M` high, more where that does not
+    hold everybody.
     """
     world, roots = [], []
     for motion in motions:
         betas = motion.betas.astype(float)
         R, t = body.forward_kinematics(
-            exp(motion.poses[row].reshape(-1, 3).astype(float)), motion.trans[row].astype(float), betas
+            exp(motion.poses[row].reshape(-1, 3).astype(float)),
+            motion.trans[row].astype(float),
+            betas,
         )
         world.append(body.skin(R, t, betas))
         roots.append(t[0])
@@ -96,11 +115,16 @@ def side_view(motions: Sequence[Motion], body: Body, row: int) -> Image:
     K = np.array([[focal, 0, SIDE_PX / 2], [0, focal, SIDE_PX / 2], [0, 0, 1]])
     blank = np.full((SIDE_PX, SIDE_PX, 3), _GROUND, np.uint8)
     colors = [body_colors(body, k) for k in range(len(motions))]
-    return draw_overlay(blank, vertices, body.faces, K, None, colors, [1.0 if each else _FAINT for each in seen])
+    return draw_overlay(
+        blank, vertices, body.faces, K, None, colors, [1.0 if each else _FAINT for each in seen]
+    )
 
 
-def turned_camera(world_from_camera: NDArray[Any], target: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return rotation, world to camera in OpenCV's axes, and centre of a camera a quarter turn further around a target.
+def turned_camera(
+    world_from_camera: NDArray[Any], target: NDArray[Any]
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return rotation, world to camera in OpenCV's axes, and centre of a camera a quarter turn
+    further around a target.
 
     It looks at the target with z up.
     """

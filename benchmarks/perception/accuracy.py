@@ -39,7 +39,9 @@ def evaluate_camera(body: Body, camera: str, options: CaptureOptions) -> dict[st
     return evaluate_clip(body, folder / f"{camera}.mp4", folder / f"truth_{camera}.npz", options)[1]
 
 
-def evaluate_clip(body: Body, video: Path, truth: Path, options: CaptureOptions) -> tuple[Motion, dict[str, Any]]:
+def evaluate_clip(
+    body: Body, video: Path, truth: Path, options: CaptureOptions
+) -> tuple[Motion, dict[str, Any]]:
     """Capture a clip; return its motion and all figures of the evaluation tool for it.
 
     :raises NoPersonError: when nobody was found.
@@ -59,9 +61,11 @@ def evaluate_motion(motion: Motion, truth: Path) -> dict[str, Any]:
 
 
 def evaluate_all(body: Body, options: Callable[[str], CaptureOptions]) -> dict[str, dict[str, Any]]:
-    """Return the figures of each camera under its name and, under "mean", the means of those in ``SHOWN``.
+    """Return the figures of each camera under its name and, under "mean", the means of those in
+    ``SHOWN``.
 
-    ``flipped`` is the largest of the three shares of ``FLIPS``, and its mean is that of the worst camera.
+    ``flipped`` is the largest of the three shares of ``FLIPS``, and its mean is that of the worst
+    camera.
     """
     found = {camera: evaluate_camera(body, camera, options(camera)) for camera in CAMERAS}
     mean = {key: float(np.mean([f[key] for f in found.values()])) for key in SHOWN}

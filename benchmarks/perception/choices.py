@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`./scripts/bench choices`: cross-validate weights and thresholds over cameras.
 
-Every weight, deviation or share that was chosen by measuring is set to values around the shipped one. For each of the
-four pose2sim cameras in turn, the value that is best for the other three is evaluated on the camera that was left out
-and compared with the shipped value. A value that is overfitted to the clips on which it was chosen loses there.
+Every weight, deviation or share that was chosen by measuring is set to values around the shipped
+one. For each of the four pose2sim cameras in turn, the value that is best for the other three is
+evaluated on the camera that was left out and compared with the shipped value. A value that is
+overfitted to the clips on which it was chosen loses there.
 """
 
 from __future__ import annotations
@@ -31,7 +32,9 @@ from .accuracy import CAMERAS, evaluate_camera
 
 @dataclass(frozen=True)
 class Choice:
-    """A constant of the pipeline, ``module.name`` or its field ``field``, and alternative values."""
+    """A constant of the pipeline, ``module.name`` or its field ``field``, and alternative
+    values.
+    """
 
     what: str
     module: ModuleType
@@ -49,7 +52,9 @@ class Choice:
     def set_to(self, value: float) -> Iterator[None]:
         """Set another value while the context lasts."""
         before: Any = getattr(self.module, self.name)
-        setattr(self.module, self.name, replace(before, **{self.field: value}) if self.field else value)
+        setattr(
+            self.module, self.name, replace(before, **{self.field: value}) if self.field else value
+        )
         try:
             yield
         finally:
@@ -59,10 +64,18 @@ class Choice:
 CHOICES = (
     Choice("weight of 2D keypoints", prepared_track, "WEIGHTS", (5e4, 2e5), "keypoints2d"),
     Choice("weight of 3D keypoints", prepared_track, "WEIGHTS", (2.5, 25.0), "keypoints3d"),
-    Choice("weight of the orientation field", prepared_track, "WEIGHTS", (250.0, 1000.0), "orientation_field"),
+    Choice(
+        "weight of the orientation field",
+        prepared_track,
+        "WEIGHTS",
+        (250.0, 1000.0),
+        "orientation_field",
+    ),
     Choice("weight of the joint prior", prepared_track, "WEIGHTS", (2.0, 8.0), "joint_prior"),
     Choice("weight of the shape prior", prepared_track, "WEIGHTS", (1.0, 10.0), "shape"),
-    Choice("weight of the floor under standing feet", prepared_track, "WEIGHTS", (5e3, 2e4), "floor"),
+    Choice(
+        "weight of the floor under standing feet", prepared_track, "WEIGHTS", (5e3, 2e4), "floor"
+    ),
     Choice("share lifted with world landmarks", lifter, "WORLD_SHARE", (0.5, 1.0)),
     Choice("speed at which balance is doubted, m/s", balance, "STANDING_M_S", (0.25, 1.0)),
     Choice("deviation of feet from the floor, m", stance, "FLOOR_SIGMA_M", (0.015, 0.06)),
@@ -101,13 +114,25 @@ def choices(quick: bool) -> dict[str, Any]:
         for value in choice.others:
             with choice.set_to(value):
                 found.append(errors())
-            rows.append([f"{choice.what}: {value:g} instead of {choice.shipped:g}", *_cells(found[-1])])
+            rows.append(
+                [f"{choice.what}: {value:g} instead of {choice.shipped:g}", *_cells(found[-1])]
+            )
         chosen, there = left_out(np.array(found)[:, :, 0])
         named = ", ".join(f"{values[k]:g}" for k in chosen)
         summary.append([choice.what, f"{values[0]:g}", named, shipped[:, 0].mean(), there.mean()])
-        figures[choice.what] = {"values": values, "errors": np.array(found).tolist(), "left_out": there.tolist()}
+        figures[choice.what] = {
+            "values": values,
+            "errors": np.array(found).tolist(),
+            "left_out": there.tolist(),
+        }
     print(table(("MPJPE-root / PA-MPJPE mm", *CAMERAS, "mean"), rows), end="\n\n")
-    head = ("choice", "shipped", "chosen without each camera", "shipped, MPJPE-root mm", "chosen, on those left out")
+    head = (
+        "choice",
+        "shipped",
+        "chosen without each camera",
+        "shipped, MPJPE-root mm",
+        "chosen, on those left out",
+    )
     print(table(head, summary), end="\n\n", flush=True)
     return figures
 
@@ -117,4 +142,6 @@ def _cells(errors: NDArray[np.float64]) -> list[str]:
 
 
 def _each(errors: NDArray[np.float64]) -> str:
-    return ", ".join(f"{name} {cell}" for name, cell in zip((*CAMERAS, "mean"), _cells(errors), strict=True))
+    return ", ".join(
+        f"{name} {cell}" for name, cell in zip((*CAMERAS, "mean"), _cells(errors), strict=True)
+    )

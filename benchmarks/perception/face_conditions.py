@@ -40,7 +40,9 @@ def faces_and_conditions(quick: bool) -> dict[str, Any]:
 
 
 def conditions() -> dict[str, Any]:
-    """Render what is missing, measure the capture by condition, print the table, return the figures by condition."""
+    """Render what is missing, measure the capture by condition, print the table, return the figures
+    by condition.
+    """
     figures: dict[str, Any] = {}
     for label, name, pixels in CONDITIONS:
         render_missing(name)
@@ -49,11 +51,17 @@ def conditions() -> dict[str, Any]:
         figures[label] = measure(seen, scale, _capture) | _confidence(seen, scale)
     render_missing(LONG)
     seen = seen_faces(LONG)
-    for label, piece in (("30 s in one piece", seen), ("the same in pieces of 5 s", in_pieces(seen, PIECE_S))):
+    for label, piece in (
+        ("30 s in one piece", seen),
+        ("the same in pieces of 5 s", in_pieces(seen, PIECE_S)),
+    ):
         figures[label] = measure(piece, 1.0, _capture) | _confidence(piece, 1.0)
     keys = [key for key in SHOWN if key != "rest"]
     columns = ("condition", *(SHOWN[key] for key in keys), "confidence", "size, px")
-    rows = [[label, *(row[key] for key in (*keys, "confidence", "size"))] for label, row in figures.items()]
+    rows = [
+        [label, *(row[key] for key in (*keys, "confidence", "size"))]
+        for label, row in figures.items()
+    ]
     print(table(columns, rows), end="\n\n", flush=True)
     return figures
 
@@ -71,10 +79,16 @@ def _capture(rows: NDArray[np.float64], times: NDArray[np.float64]) -> Found:
 
 def _confidence(seen: SeenFaces, scale: float) -> dict[str, float]:
     """Return the mean confidence, and the mean size of the box of the landmarks in pixels."""
-    person, sure, size = seen.truth["person"], np.empty(len(seen.presence)), np.empty(len(seen.presence))
+    person, sure, size = (
+        seen.truth["person"],
+        np.empty(len(seen.presence)),
+        np.empty(len(seen.presence)),
+    )
     for p in np.unique(person):
         rows = np.flatnonzero(person == p)
         found = rows_of(seen, rows, scale)
-        sure[rows] = expression_motion(found, seen.truth["seconds"][rows], smoothing=True)["expression_confidence"]
+        sure[rows] = expression_motion(found, seen.truth["seconds"][rows], smoothing=True)[
+            "expression_confidence"
+        ]
         size[rows] = parts(found)[1]
     return {"confidence": float(sure.mean()), "size": float(size.mean())}

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`./scripts/bench faces`: expression weights and gaze on rendered faces with known ones, by each way to find them.
+"""`./scripts/bench faces`: expression weights and gaze on rendered faces with known ones, by each
+way to find them.
 
-The people of the set ``talk_held_out`` are not among those that `tools.calibrate_face` measures the response on, and
-another renderer draws them. The first half of each clip is talk, the second grimaces; views are within 45°.
+The people of the set ``talk_held_out`` are not among those that `tools.calibrate_face` measures the
+response on, and another renderer draws them. The first half of each clip is talk, the second
+grimaces; views are within 45°.
 """
 
 from __future__ import annotations
@@ -47,7 +49,9 @@ Found = tuple[NDArray[np.float64], NDArray[np.float64]]  # weights (T, 52), gaze
 
 
 def faces(quick: bool) -> dict[str, Any]:
-    """Render what is missing, measure, print the tables as they come, return the figures by size and way."""
+    """Render what is missing, measure, print the tables as they come, return the figures by size
+    and way.
+    """
     for name in (CALIBRATION, HELD_OUT):
         render_missing(name)
     calibrate = monotone_maps(seen_faces(CALIBRATION))
@@ -57,7 +61,9 @@ def faces(quick: bool) -> dict[str, Any]:
         ways: dict[str, Callable[[NDArray[np.float64], NDArray[np.float64]], Found]] = {
             "nothing moves": lambda rows, _: _values(0 * rows),
             "network": lambda rows, _: _values(rows),
-            "network, calibrated": lambda rows, _: _values(_with_weights(rows, calibrate(parts(rows)[2]))),
+            "network, calibrated": lambda rows, _: _values(
+                _with_weights(rows, calibrate(parts(rows)[2]))
+            ),
             "fit": lambda rows, times: _values(fitted(rows, times)),
             "network, smoothed": lambda rows, times: smoothed(rows, times),
             "fit, smoothed: the capture": lambda rows, times: smoothed(fitted(rows, times), times),
@@ -78,7 +84,9 @@ def render_missing(name: str) -> None:
 
 
 def measure(seen: SeenFaces, scale: float, way: Callable[..., Found]) -> dict[str, float]:
-    """Return the figures of one way: mean absolute errors of weights, timing of closed eyes, and error of the gaze."""
+    """Return the figures of one way: mean absolute errors of weights, timing of closed eyes, and
+    error of the gaze.
+    """
     truth, person = seen.truth["weights"], seen.truth["person"]
     gaze, weights = np.empty((len(truth), 2, 3)), np.empty_like(truth)
     for p in np.unique(person):
@@ -97,8 +105,11 @@ def measure(seen: SeenFaces, scale: float, way: Callable[..., Found]) -> dict[st
     return {k: float(v) for k, v in out.items()} | closures(weights, truth, person)
 
 
-def closures(weights: NDArray[np.float64], truth: NDArray[np.float64], person: NDArray[np.intp]) -> dict[str, float]:
-    """Return the share of eye closures that were found, false ones per true one, and their mean offset in frames.
+def closures(
+    weights: NDArray[np.float64], truth: NDArray[np.float64], person: NDArray[np.intp]
+) -> dict[str, float]:
+    """Return the share of eye closures that were found, false ones per true one, and their mean
+    offset in frames.
 
     An eye closes where its weight rises over `CLOSED`.
     """
@@ -124,11 +135,15 @@ def monotone_maps(seen: SeenFaces) -> Callable[[NDArray[np.float64]], NDArray[np
     for found, true in zip(seen.weights.T, seen.truth["weights"].T, strict=True):
         order = np.argsort(found)
         maps.append((found[order], pooled(true[order])))
-    return lambda w: np.stack([np.interp(c, x, y) for c, (x, y) in zip(w.T, maps, strict=True)], axis=1)
+    return lambda w: np.stack(
+        [np.interp(c, x, y) for c, (x, y) in zip(w.T, maps, strict=True)], axis=1
+    )
 
 
 def pooled(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the non-decreasing sequence with least squared distance, by pooling adjacent violators."""
+    """Return the non-decreasing sequence with least squared distance, by pooling adjacent
+    violators.
+    """
     blocks: list[tuple[float, int]] = []
     for value in values:
         blocks.append((float(value), 1))
@@ -145,7 +160,9 @@ def rows_of(seen: SeenFaces, rows: NDArray[np.intp], scale: float) -> NDArray[np
     return np.array(
         [
             record(
-                FaceEstimate(scale * seen.landmarks[t], float(seen.presence[t]), region, float(light[t])),
+                FaceEstimate(
+                    scale * seen.landmarks[t], float(seen.presence[t]), region, float(light[t])
+                ),
                 seen.weights[t],
             )
             for t in rows
@@ -171,8 +188,13 @@ def smoothed(rows: NDArray[np.float64], times: NDArray[np.float64]) -> Found:
 
 
 def _gaze_from_rest(seen: SeenFaces) -> NDArray[np.float64]:
-    """Return the true gaze (T, 2, 3), from where each person's eyes point at weights of 0: ahead."""
-    gaze, turning = seen.truth["gaze"], [k for k, name in enumerate(EXPRESSIONS) if name.startswith("eyeLook")]
+    """Return the true gaze (T, 2, 3), from where each person's eyes point at weights of 0:
+    ahead.
+    """
+    gaze, turning = (
+        seen.truth["gaze"],
+        [k for k, name in enumerate(EXPRESSIONS) if name.startswith("eyeLook")],
+    )
     tangents = gaze[..., :2] / gaze[..., 2:]
     for p in np.unique(seen.truth["person"]):
         rows = seen.truth["person"] == p
@@ -192,7 +214,10 @@ def _rises(weight: NDArray[np.float64]) -> NDArray[np.intp]:
 
 
 def _fit_ms(seen: SeenFaces, scale: float) -> float:
-    rows, times = rows_of(seen, np.arange(len(seen.presence)), scale), np.arange(len(seen.presence)) / 30
+    rows, times = (
+        rows_of(seen, np.arange(len(seen.presence)), scale),
+        np.arange(len(seen.presence)) / 30,
+    )
     begin = time.perf_counter()
     fitted(rows, times)
     return 1000 * (time.perf_counter() - begin) / len(rows)

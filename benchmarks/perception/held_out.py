@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shots of the takes that the lifter was not trained on: a section of each, with a random body and a random camera.
+"""Shots of the takes that the lifter was not trained on: a section of each, with a random body and
+a random camera.
 
-The joint prior was trained on all of them but one: it is split by performer (`assets/prior/README.md`). Some choices
-were made by looking at these shots.
+The joint prior was trained on all of them but one: it is split by performer
+(`assets/prior/README.md`). Some choices were made by looking at these shots.
 """
 
 from __future__ import annotations
@@ -23,9 +24,11 @@ from ...tools.train_lifter.split import is_held_out
 SEED = 7
 SIZE = (640, 480)
 SECONDS, MIN_SECONDS = 1.5, 0.7
-SUNK_M = 0.12  # under the recorded floor: the fit left a hand there, which the performer's model lacks
+# under the recorded floor: the fit left a hand there, which the performer's model lacks
+SUNK_M = 0.12
 MAX_BETA = 2.5  # of a standard normal distribution
-FOCAL_PX = (470.0, 1000.0)  # 0.73 to 1.56 of the width: a phone's main camera to twice its focal length
+# 0.73 to 1.56 of the width: a phone's main camera to twice its focal length
+FOCAL_PX = (470.0, 1000.0)
 HEIGHT_M, DISTANCE_M, TILT_DEG = (0.8, 2.0), (3.0, 6.5), (0.0, 15.0)  # of the camera; it looks down
 MIN_FILL = 0.45  # longer side of the person's box over the image height, median of the frames
 MARGIN_PX = 12.0  # around the person in all frames
@@ -52,7 +55,9 @@ class Take:
 
 
 def held_out_takes(path: Path) -> list[Take]:
-    """Read the takes held out from the lifter's training, of a file written by ``tools.mocap.fit_body``."""
+    """Read the takes held out from the lifter's training, of a file written by
+    ``tools.mocap.fit_body``.
+    """
     return [take for take in all_takes(path) if is_held_out(np.array(take.number))]
 
 
@@ -66,13 +71,21 @@ def all_takes(path: Path) -> list[Take]:
     for k in range(len(names)):
         rows = {key: array[start[k] : start[k + 1]] for key, array in arrays.items()}
         takes.append(
-            Take(k, str(names[k]), **rows, betas=betas[k], fps=round(float(fps[k]), 1), performer=str(performers[k]))
+            Take(
+                k,
+                str(names[k]),
+                **rows,
+                betas=betas[k],
+                fps=round(float(fps[k]), 1),
+                performer=str(performers[k]),
+            )
         )
     return takes
 
 
 def draw_shot(body: Body, take: Take, seed: int = SEED) -> Shot:
-    """Return a section of the take with a random body in front of a random camera, reproducible by its seed.
+    """Return a section of the take with a random body in front of a random camera, reproducible by
+    its seed.
 
     Camera, heading and place are drawn until the person is well inside the image and the room.
 
@@ -96,14 +109,19 @@ def draw_shot(body: Body, take: Take, seed: int = SEED) -> Shot:
 
 
 def standing_feet(body: Body, shot: Shot) -> NDArray[np.bool_]:
-    """Return (T, 2) bool: whether the midpoint of heel and toe of the left and the right foot is low and at rest."""
+    """Return (T, 2) bool: whether the midpoint of heel and toe of the left and the right foot is
+    low and at rest.
+    """
     feet = feet_world(body, shot.rotations, shot.trans, shot.betas)
     speed = np.linalg.norm(np.gradient(feet, axis=0), axis=-1) * shot.fps
     return (speed < STILL_M_PER_S) & (feet[..., 2] < STANDS_BELOW_M)
 
 
 def feet_world(
-    body: Body, rotations: NDArray[np.float64], trans: NDArray[np.float64], betas: NDArray[np.floating[Any]]
+    body: Body,
+    rotations: NDArray[np.float64],
+    trans: NDArray[np.float64],
+    betas: NDArray[np.floating[Any]],
 ) -> NDArray[np.float64]:
     """Return (T, 2, 3), the midpoints of heel and toe, left and right, in the world, in metres."""
     points = body.keypoints(*body.forward_kinematics(rotations, trans, betas), betas)
@@ -112,8 +130,11 @@ def feet_world(
     return points[:, sides].mean(axis=2)
 
 
-def draw_section(rng: np.random.Generator, body: Body, take: Take, seconds: float) -> NDArray[np.intp]:
-    """Return the indices (n,) of consecutive valid frames: as many as wanted, or fewer if the take has no more.
+def draw_section(
+    rng: np.random.Generator, body: Body, take: Take, seconds: float
+) -> NDArray[np.intp]:
+    """Return the indices (n,) of consecutive valid frames: as many as wanted, or fewer if the take
+    has no more.
 
     :raises ValueError: when the take has no section of valid frames.
     """
@@ -131,14 +152,18 @@ def draw_section(rng: np.random.Generator, body: Body, take: Take, seconds: floa
 def states_and_pelvis(
     body: Body, take: Take, frames: NDArray[np.intp], betas: NDArray[np.floating[Any]]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the take's joint states (n, K+1, 3, 3) and pelvis (n, 3) in a world with z up, for a body of that shape.
+    """Return the take's joint states (n, K+1, 3, 3) and pelvis (n, 3) in a world with z up, for a
+    body of that shape.
 
-    The root trajectory is the performer's times the ratio of leg lengths, so that feet at rest remain at rest.
+    The root trajectory is the performer's times the ratio of leg lengths, so that feet at rest
+    remain at rest.
     """
     states = exp(take.poses[frames].reshape(len(frames), -1, 3).astype(float))
     states[:, 0] = R_WORLD_MODEL @ states[:, 0]
     share = _leg_length(body, betas) / _leg_length(body, take.betas)
-    return states, share * (body.rest_joints(take.betas)[0] + take.trans[frames].astype(float)) @ R_WORLD_MODEL.T
+    return states, share * (
+        body.rest_joints(take.betas)[0] + take.trans[frames].astype(float)
+    ) @ R_WORLD_MODEL.T
 
 
 def floor_under(body: Body, skin: NDArray[np.float64]) -> float:
@@ -159,13 +184,24 @@ def _skin_of_feet(body: Body) -> NDArray[np.intp]:
     return np.flatnonzero(np.isin(part, feet))
 
 
-def _draw_camera(rng: np.random.Generator, shot: Shot, skin: NDArray[np.float64]) -> tuple[Shot, NDArray[np.float64]]:
-    """Draw a camera, and a heading by which the world is turned, with all of the skin (T, V, 3) in the image."""
+def _draw_camera(
+    rng: np.random.Generator, shot: Shot, skin: NDArray[np.float64]
+) -> tuple[Shot, NDArray[np.float64]]:
+    """Draw a camera, and a heading by which the world is turned, with all of the skin (T, V, 3) in
+    the image.
+    """
     few = skin[:, ::FEW]
     for _ in range(TRIES):
-        R_heading, tilt = exp(np.array([0.0, 0.0, rng.uniform(0, 2 * np.pi)])), np.radians(rng.uniform(*TILT_DEG))
-        focal, height, distance = (rng.uniform(*limits) for limits in (FOCAL_PX, HEIGHT_M, DISTANCE_M))
-        world_from_camera = world_from_level_camera(np.array([0.0, -np.cos(tilt), -np.sin(tilt)]), height)
+        R_heading, tilt = (
+            exp(np.array([0.0, 0.0, rng.uniform(0, 2 * np.pi)])),
+            np.radians(rng.uniform(*TILT_DEG)),
+        )
+        focal, height, distance = (
+            rng.uniform(*limits) for limits in (FOCAL_PX, HEIGHT_M, DISTANCE_M)
+        )
+        world_from_camera = world_from_level_camera(
+            np.array([0.0, -np.cos(tilt), -np.sin(tilt)]), height
+        )
         world_from_camera[1, 3] = -distance
         K = np.array([[focal, 0, SIZE[0] / 2 - 0.5], [0, focal, SIZE[1] / 2 - 0.5], [0, 0, 1]])
         drawn = replace(shot, intrinsics=K, world_from_camera=world_from_camera)

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run MediaPipe's own Python pipeline over a video, in a separate environment, and print frames per second.
+"""Run MediaPipe's own Python pipeline over a video, in a separate environment, and print frames per
+second.
 
     python mediapipe_run.py VIDEO COMPLEXITY FRAMES
 
-Decoding by OpenCV and MediaPipe's pose solution with its defaults for video (tracking and smoothing), without
-post-processing. Loading and the first frame are not counted.
+Decoding by OpenCV and MediaPipe's pose solution with its defaults for video (tracking and
+smoothing), without post-processing. Loading and the first frame are not counted.
 """
 
 import sys

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measure the memory for an hour of video: a few seconds of tracking are repeated and processed to the end.
+"""Measure the memory for an hour of video: a few seconds of tracking are repeated and processed to
+the end.
 
     python -m scope.benchmarks.perception.memory [--frames 108000] [--people 2]
 
-All people are copies of the sample clip's person, each in a different place. The networks of the default preset stay
-loaded, as in a capture; their working memory is not included.
+All people are copies of the sample clip's person, each in a different place. The networks of the
+default preset stay loaded, as in a capture; their working memory is not included.
 """
 
 from __future__ import annotations
@@ -55,7 +56,9 @@ def replay(frames: int, people: int) -> dict[str, float]:
     del tracklets, tracklet, tracker
     return_freed_memory()
     repaired = (repair_left_right(tracks.pop(0), camera) for _ in range(people))
-    shot = Shot(body, camera, CameraPath.static(frames), Lines.none(), Fraction(fps), size, SAMPLE.name)
+    shot = Shot(
+        body, camera, CameraPath.static(frames), Lines.none(), Fraction(fps), size, SAMPLE.name
+    )
     motions = solve(shot, repaired, lambda *_: None).motions
     peaks["solver"] = peak_mib()
     with tempfile.TemporaryDirectory() as folder:
@@ -66,7 +69,9 @@ def replay(frames: int, people: int) -> dict[str, float]:
 
 
 def moved(observation: Observation, pixels: float) -> Observation:
-    """Return a copy of an observation, with new arrays as from a tracker, of a person further to the right."""
+    """Return a copy of an observation, with new arrays as from a tracker, of a person further to
+    the right.
+    """
     return replace(observation, keypoints_px=observation.keypoints_px + [pixels, 0.0])
 
 
@@ -79,7 +84,9 @@ def peak_mib() -> float:
 def main() -> None:
     """Run the command line."""
     parser = argparse.ArgumentParser(prog="memory")
-    parser.add_argument("--frames", type=int, default=108_000, help="an hour at 30 a second by default")
+    parser.add_argument(
+        "--frames", type=int, default=108_000, help="an hour at 30 a second by default"
+    )
     parser.add_argument("--people", type=int, default=2)
     args = parser.parse_args()
     for stage, mib in replay(args.frames, args.people).items():

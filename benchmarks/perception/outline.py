@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-r"""`./scripts/bench outline`: how well captured bodies cover people, against the landmark network's person mask.
+r"""`./scripts/bench outline`: how well captured bodies cover people, against the landmark network's
+person mask.
 
     IoU = |B ∩ M| / |B ∪ M|,   outside the mask = |B \ M| / |B|,   outside the body = |M \ B| / |M|
-with B the pixels of the captured body and M those of the mask (probability at least 0.5), both in the 256 × 256 region
-that the network saw, and only where the region lies in the image. Medians over the frames in which the person was seen.
-The clips are those next to the checkout and, once `./scripts/bench renders` has made them, the renders; for these the
-true body is measured against the mask as well, which says what IoU a perfect capture has.
+with B the pixels of the captured body and M those of the mask (probability at least 0.5), both in
+the 256 × 256 region that the network saw, and only where the region lies in the image. Medians over
+the frames in which the person was seen. The clips are those next to the checkout and, once
+`./scripts/bench renders` has made them, the renders; for these the true body is measured against
+the mask as well, which says what IoU a perfect capture has.
 """
 
 from __future__ import annotations
@@ -47,7 +49,8 @@ SHOWN = {
 }
 FIGURES = ("iou", "body_outside", "mask_outside")
 MORE_CLIPS = tuple(f"clips/{name}.mp4" for name in ("two_people_portrait", "sit_stand_close"))
-SURE = 0.5  # probability from which a pixel is the person's, and of presence from which there is one
+# probability from which a pixel is the person's, and of presence from which there is one
+SURE = 0.5
 FRAMES_PER_CLIP = 100  # about; a mask takes as long as the lite network
 
 
@@ -58,7 +61,9 @@ class Seen:
     network: LandmarkNetwork
     stride: int
     frames: int = 0
-    masks: dict[int, tuple[Region, NDArray[np.bool_], NDArray[np.float64]]] = field(default_factory=dict)
+    masks: dict[int, tuple[Region, NDArray[np.bool_], NDArray[np.float64]]] = field(
+        default_factory=dict
+    )
     size: tuple[int, int] = (0, 0)
 
     def watch(self, frame: Frame, largest: Observation | None, _: LiveBody) -> None:
@@ -95,7 +100,9 @@ def outline(quick: bool) -> dict[str, Any]:
 
 
 def measure_clip(body: Body, path: Path, quality: str) -> dict[str, float]:
-    """Capture a clip and return the medians of `FIGURES` and the height; nothing if nobody was found."""
+    """Capture a clip and return the medians of `FIGURES` and the height; nothing if nobody was
+    found.
+    """
     stride = max(1, _frame_count(path) // FRAMES_PER_CLIP)
     seen = Seen(LandmarkNetwork(landmark_network_name("best"), os.cpu_count() or 1), stride)
     try:
@@ -103,13 +110,17 @@ def measure_clip(body: Body, path: Path, quality: str) -> dict[str, float]:
     except NoPersonError:
         return {}
     rows = [compare(body, motions[0], seen, index) for index in seen.masks]
-    found = _medians([row for row in rows if row is not None]) | {"height_m": body.stature(motions[0].betas)}
+    found = _medians([row for row in rows if row is not None]) | {
+        "height_m": body.stature(motions[0].betas)
+    }
     truth = path.with_name(f"{path.stem}_truth.npz")
     return found | ({"true_iou": true_iou(body, truth, seen)} if truth.is_file() else {})
 
 
 def compare(body: Body, motion: Motion, seen: Seen, index: int) -> dict[str, float] | None:
-    """Return the `FIGURES` of one source frame; None where the motion has not seen the person of the mask."""
+    """Return the `FIGURES` of one source frame; None where the motion has not seen the person of
+    the mask.
+    """
     row = int(np.searchsorted(motion.frames, index))
     region, mask, keypoints_px = seen.masks[index]
     if row >= len(motion) or motion.frames[row] != index or not motion.valid[row]:
@@ -118,21 +129,34 @@ def compare(body: Body, motion: Motion, seen: Seen, index: int) -> dict[str, flo
     if np.median(np.linalg.norm(own[:, :2] - keypoints_px, axis=1)) > region.side_px / 10:
         return None  # somebody else was larger in this frame
     vertices = camera_vertices(motion, body, row)
-    return overlap(silhouette(body, vertices, motion.intrinsics, motion.dist, seen.size, region), mask)
+    return overlap(
+        silhouette(body, vertices, motion.intrinsics, motion.dist, seen.size, region), mask
+    )
 
 
 def true_iou(body: Body, truth: Path, seen: Seen) -> float:
     """Return the median IoU of a render's true body and the masks."""
     with np.load(truth) as data:
-        true = {key: data[key] for key in ("poses", "trans", "betas", "intrinsics", "frame_index", "world_from_camera")}
-    T, betas, rows = np.linalg.inv(true["world_from_camera"].astype(float)), true["betas"].astype(float), []
+        true = {
+            key: data[key]
+            for key in ("poses", "trans", "betas", "intrinsics", "frame_index", "world_from_camera")
+        }
+    T, betas, rows = (
+        np.linalg.inv(true["world_from_camera"].astype(float)),
+        true["betas"].astype(float),
+        [],
+    )
     for index, (region, mask, _) in seen.masks.items():
         row = int(np.searchsorted(true["frame_index"], index))
         if row >= len(true["frame_index"]) or true["frame_index"][row] != index:
             continue
-        R, t = body.forward_kinematics(exp(true["poses"][row].reshape(-1, 3).astype(float)), true["trans"][row], betas)
+        R, t = body.forward_kinematics(
+            exp(true["poses"][row].reshape(-1, 3).astype(float)), true["trans"][row], betas
+        )
         vertices = body.skin(T[:3, :3] @ R, t @ T[:3, :3].T + T[:3, 3], betas)
-        rows.append(overlap(silhouette(body, vertices, true["intrinsics"], None, seen.size, region), mask))
+        rows.append(
+            overlap(silhouette(body, vertices, true["intrinsics"], None, seen.size, region), mask)
+        )
     return _medians([row for row in rows if row is not None]).get("iou", float("nan"))
 
 
@@ -161,7 +185,9 @@ def silhouette(
     center = (np.asarray(region.center_px) + 0.5) * scale - 0.5
     affine = np.column_stack([scale * A, center + scale * A @ np.full(2, 0.5 - INPUT_SIZE / 2)])
     flags = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
-    cut: NDArray[np.uint8] = cv2.warpAffine(shape, affine, (INPUT_SIZE, INPUT_SIZE), flags=flags).astype(np.uint8)
+    cut: NDArray[np.uint8] = cv2.warpAffine(
+        shape, affine, (INPUT_SIZE, INPUT_SIZE), flags=flags
+    ).astype(np.uint8)
     return cut
 
 

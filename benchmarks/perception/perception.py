@@ -41,27 +41,52 @@ def _speed(body: Body, quick: bool) -> dict[str, Any]:
     presets = {}
     for quality in (default,) if quick else PRESETS:
         presets[quality] = side_by_side(body, video, quality, 300, rounds)
-    # The clip has 12 frames per second, so detection and left-right decisions take a larger share of each frame.
+    # The clip has 12 frames per second, so detection and left-right decisions take a larger share
+    # of each frame.
     pairs = {
         name: end_to_end(body, looped(TWO_PEOPLE, 300 if quick else 600, fps), "fast", 2)
         for name, fps in (("30 a second", 30.0), ("12 a second", None))
     }
     pair = pairs["30 a second"]
     chosen = presets[default]
-    fps = {key: chosen[key] for key in ("end_to_end", "mediapipe", "networks", "solver", "over_mediapipe")}
+    fps = {
+        key: chosen[key]
+        for key in ("end_to_end", "mediapipe", "networks", "solver", "over_mediapipe")
+    }
     fps |= {"decode": decoding(video), "two_people_fast": pair["end_to_end"]}
     rows = [
-        [q, f["end_to_end"], SPEED_TARGETS.get(q), f["networks"], f["solver"], f["cpu_ms_per_frame"], f["mediapipe"],
-         f["over_mediapipe"]]
+        [
+            q,
+            f["end_to_end"],
+            SPEED_TARGETS.get(q),
+            f["networks"],
+            f["solver"],
+            f["cpu_ms_per_frame"],
+            f["mediapipe"],
+            f["over_mediapipe"],
+        ]
         for q, f in presets.items()
-    ]  # fmt: skip
+    ]
     rows += [
-        [f"fast, two people, {name}", f["end_to_end"], 35.0, f["networks"], f["solver"], f["cpu_ms_per_frame"], None,
+        ["fast, two people, "
+         f"{name}", f["end_to_end"], 35.0, f["networks"], f["solver"], f["cpu_ms_per_frame"], None,
          None]
         for name, f in pairs.items()
     ]  # fmt: skip
-    head = ("preset", "end to end", "target", "networks", "solver", "CPU ms/frame", "MediaPipe", "ratio, target 1.5")
-    print(f"Frames per second, {frames} frames of 1080p; decoding alone {fps['decode']:.0f}; default: {default}\n")
+    head = (
+        "preset",
+        "end to end",
+        "target",
+        "networks",
+        "solver",
+        "CPU ms/frame",
+        "MediaPipe",
+        "ratio, target 1.5",
+    )
+    print(
+        f"Frames per second, {frames} frames of 1080p; decoding alone {fps['decode']:.0f}; "
+        f"default: {default}\n"
+    )
     print(table(head, rows), end="\n\n", flush=True)
     both = {"two_people_fast": pair, "two_people_fast_12": pairs["12 a second"]}
     return {"fps": fps, "fps_presets": {**presets, **both}, "default": default}
@@ -73,7 +98,9 @@ def _accuracy(body: Body) -> dict[str, Any]:
     head = ("default preset", *(heading for heading, _ in SHOWN.values()))
     rows: list[list[object]] = [["target", *(target for _, target in SHOWN.values())]]
     for name, found in (("estimated", estimated), ("given", given)):
-        rows += [[f"{camera}, {name} intrinsics", *_row(found[camera])] for camera in (*CAMERAS, "mean")]
+        rows += [
+            [f"{camera}, {name} intrinsics", *_row(found[camera])] for camera in (*CAMERAS, "mean")
+        ]
     print(table(head, rows), end="\n\n", flush=True)
     return {"clips": estimated, "clips_given_intrinsics": given}
 
@@ -83,7 +110,12 @@ def _always(options: CaptureOptions) -> Callable[[str], CaptureOptions]:
 
 
 def _show(quality: str, found: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    print(table((quality, *(heading for heading, _ in SHOWN.values())), [["mean", *_row(found["mean"])]]), end="\n\n")
+    print(
+        table(
+            (quality, *(heading for heading, _ in SHOWN.values())), [["mean", *_row(found["mean"])]]
+        ),
+        end="\n\n",
+    )
     return found["mean"]
 
 

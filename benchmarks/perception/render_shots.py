@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Render the held-out shots that build/bench/renders lacks: ``python -m scope.benchmarks.perception.render_shots``.
+"""Render the held-out shots that build/bench/renders lacks: ``python -m
+scope.benchmarks.perception.render_shots``.
 
-Runs as a separate process, because Blender's module prints on standard output and can hang at exit. NAME.mp4 and
-NAME_truth.npz of a shot are kept while the ground truth is unchanged.
+Runs as a separate process, because Blender's module prints on standard output and can hang at exit.
+NAME.mp4 and NAME_truth.npz of a shot are kept while the ground truth is unchanged.
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ from .held_out import draw_shot, held_out_takes
 
 RENDERS, MOTIONS = CACHE / "renders", ROOT / "build" / "mocap" / "motions.npz"
 NEW_PERFORMERS = MOTIONS.with_name("new_performers.npz")
-SAME = ("joints_cam", "betas", "intrinsics", "frame_index")  # between two versions of a clip's ground truth
+# between two versions of a clip's ground truth
+SAME = ("joints_cam", "betas", "intrinsics", "frame_index")
 SAME_M = 1e-3
 
 
@@ -42,18 +44,26 @@ def shots(body: Body) -> dict[str, Shot]:
 
 
 def fitted_motions() -> Path:
-    """Return the file of all recordings fitted by the default body, which is made if it is missing."""
+    """Return the file of all recordings fitted by the default body, which is made if it is
+    missing.
+    """
     if not MOTIONS.is_file():
-        print(f"fitting the body to the recordings in {DATA / 'mocap'}, once", file=sys.stderr, flush=True)
+        print(
+            f"fitting the body to the recordings in {DATA / 'mocap'}, once",
+            file=sys.stderr,
+            flush=True,
+        )
         command = ("scope.tools.mocap.fit_body", str(DATA / "mocap"), "-o", str(MOTIONS))
         subprocess.run([sys.executable, "-m", *command], check=True, stdout=subprocess.DEVNULL)
     return MOTIONS
 
 
 def fitted_new_performers() -> Path:
-    """Return the file of the performers that nothing was trained on, fitted by the default body, made if it is missing.
+    """Return the file of the performers that nothing was trained on, fitted by the default body,
+    made if it is missing.
 
-    :raises subprocess.CalledProcessError: when a package with their recordings cannot be downloaded; it says why.
+    :raises subprocess.CalledProcessError: when a package with their recordings cannot be
+        downloaded; it says why.
     """
     if not NEW_PERFORMERS.is_file():
         print(
@@ -75,7 +85,9 @@ def render_missing(body: Body) -> None:
 
             render_clip(body, shot, path, scratch)
 
-        render_if_changed(*video_and_truth(name), SAME, partial(write_truth, body=body, shot=shot), render)
+        render_if_changed(
+            *video_and_truth(name), SAME, partial(write_truth, body=body, shot=shot), render
+        )
 
 
 def render_if_changed(

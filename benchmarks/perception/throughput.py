@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames per second from video to motion file, by stage, compared with MediaPipe's pipeline with the same network.
+"""Frames per second from video to motion file, by stage, compared with MediaPipe's pipeline with
+the same network.
 
-Short clips are looped until start-up no longer matters. Loading the networks is not timed on either side. Scope and
-MediaPipe alternate, so that other load on the machine affects both alike.
+Short clips are looped until start-up no longer matters. Loading the networks is not timed on either
+side. Scope and MediaPipe alternate, so that other load on the machine affects both alike.
 """
 
 from __future__ import annotations
@@ -31,7 +32,9 @@ PEER = "mediapipe==0.10.14"
 
 
 def looped(clip: str, frames: int, fps: float | None = None) -> Path:
-    """Return the clip repeated to at least ``frames`` frames, at its own or another rate; cached in build/bench."""
+    """Return the clip repeated to at least ``frames`` frames, at its own or another rate; cached in
+    build/bench.
+    """
     target = CACHE / f"{Path(clip).stem}_{frames}{'' if fps is None else f'_{fps:g}fps'}.mp4"
     if target.exists():
         return target
@@ -58,8 +61,12 @@ def decoding(video: Path) -> float:
     return count / (time.perf_counter() - since)
 
 
-def end_to_end(body: Body, video: Path, quality: str, people: int | str = "largest") -> dict[str, float]:
-    """Return frames per second and CPU time per frame: file to motion files; by stage, what the main thread waits."""
+def end_to_end(
+    body: Body, video: Path, quality: str, people: int | str = "largest"
+) -> dict[str, float]:
+    """Return frames per second and CPU time per frame: file to motion files; by stage, what the
+    main thread waits.
+    """
     cpu = time.process_time()
     result = capture(video, body, CaptureOptions(quality=quality, people=people))
     frames = result.report["frames"]
@@ -77,7 +84,11 @@ def end_to_end(body: Body, video: Path, quality: str, people: int | str = "large
 
 def warm_up(body: Body) -> None:
     """Compile and cache everything that the first capture would."""
-    capture(DATA / "clips/run_moving_camera.mp4", body, CaptureOptions(quality="fast", wanted=VideoRange(0, 1.0)))
+    capture(
+        DATA / "clips/run_moving_camera.mp4",
+        body,
+        CaptureOptions(quality="fast", wanted=VideoRange(0, 1.0)),
+    )
 
 
 def mediapipe(video: Path, quality: str, frames: int) -> float | str:
@@ -85,7 +96,13 @@ def mediapipe(video: Path, quality: str, frames: int) -> float | str:
     try:
         python = make_environment("mediapipe", PEER)
         _bring_network(python, NETWORKS[quality])
-        command = [python, Path(__file__).with_name("mediapipe_run.py"), video, COMPLEXITY[quality], frames]
+        command = [
+            python,
+            Path(__file__).with_name("mediapipe_run.py"),
+            video,
+            COMPLEXITY[quality],
+            frames,
+        ]
         done = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=True)
         return float(done.stdout.strip().splitlines()[-1])
     except (OSError, subprocess.CalledProcessError, ValueError, IndexError) as error:
@@ -93,14 +110,18 @@ def mediapipe(video: Path, quality: str, frames: int) -> float | str:
         return "skipped: " + (reason[-1] if reason else type(error).__name__)
 
 
-def side_by_side(body: Body, video: Path, quality: str, frames: int, rounds: int) -> dict[str, float | str | None]:
+def side_by_side(
+    body: Body, video: Path, quality: str, frames: int, rounds: int
+) -> dict[str, float | str | None]:
     """Return medians of both over turns taken, and their ratio."""
     ours: list[dict[str, float]] = []
     theirs: list[float | str] = []
     for _ in range(rounds):
         ours.append(end_to_end(body, video, quality))
         theirs.append(mediapipe(video, quality, frames))
-    found: dict[str, float | str | None] = {key: float(np.median([o[key] for o in ours])) for key in ours[0]}
+    found: dict[str, float | str | None] = {
+        key: float(np.median([o[key] for o in ours])) for key in ours[0]
+    }
     measured = [t for t in theirs if isinstance(t, float)]
     mediapipe_fps = float(np.median(measured)) if measured else None
     found["over_mediapipe"] = (
@@ -119,8 +140,12 @@ def _save_all(result: Capture) -> float:
 
 
 def _bring_network(python: Path, name: str) -> None:
-    """Copy the networks that MediaPipe's wheel lacks, and that it would download, from the capture's own package."""
-    folder = next((python.parent.parent / "lib").glob("python*/site-packages/mediapipe/modules/pose_landmark"))
+    """Copy the networks that MediaPipe's wheel lacks, and that it would download, from the
+    capture's own package.
+    """
+    folder = next(
+        (python.parent.parent / "lib").glob("python*/site-packages/mediapipe/modules/pose_landmark")
+    )
     target = folder / f"pose_landmark_{name}.tflite"
     if not target.exists():
         packages = sorted((ROOT / "build" / "downloads").glob("mediapipe-pose-*.tgz"))
@@ -129,5 +154,7 @@ def _bring_network(python: Path, name: str) -> None:
         with tarfile.open(packages[0]) as package, target.open("wb") as out:
             member = package.extractfile(f"package/{target.name}")
             if member is None:
-                raise OSError(f"{packages[0]} has no file package/{target.name}: run convert_networks --force")
+                raise OSError(
+                    f"{packages[0]} has no file package/{target.name}: run convert_networks --force"
+                )
             out.write(member.read())

@@ -5,5 +5,6 @@
 - ``scene.py``: people in front of a camera, what stands around, and the ground truth
 - ``draw.py``: random scenes, reproducible by their number
 - ``surroundings.py``, ``render.py``: the scenes in Blender
-- ``accuracy.py``, ``statistics.py``: errors by groups of people and frames, with confidence intervals
+- ``accuracy.py``, ``statistics.py``: errors by groups of people and frames, with confidence
+    intervals
 """

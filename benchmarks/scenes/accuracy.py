@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`./scripts/bench scenes`: errors of captures of the rendered scenes, by groups of frames and of people."""
+"""`./scripts/bench scenes`: errors of captures of the rendered scenes, by groups of frames and of
+people.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,8 @@ from .scene import FOLDER, NEW_PERFORMERS, SPLITS
 from .statistics import Estimate, mean_over_people, mean_over_performers
 
 HIPS = [LIMB_JOINTS.index("left_hip"), LIMB_JOINTS.index("right_hip")]
-FOUND_PX = 0.15  # of the picture's longer side: the most that a captured person's hips may be off, median
+# of the picture's longer side: the most that a captured person's hips may be off, median
+FOUND_PX = 0.15
 VARIANTS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("default preset", {}),
     ("default preset, statures given", {"statures_given": True}),
@@ -41,7 +44,9 @@ Truth = dict[str, NDArray[Any]]
 
 @dataclass
 class Result:
-    """Errors of one true person of a clip, frame by frame; NaN in frames in which the person was not found."""
+    """Errors of one true person of a clip, frame by frame; NaN in frames in which the person was
+    not found.
+    """
 
     clip: str
     mpjpe_root: NDArray[np.float64]  # (T,) mm
@@ -49,7 +54,8 @@ class Result:
     size: float  # captured over true stature; NaN for people that were not found
     frames: dict[str, NDArray[Any]] = field(default_factory=dict)  # (T,) what groups are made of
     person: dict[str, Any] = field(default_factory=dict)
-    flips: dict[str, DepthFlips] = field(default_factory=dict)  # as of `depth_flips`; empty for people not found
+    # as of `depth_flips`; empty for people not found
+    flips: dict[str, DepthFlips] = field(default_factory=dict)
 
 
 def scenes(quick: bool) -> dict[str, Any]:
@@ -59,7 +65,10 @@ def scenes(quick: bool) -> dict[str, Any]:
     """
     if not quick:
         if not DATA.is_dir():
-            print(f"{DATA} does not exist: nothing was rendered; put the recordings there", file=sys.stderr)
+            print(
+                f"{DATA} does not exist: nothing was rendered; put the recordings there",
+                file=sys.stderr,
+            )
         else:
             command = (sys.executable, "-m", "scope.benchmarks.scenes.render")
             subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
@@ -75,45 +84,89 @@ def scenes(quick: bool) -> dict[str, Any]:
 
 
 def _measure(split: str, clips: list[Path], quick: bool) -> dict[str, Any]:
-    """Capture the clips of one split with every variant, print the tables and return the figures."""
+    """Capture the clips of one split with every variant, print the tables and return the
+    figures.
+    """
     body, by_variant = load_body("scope"), dict[str, list[Result]]()
     for name, options in VARIANTS[:1] if quick else VARIANTS:
         results = by_variant[name] = []
         for truth in clips:
             video = truth.with_name(truth.name.replace("_truth.npz", ".mp4"))
             with np.load(truth) as data:
-                results += evaluate_scene(body, video, {key: data[key] for key in data.files}, **options)
-            print(f"{video.stem}, {name}: {_mean(results[-1].mpjpe_root):.0f} mm", file=sys.stderr, flush=True)
+                results += evaluate_scene(
+                    body, video, {key: data[key] for key in data.files}, **options
+                )
+            print(
+                f"{video.stem}, {name}: {_mean(results[-1].mpjpe_root):.0f} mm",
+                file=sys.stderr,
+                flush=True,
+            )
     return _tables(split, by_variant)
 
 
 def _tables(split: str, by_variant: dict[str, list[Result]]) -> dict[str, Any]:
     """Print the tables of one split and return their figures, and those of every person."""
     default, *others = by_variant.items()
-    found, variants = groups(default[1]), {name: groups(results)["all"] for name, results in by_variant.items()}
+    found, variants = (
+        groups(default[1]),
+        {name: groups(results)["all"] for name, results in by_variant.items()},
+    )
     for head, rows in ((split, found), (f"{split}: variants", variants)):
-        columns: tuple[str, ...] = (f"{head}: people", "number", "MPJPE-root mm", "PA-MPJPE mm", "found", "size off, %")
-        print(table(columns, [_row(name, row) for name, row in rows.items()]), end="\n\n", flush=True)
+        columns: tuple[str, ...] = (
+            f"{head}: people",
+            "number",
+            "MPJPE-root mm",
+            "PA-MPJPE mm",
+            "found",
+            "size off, %",
+        )
+        print(
+            table(columns, [_row(name, row) for name, row in rows.items()]), end="\n\n", flush=True
+        )
     more = {name: more_than(default[1], results) for name, results in others}
     columns = (f"{split}: MPJPE-root, more than the default, mm", "people", "mean")
-    print(table(columns, [(name, each.people, each.text) for name, each in more.items()]), end="\n\n")
+    print(
+        table(columns, [(name, each.people, each.text) for name, each in more.items()]), end="\n\n"
+    )
     flips = {}
     for name, results in by_variant.items():
         flips[name] = {fit: total(r.flips[fit] for r in results if r.flips) for fit in FITS}
         print(flips_table(f"{split}, {name}: depth flips", flips[name]), end="\n\n", flush=True)
     people = {name: [_figures(r) for r in results] for name, results in by_variant.items()}
-    figures: dict[str, Any] = {"groups": found, "variants": variants, "more_than_default": more, "flips": flips}
+    figures: dict[str, Any] = {
+        "groups": found,
+        "variants": variants,
+        "more_than_default": more,
+        "flips": flips,
+    }
     figures["people"] = people
     if split == NEW_PERFORMERS:
-        figures["performers"] = {name: by_performer(results) for name, results in by_variant.items()}
+        figures["performers"] = {
+            name: by_performer(results) for name, results in by_variant.items()
+        }
         for name, rows in figures["performers"].items():
-            columns = (f"{split}, {name}: performers", "people", "MPJPE-root mm", "PA-MPJPE mm", "found", "size off, %")
-            print(table(columns, [_row(who, row) for who, row in rows.items()]), end="\n\n", flush=True)
+            columns = (
+                f"{split}, {name}: performers",
+                "people",
+                "MPJPE-root mm",
+                "PA-MPJPE mm",
+                "found",
+                "size off, %",
+            )
+            print(
+                table(columns, [_row(who, row) for who, row in rows.items()]),
+                end="\n\n",
+                flush=True,
+            )
     return figures
 
 
 def evaluate_scene(
-    body: Body, video: Path, truth: Truth, quality: str = CaptureOptions().quality, statures_given: bool = False
+    body: Body,
+    video: Path,
+    truth: Truth,
+    quality: str = CaptureOptions().quality,
+    statures_given: bool = False,
 ) -> list[Result]:
     """Capture a clip and return the errors of each of its true people."""
     count = len(truth["limbs"])
@@ -121,7 +174,9 @@ def evaluate_scene(
     if heights:
         body = load_body(chosen_body({"body": body.name, "heights_m": heights}))
     try:
-        motions = capture(video, body, CaptureOptions(quality=quality, people=count, heights_m=heights)).motions
+        motions = capture(
+            video, body, CaptureOptions(quality=quality, people=count, heights_m=heights)
+        ).motions
     except NoPersonError:
         motions = []
     return score_people(body, motions, video.stem, truth)
@@ -135,7 +190,9 @@ def score_people(body: Body, motions: list[Motion], clip: str, truth: Truth) -> 
 
 def _heights(truth: Truth) -> tuple[float, ...]:
     """Return the true statures, of who appears tallest first."""
-    tall = np.median(np.ptp(project(truth["limbs_cam"], truth["intrinsics"])[..., 1], axis=2), axis=1)
+    tall = np.median(
+        np.ptp(project(truth["limbs_cam"], truth["intrinsics"])[..., 1], axis=2), axis=1
+    )
     return tuple(truth["stature_m"][np.argsort(-tall)].tolist())
 
 
@@ -149,7 +206,9 @@ def _result(body: Body, clip: str, motion: Motion | None, truth: Truth, k: int) 
     pixels = project(true, truth["intrinsics"])
     frames["height_px"] = np.ptp(pixels[..., 1], axis=1)
     person = {key: truth[key][k].item() for key in ("stature_m", "mass_index", "loose_m")}
-    person |= {key: truth[key].item() for key in ("camera", "surroundings")} | {"people": len(truth["limbs"])}
+    person |= {key: truth[key].item() for key in ("camera", "surroundings")} | {
+        "people": len(truth["limbs"])
+    }
     person["take"] = str(truth["takes"][k])
     result = Result(clip, np.full(T, np.nan), np.full(T, np.nan), np.nan, frames, person)
     if motion is not None:
@@ -158,14 +217,20 @@ def _result(body: Body, clip: str, motion: Motion | None, truth: Truth, k: int) 
         captured = motion.joints_cam[rows][:, names].astype(float)
         result.pa_mpjpe[at] = pa_mpjpe(captured, true[at])
         roots = [points[:, HIPS].mean(axis=1) for points in (captured, true[at])]
-        result.mpjpe_root[at] = mpjpe(relative_to(captured, roots[0]), relative_to(true[at], roots[1]))
+        result.mpjpe_root[at] = mpjpe(
+            relative_to(captured, roots[0]), relative_to(true[at], roots[1])
+        )
         result.size = body.stature(motion.betas.astype(float)) / person["stature_m"]
-        result.flips = depth_flips(body, motion, dict(zip(LIMB_JOINTS, np.moveaxis(true, 1, 0), strict=True)))
+        result.flips = depth_flips(
+            body, motion, dict(zip(LIMB_JOINTS, np.moveaxis(true, 1, 0), strict=True))
+        )
     return result
 
 
 def match_people(body: Body, motions: list[Motion], truth: Truth) -> dict[int, Motion]:
-    """Return the motion of each true person that was found: nearest hips in the picture first, each motion once."""
+    """Return the motion of each true person that was found: nearest hips in the picture first, each
+    motion once.
+    """
     pixels = project(truth["limbs_cam"], truth["intrinsics"])[:, :, HIPS].mean(axis=2)
     pairs = []
     for n, motion in enumerate(motions):
@@ -221,7 +286,8 @@ GROUPS: dict[str, Chosen] = {
 
 
 def groups(results: list[Result]) -> dict[str, dict[str, Estimate]]:
-    """Return the figures of every group that has people: of each person the mean over the group's frames.
+    """Return the figures of every group that has people: of each person the mean over the group's
+    frames.
 
     Frames in which nothing of a person can be seen are left out.
     """
@@ -234,26 +300,35 @@ def groups(results: list[Result]) -> dict[str, dict[str, Estimate]]:
         found[name] = {
             "mpjpe_root": mean_over_people([_mean(r.mpjpe_root[rows]) for r, rows in inside]),
             "pa_mpjpe": mean_over_people([_mean(r.pa_mpjpe[rows]) for r, rows in inside]),
-            "found": mean_over_people([float(np.isfinite(r.mpjpe_root[rows]).mean()) for r, rows in inside]),
+            "found": mean_over_people(
+                [float(np.isfinite(r.mpjpe_root[rows]).mean()) for r, rows in inside]
+            ),
             "size_off": mean_over_people([100 * abs(r.size - 1) for r, rows in inside]),
         }
     return found
 
 
 def by_performer(results: list[Result]) -> dict[str, dict[str, Estimate]]:
-    """Return the figures of people who move as each performer does, and of all, for whom performers are drawn.
+    """Return the figures of people who move as each performer does, and of all, for whom performers
+    are drawn.
 
     A performer's recordings are named PERFORMER_NUMBER.
     """
     rows = {"all, performers drawn": results}
-    rows |= {name: [r for r in results if _performer(r) == name] for name in sorted({_performer(r) for r in results})}
+    rows |= {
+        name: [r for r in results if _performer(r) == name]
+        for name in sorted({_performer(r) for r in results})
+    }
     found = {}
     for name, of in rows.items():
         visible = [r.frames["hidden"] < len(LIMB_JOINTS) for r in of]
         values = {
             "mpjpe_root": [_mean(r.mpjpe_root[rows]) for r, rows in zip(of, visible, strict=True)],
             "pa_mpjpe": [_mean(r.pa_mpjpe[rows]) for r, rows in zip(of, visible, strict=True)],
-            "found": [_mean(np.isfinite(r.mpjpe_root[rows]) * 1.0) for r, rows in zip(of, visible, strict=True)],
+            "found": [
+                _mean(np.isfinite(r.mpjpe_root[rows]) * 1.0)
+                for r, rows in zip(of, visible, strict=True)
+            ],
             "size_off": [100 * abs(r.size - 1) for r in of],
         }
         if of is results:
@@ -274,16 +349,30 @@ def _mean(values: NDArray[np.float64]) -> float:
 
 
 def more_than(reference: list[Result], results: list[Result]) -> Estimate:
-    """Return by how much MPJPE-root is larger than the reference's, over the frames of a person that both found."""
-    return mean_over_people([_mean(r.mpjpe_root - ref.mpjpe_root) for ref, r in zip(reference, results, strict=True)])
+    """Return by how much MPJPE-root is larger than the reference's, over the frames of a person
+    that both found.
+    """
+    return mean_over_people(
+        [_mean(r.mpjpe_root - ref.mpjpe_root) for ref, r in zip(reference, results, strict=True)]
+    )
 
 
 def _figures(result: Result) -> dict[str, Any]:
     """Return what is known of one person, for the JSON file."""
     visible = result.frames["hidden"] < len(LIMB_JOINTS)
-    errors = {"mpjpe_root": _mean(result.mpjpe_root[visible]), "pa_mpjpe": _mean(result.pa_mpjpe[visible])}
+    errors = {
+        "mpjpe_root": _mean(result.mpjpe_root[visible]),
+        "pa_mpjpe": _mean(result.pa_mpjpe[visible]),
+    }
     found = float(np.isfinite(result.mpjpe_root[visible]).mean()) if visible.any() else np.nan
-    return {"clip": result.clip, **errors, "found": found, "size": result.size, "flips": result.flips, **result.person}
+    return {
+        "clip": result.clip,
+        **errors,
+        "found": found,
+        "size": result.size,
+        "flips": result.flips,
+        **result.person,
+    }
 
 
 def _row(name: str, row: dict[str, Estimate]) -> list[object]:

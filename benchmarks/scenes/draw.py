@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Random scenes, reproducible by their number. `kinds.py` chooses the properties that groups are made of.
+"""Random scenes, reproducible by their number. `kinds.py` chooses the properties that groups are
+made of.
 
-Two of three scenes are for testing: their first person moves as in a recording that the lifting network was not trained
-on, and no choice may be made by their results. The others, for development, use the other recordings. Further scenes
-for testing show performers that nothing was trained on (`tools.mocap.new_performers`), each as often as any other.
+Two of three scenes are for testing: their first person moves as in a recording that the lifting
+network was not trained on, and no choice may be made by their results. The others, for development,
+use the other recordings. Further scenes for testing show performers that nothing was trained on
+(`tools.mocap.new_performers`), each as often as any other.
 """
 
 from __future__ import annotations
@@ -26,16 +28,19 @@ NEW_SEED = 12  # of scenes of new performers
 FPS, SECONDS = 15.0, 1.2
 STRIDE = 2  # frames of a recording between two of the clip
 MAX_BETA, BETA_SPREAD = 4.0, 1.5  # wider than the default body's population
-CHILD_SCALE, HEAD_GROWTH = (0.62, 0.85), 0.6  # a child of 0.62 has a head 1 + 0.6 * 0.38 times as large, relatively
+# a child of 0.62 has a head 1 + 0.6 * 0.38 times as large, relatively
+CHILD_SCALE, HEAD_GROWTH = (0.62, 0.85), 0.6
 LOOSE_M, HAIR_M = (0.008, 0.03), (0.0, 0.05)
 FOCAL = (0.7, 1.7)  # over the longer side of the picture
 HEIGHT_M, DISTANCE_M = (0.5, 2.3), (2.2, 8.0)
 SHAKE_DEG, PAN_LAG = 0.3, 0.8  # of a held camera; the share of the person's way that it follows
-MARGIN, MIN_TALL = 0.01, 0.6  # of the picture's height; of its shorter side, what the person's stature appears as
+# of the picture's height; of its shorter side, what the person's stature appears as
+MARGIN, MIN_TALL = 0.01, 0.6
 MAX_HIDDEN = 0.5  # of the first person's limb joints, in all frames together, behind the block
 NEAREST_M, APART_M = 0.9, 0.35  # skin to camera; people from each other and from the block
 EVERY_VERTEX, EVERY_FRAME = 40, 4  # that a camera is tested with
-TRIES, TRIES_EACH, CAMERAS_EACH = 400, 20, 20  # of all recordings, of each, and of each drawn person
+# of all recordings, of each, and of each drawn person
+TRIES, TRIES_EACH, CAMERAS_EACH = 400, 20, 20
 
 
 def draw_scene(body: Body, takes: Sequence[Take], number: int, split: str | None = None) -> Scene:
@@ -71,24 +76,37 @@ def draw_scene(body: Body, takes: Sequence[Take], number: int, split: str | None
 
 
 def recordings_of(takes: Sequence[Take], split: str) -> list[list[Take]]:
-    """Return the recordings as which first persons of a split move: each by itself, or those of each new performer."""
+    """Return the recordings as which first persons of a split move: each by itself, or those of
+    each new performer.
+    """
     if split == NEW_PERFORMERS:
-        return [[take for take in takes if take.performer == name] for name in sorted({t.performer for t in takes})]
+        return [
+            [take for take in takes if take.performer == name]
+            for name in sorted({t.performer for t in takes})
+        ]
     held_out = split == TEST
     return [[take] for take in takes if bool(is_held_out(np.array(take.number))) == held_out]
 
 
 def draw_person(
-    rng: np.random.Generator, body: Body, take: Take, is_child: bool, wears_loose: bool, frames: int | None = None
+    rng: np.random.Generator,
+    body: Body,
+    take: Take,
+    is_child: bool,
+    wears_loose: bool,
+    frames: int | None = None,
 ) -> Person | None:
-    """Draw shape, size, clothes and a part of the take, with the feet on the floor; None if it is too short.
+    """Draw shape, size, clothes and a part of the take, with the feet on the floor; None if it is
+    too short.
 
     The person stands at the origin in the middle of the clip, and is turned at random.
     """
     if round(take.fps) != STRIDE * FPS:
         return None
     try:
-        section = draw_section(rng, body, take, SECONDS if frames is None else frames / FPS)[::STRIDE]
+        section = draw_section(rng, body, take, SECONDS if frames is None else frames / FPS)[
+            ::STRIDE
+        ]
     except ValueError:
         return None
     if frames is not None and len(section) < frames:
@@ -103,14 +121,30 @@ def draw_person(
     loose = rng.uniform(*LOOSE_M) if wears_loose else 0.0
     hair, seed = rng.uniform(*HAIR_M), int(rng.integers(1 << 31))
     head = 1.0 + HEAD_GROWTH * (1.0 - scale)
-    person = Person(take.name, states, pelvis - body.rest_joints(betas)[0], betas, scale, head, loose, hair, seed)
+    person = Person(
+        take.name,
+        states,
+        pelvis - body.rest_joints(betas)[0],
+        betas,
+        scale,
+        head,
+        loose,
+        hair,
+        seed,
+    )
     floor = floor_under(body, _skin(body, person, every=1)) / scale
     return _moved(person, np.array([0.0, 0.0, -floor * scale]))
 
 
 def _moved(person: Person, by: Points) -> Person:
     """Return the person moved by metres in the world."""
-    rest = (person.rotations, person.trans + by / person.scale, person.betas, person.scale, person.head_scale)
+    rest = (
+        person.rotations,
+        person.trans + by / person.scale,
+        person.betas,
+        person.scale,
+        person.head_scale,
+    )
     return Person(person.take, *rest, person.loose_m, person.hair_m, person.seed)
 
 
@@ -126,9 +160,16 @@ def _beside(rng: np.random.Generator, body: Body, first: Person, second: Person)
 
 
 def film(
-    rng: np.random.Generator, body: Body, people: tuple[Person, ...], number: int, split: str, kind: Kind
+    rng: np.random.Generator,
+    body: Body,
+    people: tuple[Person, ...],
+    number: int,
+    split: str,
+    kind: Kind,
 ) -> Scene | None:
-    """Draw a camera, and what stands in front of the first person; None if the person is not well in the picture."""
+    """Draw a camera, and what stands in front of the first person; None if the person is not well
+    in the picture.
+    """
     first, frames = people[0], len(people[0])
     width, height = kind.size
     focal = rng.uniform(*FOCAL) * max(width, height)
@@ -142,7 +183,11 @@ def film(
     if kind.camera != STATIC:
         targets = targets + follows
     if kind.camera == TRAVELLING:
-        eyes = eyes + follows + np.linspace(0, 1, frames)[:, None] * rng.normal(0, 0.25, 3) * [1, 1, 0.2]
+        eyes = (
+            eyes
+            + follows
+            + np.linspace(0, 1, frames)[:, None] * rng.normal(0, 0.25, 3) * [1, 1, 0.2]
+        )
     poses = np.array([look_at(e, t) for e, t in zip(eyes, targets, strict=True)])
     if kind.camera != STATIC:
         shake = _smooth(np.radians(SHAKE_DEG) * rng.normal(0, 3.0, (frames, 3)))
@@ -166,7 +211,9 @@ def look_at(eye: Points, target: Points) -> Points:
 def _block(
     rng: np.random.Generator, body: Body, people: tuple[Person, ...], eye: Points, target: Points
 ) -> Block | None:
-    """Draw a box between camera and first person that hides some of the legs, and that nobody touches."""
+    """Draw a box between camera and first person that hides some of the legs, and that nobody
+    touches.
+    """
     joints = np.concatenate([person.joints(body).reshape(-1, 3) for person in people])
     toward = (eye - target)[:2] / np.linalg.norm((eye - target)[:2])
     tall = rng.uniform(0.3, 0.9) * people[0].scale
@@ -181,7 +228,9 @@ def _block(
 
 
 def _well_inside(body: Body, scene: Scene) -> bool:
-    """Return whether all of the first person is in the picture, large enough, and nobody is too near the camera."""
+    """Return whether all of the first person is in the picture, large enough, and nobody is too
+    near the camera.
+    """
     width, height = scene.size
     joints = scene.project(scene.to_camera(scene.people[0].joints(body)))
     if (joints < 0).any() or (joints > np.array(scene.size) - 1).any():
@@ -195,10 +244,15 @@ def _well_inside(body: Body, scene: Scene) -> bool:
         if k == 0:
             pixels = scene.project(camera)
             margin = MARGIN * height
-            if pixels.min() < margin or (pixels.max((0, 1)) > np.array(scene.size) - 1 - margin).any():
+            if (
+                pixels.min() < margin
+                or (pixels.max((0, 1)) > np.array(scene.size) - 1 - margin).any()
+            ):
                 return False
             depth = np.median(camera[..., 2])
-            if scene.intrinsics[0, 0] * person.stature_m(body) / depth < MIN_TALL * min(width, height):
+            if scene.intrinsics[0, 0] * person.stature_m(body) / depth < MIN_TALL * min(
+                width, height
+            ):
                 return False
     return True
 

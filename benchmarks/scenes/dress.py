@@ -25,16 +25,26 @@ def dressed(body: Body, person: Person) -> bpy.types.Object:
     colors = {
         SKIN: np.array([0.62, 0.40, 0.30]) * rng.uniform(0.2, 1.0),
         HAIR: rng.uniform(0.01, 0.35) * np.array([1.0, 0.75, 0.5]),
-        SUIT: rng.uniform(0.02, 0.7, 3) if rng.random() < MANY_COLORS else np.full(3, rng.uniform(0.02, 0.6)),
+        SUIT: rng.uniform(0.02, 0.7, 3)
+        if rng.random() < MANY_COLORS
+        else np.full(3, rng.uniform(0.02, 0.6)),
         ACCENT: rng.uniform(0.02, 0.7, 3),
     }
     for slot, name in enumerate(body.material_names):
         if name in colors:
-            mesh.data.materials[slot] = _fabric(f"{name} of {mesh.name}", colors[name], patterned=name in (SUIT, HAIR))
+            mesh.data.materials[slot] = _fabric(
+                f"{name} of {mesh.name}", colors[name], patterned=name in (SUIT, HAIR)
+            )
     if rng.random() < WITH_TROUSERS and body.face_material is not None:
-        heights = body.v_template[body.faces, 1].mean(axis=1) - body.rest_joints(np.zeros(body.P))[0, 1]
-        legs = (body.face_material == body.material_names.index(SUIT)) & (heights < TROUSERS_BELOW_M)
-        mesh.data.materials.append(_fabric(f"{TROUSERS} of {mesh.name}", rng.uniform(0.02, 0.5, 3), patterned=True))
+        heights = (
+            body.v_template[body.faces, 1].mean(axis=1) - body.rest_joints(np.zeros(body.P))[0, 1]
+        )
+        legs = (body.face_material == body.material_names.index(SUIT)) & (
+            heights < TROUSERS_BELOW_M
+        )
+        mesh.data.materials.append(
+            _fabric(f"{TROUSERS} of {mesh.name}", rng.uniform(0.02, 0.5, 3), patterned=True)
+        )
         slots = np.where(legs, len(body.material_names), body.face_material).astype(np.int32)
         mesh.data.polygons.foreach_set("material_index", slots)
     shade = mesh.data.attributes.new("shade", "FLOAT", "POINT")
@@ -45,14 +55,18 @@ def dressed(body: Body, person: Person) -> bpy.types.Object:
 def _shade(rng: np.random.Generator, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the brightness (V,) of the fabric at points of the body at rest (V, 3), about 1."""
     waves = rng.normal(0.0, 2 * np.pi * FABRIC_PER_M, (FABRIC_WAVES, 3))
-    noise = np.sin(points @ waves.T + rng.uniform(0, 2 * np.pi, FABRIC_WAVES)).sum(axis=1) / np.sqrt(FABRIC_WAVES / 2)
+    noise = np.sin(points @ waves.T + rng.uniform(0, 2 * np.pi, FABRIC_WAVES)).sum(
+        axis=1
+    ) / np.sqrt(FABRIC_WAVES / 2)
     shade = np.clip(1.0 + FABRIC_CONTRAST * noise, 0.5, 1.5)
     width, striped = rng.uniform(*STRIPE_M), rng.random() < STRIPED
     return shade * np.where(striped & (points[:, 1] % width < width / 2), STRIPE_DARK, 1.0)
 
 
 def _fabric(name: str, color: NDArray[np.float64], patterned: bool) -> bpy.types.Material:
-    """Return a material of a linear colour (3,), multiplied by the mesh's attribute "shade" if it is patterned."""
+    """Return a material of a linear colour (3,), multiplied by the mesh's attribute "shade" if it
+    is patterned.
+    """
     r, g, b = color.tolist()
     material = make_material(name, (r, g, b))
     nodes, links = material.node_tree.nodes, material.node_tree.links

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A flared skirt and an open coat around the body at rest, and what says how fat a body is: girths and mass.
+"""A flared skirt and an open coat around the body at rest, and what says how fat a body is: girths
+and mass.
 
-A garment is a surface of elliptic arcs about the vertical axis of the trunk, rigid to the pelvis. Each arc is as wide
-as the trunk at the hips or the waist, whichever is nearer to its height, and farther out by a distance that grows
-towards the hem. Around standing legs it stays where it would hang; knees that are raised pass through it.
+A garment is a surface of elliptic arcs about the vertical axis of the trunk, rigid to the pelvis.
+Each arc is as wide as the trunk at the hips or the waist, whichever is nearer to its height, and
+farther out by a distance that grows towards the hem. Around standing legs it stays where it would
+hang; knees that are raised pass through it.
 """
 
 from __future__ import annotations
@@ -20,14 +22,17 @@ from .people import DENSITY, Points
 
 COLUMNS, ROWS = 48, 12
 BAND_M = 0.015  # half of the height of the slice of skin whose girth is measured
-LIMBS = ("shoulder", "elbow", "wrist", "hand", "thumb", "index", "middle", "ring", "pinky")  # left out of the trunk
+# left out of the trunk
+LIMBS = ("shoulder", "elbow", "wrist", "hand", "thumb", "index", "middle", "ring", "pinky")
 COAT_OPEN_DEG = 60.0  # to either side of the front
 SKIRT_M, COAT_M = (0.01, 0.15), (0.03, 0.12)  # off the body at the upper edge and at the hem
 
 
 @dataclass(frozen=True)
 class Garment:
-    """A surface at rest: points (n, 3), metres, in the axes of the rest pose, and triangles (m, 3)."""
+    """A surface at rest: points (n, 3), metres, in the axes of the rest pose, and triangles (m,
+    3).
+    """
 
     points: Points
     triangles: NDArray[np.int32]
@@ -70,9 +75,15 @@ def mass_kg(body: Body, betas: Points) -> float:
     return DENSITY * abs(float(np.einsum("fi,fi->", a, np.cross(b, c)))) / 6.0
 
 
-def _around(body: Body, betas: Points, top: float, opening: float, off_m: tuple[float, float]) -> Garment:
-    """Return a surface from a height down to the knees, open by an angle to either side of the front."""
-    knees = body.rest_joints(betas)[[body.joint_names.index(f"{side}_knee") for side in ("left", "right")], 1].mean()
+def _around(
+    body: Body, betas: Points, top: float, opening: float, off_m: tuple[float, float]
+) -> Garment:
+    """Return a surface from a height down to the knees, open by an angle to either side of the
+    front.
+    """
+    knees = body.rest_joints(betas)[
+        [body.joint_names.index(f"{side}_knee") for side in ("left", "right")], 1
+    ].mean()
     waist, hips = _waist(body, betas), _hips(body, betas)
     angles = np.linspace(opening, 2 * np.pi - opening, COLUMNS)  # from the front, which is z
     rows = []
@@ -80,12 +91,17 @@ def _around(body: Body, betas: Points, top: float, opening: float, off_m: tuple[
         height = top + share * (float(knees) - top)
         level = _slice(body, betas, float(np.clip(height, hips, max(waist, top - 0.1))))
         low, high = level.min(axis=0), level.max(axis=0)
-        radius, middle = (high - low) / 2 + off_m[0] + share * (off_m[1] - off_m[0]), (high + low) / 2
+        radius, middle = (
+            (high - low) / 2 + off_m[0] + share * (off_m[1] - off_m[0]),
+            (high + low) / 2,
+        )
         x, z = middle[0] + radius[0] * np.sin(angles), middle[1] + radius[1] * np.cos(angles)
         rows.append(np.column_stack([x, np.full(COLUMNS, height), z]))
     first = (np.arange(ROWS - 1)[:, None] * COLUMNS + np.arange(COLUMNS - 1)).ravel()
     corners = [first, first + 1, first + COLUMNS], [first + 1, first + COLUMNS + 1, first + COLUMNS]
-    return Garment(np.concatenate(rows), np.concatenate([np.column_stack(c) for c in corners]).astype(np.int32))
+    return Garment(
+        np.concatenate(rows), np.concatenate([np.column_stack(c) for c in corners]).astype(np.int32)
+    )
 
 
 def _waist(body: Body, betas: Points) -> float:

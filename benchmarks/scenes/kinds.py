@@ -9,7 +9,17 @@ from typing import TypeVar
 
 import numpy as np
 
-from .scene import DEVELOPMENT, INDOORS, NEW_PERFORMERS, OUTDOORS, PANNING, SPLITS, STATIC, TEST, TRAVELLING
+from .scene import (
+    DEVELOPMENT,
+    INDOORS,
+    NEW_PERFORMERS,
+    OUTDOORS,
+    PANNING,
+    SPLITS,
+    STATIC,
+    TEST,
+    TRAVELLING,
+)
 
 SEED = 11
 TEST_OF = 3  # every third scene is for development, the others are for testing
@@ -27,7 +37,8 @@ Value = TypeVar("Value")
 class Kind:
     """What is the same in all tries to draw a scene."""
 
-    recording: int  # of the first person, into the recordings of the split, or into the new performers
+    # of the first person, into the recordings of the split, or into the new performers
+    recording: int
     size: tuple[int, int]  # width, height
     camera: str
     surroundings: str
@@ -38,14 +49,17 @@ class Kind:
 
 
 def split_of(number: int) -> str:
-    """Return whether a numbered scene of the recordings in ``shared/data`` is for testing or for development."""
+    """Return whether a numbered scene of the recordings in ``shared/data`` is for testing or for
+    development.
+    """
     return TEST if number % TEST_OF != 0 else DEVELOPMENT
 
 
 def kind_of(number: int, split: str, recordings: int) -> Kind:
     """Return the kind of a scene. Scenes of new performers are numbered by themselves.
 
-    Every property takes each of its values once, in random order, before it takes them again in another order.
+    Every property takes each of its values once, in random order, before it takes them again in
+    another order.
 
     :param recordings: how many recordings, or new performers, the scene's split has.
     """

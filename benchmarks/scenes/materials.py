@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Surfaces with small pictures, which Cycles samples in half the time of procedural noise. Needs bpy."""
+"""Surfaces with small pictures, which Cycles samples in half the time of procedural noise. Needs
+bpy.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,9 @@ def pictured(name: str, picture: Picture, width_m: float, height_m: float | None
     """Return a surface with a picture that repeats."""
     image = bpy.data.images.new(name, SIDE, SIDE, float_buffer=True)
     image.colorspace_settings.name = "Linear Rec.709"
-    image.pixels.foreach_set(np.concatenate([picture, np.ones((SIDE, SIDE, 1))], axis=2).astype(np.float32).ravel())
+    image.pixels.foreach_set(
+        np.concatenate([picture, np.ones((SIDE, SIDE, 1))], axis=2).astype(np.float32).ravel()
+    )
     material, diffuse = _diffuse(name)
     texture = material.node_tree.nodes.new("ShaderNodeTexImage")
     texture.image = image

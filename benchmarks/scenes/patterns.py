@@ -13,7 +13,8 @@ BOARDS, TILES, BRICK_ROWS = 12, 4, 16  # along one side
 
 
 def noise(rng: np.random.Generator, exponent: float, stretch: float = 1.0) -> NDArray[np.float64]:
-    """Return periodic noise (SIDE, SIDE) of zero mean and unit variance, with amplitudes f^-exponent.
+    """Return periodic noise (SIDE, SIDE) of zero mean and unit variance, with amplitudes
+    f^-exponent.
 
     :param stretch: how many times longer its grains are along the second axis than along the first.
     """
@@ -24,8 +25,12 @@ def noise(rng: np.random.Generator, exponent: float, stretch: float = 1.0) -> ND
     return values / values.std()
 
 
-def mottled(rng: np.random.Generator, color: NDArray[np.float64], contrast: float, exponent: float = 1.2) -> Picture:
-    """Return plaster, asphalt, carpet or grass: one linear colour (3,), lighter and darker by a share."""
+def mottled(
+    rng: np.random.Generator, color: NDArray[np.float64], contrast: float, exponent: float = 1.2
+) -> Picture:
+    """Return plaster, asphalt, carpet or grass: one linear colour (3,), lighter and darker by a
+    share.
+    """
     return _shaded(color, contrast * noise(rng, exponent))
 
 
@@ -50,9 +55,13 @@ def bricks(rng: np.random.Generator, color: NDArray[np.float64]) -> Picture:
     high, wide = SIDE // BRICK_ROWS, 4 * SIDE // BRICK_ROWS
     row, column = np.mgrid[:SIDE, :SIDE]
     along = (column + row // high % 2 * wide // 2) % SIDE
-    shade = 0.15 * rng.standard_normal((BRICK_ROWS, SIDE // wide))[row // high, along // wide] + 0.06 * noise(rng, 0.8)
+    shade = 0.15 * rng.standard_normal((BRICK_ROWS, SIDE // wide))[
+        row // high, along // wide
+    ] + 0.06 * noise(rng, 0.8)
     joint = (row % high < JOINT_PX) | (along % wide < JOINT_PX)
-    return np.where(joint[..., None], _shaded(np.full(3, 0.45), 0.1 * noise(rng, 0.8)), _shaded(color, shade))
+    return np.where(
+        joint[..., None], _shaded(np.full(3, 0.45), 0.1 * noise(rng, 0.8)), _shaded(color, shade)
+    )
 
 
 def stripes(rng: np.random.Generator, color: NDArray[np.float64]) -> Picture:

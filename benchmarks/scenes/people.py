@@ -14,14 +14,17 @@ from ...tools.render_sample.truth import LIMBS
 
 Points = NDArray[np.float64]
 DENSITY = 1010.0  # kg/m³ of a human body, with air in the lungs
-CLOTHES_WAVES, CLOTHES_PER_M = 24, 3.0  # of the noise that clothes stand off by, and its spatial frequency
+# of the noise that clothes stand off by, and its spatial frequency
+CLOTHES_WAVES, CLOTHES_PER_M = 24, 3.0
 SIDES = ("left", "right")
 LIMB_JOINTS = tuple(f"{side}_{joint}" for joint in LIMBS.values() for side in SIDES)
 
 
 @dataclass(frozen=True)
 class Person:
-    """A body in motion. The whole person is ``scale`` times the body of these shape coefficients, and so is the way."""
+    """A body in motion. The whole person is ``scale`` times the body of these shape coefficients,
+    and so is the way.
+    """
 
     take: str
     rotations: Points  # (T, K+1, 3, 3) joint states, row 0 the root in the world
@@ -38,7 +41,9 @@ class Person:
 
     def joints(self, body: Body) -> Points:
         """Return all joints (T, K+1, 3) in the world, metres."""
-        joints: Points = self.scale * body.forward_kinematics(self.rotations, self.trans, self.betas)[1]
+        joints: Points = (
+            self.scale * body.forward_kinematics(self.rotations, self.trans, self.betas)[1]
+        )
         return joints
 
     def limbs(self, body: Body) -> Points:
@@ -46,7 +51,9 @@ class Person:
         return self.joints(body)[:, [body.joint_names.index(name) for name in LIMB_JOINTS]]
 
     def skin(self, body: Body, frame: int) -> Points:
-        """Return the vertices (V, 3) of the skin in one frame, without clothes, in the world, metres."""
+        """Return the vertices (V, 3) of the skin in one frame, without clothes, in the world,
+        metres.
+        """
         R, t = body.forward_kinematics(self.rotations[frame], self.trans[frame], self.betas)
         vertices: Points = body.skin(R, t, self.betas)
         head = body.joint_names.index("head")
@@ -70,7 +77,9 @@ class Person:
 
     def mass_index(self, body: Body) -> float:
         """Return mass over squared stature, kg/m², of the skin's volume."""
-        a, b, c = np.moveaxis((body.v_template + body.shapedirs @ self.betas)[body.triangles()], 1, 0)
+        a, b, c = np.moveaxis(
+            (body.v_template + body.shapedirs @ self.betas)[body.triangles()], 1, 0
+        )
         volume = float(np.einsum("fi,fi->", a, np.cross(b, c))) / 6.0
         return DENSITY * self.scale * abs(volume) / float(body.stature(self.betas)) ** 2
 
@@ -82,7 +91,9 @@ class Person:
         noise = np.sin(body.v_template @ waves.T + phase).sum(axis=1) / np.sqrt(CLOTHES_WAVES / 2)
         off = np.clip(0.5 + 0.35 * noise, 0.0, 1.0)
         of = {name: _share_of(body, name) for name in ("suit", "suit_accent", "hair")}
-        offsets: Points = off * (self.loose_m * (of["suit"] + of["suit_accent"]) + self.hair_m * of["hair"])
+        offsets: Points = off * (
+            self.loose_m * (of["suit"] + of["suit_accent"]) + self.hair_m * of["hair"]
+        )
         return offsets
 
 
@@ -92,5 +103,7 @@ def _share_of(body: Body, material: str) -> Points:
     corners = body.faces.shape[1]
     of = np.repeat(body.face_material == body.material_names.index(material), corners).astype(float)
     counts = np.bincount(body.faces.ravel(), minlength=len(body.v_template))
-    share: Points = np.bincount(body.faces.ravel(), of, len(body.v_template)) / np.maximum(counts, 1)
+    share: Points = np.bincount(body.faces.ravel(), of, len(body.v_template)) / np.maximum(
+        counts, 1
+    )
     return np.where(share < 1.0, 0.0, share)  # the seam with bare skin stays where it is

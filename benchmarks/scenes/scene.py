@@ -67,7 +67,9 @@ class Scene:
     def to_camera(self, points_world: Points) -> Points:
         """Transform points (T, ..., 3) of all frames to the camera frame, metres."""
         flat = points_world.reshape(len(self), -1, 3)
-        return transform_points(np.linalg.inv(self.world_from_camera), flat).reshape(points_world.shape)
+        return transform_points(np.linalg.inv(self.world_from_camera), flat).reshape(
+            points_world.shape
+        )
 
     def project(self, points_camera: Points) -> Points:
         """Project points (..., 3) to pixels (..., 2)."""
@@ -79,11 +81,20 @@ class Scene:
         stands = np.zeros((len(self), 2), bool)
         T_world_camera = self.world_from_camera[frame]
         return Shot(
-            first.rotations, first.trans, first.betas, self.intrinsics, T_world_camera, self.size, self.fps, stands
+            first.rotations,
+            first.trans,
+            first.betas,
+            self.intrinsics,
+            T_world_camera,
+            self.size,
+            self.fps,
+            stands,
         )
 
     def hidden(self, person: Person, body: Body) -> NDArray[np.bool_]:
-        """Return (T, 12) bool: which limb joints of a person are behind the block or outside the picture."""
+        """Return (T, 12) bool: which limb joints of a person are behind the block or outside the
+        picture.
+        """
         limbs = person.limbs(body)
         pixels = self.project(self.to_camera(limbs))
         out = ((pixels < 0) | (pixels > np.array(self.size) - 1)).any(axis=-1)
@@ -93,7 +104,9 @@ class Scene:
         return out
 
     def behind_others(self, person: Person, body: Body) -> NDArray[np.bool_]:
-        """Return (T, 12) bool: which limb joints of a person are behind the skin of somebody else."""
+        """Return (T, 12) bool: which limb joints of a person are behind the skin of somebody
+        else.
+        """
         limbs = self.to_camera(person.limbs(body))
         behind = np.zeros(limbs.shape[:2], bool)
         for other in self.people:
@@ -109,9 +122,13 @@ class Scene:
         return behind
 
     def view_deg(self, person: Person, body: Body) -> Points:
-        """Return the horizontal angle between the pelvis's front and the camera, (T,): 0 in front, 180 behind."""
+        """Return the horizontal angle between the pelvis's front and the camera, (T,): 0 in front,
+        180 behind.
+        """
         toward = self.world_from_camera[:, :2, 3] - person.joints(body)[:, 0, :2]
-        cosine = np.einsum("ti,ti->t", toward / np.linalg.norm(toward, axis=1, keepdims=True), person.facing())
+        cosine = np.einsum(
+            "ti,ti->t", toward / np.linalg.norm(toward, axis=1, keepdims=True), person.facing()
+        )
         angle: Points = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
         return angle
 
@@ -119,9 +136,9 @@ class Scene:
 def write_truth(path: Path, body: Body, scene: Scene) -> None:
     """Write the ground truth of all N people as plain arrays.
 
-    limbs (N, T, 12, 3) in the world and limbs_cam in the camera frame, metres, as ``names``; hidden (N, T, 12);
-    view_deg (N, T); stature_m, mass_index, loose_m (N,); takes (N,); intrinsics, world_from_camera (T, 4, 4), size,
-    fps; camera, surroundings, test.
+    limbs (N, T, 12, 3) in the world and limbs_cam in the camera frame, metres, as ``names``; hidden
+    (N, T, 12); view_deg (N, T); stature_m, mass_index, loose_m (N,); takes (N,); intrinsics,
+    world_from_camera (T, 4, 4), size, fps; camera, surroundings, test.
     """
     people = scene.people
     limbs = np.array([person.limbs(body) for person in people])
@@ -130,7 +147,9 @@ def write_truth(path: Path, body: Body, scene: Scene) -> None:
         limbs=limbs,
         limbs_cam=np.array([scene.to_camera(each) for each in limbs]),
         names=np.array(LIMB_JOINTS),
-        hidden=np.array([scene.hidden(person, body) | scene.behind_others(person, body) for person in people]),
+        hidden=np.array(
+            [scene.hidden(person, body) | scene.behind_others(person, body) for person in people]
+        ),
         view_deg=np.array([scene.view_deg(person, body) for person in people]),
         stature_m=np.array([person.stature_m(body) for person in people]),
         mass_index=np.array([person.mass_index(body) for person in people]),

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Show what the scenes look like: ``python -m scope.benchmarks.scenes.sheet OUT.jpg`` writes one picture of several."""
+"""Show what the scenes look like: ``python -m scope.benchmarks.scenes.sheet OUT.jpg`` writes one
+picture of several.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,9 @@ QUALITY = 70
 
 
 def sheet(clips: list[Path]) -> NDArray[np.uint8]:
-    """Return the middle frames of the first clips that fill the sheet, each cut to its middle part."""
+    """Return the middle frames of the first clips that fill the sheet, each cut to its middle
+    part.
+    """
     tiles = [_middle(clip) for clip in clips[: COLUMNS * ROWS]]
     tiles += [np.zeros((HEIGHT, WIDTH, 3), np.uint8)] * (COLUMNS * ROWS - len(tiles))
     return np.vstack([np.hstack(tiles[row * COLUMNS : (row + 1) * COLUMNS]) for row in range(ROWS)])
@@ -34,8 +38,12 @@ def _middle(clip: Path) -> NDArray[Any]:
     high, wide = frame.shape[:2]
     side = min(high, wide)
     top, left = (high - side) // 2, (wide - side) // 2
-    return cv2.resize(frame[top : top + side, left : left + side], (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
+    return cv2.resize(
+        frame[top : top + side, left : left + side], (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA
+    )
 
 
 if __name__ == "__main__":
-    cv2.imwrite(sys.argv[1], sheet(sorted(FOLDER.glob("test_*.mp4"))), [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+    cv2.imwrite(
+        sys.argv[1], sheet(sorted(FOLDER.glob("test_*.mp4"))), [cv2.IMWRITE_JPEG_QUALITY, QUALITY]
+    )

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Means over people, with confidence intervals by the bootstrap over people, or over who performed their motions."""
+"""Means over people, with confidence intervals by the bootstrap over people, or over who performed
+their motions.
+"""
 
 from __future__ import annotations
 
@@ -30,10 +32,11 @@ class Estimate(NamedTuple):
 
 
 def mean_over_people(values: Sequence[float] | NDArray[np.float64]) -> Estimate:
-    """Return the mean of one value a person, with the bootstrap's percentile interval (Efron 1979) of 95 %.
+    """Return the mean of one value a person, with the bootstrap's percentile interval (Efron 1979)
+    of 95 %.
 
-    Frames of one clip resemble each other, so people are drawn with replacement, not frames. With fewer than two
-    people, the interval is NaN.
+    Frames of one clip resemble each other, so people are drawn with replacement, not frames. With
+    fewer than two people, the interval is NaN.
 
     :param values: (n,), NaN where a person has no value.
     """
@@ -46,11 +49,13 @@ def mean_over_people(values: Sequence[float] | NDArray[np.float64]) -> Estimate:
     return Estimate(float(found.mean()), float(low), float(high), len(found))
 
 
-def mean_over_performers(values: Sequence[float] | NDArray[np.float64], performers: Sequence[str]) -> Estimate:
+def mean_over_performers(
+    values: Sequence[float] | NDArray[np.float64], performers: Sequence[str]
+) -> Estimate:
     """Return the mean of one value a person, with an interval that whole performers are drawn for.
 
-    People who move as the same performer does resemble each other, so performers are drawn with replacement, each with
-    all of their people. With fewer than two performers, the interval is NaN.
+    People who move as the same performer does resemble each other, so performers are drawn with
+    replacement, each with all of their people. With fewer than two performers, the interval is NaN.
 
     :param values: (n,), NaN where a person has no value; ``performers``: n names.
     """

@@ -24,7 +24,9 @@ Rng = np.random.Generator
 
 
 def build_scene(scene: Scene, body: Body) -> tuple[list[bpy.types.Object], NDArray[np.float64]]:
-    """Build everything, ready to render; return the people's mesh objects and the positions of the lamps (n, 3)."""
+    """Build everything, ready to render; return the people's mesh objects and the positions of the
+    lamps (n, 3).
+    """
     bpy.ops.wm.read_factory_settings(use_empty=True)
     set_up_rendering(bpy.context.scene, scene.size)
     add_camera(bpy.context.scene, scene.intrinsics, scene.size, scene.world_from_camera[0])
@@ -40,7 +42,9 @@ def build_scene(scene: Scene, body: Body) -> tuple[list[bpy.types.Object], NDArr
 
 
 def _limit_light_paths(scene: bpy.types.Scene) -> None:
-    """Make a sample cost as little as it can: a path ends after one bounce, in ambient light if nothing is near."""
+    """Make a sample cost as little as it can: a path ends after one bounce, in ambient light if
+    nothing is near.
+    """
     cycles = scene.cycles
     cycles.use_light_tree, scene.world.cycles.sampling_method = False, "NONE"
     cycles.use_fast_gi, cycles.fast_gi_method, cycles.ao_bounces_render = True, "REPLACE", 1
@@ -53,7 +57,9 @@ def move_camera(world_from_camera: NDArray[np.float64]) -> None:
 
 
 def _occupied(scene: Scene, body: Body) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the least and largest x and y (2,) of the people, the block and the camera, with room around them."""
+    """Return the least and largest x and y (2,) of the people, the block and the camera, with room
+    around them.
+    """
     points = [person.joints(body).reshape(-1, 3) for person in scene.people]
     points.append(scene.world_from_camera[:, :3, 3])
     if scene.block is not None:
@@ -70,7 +76,9 @@ def _room(rng: Rng, low: NDArray[np.float64], high: NDArray[np.float64]) -> NDAr
     wall = _wall(rng)
     dark = plain("skirting", np.full(3, rng.uniform(0.05, 0.6)))
     add_surfaced_box("floor", (cx, cy, -0.05), (wide, deep, 0.1), _floor(rng))
-    add_surfaced_box("ceiling", (cx, cy, tall + 0.05), (wide, deep, 0.1), plain("ceiling", np.full(3, 0.8)))
+    add_surfaced_box(
+        "ceiling", (cx, cy, tall + 0.05), (wide, deep, 0.1), plain("ceiling", np.full(3, 0.8))
+    )
     for side, (place, size, inward) in enumerate(
         [
             ((x0 - WALL_M / 2, cy), (WALL_M, deep), (1, 0)),
@@ -82,7 +90,9 @@ def _room(rng: Rng, low: NDArray[np.float64], high: NDArray[np.float64]) -> NDAr
         add_surfaced_box(f"wall {side}", (*place, tall / 2), (*size, tall), wall)
         along = np.array([abs(inward[1]), abs(inward[0])])
         face = np.array(place) + WALL_M / 2 * np.array(inward)
-        add_surfaced_box(f"skirting {side}", (*face, 0.05), (*(np.array(size) * along + 0.02), 0.1), dark)
+        add_surfaced_box(
+            f"skirting {side}", (*face, 0.05), (*(np.array(size) * along + 0.02), 0.1), dark
+        )
         length = float(np.array(size) @ along)
         for k in range(rng.integers(1, 4)):  # pictures, doors, shelves
             at = face + along * rng.uniform(-0.4, 0.4) * length
@@ -95,11 +105,17 @@ def _room(rng: Rng, low: NDArray[np.float64], high: NDArray[np.float64]) -> NDAr
     for k in range(rng.integers(0, 2)):
         add_surfaced_box(f"rug {k}", (cx, cy, 0.004), (wide / 3, deep / 3, 0.008), _any(rng, "rug"))
     lamps = np.array(
-        [[cx + rng.uniform(-1, 1), cy + rng.uniform(-1, 1), tall - 0.1] for _ in range(rng.integers(1, 3))]
+        [
+            [cx + rng.uniform(-1, 1), cy + rng.uniform(-1, 1), tall - 0.1]
+            for _ in range(rng.integers(1, 3))
+        ]
     )
     for k, lamp in enumerate(lamps):
         data = bpy.data.lights.new(f"lamp {k}", "AREA")
-        data.energy, data.size = rng.uniform(120, 260) * (wide * deep / 30) ** 0.5, rng.uniform(0.6, 1.8)
+        data.energy, data.size = (
+            rng.uniform(120, 260) * (wide * deep / 30) ** 0.5,
+            rng.uniform(0.6, 1.8),
+        )
         data.color = (1.0, rng.uniform(0.8, 1.0), rng.uniform(0.6, 1.0))
         _link(bpy.data.objects.new(f"lamp {k}", data)).location = lamp.tolist()
     _sky((0.9, 0.95, 1.0), rng.uniform(0.3, 0.6))
@@ -130,19 +146,31 @@ def _street(rng: Rng, low: NDArray[np.float64], high: NDArray[np.float64]) -> ND
                 add_surfaced_box("window", _triple(place), _triple(extent), glass)
     for k in range(rng.integers(2, 7)):
         angle = rng.uniform(0, 2 * np.pi)
-        at = center + (np.linalg.norm(reach) + rng.uniform(1.0, 12.0)) * np.array([np.cos(angle), np.sin(angle)])
+        at = center + (np.linalg.norm(reach) + rng.uniform(1.0, 12.0)) * np.array(
+            [np.cos(angle), np.sin(angle)]
+        )
         tall = rng.uniform(2.0, 4.5)
         if rng.random() < 0.6:
-            bpy.ops.mesh.primitive_cylinder_add(radius=rng.uniform(0.1, 0.25), depth=tall, location=(*at, tall / 2))
+            bpy.ops.mesh.primitive_cylinder_add(
+                radius=rng.uniform(0.1, 0.25), depth=tall, location=(*at, tall / 2)
+            )
             bpy.context.object.data.materials.append(bark.material)
             for _ in range(4):
                 crown = (*(at + rng.normal(0, 0.5, 2)), tall + rng.uniform(-0.3, 1.0))
-                bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3, radius=rng.uniform(0.7, 1.4), location=crown)
+                bpy.ops.mesh.primitive_ico_sphere_add(
+                    subdivisions=3, radius=rng.uniform(0.7, 1.4), location=crown
+                )
                 bpy.context.object.data.materials.append(leaves.material)
         else:
             add_surfaced_box(f"post {k}", (*at, tall / 2), (0.12, 0.12, tall), glass)
     elevation, azimuth = np.radians(rng.uniform(35, 75)), rng.uniform(0, 2 * np.pi)
-    toward = np.array([np.cos(azimuth) * np.cos(elevation), np.sin(azimuth) * np.cos(elevation), np.sin(elevation)])
+    toward = np.array(
+        [
+            np.cos(azimuth) * np.cos(elevation),
+            np.sin(azimuth) * np.cos(elevation),
+            np.sin(elevation),
+        ]
+    )
     data = bpy.data.lights.new("sun", "SUN")
     overcast = rng.random() < 0.3
     data.energy, data.angle = (1.2, 0.8) if overcast else (rng.uniform(2.5, 4.0), 0.01)
@@ -188,7 +216,9 @@ def _ground(rng: Rng) -> Surface:
     if rng.random() < 0.4:
         return pictured("ground", mottled(rng, np.array([0.10, 0.16, 0.05]), 0.35, 0.9), 5.0)
     gray = np.full(3, rng.uniform(0.08, 0.35))
-    return pictured("ground", mottled(rng, gray, 0.12) if rng.random() < 0.6 else tiles(rng, gray), 4.0)
+    return pictured(
+        "ground", mottled(rng, gray, 0.12) if rng.random() < 0.6 else tiles(rng, gray), 4.0
+    )
 
 
 def _house(rng: Rng) -> Surface:
@@ -198,12 +228,18 @@ def _house(rng: Rng) -> Surface:
 
 
 def _on_wall(rng: Rng, width: float, height: float) -> Surface:
-    return pictured("picture", painting(rng), width, height) if rng.random() < 0.5 else _any(rng, "furniture")
+    return (
+        pictured("picture", painting(rng), width, height)
+        if rng.random() < 0.5
+        else _any(rng, "furniture")
+    )
 
 
 def _any(rng: Rng, name: str) -> Surface:
     color = rng.uniform(0.05, 0.6) * rng.uniform(0.5, 1.0, 3)
-    return pictured(name, boards(rng, color) if rng.random() < 0.5 else mottled(rng, color, 0.08), 1.5)
+    return pictured(
+        name, boards(rng, color) if rng.random() < 0.5 else mottled(rng, color, 0.08), 1.5
+    )
 
 
 def _triple(values: NDArray[np.float64]) -> Triple:

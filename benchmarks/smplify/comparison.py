@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`./scripts/bench smplify`: accuracy and time of SMPLify's way beside Scope's, on the same frames and keypoints."""
+"""`./scripts/bench smplify`: accuracy and time of SMPLify's way beside Scope's, on the same frames
+and keypoints.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,8 @@ SHOWN_PX = 220
 SIDES = {"L": "left", "R": "right"}
 Points = NDArray[np.float64]
 MS = "ms per frame: SMPLify's of the processor, Scope's by the clock"
-Columns = tuple[tuple[str, Points, float], ...]  # name, joints (F, K+1, 3) in the camera frame, ms per frame
+# name, joints (F, K+1, 3) in the camera frame, ms per frame
+Columns = tuple[tuple[str, Points, float], ...]
 
 
 def smplify(quick: bool) -> dict[str, Any]:
@@ -57,7 +60,9 @@ def smplify(quick: bool) -> dict[str, Any]:
     return figures
 
 
-def _clip(body: Body, prior: PosePrior, video: Path, truth: Path, every: int) -> dict[str, dict[str, float]]:
+def _clip(
+    body: Body, prior: PosePrior, video: Path, truth: Path, every: int
+) -> dict[str, dict[str, float]]:
     """Return the figures of each optimizer on every so many frames of a clip."""
     raw = capture(video, body, CaptureOptions(smoothing=False))
     whole = capture(video, body, CaptureOptions())
@@ -79,7 +84,11 @@ def _clip(body: Body, prior: PosePrior, video: Path, truth: Path, every: int) ->
             np.array([objective.joints(x) for x in fits]),
             float(np.median(took)),
         ),
-        ("Scope, each frame", motion.joints_cam[rows].astype(float), 1e3 / raw.report["fps"]["solver"]),
+        (
+            "Scope, each frame",
+            motion.joints_cam[rows].astype(float),
+            1e3 / raw.report["fps"]["solver"],
+        ),
         ("Scope, the clip", whole.motions[0].joints_cam[rows].astype(float), ours),
     )
     _draw(body, video, motion, rows, np.array(fits), objective, whole.motions[0])
@@ -94,10 +103,12 @@ def frame_of(motion: Motion, row: int) -> Frame:
 
 
 def errors(body: Body, joints: Points, true: Points, names: list[str]) -> dict[str, float]:
-    """Return mean errors of the twelve limb joints, mm: ``mpjpe_root``, relative to the hips, and ``pa_mpjpe``.
+    """Return mean errors of the twelve limb joints, mm: ``mpjpe_root``, relative to the hips, and
+    ``pa_mpjpe``.
 
     :param joints: (F, K+1, 3), those of the body, in the camera frame.
-    :param true: (F, J, 3), as ``names``, in the camera frame; frames that lack a joint (NaN) do not count.
+    :param true: (F, J, 3), as ``names``, in the camera frame; frames that lack a joint (NaN) do not
+        count.
     """
     limbs = [side + limb for limb in LIMBS for side in SIDES]
     at = [body.joint_names.index(f"{SIDES[limb[0]]}_{LIMBS[limb[1:]]}") for limb in limbs]
@@ -106,13 +117,24 @@ def errors(body: Body, joints: Points, true: Points, names: list[str]) -> dict[s
     captured, wanted = captured[known], wanted[known]
     hips = [limbs.index("LHip"), limbs.index("RHip")]
     relative = [relative_to(points, points[:, hips].mean(axis=1)) for points in (captured, wanted)]
-    return {"mpjpe_root": float(mpjpe(*relative).mean()), "pa_mpjpe": float(pa_mpjpe(captured, wanted).mean())}
+    return {
+        "mpjpe_root": float(mpjpe(*relative).mean()),
+        "pa_mpjpe": float(pa_mpjpe(captured, wanted).mean()),
+    }
 
 
 def _draw(
-    body: Body, video: Path, motion: Motion, rows: NDArray[np.intp], fits: Points, objective: Objective, whole: Motion
+    body: Body,
+    video: Path,
+    motion: Motion,
+    rows: NDArray[np.intp],
+    fits: Points,
+    objective: Objective,
+    whole: Motion,
 ) -> None:
-    """Write a picture of three frames: SMPLify's body and Scope's over the footage, and both turned by 90 degrees."""
+    """Write a picture of three frames: SMPLify's body and Scope's over the footage, and both turned
+    by 90 degrees.
+    """
     shown = rows[np.linspace(0, len(rows) - 1, 3).round().astype(int)]
     images = frames_of(video, motion.frames[shown].tolist())
     strips = []
@@ -127,8 +149,12 @@ def _draw(
         for person, skin in enumerate((theirs, ours)):
             colors = [body_colors(body, person)]
             for ground, shape in ((image, skin), (np.full_like(image, 236), turned(skin))):
-                pictures.append(draw_overlay(ground, [shape], body.faces, motion.intrinsics, None, colors, 1.0))
-        strips.append(np.hstack([_cropped(picture, project(ours, motion.intrinsics)) for picture in pictures]))
+                pictures.append(
+                    draw_overlay(ground, [shape], body.faces, motion.intrinsics, None, colors, 1.0)
+                )
+        strips.append(
+            np.hstack([_cropped(picture, project(ours, motion.intrinsics)) for picture in pictures])
+        )
     CACHE.mkdir(parents=True, exist_ok=True)
     write_jpeg(CACHE / f"smplify_{video.stem}.jpg", np.vstack(strips))
 
@@ -146,5 +172,7 @@ def _cropped(image: NDArray[np.uint8], pixels: Points) -> NDArray[np.uint8]:
     low, high = pixels.min(axis=0), pixels.max(axis=0)
     half, (x, y) = 0.6 * float((high - low).max()), (low + high) / 2
     M = np.array([[1, 0, half - x], [0, 1, half - y]]) * (SHOWN_PX / (2 * half))
-    cropped = cv2.warpAffine(image, M, (SHOWN_PX, SHOWN_PX), flags=cv2.INTER_AREA, borderValue=(236, 236, 236))
+    cropped = cv2.warpAffine(
+        image, M, (SHOWN_PX, SHOWN_PX), flags=cv2.INTER_AREA, borderValue=(236, 236, 236)
+    )
     return cropped.astype(np.uint8, copy=False)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Levenberg-Marquardt with a dense Jacobian by differences: the cost of an optimizer that ignores all structure."""
+"""Levenberg-Marquardt with a dense Jacobian by differences: the cost of an optimizer that ignores
+all structure.
+"""
 
 from __future__ import annotations
 
@@ -23,10 +25,13 @@ class Minimum(NamedTuple):
     iterations: int
 
 
-def minimize(residuals: Residuals, x: Vector, free: NDArray[np.bool_], limit: int, tolerance: float) -> Minimum:
+def minimize(
+    residuals: Residuals, x: Vector, free: NDArray[np.bool_], limit: int, tolerance: float
+) -> Minimum:
     """Minimize half the sum of squared residuals over the free unknowns.
 
-    (JᵀJ + λ diag JᵀJ) d = −Jᵀr (Marquardt 1963), λ divided by 10 after a decrease and multiplied by 10 otherwise.
+    (JᵀJ + λ diag JᵀJ) d = −Jᵀr (Marquardt 1963), λ divided by 10 after a decrease and multiplied by
+    10 otherwise.
 
     :param residuals: from points (B, n) to residuals (B, m).
     :param x: (n,) start.
@@ -52,7 +57,13 @@ def minimize(residuals: Residuals, x: Vector, free: NDArray[np.bool_], limit: in
             damping *= 10
             if damping > MAX_DAMPING:
                 return Minimum(x, cost, iteration)
-        decrease, x, r, cost, damping = (cost - lower) / cost, trial, r_trial, lower, max(damping / 10, MIN_DAMPING)
+        decrease, x, r, cost, damping = (
+            (cost - lower) / cost,
+            trial,
+            r_trial,
+            lower,
+            max(damping / 10, MIN_DAMPING),
+        )
         if decrease < tolerance:
             return Minimum(x, cost, iteration + 1)
     return Minimum(x, cost, limit)

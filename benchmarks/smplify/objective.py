@@ -2,9 +2,9 @@
 r"""SMPLify's objective for one frame, with what this body and these keypoints have.
 
     E = Σ_i w_i ρ(Π(x_i) − p_i) + λ_θ (θ − μ)ᵀ Σ⁻¹ (θ − μ) + λ_β ‖β‖² + λ_a Σ_bends exp(θ)²
-with the Geman-McClure ρ(e) = σ² ‖e‖² / (σ² + ‖e‖²), σ = 100 px, of keypoints p_i with confidence w_i. The pose prior is
-one Gaussian instead of a mixture of eight, over the rotation vectors of all recordings in ../shared; interpenetration
-is left out. The weights fall in four stages, as there.
+with the Geman-McClure ρ(e) = σ² ‖e‖² / (σ² + ‖e‖²), σ = 100 px, of keypoints p_i with confidence
+w_i. The pose prior is one Gaussian instead of a mixture of eight, over the rotation vectors of all
+recordings in ../shared; interpenetration is left out. The weights fall in four stages, as there.
 Source: Bogo et al., Keep it SMPL, ECCV 2016; the weights are those of its published code.
 """
 
@@ -57,15 +57,24 @@ class Frame:
 
 
 class Objective:
-    """The residuals of one frame; unknowns are the root's rotation vector and translation, 3K angles and β."""
+    """The residuals of one frame; unknowns are the root's rotation vector and translation, 3K
+    angles and β.
+    """
 
     def __init__(self, body: Body, prior: PosePrior, frame: Frame) -> None:
         self.body, self.prior, self.frame = body, prior, frame
         points = body.keypoint_set("blazepose")
         self.at = np.array([points[name] for name in frame.names])
         self.trunk = np.array([frame.names.index(name) for name in TRUNK])
-        bends = [("left_knee", 0, -1.0), ("right_knee", 0, -1.0), ("left_elbow", 1, 1.0), ("right_elbow", 1, -1.0)]
-        self.bends = np.array([ROOT + 3 * (body.joint_names.index(name) - 1) + axis for name, axis, _ in bends])
+        bends = [
+            ("left_knee", 0, -1.0),
+            ("right_knee", 0, -1.0),
+            ("left_elbow", 1, 1.0),
+            ("right_elbow", 1, -1.0),
+        ]
+        self.bends = np.array(
+            [ROOT + 3 * (body.joint_names.index(name) - 1) + axis for name, axis, _ in bends]
+        )
         self.signs = np.array([sign for *_, sign in bends])
         self.n = ROOT + 3 * body.K + body.P
 
@@ -81,9 +90,13 @@ class Objective:
         return Minimum(x, found.cost, iterations)
 
     def pose(self, x: Vector) -> tuple[Vector, Vector, Vector]:
-        """Return joint states (B, K+1, 3, 3), translations (B, 3) and shapes (B, P) of unknowns (B, n)."""
+        """Return joint states (B, K+1, 3, 3), translations (B, 3) and shapes (B, P) of unknowns (B,
+        n).
+        """
         K = self.body.K
-        vectors = np.concatenate([x[:, :3], x[:, ROOT : ROOT + 3 * K]], axis=1).reshape(len(x), K + 1, 3)
+        vectors = np.concatenate([x[:, :3], x[:, ROOT : ROOT + 3 * K]], axis=1).reshape(
+            len(x), K + 1, 3
+        )
         states = exp(vectors)
         states[:, 0] = UPRIGHT @ states[:, 0]
         return states, x[:, 3:ROOT], x[:, ROOT + 3 * K :]
@@ -100,16 +113,23 @@ class Objective:
         theta, betas = x[:, ROOT : ROOT + 3 * K], x[:, ROOT + 3 * K :]
         off = self._offsets(x)
         squared = (off**2).sum(axis=-1, keepdims=True)
-        robust = off * (SIGMA_PX / np.sqrt(SIGMA_PX**2 + squared)) * np.sqrt(self.frame.confidence)[:, None]
+        robust = (
+            off
+            * (SIGMA_PX / np.sqrt(SIGMA_PX**2 + squared))
+            * np.sqrt(self.frame.confidence)[:, None]
+        )
         prior = np.sqrt(pose_weight) * (theta - self.prior.mean) @ self.prior.whitening.T
         bends = BEND * np.exp(np.clip(self.signs * x[:, self.bends], -10, 3))
-        return np.concatenate([robust.reshape(len(x), -1), prior, np.sqrt(shape_weight) * betas, bends], axis=1)
+        return np.concatenate(
+            [robust.reshape(len(x), -1), prior, np.sqrt(shape_weight) * betas, bends], axis=1
+        )
 
     def _offsets(self, x: Vector) -> Vector:
         """Return projected minus seen keypoints (B, J, 2), pixels."""
         states, trans, betas = self.pose(x)
         points = np.empty((len(x), len(self.at), 3))
-        shapes, of = np.unique(betas, axis=0, return_inverse=True)  # most points of a Jacobian share theirs
+        # most points of a Jacobian share theirs
+        shapes, of = np.unique(betas, axis=0, return_inverse=True)
         for k, shape in enumerate(shapes):
             rows = of.reshape(-1) == k
             R, t = self.body.forward_kinematics(states[rows], trans[rows], shape)
@@ -118,11 +138,15 @@ class Objective:
         return project(points, self.frame.intrinsics) - self.frame.pixels
 
     def _place(self, heading: float) -> Minimum:
-        """Return root rotation and translation that fit the trunk, with the prior's mean pose, from one heading."""
+        """Return root rotation and translation that fit the trunk, with the prior's mean pose, from
+        one heading.
+        """
         x = np.zeros(self.n)
         x[1] = heading
         x[ROOT : ROOT + 3 * self.body.K] = self.prior.mean
-        rest = self.body.keypoints(*self.body.forward_kinematics(*(each[0] for each in self.pose(x[None]))))[self.at]
+        rest = self.body.keypoints(
+            *self.body.forward_kinematics(*(each[0] for each in self.pose(x[None])))
+        )[self.at]
         shoulders, hips = self.trunk[:2], self.trunk[2:]
         pixels, K = self.frame.pixels, self.frame.intrinsics
         tall_px = np.linalg.norm(pixels[shoulders].mean(axis=0) - pixels[hips].mean(axis=0))
@@ -131,4 +155,10 @@ class Objective:
         ray = np.linalg.solve(K, np.append(pixels[self.trunk].mean(axis=0), 1.0))
         x[3:ROOT] = depth * ray - rest[self.trunk].mean(axis=0)
         free = np.arange(self.n) < ROOT
-        return minimize(lambda x: self._offsets(x)[:, self.trunk].reshape(len(x), -1), x, free, START_LIMIT, TOLERANCE)
+        return minimize(
+            lambda x: self._offsets(x)[:, self.trunk].reshape(len(x), -1),
+            x,
+            free,
+            START_LIMIT,
+            TOLERANCE,
+        )

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The step of a whole clip against one dense matrix, against frames that are fitted alone and smoothed, and with
-outlines.
+"""The step of a whole clip against one dense matrix, against frames that are fitted alone and
+smoothed, and with outlines.
 
-The dense way writes the clip's normal equations H (n, n), n = T (6 + 3K) + P, as one matrix, factorizes it by LAPACK's
-Cholesky and solves the two triangular systems. In front of it stands, as in `dense.py`, the product H = JᵀJ by BLAS.
+The dense way writes the clip's normal equations H (n, n), n = T (6 + 3K) + P, as one matrix,
+factorizes it by LAPACK's Cholesky and solves the two triangular systems. In front of it stands, as
+in `dense.py`, the product H = JᵀJ by BLAS.
 """
 
 from __future__ import annotations
@@ -35,7 +36,9 @@ _SIGMA = 1e-4  # of the robust kernel, normalized image coordinates, squared
 
 
 def against_dense(rounds: int) -> list[dict[str, float]]:
-    """Return rows of frames, and the least milliseconds of the whole step in both ways, in one thread, K=23, P=10."""
+    """Return rows of frames, and the least milliseconds of the whole step in both ways, in one
+    thread, K=23, P=10.
+    """
     rows = []
     for frames in DENSE_LENGTHS:
         problem, poses = make_clip(23, frames, contacts=0)
@@ -43,7 +46,9 @@ def against_dense(rounds: int) -> list[dict[str, float]]:
         problem.linearize(0, poses, system)
         factor, parts = make_factor(system), len(problem.tree.parents)
         H, g = dense_equations(system, frames, parts, problem.tree.globals, 1.0, scale)
-        J = np.random.default_rng(0).standard_normal((frames * RESIDUALS_PER_FRAME + 3 * (frames - 2) * parts, len(g)))
+        J = np.random.default_rng(0).standard_normal(
+            (frames * RESIDUALS_PER_FRAME + 3 * (frames - 2) * parts, len(g))
+        )
         eliminated, solved, product = in_turns(
             rounds,
             partial(solve_clip, problem.tree, system, 1.0, scale, factor),
@@ -51,8 +56,10 @@ def against_dense(rounds: int) -> list[dict[str, float]]:
             partial(np.matmul, J.T, J),
         )
         rows.append({
-            "frames": frames, "elimination_ms": eliminated, "dense_solve_ms": solved, "dense_product_ms": product,
-            "dense_over_elimination": (solved + product) / eliminated, "solve_alone": solved / eliminated,
+            "frames": frames, "elimination_ms": eliminated, "dense_solve_ms": solved,
+            "dense_product_ms": product,
+            "dense_over_elimination": (solved + product) / eliminated,
+            "solve_alone": solved / eliminated,
         })  # fmt: skip
     return rows
 
@@ -60,7 +67,9 @@ def against_dense(rounds: int) -> list[dict[str, float]]:
 def dense_equations(
     system: ClipSystem, frames: int, parts: int, count: int, damping: float, root_scale: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the damped normal equations of a clip without standing points as one matrix (n, n), and Jᵀr (n,)."""
+    """Return the damped normal equations of a clip without standing points as one matrix (n, n),
+    and Jᵀr (n,).
+    """
     m = 3 + 3 * parts
     H, g = np.zeros((frames * m + count, frames * m + count)), np.zeros(frames * m + count)
     slots = [0, *range(6, m, 3), 3]
@@ -82,10 +91,11 @@ def dense_equations(
 
 
 def against_frames(rounds: int) -> list[dict[str, float]]:
-    """Return the least milliseconds a frame of a clip fitted at once, and of its frames fitted alone and smoothed.
+    """Return the least milliseconds a frame of a clip fitted at once, and of its frames fitted
+    alone and smoothed.
 
-    Both start from the same poses, with the shape given, and stop at the relative decrease at which a capture does;
-    K=23, 120 terms a frame with 3 pixels of noise.
+    Both start from the same poses, with the shape given, and stop at the relative decrease at which
+    a capture does; K=23, 120 terms a frame with 3 pixels of noise.
     """
     problem, seen, states = _noisy_clip(FRAMES)
     options, clip_options = (Options(stages=[Stage(Weights(), stop, 50)]) for stop in (1e-4, 1e-3))
@@ -94,29 +104,51 @@ def against_frames(rounds: int) -> list[dict[str, float]]:
 
     def together() -> None:
         fit_motion(
-            problem.body, seen, times, init=states, priors=Priors(), options=clip_options, motion=MOTION, shape=beta,
+            problem.body,
+            seen,
+            times,
+            init=states,
+            priors=Priors(),
+            options=clip_options,
+            motion=MOTION,
+            shape=beta,
             window=np.inf,
-        )  # fmt: skip
+        )
 
     def alone() -> None:
         starts = [replace(state, beta=np.zeros(0)) for state in states]
-        fits = [fit_tree(tree, m, state, Priors(), options) for m, state in zip(seen, starts, strict=True)]
-        smooth_rotations(np.array([[fit.state.R_camera_root, *fit.state.Omega] for fit in fits]), times)
+        fits = [
+            fit_tree(tree, m, state, Priors(), options)
+            for m, state in zip(seen, starts, strict=True)
+        ]
+        smooth_rotations(
+            np.array([[fit.state.R_camera_root, *fit.state.Omega] for fit in fits]), times
+        )
         smooth_root(np.array([fit.state.t_camera_root for fit in fits]), times)
 
     clip, frames = in_turns(rounds, together, alone)
-    return [{"frames": FRAMES, "clip_ms": clip / FRAMES, "frames_ms": frames / FRAMES, "ratio": clip / frames}]
+    return [
+        {
+            "frames": FRAMES,
+            "clip_ms": clip / FRAMES,
+            "frames_ms": frames / FRAMES,
+            "ratio": clip / frames,
+        }
+    ]
 
 
 def with_outlines(rounds: int) -> list[dict[str, float]]:
-    """Return the least milliseconds a frame of linearizing a clip, without outlines, with one in six frames, in all."""
+    """Return the least milliseconds a frame of linearizing a clip, without outlines, with one in
+    six frames, in all.
+    """
     calls: list[Callable[[], object]] = []
     for every in (0, 6, 1):
         problem, poses = make_clip(23, FRAMES, added=partial(_with_outline, every=every))
         calls.append(partial(problem.linearize, 0, poses, problem.make_system()))
     without, some, all_ = in_turns(rounds, *calls)
     return [{
-        "frames": FRAMES, "rows_a_frame": OUTLINE_ROWS, "without_ms": without / FRAMES, "one_in_six_ms": some / FRAMES,
+        "frames": FRAMES, "rows_a_frame": OUTLINE_ROWS, "without_ms": without / FRAMES,
+        "one_in_six_ms": some / FRAMES,
         "all_ms": all_ / FRAMES,
     }]  # fmt: skip
 
@@ -130,12 +162,21 @@ def _with_outline(measurements: Measurements, f: int, every: int) -> Measurement
     angle, ones = rng.uniform(0.0, 2 * np.pi, OUTLINE_ROWS), np.ones(OUTLINE_ROWS)
     normal = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     contour = rng.uniform(-0.1, 0.1, (OUTLINE_ROWS, 2))
-    rows = pack(points, np.zeros((OUTLINE_ROWS, 3)), contour, normal, (ones, ones), (_SIGMA * ones, _SIGMA * ones))
+    rows = pack(
+        points,
+        np.zeros((OUTLINE_ROWS, 3)),
+        contour,
+        normal,
+        (ones, ones),
+        (_SIGMA * ones, _SIGMA * ones),
+    )
     return replace(measurements, tables={"outline": rows})
 
 
 def _noisy_clip(frames: int) -> tuple[Problem, list[Measurements], list[State]]:
-    """Return a benchmark problem, its measurements with noise of each frame's own, and states near the truth."""
+    """Return a benchmark problem, its measurements with noise of each frame's own, and states near
+    the truth.
+    """
     problem, rng = make_problem(23, 10, 120), np.random.default_rng(2)
     seen, states = [], []
     bank = problem.bank

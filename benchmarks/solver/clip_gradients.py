@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The alternative to block elimination over time: conjugate gradients on a whole clip, preconditioned frame by frame.
+"""The alternative to block elimination over time: conjugate gradients on a whole clip,
+preconditioned frame by frame.
 
-Each frame's matrix is applied through the tree, never formed, and its recursion, with the temporal terms' diagonal
-added, is the preconditioner. The shape is fixed and no point stands still, which favours this method: beta would add
-columns to every operation, and contacts couple whole chains of joints. See ../notebook/solver.md for the comparison.
+Each frame's matrix is applied through the tree, never formed, and its recursion, with the temporal
+terms' diagonal added, is the preconditioner. The shape is fixed and no point stands still, which
+favours this method: beta would add columns to every operation, and contacts couple whole chains of
+joints. See ../notebook/solver.md for the comparison.
 """
 
 from __future__ import annotations
@@ -40,7 +42,9 @@ def apply_frame(tree, pose, blocks, damping, root_scale, x, d, out) -> None:  # 
         a, b, c, e, f, g = x[i]
         A = blocks.A[i]
         for r in range(6):
-            x[i, r] = A[r, 0] * a + A[r, 1] * b + A[r, 2] * c + A[r, 3] * e + A[r, 4] * f + A[r, 5] * g
+            x[i, r] = (
+                A[r, 0] * a + A[r, 1] * b + A[r, 2] * c + A[r, 3] * e + A[r, 4] * f + A[r, 5] * g
+            )
     for i in range(n - 1, 0, -1):
         y, H, at = x[i], blocks.H_uu[i], 3 + 3 * i
         sx, sy, sz = pose.t[i, 0] - o[0], pose.t[i, 1] - o[1], pose.t[i, 2] - o[2]
@@ -57,7 +61,9 @@ def apply_frame(tree, pose, blocks, damping, root_scale, x, d, out) -> None:  # 
 
 @kernel
 def precondition_frame(tree, pose, work, m, q, r, z) -> None:  # type: ignore[no-untyped-def]
-    """Write z (n,) = (the matrix that `eliminate` factorized)^-1 r; m (K+1, 6) and q (K+1, 3) are overwritten."""
+    """Write z (n,) = (the matrix that `eliminate` factorized)^-1 r; m (K+1, 6) and q (K+1, 3) are
+    overwritten.
+    """
     o = pose.t[0]
     n = tree.parents.shape[0]
     for i in range(n):
@@ -105,7 +111,9 @@ def precondition_frame(tree, pose, work, m, q, r, z) -> None:  # type: ignore[no
 
 @kernel
 def add_couplings(D, B1, B2, d, out) -> None:  # type: ignore[no-untyped-def]
-    """Add the temporal terms' product with d (T, n) to out; each (T, K+2, 3, 3): blocks (f, f), (f, f-1), (f, f-2)."""
+    """Add the temporal terms' product with d (T, n) to out; each (T, K+2, 3, 3): blocks (f, f), (f,
+    f-1), (f, f-2).
+    """
     last = D.shape[1] - 1
     for f in range(D.shape[0]):
         for k in range(last + 1):
@@ -124,9 +132,13 @@ def add_couplings(D, B1, B2, d, out) -> None:  # type: ignore[no-untyped-def]
 
 
 class ConjugateGradients:
-    """The damped step of a clip of fixed shape, one own-axes camera and no contacts, by conjugate gradients."""
+    """The damped step of a clip of fixed shape, one own-axes camera and no contacts, by conjugate
+    gradients.
+    """
 
-    def __init__(self, problem: ClipProblem, poses: Pose, damping: float, root_scale: float) -> None:
+    def __init__(
+        self, problem: ClipProblem, poses: Pose, damping: float, root_scale: float
+    ) -> None:
         """Linearize and factorize every frame."""
         tree, T = problem.tree, problem.frames
         self.tree, self.damping, self.root_scale = tree, damping, root_scale
@@ -136,8 +148,18 @@ class ConjugateGradients:
         self.work = [make_workspace(tree) for _ in range(T)]
         stage = problem.settings.stages[0]
         for f in range(T):
-            linearize(tree, terms_of(problem.views, f), stage, 0.0, self.poses[f], self.blocks[f], self.work[f].scratch)
-        acceleration.accumulate(tree, poses, problem.motion, 0, T, acceleration.make_memory(tree), temporal)
+            linearize(
+                tree,
+                terms_of(problem.views, f),
+                stage,
+                0.0,
+                self.poses[f],
+                self.blocks[f],
+                self.work[f].scratch,
+            )
+        acceleration.accumulate(
+            tree, poses, problem.motion, 0, T, acceleration.make_memory(tree), temporal
+        )
         K = len(tree.parents) - 1
         at = [0, *(3 + 3 * k for k in range(1, K + 1)), 3]
         pick = [np.ix_(range(a, a + 3), range(a, a + 3)) for a in at]
@@ -156,7 +178,9 @@ class ConjugateGradients:
         """Return the product with the clip's damped matrix."""
         out = np.zeros_like(d)
         for f, (pose, blocks) in enumerate(zip(self.poses, self.blocks, strict=True)):
-            apply_frame(self.tree, pose, blocks, self.damping, self.root_scale, self.x, d[f], out[f])
+            apply_frame(
+                self.tree, pose, blocks, self.damping, self.root_scale, self.x, d[f], out[f]
+            )
         add_couplings(self.D, self.B1, self.B2, d, out)
         return out
 
@@ -170,7 +194,9 @@ class ConjugateGradients:
     def solve(
         self, gradient: NDArray[np.float64], tolerance: float, most: int = 2000
     ) -> tuple[NDArray[np.float64], int]:
-        """Return the step (T, n) and the number of iterations until |residual| <= tolerance |gradient|."""
+        """Return the step (T, n) and the number of iterations until |residual| <= tolerance
+        |gradient|.
+        """
         d, r = np.zeros_like(gradient), -gradient
         z = self.precondition(r)
         p, rz = z.copy(), float(np.vdot(r, z))

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The step of a whole clip: time per frame against the number of frames, and against conjugate gradients."""
+"""The step of a whole clip: time per frame against the number of frames, and against conjugate
+gradients.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,16 @@ from functools import partial
 
 import numpy as np
 
-from ...solver import Measurements, MotionPrior, Options, Priors, Stage, StandingPoints, Weights, rotations
+from ...solver import (
+    Measurements,
+    MotionPrior,
+    Options,
+    Priors,
+    Stage,
+    StandingPoints,
+    Weights,
+    rotations,
+)
 from ...solver.compiled.part import Pose
 from ...solver.compiled.tree import make_tree, with_fixed_shape
 from ...solver.gauss_newton.optimizer import make_settings
@@ -28,7 +39,8 @@ RATE = 30.0
 LENGTHS = (75, 150, 300, 600)
 GAP = 30  # frames without measurements
 OUTLINE_WEIGHT = 3e5
-MOTION = MotionPrior(joints=0.1, root_rotation=0.1, root_position=3.0)  # larger ones need more conjugate gradients
+# larger ones need more conjugate gradients
+MOTION = MotionPrior(joints=0.1, root_rotation=0.1, root_position=3.0)
 
 
 def make_clip(
@@ -40,7 +52,8 @@ def make_clip(
     pool: ThreadPoolExecutor | None = None,
     added: Callable[[Measurements, int], Measurements] = lambda seen, _: seen,
 ) -> tuple[ClipProblem, Pose]:
-    """Return a clip with 120 terms a frame about one state, and poses that swing about it; `gap` frames see nothing.
+    """Return a clip with 120 terms a frame about one state, and poses that swing about it; `gap`
+    frames see nothing.
 
     :param added: returns a frame's measurements with further ones.
     """
@@ -51,12 +64,18 @@ def make_clip(
     priors = Priors()
     packed = pack_priors(tree, replace(priors, shape_mean=None))
     first = (frames - gap) // 2
-    seen = [Measurements() if first <= f < first + gap else added(p.measurements, f) for f in range(frames)]
+    seen = [
+        Measurements() if first <= f < first + gap else added(p.measurements, f)
+        for f in range(frames)
+    ]
     views, _ = pack_frames(tree, seen, packed)
     poses = make_poses(tree, frames)
     for f in range(frames):
         swing = 0.1 * np.sin(3.0 * f / RATE)
-        poses.R[f, 0], poses.t[f, 0] = p.bank[0][0] @ rotations.exp([0.0, swing, 0.0]), p.bank[1][0] + [swing, 0.0, 0.0]
+        poses.R[f, 0], poses.t[f, 0] = (
+            p.bank[0][0] @ rotations.exp([0.0, swing, 0.0]),
+            p.bank[1][0] + [swing, 0.0, 0.0],
+        )
         poses.Omega[f] = p.bank[2][0] @ rotations.exp([swing, 0.0, swing])
     if not fixed:
         poses.beta[:] = p.bank[3][0]
@@ -65,11 +84,15 @@ def make_clip(
     stage = Stage(Weights(tables={"outline": OUTLINE_WEIGHT}))
     settings = make_settings(Options(stages=[stage]), [stage])
     P = tree.shape
-    return ClipProblem(tree, views, motion, SharedPriors(np.zeros(P), np.eye(P), 0.0), settings, pool), poses
+    return ClipProblem(
+        tree, views, motion, SharedPriors(np.zeros(P), np.eye(P), 0.0), settings, pool
+    ), poses
 
 
 def clip_table(rounds: int) -> list[dict[str, float]]:
-    """Return rows of K, frames, and the least milliseconds a frame of linearization and of a step, two threads."""
+    """Return rows of K, frames, and the least milliseconds a frame of linearization and of a step,
+    two threads.
+    """
     rows = []
     for K in (23, 51):
         for frames in LENGTHS:
@@ -80,12 +103,21 @@ def clip_table(rounds: int) -> list[dict[str, float]]:
                 linearize = _least(rounds, partial(problem.linearize, 0, poses, system))
                 solve = partial(solve_clip, problem.tree, system, 1.0, scale, factor, pool)
                 step = _least(rounds, solve)
-            rows.append({"K": K, "frames": frames, "linearize_ms": linearize / frames, "step_ms": step / frames})
+            rows.append(
+                {
+                    "K": K,
+                    "frames": frames,
+                    "linearize_ms": linearize / frames,
+                    "step_ms": step / frames,
+                }
+            )
     return rows
 
 
 def against_gradients(rounds: int, frames: int = 300) -> list[dict[str, float]]:
-    """Return rows of a gap's length, a tolerance, iterations, and milliseconds a frame of both ways, in one thread."""
+    """Return rows of a gap's length, a tolerance, iterations, and milliseconds a frame of both
+    ways, in one thread.
+    """
     rows = []
     for gap in (0, GAP):
         problem, poses = make_clip(23, frames, gap, fixed=True, contacts=0)
@@ -106,8 +138,11 @@ def against_gradients(rounds: int, frames: int = 300) -> list[dict[str, float]]:
     return rows
 
 
-def in_turns(rounds: int, *runs: Callable[[], object], clock: Callable[[], float] = time.process_time) -> list[float]:
-    """Return the least time of each run in milliseconds, taken in turns; the first, which may compile, does not count.
+def in_turns(
+    rounds: int, *runs: Callable[[], object], clock: Callable[[], float] = time.process_time
+) -> list[float]:
+    """Return the least time of each run in milliseconds, taken in turns; the first, which may
+    compile, does not count.
 
     :param clock: the processor's time by default, which other load changes little.
     """

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Baseline for the sparse formulation: the paper's dense, unconstrained one, optimized as far as possible.
+"""Baseline for the sparse formulation: the paper's dense, unconstrained one, optimized as far as
+possible.
 
-The poses of the parts are functions of the root, the joint states and the shape, so a keypoint's residual depends on
-every joint above it. The Jacobian J (rows, 6 + 3K + P) is filled by compiled code, only where it is not zero; the
-normal equations are one BLAS call (numpy makes JᵀJ a symmetric rank-k update), solved by Cholesky (LAPACK).
-The unknowns are the solver's, so that both give the same step: the root's twist about the pelvis, u_1..K, beta.
+The poses of the parts are functions of the root, the joint states and the shape, so a keypoint's
+residual depends on every joint above it. The Jacobian J (rows, 6 + 3K + P) is filled by compiled
+code, only where it is not zero; the normal equations are one BLAS call (numpy makes JᵀJ a symmetric
+rank-k update), solved by Cholesky (LAPACK). The unknowns are the solver's, so that both give the
+same step: the root's twist about the pelvis, u_1..K, beta.
 """
 
 from __future__ import annotations
@@ -19,19 +21,29 @@ from ...solver.compiled.part import GRADIENT
 from ...solver.gauss_newton.linearize import clear_blocks, make_blocks, make_pose, place_parts
 from ...solver.gauss_newton.terms import HAS_2D, HAS_3D, HAS_DIRECTION
 from ...solver.residuals import joint_flow, keypoint2d
-from ...solver.residuals.registry import KEYPOINT2D, KEYPOINT3D, ORIENTATION_FIELD, RESIDUALS, SHAPE_PRIOR, column_of
+from ...solver.residuals.registry import (
+    KEYPOINT2D,
+    KEYPOINT3D,
+    ORIENTATION_FIELD,
+    RESIDUALS,
+    SHAPE_PRIOR,
+    column_of,
+)
 from ...solver.residuals.robust import geman_mcclure
 from .loops import put
 from .problem import Problem
 
-FLOW, FLOW_COLUMN = list(RESIDUALS).index("joint_flow"), column_of("joint_flow")  # the problem's one prior
+# the problem's one prior
+FLOW, FLOW_COLUMN = list(RESIDUALS).index("joint_flow"), column_of("joint_flow")
 
 
 @kernel
 def _write_row(tree, pose, J, row, i, p, o, gx, gy, gz, moved, part_moves) -> None:  # type: ignore[no-untyped-def]
-    """Write one row of J for a gradient g with respect to the point p of part i; `moved` (3, P) is dp/dbeta.
+    """Write one row of J for a gradient g with respect to the point p of part i; `moved` (3, P) is
+    dp/dbeta.
 
-    With `part_moves` = 0 the residual depends on the lever's direction only, which translations do not change.
+    With `part_moves` = 0 the residual depends on the lever's direction only, which translations do
+    not change.
     """
     ex, ey, ez = p[0] - o[0], p[1] - o[1], p[2] - o[2]
     k = i
@@ -74,7 +86,11 @@ def fill(tree, terms, stage, pose, J, r, moved) -> None:  # type: ignore[no-unty
             p = (lever[0] + t[0], lever[1] + t[1], lever[2] + t[2])
             for k in range(3):
                 for a in range(tree.shape):
-                    turned = R[k, 0] * terms.V[j, 0, a] + R[k, 1] * terms.V[j, 1, a] + R[k, 2] * terms.V[j, 2, a]
+                    turned = (
+                        R[k, 0] * terms.V[j, 0, a]
+                        + R[k, 1] * terms.V[j, 1, a]
+                        + R[k, 2] * terms.V[j, 2, a]
+                    )
                     moved[0, k, a] = turned
                     moved[1, k, a] = turned + pose.D[i, k, a]
             if flags & HAS_2D:
@@ -83,8 +99,12 @@ def fill(tree, terms, stage, pose, J, r, moved) -> None:  # type: ignore[no-unty
                 rx, ry = p[0] * iz - m[0], p[1] * iz - m[1]
                 _, w = geman_mcclure(rx * rx + ry * ry, inv_sigma[KEYPOINT2D])
                 w = np.sqrt(w * weights[KEYPOINT2D] * m[2])
-                _write_row(tree, pose, J, row, i, p, t, w * iz, 0.0, -w * p[0] * iz * iz, moved[1], 1)
-                _write_row(tree, pose, J, row + 1, i, p, t, 0.0, w * iz, -w * p[1] * iz * iz, moved[1], 1)
+                _write_row(
+                    tree, pose, J, row, i, p, t, w * iz, 0.0, -w * p[0] * iz * iz, moved[1], 1
+                )
+                _write_row(
+                    tree, pose, J, row + 1, i, p, t, 0.0, w * iz, -w * p[1] * iz * iz, moved[1], 1
+                )
                 r[row], r[row + 1] = w * rx, w * ry
                 row += 2
             if flags & HAS_3D:
@@ -102,7 +122,9 @@ def fill(tree, terms, stage, pose, J, r, moved) -> None:  # type: ignore[no-unty
                 length = np.sqrt(lever[0] * lever[0] + lever[1] * lever[1] + lever[2] * lever[2])
                 h = (lever[0] / length, lever[1] / length, lever[2] / length)
                 e = (h[0] - m[0], h[1] - m[1], h[2] - m[2])
-                _, w = geman_mcclure(e[0] * e[0] + e[1] * e[1] + e[2] * e[2], inv_sigma[ORIENTATION_FIELD])
+                _, w = geman_mcclure(
+                    e[0] * e[0] + e[1] * e[1] + e[2] * e[2], inv_sigma[ORIENTATION_FIELD]
+                )
                 w = np.sqrt(w * weights[ORIENTATION_FIELD] * m[3])
                 g = w / length
                 for k in range(3):
@@ -137,9 +159,16 @@ def _solve(L, g, out) -> None:  # type: ignore[no-untyped-def]
 
 @kernel
 def _add_priors(tree, terms, stage, pose, blocks, H, g) -> None:  # type: ignore[no-untyped-def]
-    """Add the prior of the joints' states, each of which is of one joint alone, to the normal equations."""
+    """Add the prior of the joints' states, each of which is of one joint alone, to the normal
+    equations.
+    """
     clear_blocks(blocks)
-    ints, floats, weight, inv_sigma = terms.ints[FLOW], terms.floats[FLOW], stage[0, FLOW_COLUMN], stage[1, FLOW_COLUMN]
+    ints, floats, weight, inv_sigma = (
+        terms.ints[FLOW],
+        terms.floats[FLOW],
+        stage[0, FLOW_COLUMN],
+        stage[1, FLOW_COLUMN],
+    )
     joint_flow.accumulate(tree, ints, floats, weight, inv_sigma, 0.0, pose, blocks)
     for i in range(1, tree.parents.shape[0]):
         at = 3 + 3 * i

@@ -36,9 +36,23 @@ def steps(count, tree, terms, stage, damping, root_scale, bank, pose, blocks, wo
 
 @kernel
 def iterations(  # type: ignore[no-untyped-def]
-    count, tree, terms, stage, damping, root_scale, bank, pose, trial, blocks, other, curvature, work
+    count,
+    tree,
+    terms,
+    stage,
+    damping,
+    root_scale,
+    bank,
+    pose,
+    trial,
+    blocks,
+    other,
+    curvature,
+    work,
 ):
-    """Solve, move and linearize at the trial point `count` times: an iteration, accepted or rejected."""
+    """Solve, move and linearize at the trial point `count` times: an iteration, accepted or
+    rejected.
+    """
     put(bank, 0, pose)
     total = linearize(tree, terms, stage, 0.0, pose, blocks, work.scratch)
     for k in range(count):
@@ -58,5 +72,7 @@ def priors(count, tree, terms, stage, bank, pose, blocks):  # type: ignore[no-un
     total = 0.0
     for k in range(count):
         put(bank, k, pose)
-        total += accumulate_tables(tree, terms.ints, terms.floats, stage[0], stage[1], 0.0, pose, blocks)
+        total += accumulate_tables(
+            tree, terms.ints, terms.floats, stage[0], stage[1], 0.0, pose, blocks
+        )
     return total

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run one peer on the benchmark problem, in the peer's own environment; print the microseconds of one iteration.
+"""Run one peer on the benchmark problem, in the peer's own environment; print the microseconds of
+one iteration.
 
-Unknowns are the coordinates d of a step away from a state of the bank, as in dense.py; residuals and Jacobian come
-from the same compiled code as there.
+Unknowns are the coordinates d of a step away from a state of the bank, as in dense.py; residuals
+and Jacobian come from the same compiled code as there.
 """
 
 from __future__ import annotations
@@ -62,15 +63,21 @@ def run_scipy(residuals: Residuals) -> float:
         residuals.start(k)
         start = time.perf_counter()
         found = least_squares(
-            lambda d: residuals.at(d)[0].copy(), np.zeros(residuals.size), lambda d: residuals.at(d)[1].copy(),
-            method="lm", max_nfev=ITERATIONS, x_scale=1.0,
-        )  # fmt: skip
+            lambda d: residuals.at(d)[0].copy(),
+            np.zeros(residuals.size),
+            lambda d: residuals.at(d)[1].copy(),
+            method="lm",
+            max_nfev=ITERATIONS,
+            x_scale=1.0,
+        )
         times.append((time.perf_counter() - start) / max(found.nfev, 1))
     return float(np.median(times[2:])) * 1e6
 
 
 def run_ceres(residuals: Residuals) -> float:
-    """Time of an iteration of Ceres with dense normal equations and Cholesky; its callback into Python included."""
+    """Time of an iteration of Ceres with dense normal equations and Cholesky; its callback into
+    Python included.
+    """
     import pyceres
 
     class Cost(pyceres.CostFunction):

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Other optimizers on the same problem, one thread: each in an environment of its own.
 
-scipy and Ceres use the dense baseline's residuals and Jacobian; momentum has its own (see momentum_run.py).
-Environments are made once in build/bench. A peer that cannot be installed is left out, with the reason. Not for CI.
+scipy and Ceres use the dense baseline's residuals and Jacobian; momentum has its own (see
+momentum_run.py). Environments are made once in build/bench. A peer that cannot be installed is left
+out, with the reason. Not for CI.
 """
 
 from __future__ import annotations
@@ -44,7 +45,9 @@ def _run(name: str, package: str) -> float:
         link.symlink_to(ROOT)
     environment = {**os.environ, "PYTHONPATH": str(path)}
     command = [str(python), "-m", "scope.benchmarks.solver.peer_run", name]
-    done = subprocess.run(command, env=environment, cwd=path, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        command, env=environment, cwd=path, capture_output=True, text=True, check=True
+    )
     return float(done.stdout.strip().splitlines()[-1])
 
 
@@ -73,12 +76,16 @@ def _run_momentum() -> float:
     )
     one = {name: "1" for name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
     command = [str(python), str(Path(__file__).with_name("momentum_run.py")), str(file)]
-    done = subprocess.run(command, env={**os.environ, **one}, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        command, env={**os.environ, **one}, capture_output=True, text=True, check=True
+    )
     return float(done.stdout.strip().splitlines()[-1])
 
 
 def _python312() -> str:
-    """Return the path of a Python 3.12, on the PATH or among pyenv's versions, which are not on it."""
+    """Return the path of a Python 3.12, on the PATH or among pyenv's versions, which are not on
+    it.
+    """
     pyenv = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv")) / "versions"
     for candidate in ("python3.12", *sorted(str(p) for p in pyenv.glob("3.12*/bin/python"))):
         if not shutil.which(candidate):
@@ -95,8 +102,19 @@ def make_environment(name: str, *packages: str, interpreter: str = sys.executabl
     python, stamp = folder / "bin" / "python", folder / "installed"
     if not stamp.exists():
         print(f"installing {packages[-1]} in {folder}, once", file=sys.stderr)
-        subprocess.run([interpreter, "-m", "venv", str(folder)], check=True, capture_output=True, text=True)
-        command = [str(python), "-m", "pip", "install", "--quiet", "--only-binary", ":all:", *packages]
+        subprocess.run(
+            [interpreter, "-m", "venv", str(folder)], check=True, capture_output=True, text=True
+        )
+        command = [
+            str(python),
+            "-m",
+            "pip",
+            "install",
+            "--quiet",
+            "--only-binary",
+            ":all:",
+            *packages,
+        ]
         subprocess.run(command, check=True, capture_output=True, text=True)
         stamp.touch()
     return python

@@ -30,16 +30,36 @@ def plot(path: Path, title: str, x_label: str, y_label: str, lines: Lines) -> No
 
     def place(x: float, log_y: float) -> tuple[int, int]:
         across = left + (x - x0) / (x1 - x0) * (width - left - right)
-        return round(across), round(height - bottom - (log_y - y0) / (y1 - y0) * (height - top - bottom))
+        return round(across), round(
+            height - bottom - (log_y - y0) / (y1 - y0) * (height - top - bottom)
+        )
 
     for decade in np.arange(np.floor(y0), np.ceil(y1) + 1):
         for digit in (1, 2, 5):
             at = decade + np.log10(digit)
             if y0 - 1e-9 <= at <= y1 + 1e-9:
                 cv2.line(picture, place(x0, at), place(x1, at), (225, 225, 225), 1)
-                cv2.putText(picture, f"{10**at:g}", (8, place(x0, at)[1] + 5), FONT, 0.5, INK, 1, cv2.LINE_AA)
+                cv2.putText(
+                    picture,
+                    f"{10**at:g}",
+                    (8, place(x0, at)[1] + 5),
+                    FONT,
+                    0.5,
+                    INK,
+                    1,
+                    cv2.LINE_AA,
+                )
     for x in sorted(set(xs)):
-        cv2.putText(picture, f"{x:g}", (place(x, y0)[0] - 14, height - bottom + 22), FONT, 0.5, INK, 1, cv2.LINE_AA)
+        cv2.putText(
+            picture,
+            f"{x:g}",
+            (place(x, y0)[0] - 14, height - bottom + 22),
+            FONT,
+            0.5,
+            INK,
+            1,
+            cv2.LINE_AA,
+        )
     for number, (name, (x, y)) in enumerate(lines.items()):
         colour = COLOURS[number % len(COLOURS)]
         points = [place(a, float(np.log10(b))) for a, b in zip(x, y, strict=True)]
@@ -48,13 +68,19 @@ def plot(path: Path, title: str, x_label: str, y_label: str, lines: Lines) -> No
             cv2.circle(picture, point, 4, colour, -1, cv2.LINE_AA)
         end = (left + 10 + 160 * (number % 4), height - 8)
         cv2.putText(picture, name, end, FONT, 0.5, colour, 1, cv2.LINE_AA)
-    cv2.putText(picture, f"{title}: {y_label} by {x_label}", (left, 24), FONT, 0.6, INK, 1, cv2.LINE_AA)
+    cv2.putText(
+        picture, f"{title}: {y_label} by {x_label}", (left, 24), FONT, 0.6, INK, 1, cv2.LINE_AA
+    )
     path.parent.mkdir(parents=True, exist_ok=True)
     cv2.imwrite(str(path), picture)
 
 
-def plot_experiment(folder: Path, number: int, rows: list[dict[str, float]], suffix: str = "") -> list[Path]:
-    """Write the pictures of one experiment and return their paths, whose names end with ``suffix``."""
+def plot_experiment(
+    folder: Path, number: int, rows: list[dict[str, float]], suffix: str = ""
+) -> list[Path]:
+    """Write the pictures of one experiment and return their paths, whose names end with
+    ``suffix``.
+    """
     key = "P" if number == 3 else "N"
     times, speedups = {}, {}
     for K, name in BODIES.items():

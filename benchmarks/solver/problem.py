@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The benchmark problem: a real kinematic tree with N terms spread evenly over it.
 
-Every keypoint has a dense, non-zero V_j and one term of each kind (2D, 3D, orientation field), so N terms are N / 3
-keypoints. Weights are set at run time, the robust kernel is on, and the states of `Problem.bank` alternate, so that
-each step is linearized at a different state. N = 52 are 19 2D, 17 3D and 16 orientation terms on 20 keypoints.
+Every keypoint has a dense, non-zero V_j and one term of each kind (2D, 3D, orientation field), so N
+terms are N / 3 keypoints. Weights are set at run time, the robust kernel is on, and the states of
+`Problem.bank` alternate, so that each step is linearized at a different state. N = 52 are 19 2D, 17
+3D and 16 orientation terms on 20 keypoints.
 """
 
 from __future__ import annotations
@@ -14,7 +15,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...solver import Measurements, Options, Priors, Stage, State, Tree, Weights, load_body, make_tree, rotations
+from ...solver import (
+    Measurements,
+    Options,
+    Priors,
+    Stage,
+    State,
+    Tree,
+    Weights,
+    load_body,
+    make_tree,
+    rotations,
+)
 from ...solver.gauss_newton.terms import Terms, make_terms
 from ...solver.learned_prior import load_joint_prior
 from ...solver.measurements import Keypoints2D, Keypoints3D, OrientationField, PosePriors
@@ -53,8 +65,12 @@ class Problem:
     measurements: Measurements
 
 
-def make_problem(K: int, P: int, N: int, joint_flow: bool = False, everything: bool = False, seed: int = 0) -> Problem:
-    """Return the benchmark problem; with `everything` also a root prior, both joint priors and limits."""
+def make_problem(
+    K: int, P: int, N: int, joint_flow: bool = False, everything: bool = False, seed: int = 0
+) -> Problem:
+    """Return the benchmark problem; with `everything` also a root prior, both joint priors and
+    limits.
+    """
     rng = np.random.default_rng(seed)
     body = load_body(BODIES[K])
     n2, n3, nd = SPLIT.get(N, (N // 3,) * 3)
@@ -74,9 +90,13 @@ def make_problem(K: int, P: int, N: int, joint_flow: bool = False, everything: b
     a, b, c = (np.sort(rng.permutation(M)[:n]) for n in (n2, n3, nd))
     measurements = Measurements(
         INTRINSICS,
-        Keypoints2D(a, pixels[a, :2] / pixels[a, 2:] + 3.0 * rng.standard_normal((n2, 2)), confidence[0, a]),
+        Keypoints2D(
+            a, pixels[a, :2] / pixels[a, 2:] + 3.0 * rng.standard_normal((n2, 2)), confidence[0, a]
+        ),
         Keypoints3D(b, points[b] + 0.02 * rng.standard_normal((n3, 3)), confidence[1, b]),
-        OrientationField(M + part[c], c, lever[c] + 0.01 * rng.standard_normal((nd, 3)), confidence[2, c]),
+        OrientationField(
+            M + part[c], c, lever[c] + 0.01 * rng.standard_normal((nd, 3)), confidence[2, c]
+        ),
     )
     priors = Priors()
     if joint_flow or everything:
@@ -95,7 +115,16 @@ def make_problem(K: int, P: int, N: int, joint_flow: bool = False, everything: b
     options = Options()
     table, _, _ = options.stage_table([Stage(Weights())])
     bank = _bank(rng, truth, tree)
-    return Problem(tree, terms, table[0], options.damping, 1.0 / options.root_length, bank, arrays, measurements)
+    return Problem(
+        tree,
+        terms,
+        table[0],
+        options.damping,
+        1.0 / options.root_length,
+        bank,
+        arrays,
+        measurements,
+    )
 
 
 def _state(rng: np.random.Generator, K: int, P: int) -> State:

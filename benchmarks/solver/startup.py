@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Time of the first call after installation, which compiles, and of the first call in a later session."""
+"""Time of the first call after installation, which compiles, and of the first call in a later
+session.
+"""
 
 from __future__ import annotations
 
@@ -28,5 +30,7 @@ def startup() -> dict[str, float]:
 
 def _run(cache: str) -> float:
     environment = {**os.environ, "NUMBA_CACHE_DIR": cache}
-    done = subprocess.run([sys.executable, "-c", _SCRIPT], env=environment, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", _SCRIPT], env=environment, capture_output=True, text=True, check=True
+    )
     return float(done.stdout.strip().splitlines()[-1])

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Gauss-Newton steps, sparse and dense, on the benchmark problem; the paper's Experiments 1 to 3."""
+"""Gauss-Newton steps, sparse and dense, on the benchmark problem; the paper's Experiments 1 to
+3.
+"""
 
 from __future__ import annotations
 
@@ -31,11 +33,15 @@ SPARSE_BATCH, DENSE_BATCH = 40, 4
 def sparse_run(p: Problem) -> Callable[[int], object]:
     """Return run(n): n steps of the solver, each linearized at another state."""
     pose, blocks, work = make_pose(p.tree), make_blocks(p.tree), make_workspace(p.tree)
-    return lambda n: loops.steps(n, p.tree, p.terms, p.stage, p.damping, p.root_scale, p.bank, pose, blocks, work)
+    return lambda n: loops.steps(
+        n, p.tree, p.terms, p.stage, p.damping, p.root_scale, p.bank, pose, blocks, work
+    )
 
 
 def called_run(p: Problem) -> Callable[[int], object]:
-    """Return run(n): n steps of the solver, each called from Python, as those of the dense baseline are."""
+    """Return run(n): n steps of the solver, each called from Python, as those of the dense baseline
+    are.
+    """
     steps = sparse_run(p)
     return lambda n: [steps(1) for _ in range(n)]
 
@@ -48,10 +54,23 @@ def dense_run(p: Problem) -> Callable[[int], object]:
 
 def iteration_run(p: Problem) -> Callable[[int], object]:
     """Return run(n): n whole iterations: step, move, linearize at the trial point."""
-    poses, blocks = (make_pose(p.tree), make_pose(p.tree)), (make_blocks(p.tree), make_blocks(p.tree))
+    poses, blocks = (
+        (make_pose(p.tree), make_pose(p.tree)),
+        (make_blocks(p.tree), make_blocks(p.tree)),
+    )
     curvature, work = make_curvature(p.tree), make_workspace(p.tree)
     return lambda n: loops.iterations(
-        n, p.tree, p.terms, p.stage, p.damping, p.root_scale, p.bank, *poses, *blocks, curvature, work
+        n,
+        p.tree,
+        p.terms,
+        p.stage,
+        p.damping,
+        p.root_scale,
+        p.bank,
+        *poses,
+        *blocks,
+        curvature,
+        work,
     )
 
 
@@ -61,8 +80,11 @@ def prior_run(p: Problem) -> Callable[[int], object]:
     return lambda n: loops.priors(n, p.tree, p.terms, p.stage, p.bank, pose, blocks)
 
 
-def compare(problems: dict[str, Problem], rounds: int) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
-    """Return the times of a sparse step in a compiled loop, of one called from Python, and of a dense step.
+def compare(
+    problems: dict[str, Problem], rounds: int
+) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
+    """Return the times of a sparse step in a compiled loop, of one called from Python, and of a
+    dense step.
 
     Microseconds, measured in turns. The dense step is called from Python.
     """
@@ -90,13 +112,20 @@ def target_table(rounds: int) -> dict[str, object]:
     )
     ratios = {n: dense[n] / sparse[n] for n in sparse}
     called_ratios = {n: dense[n] / called[n] for n in sparse}
-    return {"gn_step": sparse, "dense_over_sparse": ratios, "dense_over_called": called_ratios, **more}
+    return {
+        "gn_step": sparse,
+        "dense_over_sparse": ratios,
+        "dense_over_called": called_ratios,
+        **more,
+    }
 
 
 def experiment(which: int, rounds: int, terms: int | None = None) -> list[dict[str, float]]:
-    """Return the rows of the paper's Experiment 1 (P = 0, growing N), 2 (P = 10, growing N) or 3 (growing P).
+    """Return the rows of the paper's Experiment 1 (P = 0, growing N), 2 (P = 10, growing N) or 3
+    (growing P).
 
-    :param terms: N of Experiment 3. If None, as in the paper: one term of each kind for every part, N = 3 (K + 1).
+    :param terms: N of Experiment 3. If None, as in the paper: one term of each kind for every part,
+        N = 3 (K + 1).
     :return: rows of K, P, N, and the times of a sparse and of a dense step in microseconds.
     """
     if which == 3:
@@ -114,10 +143,16 @@ def experiment(which: int, rounds: int, terms: int | None = None) -> list[dict[s
 def growth(rows: list[dict[str, float]], K: int, method: str) -> float:
     """Return the exponent a of time ~ N^a, fitted over the rows of K joints."""
     chosen = [row for row in rows if row["K"] == K]
-    return float(np.polyfit(np.log([r["N"] for r in chosen]), np.log([r[method] for r in chosen]), 1)[0])
+    return float(
+        np.polyfit(np.log([r["N"] for r in chosen]), np.log([r[method] for r in chosen]), 1)[0]
+    )
 
 
 def growth_in_joints(rows: list[dict[str, float]], method: str) -> float:
-    """Return the median exponent a of time ~ K^a between the bodies of the rows, whose points are in the same order."""
+    """Return the median exponent a of time ~ K^a between the bodies of the rows, whose points are
+    in the same order.
+    """
     small, large = ([row[method] for row in rows if row["K"] == K] for K in (23, 51))
-    return float(np.median([np.log(b / a) / np.log(51 / 23) for a, b in zip(small, large, strict=True)]))
+    return float(
+        np.median([np.log(b / a) / np.log(51 / 23) for a, b in zip(small, large, strict=True)])
+    )

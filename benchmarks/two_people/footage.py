@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The four videos, out of a pinned wheel, and how they relate to Pose2Sim's clips of the man alone.
 
-pose2sim's ``Demo_MultiPerson`` shows the man of its other demo, filmed by the same cameras at the same time, and a
-woman who is computer-generated and was drawn into the footage. Frame i of these videos is frame i − 1 of the clips next
-to the checkout, and their pixels are related by a scale and a shift: p' = s p + d, constant over the clip.
+pose2sim's ``Demo_MultiPerson`` shows the man of its other demo, filmed by the same cameras at the
+same time, and a woman who is computer-generated and was drawn into the footage. Frame i of these
+videos is frame i − 1 of the clips next to the checkout, and their pixels are related by a scale and
+a shift: p' = s p + d, constant over the clip.
 """
 
 from __future__ import annotations
@@ -40,7 +41,9 @@ _INLIER_PX = 1.5
 
 @dataclass(frozen=True)
 class Camera:
-    """One camera: ``K`` (3, 3) and ``dist`` (5,) of its video here; ``T_camera_world`` (4, 4), world is camera 1's."""
+    """One camera: ``K`` (3, 3) and ``dist`` (5,) of its video here; ``T_camera_world`` (4, 4),
+    world is camera 1's.
+    """
 
     name: str
     K: NDArray[np.float64]
@@ -53,7 +56,8 @@ class Camera:
 
 
 def extract(folder: Path = FOLDER, downloads: Path = DOWNLOADS) -> dict[str, Path]:
-    """Return the videos by camera; they are extracted, and the wheel is downloaded, where that was not done yet.
+    """Return the videos by camera; they are extracted, and the wheel is downloaded, where that was
+    not done yet.
 
     :raises SetupError: when the wheel cannot be downloaded.
     """
@@ -63,27 +67,44 @@ def extract(folder: Path = FOLDER, downloads: Path = DOWNLOADS) -> dict[str, Pat
         with zipfile.ZipFile(POSE2SIM.fetch(downloads)) as archive:
             for camera, video in videos.items():
                 member = _MEMBER.format(camera.replace("cam", "cam0"))
-                with atomic_path(video) as part, archive.open(member) as source, part.open("wb") as target:
+                with (
+                    atomic_path(video) as part,
+                    archive.open(member) as source,
+                    part.open("wb") as target,
+                ):
                     shutil.copyfileobj(source, target)
     return videos
 
 
 def load_cameras(videos: dict[str, Path]) -> dict[str, Camera]:
-    """Return the cameras: intrinsics from the calibration next to the checkout, poses from the man's true joints."""
+    """Return the cameras: intrinsics from the calibration next to the checkout, poses from the
+    man's true joints.
+    """
     cameras = {}
     for name, video in videos.items():
-        calibration = json.loads((DATA / "pose2sim" / f"calibration_{name}.json").read_text("utf-8"))
+        calibration = json.loads(
+            (DATA / "pose2sim" / f"calibration_{name}.json").read_text("utf-8")
+        )
         scale, shift, matched, off_px = register(DATA / "pose2sim" / f"{name}.mp4", video)
         K = np.array(calibration["intrinsics"], float)
         K[:2] *= scale
         K[:2, 2] += shift
         T = np.eye(4)
-        with np.load(DATA / "pose2sim" / f"truth_{CAMERAS[0]}.npz") as first, np.load(man_alone(name)) as truth:
-            world, here, up = first["joints"].reshape(-1, 3), truth["joints"].reshape(-1, 3), truth["up"]
+        with (
+            np.load(DATA / "pose2sim" / f"truth_{CAMERAS[0]}.npz") as first,
+            np.load(man_alone(name)) as truth,
+        ):
+            world, here, up = (
+                first["joints"].reshape(-1, 3),
+                truth["joints"].reshape(-1, 3),
+                truth["up"],
+            )
         known = np.isfinite(world).all(1) & np.isfinite(here).all(1)
         _, T[:3, :3], T[:3, 3] = similarity(world[known], here[known], with_scale=False)
         size = _size(video)
-        cameras[name] = Camera(name, K, np.array(calibration["dist"], float), T, size, up, matched, off_px)
+        cameras[name] = Camera(
+            name, K, np.array(calibration["dist"], float), T, size, up, matched, off_px
+        )
     return cameras
 
 
@@ -119,7 +140,9 @@ def register(alone: Path, together: Path) -> tuple[float, NDArray[np.float64], i
 def _images(video: Path, wanted: list[int]) -> list[NDArray[np.uint8]]:
     with open_video(video) as footage:
         return [
-            np.asarray(cv2.cvtColor(f.image_rgb, cv2.COLOR_RGB2GRAY), np.uint8) for f in footage if f.index in wanted
+            np.asarray(cv2.cvtColor(f.image_rgb, cv2.COLOR_RGB2GRAY), np.uint8)
+            for f in footage
+            if f.index in wanted
         ]
 
 

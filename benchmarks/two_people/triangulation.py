@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 r"""Points in space from their keypoints in several calibrated cameras, some of which are wrong.
 
-    X* = argmin over X of Σ_c w_c ρ(|f_c (π(T_c X) − x_c)|),   ρ(e) = s² e² / (s² + e²)   (Geman-McClure)
+    X* = argmin over X of Σ_c w_c ρ(|f_c (π(T_c X) − x_c)|),
+    ρ(e) = s² e² / (s² + e²)   (Geman-McClure)
 
-with the keypoints x_c in normalized image coordinates (undistorted, focal length 1), confidences w_c and focal lengths
-f_c. The start is the best of the points that two cameras give linearly (Hartley and Sturm 1997); a few Gauss-Newton
-steps with the weights of ρ follow.
+with the keypoints x_c in normalized image coordinates (undistorted, focal length 1), confidences
+w_c and focal lengths f_c. The start is the best of the points that two cameras give linearly
+(Hartley and Sturm 1997); a few Gauss-Newton steps with the weights of ρ follow.
 """
 
 from __future__ import annotations
@@ -28,7 +29,9 @@ _BEHIND = 1e3  # reprojection error, in focal lengths, of a point behind the cam
 
 @dataclass(frozen=True)
 class Triangulated:
-    """N points: ``points`` (N, 3) metres, NaN without enough good views; ``error_px`` and ``good`` (C, N)."""
+    """N points: ``points`` (N, 3) metres, NaN without enough good views; ``error_px`` and ``good``
+    (C, N).
+    """
 
     points: NDArray[np.float64]
     error_px: NDArray[np.float64]
@@ -67,20 +70,26 @@ def triangulate(
 
 
 def from_views(x: NDArray[np.float64], T_camera_world: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the points (N, 3), world, that solve x × (T X) = 0 in all views with the least algebraic error.
+    """Return the points (N, 3), world, that solve x × (T X) = 0 in all views with the least
+    algebraic error.
 
     :param x: (C, N, 2) normalized image coordinates.
     :param T_camera_world: (C, 4, 4).
     """
     T = T_camera_world[:, None, :3]
-    rows = np.concatenate([x[..., :1] * T[:, :, 2] - T[:, :, 0], x[..., 1:] * T[:, :, 2] - T[:, :, 1]])  # (2C, N, 4)
+    # (2C, N, 4)
+    rows = np.concatenate(
+        [x[..., :1] * T[:, :, 2] - T[:, :, 0], x[..., 1:] * T[:, :, 2] - T[:, :, 1]]
+    )
     h = np.linalg.svd(rows.transpose(1, 0, 2))[2][:, -1]
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(h[:, :3] / h[:, 3:])
 
 
 def project(X: NDArray[np.float64], T_camera_world: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the normalized image coordinates (C, N, 2) of points (N, 3); far outside for those behind a camera."""
+    """Return the normalized image coordinates (C, N, 2) of points (N, 3); far outside for those
+    behind a camera.
+    """
     p = _in_cameras(X, T_camera_world)
     ahead = p[..., 2:] > 1e-6
     return np.asarray(np.where(ahead, p[..., :2] / np.where(ahead, p[..., 2:], 1.0), _BEHIND))
@@ -97,19 +106,27 @@ class _Views:
 
     def error_px(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the errors e (C, N) of points (N, 3)."""
-        return np.asarray(self.focal_px[:, None] * np.linalg.norm(project(X, self.T) - self.x, axis=-1))
+        return np.asarray(
+            self.focal_px[:, None] * np.linalg.norm(project(X, self.T) - self.x, axis=-1)
+        )
 
     def cost(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the cost (N,) of each point; infinite for NaN."""
         e2 = self.error_px(X) ** 2
-        return np.asarray(np.nan_to_num(self.weight * SCALE_PX**2 * e2 / (SCALE_PX**2 + e2), nan=np.inf).sum(0))
+        return np.asarray(
+            np.nan_to_num(self.weight * SCALE_PX**2 * e2 / (SCALE_PX**2 + e2), nan=np.inf).sum(0)
+        )
 
     def step(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the points after one Gauss-Newton step."""
         R = self.T[:, None, :3, :3]
         q, depth = project(X, self.T), np.maximum(_in_cameras(X, self.T)[..., 2, None, None], 1e-6)
         r = self.focal_px[:, None, None] * (q - self.x)
-        J = self.focal_px[:, None, None, None] * (R[..., :2, :] - q[..., None] * R[..., 2:, :]) / depth
+        J = (
+            self.focal_px[:, None, None, None]
+            * (R[..., :2, :] - q[..., None] * R[..., 2:, :])
+            / depth
+        )
         w = self.weight * _robust(r)
         H = np.einsum("cn,cnij,cnik->njk", w, J, J) + 1e-6 * np.eye(3)
         g = np.einsum("cn,cnij,cni->nj", w, J, r)
@@ -121,7 +138,9 @@ class _Views:
 
 def _in_cameras(X: NDArray[np.float64], T_camera_world: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return points (N, 3), world, in the axes of each camera, (C, N, 3)."""
-    return np.asarray(X @ T_camera_world[:, :3, :3].transpose(0, 2, 1) + T_camera_world[:, None, :3, 3])
+    return np.asarray(
+        X @ T_camera_world[:, :3, :3].transpose(0, 2, 1) + T_camera_world[:, None, :3, 3]
+    )
 
 
 def _weight(confidence: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -143,11 +162,13 @@ def adjust_cameras(
     sigma_m: float,
     steps: int = 30,
 ) -> NDArray[np.float64]:
-    """Return the cameras (C, 4, 4) in which N points are most consistent: bundle adjustment of points and poses.
+    """Return the cameras (C, 4, 4) in which N points are most consistent: bundle adjustment of
+    points and poses.
 
-    The cost is that of `triangulate` over all points with enough views, plus |ω_c|² / σ_r² + |t_c|² / σ_t² for each
-    camera's correction T_c ← exp(ω_c, t_c) T_c in its own axes, which also determines the scale. The points are
-    eliminated (Schur complement), so each step solves for 6 C unknowns.
+    The cost is that of `triangulate` over all points with enough views, plus |ω_c|² / σ_r² + |t_c|²
+    / σ_t² for each camera's correction T_c ← exp(ω_c, t_c) T_c in its own axes, which also
+    determines the scale. The points are eliminated (Schur complement), so each step solves for 6 C
+    unknowns.
 
     :param x: (C, N, 2) normalized image coordinates.
     :param confidence: (C, N), 0..1.
@@ -166,10 +187,15 @@ def adjust_cameras(
         p = _in_cameras(X[known], T)
         q, f = p[..., :2] / p[..., 2:], focal_px[:, None, None]
         r = f * (q - x[:, known])
-        J_camera = f[..., None] * np.concatenate([np.eye(2) + 0 * q[..., None], -q[..., None]], -1) / p[..., 2:, None]
+        J_camera = (
+            f[..., None]
+            * np.concatenate([np.eye(2) + 0 * q[..., None], -q[..., None]], -1)
+            / p[..., 2:, None]
+        )
         w = weight[:, known] * _robust(r)
         J_point = J_camera @ T[:, None, :3, :3]
-        J_pose = np.concatenate([J_camera @ -_cross(p), J_camera], -1)  # (C, N, 2, 6): dp = ω × p + t
+        # (C, N, 2, 6): dp = ω × p + t
+        J_pose = np.concatenate([J_camera @ -_cross(p), J_camera], -1)
         H_points = np.einsum("cn,cnij,cnik->njk", w, J_point, J_point) + 1e-6 * np.eye(3)
         g_points = np.einsum("cn,cnij,cni->nj", w, J_point, r)
         mixed = np.einsum("cn,cnij,cnik->ncjk", w, J_pose, J_point).reshape(len(p[0]), 6 * C, 3)
@@ -181,7 +207,9 @@ def adjust_cameras(
         H -= np.einsum("nij,njk,nlk->il", mixed, inverse, mixed)
         g -= np.einsum("nij,njk,nk->i", mixed, inverse, g_points)
         so_far = np.concatenate([_correction(a, b) for a, b in zip(T, start, strict=True)])
-        change = -np.linalg.solve(H + np.diag(inverse_variance), g + inverse_variance * so_far).reshape(C, 6)
+        change = -np.linalg.solve(
+            H + np.diag(inverse_variance), g + inverse_variance * so_far
+        ).reshape(C, 6)
         for c in range(C):
             R = exp(change[c, :3])
             T[c, :3] = R @ T[c, :3]
@@ -192,7 +220,9 @@ def adjust_cameras(
 
 
 def _correction(T: NDArray[np.float64], start: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return rotation vector and translation (6,) that lead from one pose of a camera to the other."""
+    """Return rotation vector and translation (6,) that lead from one pose of a camera to the
+    other.
+    """
     D = T @ np.linalg.inv(start)
     return np.concatenate([log(D[:3, :3]), D[:3, 3]])
 

@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Joints of both people in space, triangulated from a landmark network's keypoints in all four cameras.
+"""Joints of both people in space, triangulated from a landmark network's keypoints in all four
+cameras.
 
-Each camera's frames are observed twice. First, a person is followed from frame to frame, beginning in a given region,
-and triangulated; where the network jumped onto the other person in one camera, the robust triangulation leaves that
-camera out. Then, every frame is observed in the regions where the triangulated person is, as it is and mirrored; the
-mean of both gives the keypoints, and their difference lowers the confidence.
+Each camera's frames are observed twice. First, a person is followed from frame to frame, beginning
+in a given region, and triangulated; where the network jumped onto the other person in one camera,
+the robust triangulation leaves that camera out. Then, every frame is observed in the regions where
+the triangulated person is, as it is and mirrored; the mean of both gives the keypoints, and their
+difference lowers the confidence.
 
-The woman was drawn with cameras that are not quite those of the footage: in camera 1, she is 27 pixels off. Her truth
-therefore has cameras of its own, by bundle adjustment. It holds for her pose and size, but where she is relative to the
-man is known to a few centimetres only.
+The woman was drawn with cameras that are not quite those of the footage: in camera 1, she is 27
+pixels off. Her truth therefore has cameras of its own, by bundle adjustment. It holds for her pose
+and size, but where she is relative to the man is known to a few centimetres only.
 """
 
 from __future__ import annotations
@@ -24,7 +26,11 @@ from numpy.typing import NDArray
 
 from ...scope_addon.atomic_write import write_npz
 from ...scope_addon.capture.media.video import open_video
-from ...scope_addon.capture.perception.landmark_network import KEYPOINT_COUNT, KEYPOINT_NAMES, LandmarkNetwork
+from ...scope_addon.capture.perception.landmark_network import (
+    KEYPOINT_COUNT,
+    KEYPOINT_NAMES,
+    LandmarkNetwork,
+)
 from ...scope_addon.capture.perception.region import Region, region_from_points
 from ..perception.accuracy import CAMERAS
 from .footage import FPS, LATER, Camera, man_alone
@@ -34,7 +40,8 @@ PEOPLE = ("man", "woman")
 NETWORK, SECOND_NETWORK = "pose_landmark_heavy", "pose_landmark_full"
 THREADS = 2
 DRAWN = ("woman",)
-SIGMA_RAD, SIGMA_M = np.radians(1.0), 0.1  # by which the cameras that she was drawn with may differ, each axis
+# by which the cameras that she was drawn with may differ, each axis
+SIGMA_RAD, SIGMA_M = np.radians(1.0), 0.1
 FIRST_REGIONS = {  # in frame 0: centre of the hips x, y; side; rotation
     ("man", "cam1"): (390, 720, 900, 0.1), ("woman", "cam1"): (773, 1250, 1100, 0.35),
     ("man", "cam2"): (560, 750, 900, 0.0), ("woman", "cam2"): (203, 1080, 1000, 0.0),
@@ -42,27 +49,33 @@ FIRST_REGIONS = {  # in frame 0: centre of the hips x, y; side; rotation
     ("man", "cam4"): (420, 1010, 1000, -0.4), ("woman", "cam4"): (800, 690, 700, -0.3),
 }  # fmt: skip
 NAMES = {  # of the evaluation tool, by the network's
-    "nose": "Nose", "left_eye": "LEye", "right_eye": "REye", "left_ear": "LEar", "right_ear": "REar",
-    "left_heel": "LHeel", "right_heel": "RHeel", "left_foot_index": "LBigToe", "right_foot_index": "RBigToe",
+    "nose": "Nose", "left_eye": "LEye", "right_eye": "REye", "left_ear": "LEar",
+    "right_ear": "REar",
+    "left_heel": "LHeel", "right_heel": "RHeel", "left_foot_index": "LBigToe",
+    "right_foot_index": "RBigToe",
     **{f"{side}_{joint}": f"{side[0].upper()}{joint.title()}" for joint in
        ("shoulder", "elbow", "wrist", "hip", "knee", "ankle") for side in ("left", "right")},
 }  # fmt: skip
 _SHOULDERS, _HIPS = [11, 12], [23, 24]
-_CIRCLE = 1.1  # radius of the body circle over the distance of the keypoint that is farthest from the hips
+# radius of the body circle over the distance of the keypoint that is farthest from the hips
+_CIRCLE = 1.1
 _MIRRORED_PX = 15.0  # difference of the two views of a keypoint that halves its confidence
 _SWAPPED = [
     KEYPOINT_NAMES.index(
-        name.replace("left", "*").replace("right", "left").replace("*", "right") if "left" in name or "right" in name
+        name.replace("left", "*").replace("right", "left").replace("*", "right")
+        if "left" in name or "right" in name
         else name
     )
     for name in KEYPOINT_NAMES
-]  # fmt: skip
+]
 Keypoints = NDArray[np.float64]  # (C, T, 33, 3): pixels, confidence
 
 
 @dataclass(frozen=True)
 class TruePerson:
-    """``joints`` (T, 33, 3) metres, in the world of ``cameras``, NaN where not known; ``found``: T · 33 points."""
+    """``joints`` (T, 33, 3) metres, in the world of ``cameras``, NaN where not known; ``found``: T
+    · 33 points.
+    """
 
     joints: NDArray[np.float64]
     found: Triangulated
@@ -74,18 +87,28 @@ def build(videos: dict[str, Path], cameras: dict[str, Camera]) -> dict[str, dict
     """Return both people, by the network whose keypoints they are made of."""
     network = LandmarkNetwork(NETWORK, THREADS)
     followed = _stacked([follow(network, videos[name], name) for name in CAMERAS])
-    rough = {person: solve(keypoints, cameras, person in DRAWN) for person, keypoints in followed.items()}
+    rough = {
+        person: solve(keypoints, cameras, person in DRAWN) for person, keypoints in followed.items()
+    }
     people: dict[str, dict[str, TruePerson]] = {}
-    for name, observer in ((NETWORK, network), (SECOND_NETWORK, LandmarkNetwork(SECOND_NETWORK, THREADS))):
+    for name, observer in (
+        (NETWORK, network),
+        (SECOND_NETWORK, LandmarkNetwork(SECOND_NETWORK, THREADS)),
+    ):
         print(f"observing with {name}", file=sys.stderr, flush=True)
         seen = _stacked([observe(observer, videos[c], c, rough) for c in CAMERAS])
-        people[name] = {person: solve(keypoints, cameras, person in DRAWN) for person, keypoints in seen.items()}
+        people[name] = {
+            person: solve(keypoints, cameras, person in DRAWN) for person, keypoints in seen.items()
+        }
     return people
 
 
 def follow(network: LandmarkNetwork, video: Path, camera: str) -> dict[str, Keypoints]:
     """Return the keypoints (T, 33, 3) of both people, each followed from frame to frame."""
-    regions = [Region((x, y), side, turn) for x, y, side, turn in (FIRST_REGIONS[p, camera] for p in PEOPLE)]
+    regions = [
+        Region((x, y), side, turn)
+        for x, y, side, turn in (FIRST_REGIONS[p, camera] for p in PEOPLE)
+    ]
     seen: dict[str, list[NDArray[np.float64]]] = {person: [] for person in PEOPLE}
     for image in images(video):
         if not seen[PEOPLE[0]]:  # the given regions are rough
@@ -97,9 +120,15 @@ def follow(network: LandmarkNetwork, video: Path, camera: str) -> dict[str, Keyp
     return {person: np.array(rows) for person, rows in seen.items()}
 
 
-def observe(network: LandmarkNetwork, video: Path, camera: str, people: dict[str, TruePerson]) -> dict[str, Keypoints]:
-    """Return the keypoints (T, 33, 3) of both people, observed where they are known to be, as it is and mirrored."""
-    regions = {person: regions_of(truth.joints, truth.cameras[camera]) for person, truth in people.items()}
+def observe(
+    network: LandmarkNetwork, video: Path, camera: str, people: dict[str, TruePerson]
+) -> dict[str, Keypoints]:
+    """Return the keypoints (T, 33, 3) of both people, observed where they are known to be, as it is
+    and mirrored.
+    """
+    regions = {
+        person: regions_of(truth.joints, truth.cameras[camera]) for person, truth in people.items()
+    }
     seen: dict[str, list[NDArray[np.float64]]] = {person: [] for person in people}
     for k, image in enumerate(images(video)):
         width = image.shape[1]
@@ -133,7 +162,10 @@ def solve(keypoints: Keypoints, cameras: dict[str, Camera], adjusts: bool) -> Tr
         cv2.undistortPoints(seen[..., :2].reshape(-1, 1, 2), camera.K, camera.dist).reshape(-1, 2)
         for seen, camera in zip(keypoints, listed, strict=True)
     ])  # fmt: skip
-    poses, focal = np.stack([c.T_camera_world for c in listed]), np.array([c.K[0, 0] for c in listed])
+    poses, focal = (
+        np.stack([c.T_camera_world for c in listed]),
+        np.array([c.K[0, 0] for c in listed]),
+    )
     confidence = keypoints[..., 2].reshape(C, -1)
     if adjusts:
         poses = adjust_cameras(x, confidence, poses, focal, SIGMA_RAD, SIGMA_M)
@@ -143,7 +175,9 @@ def solve(keypoints: Keypoints, cameras: dict[str, Camera], adjusts: bool) -> Tr
 
 
 def regions_of(joints: NDArray[np.float64], camera: Camera) -> list[Region]:
-    """Return the region of a person in every frame; joints (T, 33, 3) that are not known are interpolated."""
+    """Return the region of a person in every frame; joints (T, 33, 3) that are not known are
+    interpolated.
+    """
     filled, rows = joints.copy(), np.arange(len(joints))
     for j in range(KEYPOINT_COUNT):
         known = np.isfinite(joints[:, j, 0])
@@ -160,15 +194,21 @@ def regions_of(joints: NDArray[np.float64], camera: Camera) -> list[Region]:
 
 
 def pixels(X: NDArray[np.float64], camera: Camera) -> NDArray[np.float64]:
-    """Project points (N, 3), metres, world, into a camera's image: (N, 2) pixels, NaN where the point is not known."""
+    """Project points (N, 3), metres, world, into a camera's image: (N, 2) pixels, NaN where the
+    point is not known.
+    """
     x = project(X, camera.T_camera_world[None])[0]
     rays = np.column_stack([x, np.ones(len(x))])
-    px = np.asarray(cv2.projectPoints(rays, np.zeros(3), np.zeros(3), camera.K, camera.dist)[0].reshape(-1, 2))
+    px = np.asarray(
+        cv2.projectPoints(rays, np.zeros(3), np.zeros(3), camera.K, camera.dist)[0].reshape(-1, 2)
+    )
     return np.where(np.isfinite(X).all(1)[:, None], px, np.nan)
 
 
 def save(folder: Path, name: str, truth: TruePerson) -> None:
-    """Write the person's truth for every camera in the evaluation tool's format: ``NAME_CAMERA.npz``."""
+    """Write the person's truth for every camera in the evaluation tool's format:
+    ``NAME_CAMERA.npz``.
+    """
     columns = [KEYPOINT_NAMES.index(name) for name in NAMES]
     joints = truth.joints[:, columns]
     for camera in truth.cameras.values():
@@ -186,13 +226,19 @@ def save_man(folder: Path, cameras: dict[str, Camera]) -> None:
 
 
 def _write(
-    path: Path, joints: NDArray[np.float64], names: NDArray[np.str_], frames: NDArray[np.int64], camera: Camera
+    path: Path,
+    joints: NDArray[np.float64],
+    names: NDArray[np.str_],
+    frames: NDArray[np.int64],
+    camera: Camera,
 ) -> None:
     T = camera.T_camera_world
     uv = pixels(joints.reshape(-1, 3), camera).reshape(*joints.shape[:2], 2)
     arrays = {
-        "joints": joints @ T[:3, :3].T + T[:3, 3], "names": names, "frame_index": frames, "intrinsics": camera.K,
-        "dist": camera.dist, "fps": np.asarray(FPS), "size": np.asarray(camera.size), "uv": uv, "up": camera.up,
+        "joints": joints @ T[:3, :3].T + T[:3, 3], "names": names, "frame_index": frames,
+        "intrinsics": camera.K,
+        "dist": camera.dist, "fps": np.asarray(FPS), "size": np.asarray(camera.size), "uv": uv,
+        "up": camera.up,
     }  # fmt: skip
     write_npz(path, arrays, compressed=True)
 

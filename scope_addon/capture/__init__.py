@@ -5,5 +5,6 @@ import os
 
 from ..footage import MAX_PIXELS
 
-# OpenCV reads this once, while it is loaded, and compares it with an image's header before it takes memory for it.
+# OpenCV reads this once, while it is loaded, and compares it with an image's header before it takes
+# memory for it.
 os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(MAX_PIXELS))

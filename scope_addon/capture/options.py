@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The options of a capture as the pipeline reads them, and their validation before any footage is opened."""
+"""The options of a capture as the pipeline reads them, and their validation before any footage is
+opened.
+"""
 
 from __future__ import annotations
 
@@ -32,52 +34,66 @@ _DEFAULT = {option.name: option.default for option in OPTIONS}
 class CaptureOptions:
     """How to capture; the defaults suit a phone clip of one person.
 
-    Its fields are the options of `Place.CAPTURE`, typed; ``start``, ``end`` and ``fps`` together are ``wanted``.
+    Its fields are the options of `Place.CAPTURE`, typed; ``start``, ``end`` and ``fps`` together
+    are ``wanted``.
     """
 
     quality: str = _DEFAULT["quality"]  # fast, balanced, best
-    people: int | str = _DEFAULT["people"]  # how many at most; "all"; "largest": the most prominent one over the clip
-    heights_m: Sequence[float] = _DEFAULT["heights_m"]  # most prominent person first; others are estimated
+    # how many at most; "all"; "largest": the most prominent one over the clip
+    people: int | str = _DEFAULT["people"]
+    # most prominent person first; others are estimated
+    heights_m: Sequence[float] = _DEFAULT["heights_m"]
     focal_mm: float | None = _DEFAULT["focal_mm"]
     fov_deg: float | None = _DEFAULT["fov_deg"]
     calibration: Path | None = _DEFAULT["calibration"]
     wanted: FootageRange = VideoRange()  # range of frames
     smoothing: bool = _DEFAULT["smoothing"]
-    uneven_ground: bool = _DEFAULT["uneven_ground"]  # feet rest at any height, not on one horizontal floor
+    # feet rest at any height, not on one horizontal floor
+    uneven_ground: bool = _DEFAULT["uneven_ground"]
     threads: int = _DEFAULT["threads"]  # 0: as many as there are cores
-    hands: str = _DEFAULT["hands"]  # off, auto, on: the fingers as well; the body needs finger joints
+    # off, auto, on: the fingers as well; the body needs finger joints
+    hands: str = _DEFAULT["hands"]
     face: bool = _DEFAULT["face"]  # expressions and gaze as well
     provider: str = _DEFAULT["provider"]  # what the networks run on; see `execution`
-    detector: Path | None = _DEFAULT["detector"]  # the user's own networks, ONNX files; see `adapters`
+    # the user's own networks, ONNX files; see `adapters`
+    detector: Path | None = _DEFAULT["detector"]
     keypoints: Path | None = _DEFAULT["keypoints"]
     ablation: Ablation = NO_ABLATION  # for experiments
-    window_s: float = WINDOW_S  # of which clips at least twice as long are observed one after another
+    # of which clips at least twice as long are observed one after another
+    window_s: float = WINDOW_S
 
 
 def capture_options(values: Mapping[str, Any]) -> CaptureOptions:
     """Convert the values of a command line or a request to the pipeline's options.
 
     :param values: by option name; other names are ignored.
-    :raises UsageError: a time or the frame rate cannot be parsed, or the end does not come after the start.
+    :raises UsageError: a time or the frame rate cannot be parsed, or the end does not come after
+        the start.
     """
     fields: dict[str, Any] = {}
     for each in options_at(Place.CAPTURE | Place.WORKER):
         value = values[each.name]
         fields[each.name] = Path(value) if each.value_type is Path and value is not None else value
-    return CaptureOptions(wanted=parse_range(values["start"], values["end"], values["fps"]), **fields)
+    return CaptureOptions(
+        wanted=parse_range(values["start"], values["end"], values["fps"]), **fields
+    )
 
 
 def check_options(body: Body, options: CaptureOptions) -> None:
     """Check the options as far as possible without opening footage or networks.
 
-    :raises UsageError: an option has an impossible value, contradicts another one or does not suit the body.
+    :raises UsageError: an option has an impossible value, contradicts another one or does not suit
+        the body.
     :raises InputError: the calibration cannot be used.
     """
     most_people(options.people)
     landmark_network_name(options.quality)
     Execution(options.provider)
     if options.keypoints and not options.ablation.lifter:
-        raise UsageError("the lifter cannot be left out with a keypoint file: such a network does not estimate depth")
+        raise UsageError(
+            "the lifter cannot be left out with a keypoint file: such a network does "
+            "not estimate depth"
+        )
     if problem := option("hands").type_error(options.hands):
         raise UsageError(f"hands {problem}")
     if options.hands != OFF:
@@ -85,7 +101,13 @@ def check_options(body: Body, options: CaptureOptions) -> None:
     for height_m in options.heights_m:
         require_stature(body, height_m)
     if options.focal_mm is not None or options.fov_deg is not None:
-        choose_camera(1, 1, focal_mm=options.focal_mm, fov_deg=options.fov_deg, calibration=options.calibration)
+        choose_camera(
+            1,
+            1,
+            focal_mm=options.focal_mm,
+            fov_deg=options.fov_deg,
+            calibration=options.calibration,
+        )
     elif options.calibration:
         read_calibration(options.calibration)
     for each in options_at(Place.CAPTURE):  # ranges not checked above

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The main job: footage in, motions and a report out. This module only knows the order of the stages."""
+"""The main job: footage in, motions and a report out. This module only knows the order of the
+stages.
+"""
 
 from __future__ import annotations
 
@@ -42,11 +44,12 @@ def capture(
 ) -> Capture:
     """Capture the people of a video or still image, the most prominent one first.
 
-    :param unfinished: folder in which estimates and finished windows are kept while this lasts, and found if an earlier
-        capture was killed; the caller removes it. None: nothing is kept.
-    :param windows: folder with windows of a long clip that `observe_windows` has written; those that are missing are
-        observed now.
-    :raises UsageError: an option has an impossible value, contradicts another one or does not suit the body.
+    :param unfinished: folder in which estimates and finished windows are kept while this lasts, and
+        found if an earlier capture was killed; the caller removes it. None: nothing is kept.
+    :param windows: folder with windows of a long clip that `observe_windows` has written; those
+        that are missing are observed now.
+    :raises UsageError: an option has an impossible value, contradicts another one or does not suit
+        the body.
     :raises VideoError: the footage cannot be used.
     :raises NoPersonError: nobody was found.
     :raises CancelledError: raised by ``progress`` itself, passed on.
@@ -54,20 +57,32 @@ def capture(
     check_options(body, options)
     clock = StageClock()
     with open_video(Path(path), options.wanted) as video:
-        footage, tracks = observe(video, body, options, clock, Listeners(progress, watch), unfinished, windows)
+        footage, tracks = observe(
+            video, body, options, clock, Listeners(progress, watch), unfinished, windows
+        )
     return_freed_memory()  # of the networks
     with clock.stage("solver"):
-        repaired = (repair(tracks.pop(0), footage.camera, options.ablation) for _ in range(len(tracks)))
-        solved = solve(shot_of(video, body, options, footage), repaired, progress, options.heights_m)
+        repaired = (
+            repair(tracks.pop(0), footage.camera, options.ablation) for _ in range(len(tracks))
+        )
+        solved = solve(
+            shot_of(video, body, options, footage), repaired, progress, options.heights_m
+        )
         motions = [replace(motion, timestamps=footage.timestamps) for motion in solved.motions]
     rates = clock.rates(len(footage.timestamps))
     return Capture(motions, make_report(video, body, options, footage, solved, rates))
 
 
 def shot_of(video: Video, body: Body, options: CaptureOptions, footage: Footage) -> Shot:
-    """Assemble what is known of observed footage; the camera's path so far contains only its rotation."""
+    """Assemble what is known of observed footage; the camera's path so far contains only its
+    rotation.
+    """
     frames, motion = len(footage.timestamps), footage.camera_motion
-    path = CameraPath.static(frames) if motion.is_static else CameraPath.rotating(motion.R_first_camera)
+    path = (
+        CameraPath.static(frames)
+        if motion.is_static
+        else CameraPath.rotating(motion.R_first_camera)
+    )
     return Shot(
         body,
         footage.camera,

@@ -27,14 +27,16 @@ def connect(scheduler: str) -> Client:
     :raises ClusterError: the scheduler does not answer.
     """
     address = scheduler if _ADDRESS.fullmatch(scheduler) else _address_in_file(scheduler)
-    logging.getLogger("distributed").setLevel(logging.CRITICAL + 1)  # what goes wrong is reported by its consequences
+    # what goes wrong is reported by its consequences
+    logging.getLogger("distributed").setLevel(logging.CRITICAL + 1)
     try:
         with warnings.catch_warnings(action="ignore"):  # of other versions of packages on workers
             return Client(address, timeout=_TIMEOUT_S, set_as_default=False, name="scope-batch")
     except (OSError, ValueError, TypeError, RuntimeError) as error:
         cause = " ".join(str(error.__cause__ or error).split())
         raise ClusterError(
-            f"the Dask scheduler {scheduler} cannot be reached ({cause[:200]}); start it, or check its address"
+            f"the Dask scheduler {scheduler} cannot be reached ({cause[:200]}); start it, or check "
+            "its address"
         ) from error
 
 
@@ -43,10 +45,15 @@ def _address_in_file(scheduler: str) -> str:
     path = Path(scheduler)
     if not path.exists() or path.is_dir():
         raise UsageError(
-            f"--scheduler must be an address such as tcp://HOST:8786 or the path of a scheduler file, not {scheduler!r}"
+            "--scheduler must be an address such as tcp://HOST:8786 or the path of a scheduler "
+            f"file, not {scheduler!r}"
         )
-    content = read_json_object(path, InputError, "scheduler file", "give the one that Dask has written")
+    content = read_json_object(
+        path, InputError, "scheduler file", "give the one that Dask has written"
+    )
     address = content.get("address")
     if not isinstance(address, str) or not _ADDRESS.fullmatch(address):
-        raise InputError(f"{path} is not a scheduler file: it has no address; give the one that Dask has written")
+        raise InputError(
+            f"{path} is not a scheduler file: it has no address; give the one that Dask has written"
+        )
     return address

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Long clips that several workers observe, window by window, before one joins the windows and captures the clip."""
+"""Long clips that several workers observe, window by window, before one joins the windows and
+captures the clip.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +45,9 @@ class Divisions:
         """
         folder.mkdir(parents=True, exist_ok=True)
         ranges = window_ranges(int(entry["windows"]), workers)
-        self._open[task.name] = _Division(task, entry["key"], int(entry["windows"]), folder, set(ranges))
+        self._open[task.name] = _Division(
+            task, entry["key"], int(entry["windows"]), folder, set(ranges)
+        )
         return [task._replace(windows=each, key=entry["key"]) for each in ranges]
 
     def folder(self, task: ClipTask) -> Path:
@@ -51,7 +55,8 @@ class Divisions:
         return self._open[task.name].folder
 
     def ended(self, task: ClipTask, worker: str, entry: Entry | None) -> list[ClipTask]:
-        """Note that some windows were observed, or were given up; they are then left to the task that joins all.
+        """Note that some windows were observed, or were given up; they are then left to the task
+        that joins all.
 
         :param entry: of the windows; None: they were given up.
         :return: the task that joins the windows, when no others are left.
@@ -69,7 +74,8 @@ class Divisions:
     def close(self, task: ClipTask) -> tuple[int, dict[str, Any]]:
         """Forget a clip, and remove its windows.
 
-        :return: how many of its frames were observed in windows, and what its entry in the report has besides.
+        :return: how many of its frames were observed in windows, and what its entry in the report
+            has besides.
         """
         division = self._open.pop(task.name, None)
         if division is None:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Footage and results in a store of files that is addressed by URLs (``s3://``, ``gs://``, ``sftp://``), by `fsspec`.
+"""Footage and results in a store of files that is addressed by URLs (``s3://``, ``gs://``,
+``sftp://``), by `fsspec`.
 
-A store moves a file to its final name by copying (S3, Google Cloud) or renaming (SFTP); either way a reader finds the
-earlier file or the complete new one.
+A store moves a file to its final name by copying (S3, Google Cloud) or renaming (SFTP); either way
+a reader finds the earlier file or the complete new one.
 """
 
 from __future__ import annotations
@@ -35,7 +36,9 @@ def store_errors(error: type[InputError] | type[OutputError], url: str) -> Itera
         raise
     except Exception as failure:
         cause = " ".join(f"{failure}".split())[:200] or type(failure).__name__
-        raise error(f"{url} cannot be used ({cause}); check the address and the credentials") from failure
+        raise error(
+            f"{url} cannot be used ({cause}); check the address and the credentials"
+        ) from failure
 
 
 def _open(url: str) -> tuple[Any, str]:
@@ -51,7 +54,8 @@ def _open(url: str) -> tuple[Any, str]:
 
 
 def names_below(url: str, without: str = "") -> list[str]:
-    """Return the names of all files below a URL, relative to it; names that would lead elsewhere are left out.
+    """Return the names of all files below a URL, relative to it; names that would lead elsewhere
+    are left out.
 
     :param without: URL of a folder to leave out.
     :raises UsageError: the URL cannot be used.
@@ -59,13 +63,22 @@ def names_below(url: str, without: str = "") -> list[str]:
     file_system, root = _open(url)
     left_out = _open(without)[1] + "/" if without else ""
     file_system.invalidate_cache()
-    found = [str(path) for path in file_system.find(root) if not (left_out and str(path).startswith(left_out))]
+    found = [
+        str(path)
+        for path in file_system.find(root)
+        if not (left_out and str(path).startswith(left_out))
+    ]
     names = [path.removeprefix(root).lstrip("/") for path in found]
-    return [n for n in names if n and "\\" not in n and not {"..", ATTEMPTS} & set(PurePosixPath(n).parts)]
+    return [
+        n
+        for n in names
+        if n and "\\" not in n and not {"..", ATTEMPTS} & set(PurePosixPath(n).parts)
+    ]
 
 
 def mirror_footage(url: str, out: str, folder: Path) -> Path:
-    """Make a folder with an empty file for each one below a URL, so that clips can be chosen by their names.
+    """Make a folder with an empty file for each one below a URL, so that clips can be chosen by
+    their names.
 
     :param out: URL or path of the results, which are no footage.
     :raises InputError: the store cannot be read.
@@ -77,7 +90,8 @@ def mirror_footage(url: str, out: str, folder: Path) -> Path:
 
 
 def mirror_results(url: str, folder: Path) -> Path:
-    """Make a folder with an empty file for each result below a URL, and with the report of the previous batch.
+    """Make a folder with an empty file for each result below a URL, and with the report of the
+    previous batch.
 
     :raises OutputError: the store cannot be read.
     :raises UsageError: the URL cannot be used.
@@ -171,8 +185,11 @@ class RemoteStaging:
     def windows(self, number: int) -> None:
         """Return that clips are not divided; see `Staging.windows`."""
 
-    def publish(self, attempt: str, outputs: list[str], content: dict[str, Any], folder: Path | None = None) -> bool:
-        """Give the results of an attempt their final names; see `Staging.publish`. Their sizes are compared.
+    def publish(
+        self, attempt: str, outputs: list[str], content: dict[str, Any], folder: Path | None = None
+    ) -> bool:
+        """Give the results of an attempt their final names; see `Staging.publish`. Their sizes are
+        compared.
 
         :param folder: is not used, because clips are not divided.
         :raises OutputError: the store cannot be written.
@@ -183,7 +200,10 @@ class RemoteStaging:
             file_system.invalidate_cache()
             for name in outputs:
                 staged = f"{root}/{name}"
-                if not file_system.exists(staged) or file_system.size(staged) != content[name]["bytes"]:
+                if (
+                    not file_system.exists(staged)
+                    or file_system.size(staged) != content[name]["bytes"]
+                ):
                     return False
             for name in outputs:
                 self._move(f"{root}/{name}", name)

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Give the clips of a batch to the workers of a Dask cluster, each to one worker at a time, and publish the results.
+"""Give the clips of a batch to the workers of a Dask cluster, each to one worker at a time, and
+publish the results.
 
-Which worker captures what is decided here and not by the scheduler, because workers have to be checked before they
-get a clip, also those that join later, and because a capture uses all threads of a worker, not one.
+Which worker captures what is decided here and not by the scheduler, because workers have to be
+checked before they get a clip, also those that join later, and because a capture uses all threads
+of a worker, not one.
 """
 
 from __future__ import annotations
@@ -50,7 +52,8 @@ class DaskRunner:
     :param folder: URL of the footage, or its path, the same on all machines.
     :param out: URL of the output folder, or its path, the same on all machines.
     :param jobs: number of clips that a worker captures at a time.
-    :param program: command that takes ``capture FILE -o OUT --json``; None for each worker's own installation.
+    :param program: command that takes ``capture FILE -o OUT --json``; None for each worker's own
+        installation.
     :param say: called with messages for the user.
     """
 
@@ -90,19 +93,27 @@ class DaskRunner:
             found: dict[str, Entry] = {}
             if time.monotonic() - self._looked > _POLLING_INTERVAL_S:
                 found = self._check_workers(wanted)
-            while self._waiting and self._client.status == "running" and (record := self._workers.free(self._jobs)):
+            while (
+                self._waiting
+                and self._client.status == "running"
+                and (record := self._workers.free(self._jobs))
+            ):
                 self._start(self._waiting.popleft(), record.address)
             yield found | self._next_outcome()
 
     def stop(self) -> dict[str, Entry]:
-        """See `Runner.stop`; workers end what nobody waits for, and what is not published is not finished."""
+        """See `Runner.stop`; workers end what nobody waits for, and what is not published is not
+        finished.
+        """
         attempts, self._attempts = list(self._attempts.values()), {}
         self._cancel([attempt.future for attempt in attempts])
         self._client.close(timeout=5)
         return {}
 
     def close(self) -> None:
-        """Give up all attempts, disconnect, and remove what is not published; after the report is written."""
+        """Give up all attempts, disconnect, and remove what is not published; after the report is
+        written.
+        """
         self.stop()
         if self._staging:
             self._staging.close()
@@ -124,7 +135,8 @@ class DaskRunner:
         assert self._staging is not None
         return {
             "program": program_version(ROOT),
-            "bpy": self._program is None and any(suffix != ".npz" for suffix in task.settings.suffixes),
+            "bpy": self._program is None
+            and any(suffix != ".npz" for suffix in task.settings.suffixes),
             "folder": self._folder,
             "out": self._out,
             "attempts": str(self._staging.folder),
@@ -142,27 +154,40 @@ class DaskRunner:
         :raises ClusterError: the scheduler is lost, or no worker can capture.
         """
         self._looked = time.monotonic()
-        if self._client.status == "connecting":  # all futures are lost, and will be reported as such
+        # all futures are lost, and will be reported as such
+        if self._client.status == "connecting":
             return {}
         if self._client.status != "running":
             raise ClusterError(
-                "the connection to the Dask scheduler was lost; finished clips are kept, run the same command again to "
+                "the connection to the Dask scheduler was lost; finished clips are kept, run the "
+                "same command again to "
                 "continue"
             )
-        try:  # not scheduler_info(), which may return a list without workers if the scheduler does not answer
+        # not scheduler_info(), which may return a list without workers if the scheduler does not
+        # answer
+        try:
             assert self._client.scheduler is not None
-            present = list(self._client.sync(self._client.scheduler.identity, n_workers=-1)["workers"])
+            present = list(
+                self._client.sync(self._client.scheduler.identity, n_workers=-1)["workers"]
+            )
         except (OSError, TimeoutError):
             return {}
         found: dict[str, Entry] = {}
         for address in self._workers.gone(present):
-            for key in [key for key, attempt in self._attempts.items() if attempt.worker == address]:
+            for key in [
+                key for key, attempt in self._attempts.items() if attempt.worker == address
+            ]:
                 found |= self._give_up(key, "left the cluster")
         for address in self._workers.new(present):
             self._submit(None, address, "", worker_side.check_worker, wanted)
         if self._workers.all_refused():
-            problems = [e["event"] for e in self._workers.log if e["event"].startswith("gets no clips: ")]
-            raise ClusterError(f"no worker of the cluster can capture: {problems[-1].removeprefix('gets no clips: ')}")
+            problems = [
+                e["event"] for e in self._workers.log if e["event"].startswith("gets no clips: ")
+            ]
+            raise ClusterError(
+                "no worker of the cluster can capture: "
+                f"{problems[-1].removeprefix('gets no clips: ')}"
+            )
         if not present and not self._told_to_wait:
             self._say("the cluster has no workers; waiting for one")
         self._told_to_wait = not present
@@ -173,27 +198,45 @@ class DaskRunner:
         assert self._staging is not None
         folder = self._staging.attempt(self._count)
         footage = f"{self._folder.rstrip('/')}/{task.file}"
-        divides = not (task.windows or task.windows_folder or is_url(self._folder) or is_url(self._out))
-        remote = task._replace(footage=footage, out=folder, final=self._out, windows=COUNT if divides else task.windows)
+        divides = not (
+            task.windows or task.windows_folder or is_url(self._folder) or is_url(self._out)
+        )
+        remote = task._replace(
+            footage=footage, out=folder, final=self._out, windows=COUNT if divides else task.windows
+        )
         arguments = (self._program, self._jobs, program_version(ROOT))
         self._submit(task, address, folder, worker_side.capture_on_worker, remote, *arguments)
         self._workers.records[address].running += 1
 
     def _submit(
-        self, task: ClipTask | None, address: str, folder: str, function: Callable[..., Any], first: Any, *others: Any
+        self,
+        task: ClipTask | None,
+        address: str,
+        folder: str,
+        function: Callable[..., Any],
+        first: Any,
+        *others: Any,
     ) -> None:
         assert self._staging is not None
         key = f"scope-{'check' if task is None else 'clip'}-{self._staging.token}-{self._count}"
         self._count += 1
         arguments = (first,) if task is None else (first, key, *others)
         future = self._client.submit(
-            function, *arguments, key=key, workers=[address], allow_other_workers=False, retries=0, pure=False
+            function,
+            *arguments,
+            key=key,
+            workers=[address],
+            allow_other_workers=False,
+            retries=0,
+            pure=False,
         )
         self._attempts[key] = _Attempt(future, address, task, folder)
         future.add_done_callback(lambda done: self._done.put(done.key))
 
     def _next_outcome(self) -> dict[str, Entry]:
-        """Wait a second for an attempt to end, and return the clip's entry if that is its last one."""
+        """Wait a second for an attempt to end, and return the clip's entry if that is its last
+        one.
+        """
         try:
             key = self._done.get(timeout=_POLLING_INTERVAL_S)
         except queue.Empty:
@@ -213,7 +256,9 @@ class DaskRunner:
             return {}
         return self._outcome(key, attempt, attempt.task, result)
 
-    def _outcome(self, key: str, attempt: _Attempt, task: ClipTask, entry: Entry) -> dict[str, Entry]:
+    def _outcome(
+        self, key: str, attempt: _Attempt, task: ClipTask, entry: Entry
+    ) -> dict[str, Entry]:
         """Publish the results of an attempt and return the clip's entry."""
         assert self._staging is not None
         if entry["status"] == worker_side.REFUSED:
@@ -227,8 +272,12 @@ class DaskRunner:
         if is_part(task):
             return self._collect(key, attempt, task, entry, content)
         try:
-            if entry["status"] == "done" and not self._staging.publish(attempt.folder, entry["outputs"], content):
-                return self._give_up(key, f"the results of {task.file} are not what the worker has written")
+            if entry["status"] == "done" and not self._staging.publish(
+                attempt.folder, entry["outputs"], content
+            ):
+                return self._give_up(
+                    key, f"the results of {task.file} are not what the worker has written"
+                )
         except (ScopeError, OSError) as error:
             text = system_error_message(error) if isinstance(error, OSError) else str(error)
             entry = failure(task, text)
@@ -241,7 +290,9 @@ class DaskRunner:
         self._workers.finished(address, entry, observed)
         return {task.name: entry | {"worker": address} | about}
 
-    def _divide(self, key: str, attempt: _Attempt, task: ClipTask, entry: Entry) -> dict[str, Entry]:
+    def _divide(
+        self, key: str, attempt: _Attempt, task: ClipTask, entry: Entry
+    ) -> dict[str, Entry]:
         """Let the workers observe the windows of a long clip."""
         assert self._staging is not None
         folder = self._staging.windows(self._count)
@@ -252,42 +303,63 @@ class DaskRunner:
             parts = self._divisions.begin(task, entry, folder, self._workers.slots(self._jobs))
         except OSError as error:
             return self._ended(task, attempt.worker, failure(task, system_error_message(error)))
-        self._workers.event(attempt.worker, f"{task.file} is divided into {entry['windows']} windows")
+        self._workers.event(
+            attempt.worker, f"{task.file} is divided into {entry['windows']} windows"
+        )
         self._waiting.extendleft(reversed(parts))
         return {}
 
     def _collect(
         self, key: str, attempt: _Attempt, task: ClipTask, entry: Entry, content: dict[str, Any]
     ) -> dict[str, Entry]:
-        """Keep the windows that were observed; what fails here is observed again by the task that joins them."""
+        """Keep the windows that were observed; what fails here is observed again by the task that
+        joins them.
+        """
         assert self._staging is not None
         done = entry["status"] == "done"
         try:
             folder = self._divisions.folder(task)
-            if done and not self._staging.publish(attempt.folder, entry["outputs"], content, folder):
-                return self._give_up(key, f"the windows of {task.file} are not what the worker has written")
+            if done and not self._staging.publish(
+                attempt.folder, entry["outputs"], content, folder
+            ):
+                return self._give_up(
+                    key, f"the windows of {task.file} are not what the worker has written"
+                )
         except (ScopeError, OSError):
             done = False
         self._forget(key)
         if done:
             self._workers.observed(attempt.worker, len(entry["outputs"]), entry)
-        self._waiting.extendleft(self._divisions.ended(task, attempt.worker, entry if done else None))
+        self._waiting.extendleft(
+            self._divisions.ended(task, attempt.worker, entry if done else None)
+        )
         return {}
 
     def _failed(self, key: str, attempt: _Attempt, error: Exception) -> dict[str, Entry]:
-        """Handle an exception that is not Scope's own: a lost worker, or an installation that does not fit."""
+        """Handle an exception that is not Scope's own: a lost worker, or an installation that does
+        not fit.
+        """
         text = " ".join(f"{type(error).__name__}: {error}".split())[:300]
         if attempt.task is None:
             self._forget(key)
-            self._workers.checked(attempt.worker, {"problem": f"Scope does not run there ({text}); install it"})
+            self._workers.checked(
+                attempt.worker, {"problem": f"Scope does not run there ({text}); install it"}
+            )
             return {}
-        if type(error).__name__ in ("KilledWorker", "TimeoutError", "FutureCancelledError", "CommClosedError"):
+        if type(error).__name__ in (
+            "KilledWorker",
+            "TimeoutError",
+            "FutureCancelledError",
+            "CommClosedError",
+        ):
             return self._give_up(key, text)
         self._forget(key)
         if is_part(attempt.task):
             self._waiting.extendleft(self._divisions.ended(attempt.task, attempt.worker, None))
             return {}
-        return self._ended(attempt.task, attempt.worker, failure(attempt.task, internal_error_message(error)))
+        return self._ended(
+            attempt.task, attempt.worker, failure(attempt.task, internal_error_message(error))
+        )
 
     def _give_up(self, key: str, why: str, *, blame: bool = True) -> dict[str, Entry]:
         """Let another worker capture the clip, or return its entry if too many were lost.
@@ -299,7 +371,9 @@ class DaskRunner:
         task = attempt.task
         if task is None:
             return {}
-        self._workers.event(attempt.worker, f"{described(task)} is captured again: {why}", tell=True)
+        self._workers.event(
+            attempt.worker, f"{described(task)} is captured again: {why}", tell=True
+        )
         self._workers.records[attempt.worker].attempts_lost += 1
         part = task.name, task.windows
         self._lost[part] += blame
@@ -309,7 +383,10 @@ class DaskRunner:
         if is_part(task):
             self._waiting.extendleft(self._divisions.ended(task, attempt.worker, None))
             return {}
-        message = f"{ATTEMPTS} workers were lost while they captured it; does it need more memory than they have?"
+        message = (
+            f"{ATTEMPTS} workers were lost while they captured it; does it need more memory than "
+            f"they have?"
+        )
         _, about = self._divisions.close(task)
         return {task.name: failure(task, message) | {"worker": attempt.worker} | about}
 
@@ -324,5 +401,6 @@ class DaskRunner:
 
     def _cancel(self, futures: list[Future[Any]]) -> None:
         if futures and self._client.status == "running":
-            with suppress(OSError, TimeoutError):  # the scheduler is lost, and forgets them by itself
+            # the scheduler is lost, and forgets them by itself
+            with suppress(OSError, TimeoutError):
                 self._client.cancel(futures, force=True)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Folders of attempts below the output folder, and publishing: only checked results get their final names.
+"""Folders of attempts below the output folder, and publishing: only checked results get their final
+names.
 
-An attempt that was given up has no folder any more. A worker that was thought lost and still runs can therefore not
-publish anything, because only this machine renames results.
+An attempt that was given up has no folder any more. A worker that was thought lost and still runs
+can therefore not publish anything, because only this machine renames results.
 """
 
 from __future__ import annotations
@@ -48,11 +49,16 @@ class Staging:
         return str(self.folder / str(number))
 
     def windows(self, number: int) -> Path | None:
-        """Return the path of a folder for the windows of a clip; None where clips are not divided."""
+        """Return the path of a folder for the windows of a clip; None where clips are not
+        divided.
+        """
         return self.folder / f"windows{number}"
 
-    def publish(self, attempt: str, outputs: list[str], content: dict[str, Any], folder: Path | None = None) -> bool:
-        """Give the results of an attempt their final names, and return True; False if one is not what was captured.
+    def publish(
+        self, attempt: str, outputs: list[str], content: dict[str, Any], folder: Path | None = None
+    ) -> bool:
+        """Give the results of an attempt their final names, and return True; False if one is not
+        what was captured.
 
         :param folder: to which they go, if not to the output folder.
         :param outputs: the results, relative to the attempt's folder and to that one.
@@ -61,7 +67,9 @@ class Staging:
         :raises OutputError: a final name is that of a folder or device.
         """
         try:
-            if not all(file_hash(Path(attempt, name)) == content[name]["sha256"] for name in outputs):
+            if not all(
+                file_hash(Path(attempt, name)) == content[name]["sha256"] for name in outputs
+            ):
                 return False
         except (OSError, KeyError):
             return False

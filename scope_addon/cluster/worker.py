@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What runs on a Dask worker: the check whether it can capture, and the capture of a clip in a process of its own.
+"""What runs on a Dask worker: the check whether it can capture, and the capture of a clip in a
+process of its own.
 
-The capture is a subprocess, because the workers of a Dask nanny may not have children of `multiprocessing`. It ends
-with the worker, because the worker's end closes its standard input.
+The capture is a subprocess, because the workers of a Dask nanny may not have children of
+`multiprocessing`. It ends with the worker, because the worker's end closes its standard input.
 """
 
 from __future__ import annotations
@@ -23,7 +24,15 @@ from ..footage import is_url
 from ..installed import CAPTURE, check_installed
 from ..job.batch import ROOT
 from ..job.clips.processes import ClipProcesses
-from ..job.clips.task import CaptureSettings, ClipTask, Entry, Extras, capture_clip, failure, file_hash
+from ..job.clips.task import (
+    CaptureSettings,
+    ClipTask,
+    Entry,
+    Extras,
+    capture_clip,
+    failure,
+    file_hash,
+)
 from ..job.request import program_version
 from . import remote
 from .staging import TOKEN
@@ -35,7 +44,8 @@ LOST, REFUSED = "lost", "refused"  # statuses of an attempt, in addition to thos
 def check_worker(wanted: dict[str, Any]) -> dict[str, Any]:
     """Return what the worker is, and as ``problem`` why it cannot capture; empty if it can.
 
-    :param wanted: plain values, because a worker with another version of Scope has to understand them.
+    :param wanted: plain values, because a worker with another version of Scope has to understand
+        them.
     """
     try:
         problem = _problem(wanted)
@@ -47,7 +57,10 @@ def check_worker(wanted: dict[str, Any]) -> dict[str, Any]:
 def _problem(wanted: dict[str, Any]) -> str:
     ours, theirs = program_version(ROOT), wanted["program"]
     if ours != theirs:
-        return f"it runs another version of Scope ({ours[:8]}, and not {theirs[:8]}); install the same version there"
+        return (
+            f"it runs another version of Scope ({ours[:8]}, and not {theirs[:8]}); install the "
+            f"same version there"
+        )
     check_installed(CAPTURE + (("bpy",) if wanted["bpy"] else ()))
     folder, attempts = wanted["folder"], wanted["attempts"]
     with remote.store_errors(InputError, folder):
@@ -55,31 +68,54 @@ def _problem(wanted: dict[str, Any]) -> str:
             return f"it has no folder {folder}; all machines need the footage under the same path"
     token = Path(attempts, TOKEN)
     with remote.store_errors(OutputError, attempts):
-        text = remote.read_text(f"{attempts}/{TOKEN}") if is_url(attempts) else token.is_file() and token.read_text()
+        text = (
+            remote.read_text(f"{attempts}/{TOKEN}")
+            if is_url(attempts)
+            else token.is_file() and token.read_text()
+        )
     if text != wanted["token"]:
-        return f"it does not see the output folder {wanted['out']}; all machines need it under the same path"
-    settings = CaptureSettings(wanted["options"], tuple(wanted["suffixes"]), Extras(*wanted["extras"]))
+        return (
+            f"it does not see the output folder {wanted['out']}; all machines need it under the "
+            f"same path"
+        )
+    settings = CaptureSettings(
+        wanted["options"], tuple(wanted["suffixes"]), Extras(*wanted["extras"])
+    )
     if settings.basis(ours) != wanted["basis"]:
-        return "a file that the options name is missing or different there; all machines need the same under its path"
+        return (
+            "a file that the options name is missing or different there; all machines need the "
+            "same under its path"
+        )
     return ""
 
 
-def capture_on_worker(task: ClipTask, key: str, program: tuple[str, ...] | None, jobs: int, version: str) -> Entry:
-    """Capture a clip into the folder of an attempt, ``task.out``, and return its entry with the hashes of the results.
+def capture_on_worker(
+    task: ClipTask, key: str, program: tuple[str, ...] | None, jobs: int, version: str
+) -> Entry:
+    """Capture a clip into the folder of an attempt, ``task.out``, and return its entry with the
+    hashes of the results.
 
     :param key: Dask's key of this task.
     :param program: command that takes ``capture FILE -o OUT --json``; None for this installation.
     :param jobs: number of clips that are captured in parallel on this worker.
-    :param version: the version of Scope, which a worker that was started again may not have any more.
+    :param version: the version of Scope, which a worker that was started again may not have any
+        more.
     """
     if program_version(ROOT) != version:
-        return {"status": REFUSED, "message": "it runs another version of Scope now; install the same version there"}
+        return {
+            "status": REFUSED,
+            "message": "it runs another version of Scope now; install the same version there",
+        }
     worker = get_worker()
     if not is_url(task.out):
         try:
             Path(task.out).mkdir()
-        except OSError as error:  # given up meanwhile, or begun before this worker was started again
-            return {"status": LOST, "message": f"the folder of the attempt cannot be made ({error.strerror})"}
+        # given up meanwhile, or begun before this worker was started again
+        except OSError as error:
+            return {
+                "status": LOST,
+                "message": f"the folder of the attempt cannot be made ({error.strerror})",
+            }
     run = partial(ClipProcesses().run, wanted=partial(_is_wanted, worker, key))
     threads = max(1, min(worker.state.nthreads, os.cpu_count() or 1) // jobs)
     with tempfile.TemporaryDirectory(prefix="scope-clip-") as scratch:
@@ -87,7 +123,9 @@ def capture_on_worker(task: ClipTask, key: str, program: tuple[str, ...] | None,
         try:
             if is_url(task.footage):
                 with remote.store_errors(InputError, task.footage):
-                    local = local._replace(footage=str(remote.download(task.footage, Path(scratch))))
+                    local = local._replace(
+                        footage=str(remote.download(task.footage, Path(scratch)))
+                    )
         except ScopeError as error:
             return failure(task, str(error))
         if is_url(task.out):
@@ -98,7 +136,10 @@ def capture_on_worker(task: ClipTask, key: str, program: tuple[str, ...] | None,
         try:
             return entry | {"content": _content(Path(local.out), entry, task.out)}
         except (ScopeError, OSError) as error:
-            return {"status": LOST, "message": f"a result cannot be read again or uploaded ({error})"}
+            return {
+                "status": LOST,
+                "message": f"a result cannot be read again or uploaded ({error})",
+            }
 
 
 def _content(folder: Path, entry: Entry, out: str) -> dict[str, dict[str, Any]]:
@@ -114,7 +155,9 @@ def _content(folder: Path, entry: Entry, out: str) -> dict[str, dict[str, Any]]:
 
 
 def _is_wanted(worker: Worker, key: str) -> bool:
-    """Return whether the scheduler still waits for a task; if not, or if it is lost, nobody does."""
+    """Return whether the scheduler still waits for a task; if not, or if it is lost, nobody
+    does.
+    """
     state = worker.state.tasks.get(key)
     alive = worker.status in (Status.running, Status.paused)
     return alive and state is not None and state.state in ("executing", "long-running")

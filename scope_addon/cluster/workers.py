@@ -59,7 +59,9 @@ class Workers:
 
     def event(self, address: str, text: str, *, tell: bool = False) -> None:
         """Add a line to the log, and tell the user if it matters to them."""
-        self.log.append({"second": round(time.monotonic() - self._start, 1), "worker": address, "event": text})
+        self.log.append(
+            {"second": round(time.monotonic() - self._start, 1), "worker": address, "event": text}
+        )
         if tell:
             self._say(f"worker {address}: {text}")
 
@@ -74,7 +76,9 @@ class Workers:
     def gone(self, addresses: Iterable[str]) -> list[str]:
         """Record workers that have left, and return their addresses."""
         present = set(addresses)
-        left = [a for a, record in self.records.items() if record.state != LOST and a not in present]
+        left = [
+            a for a, record in self.records.items() if record.state != LOST and a not in present
+        ]
         for address in left:
             self.records[address].state = LOST
             self.event(address, "left the cluster")
@@ -83,13 +87,22 @@ class Workers:
     def checked(self, address: str, found: dict[str, Any]) -> None:
         """Record the result of a worker's check."""
         record, problem = self.records[address], found.get("problem")
-        record.host, record.threads = str(found.get("host", record.host)), int(found.get("threads", record.threads))
+        record.host, record.threads = (
+            str(found.get("host", record.host)),
+            int(found.get("threads", record.threads)),
+        )
         record.state = REFUSED if problem else READY
         self.event(address, f"gets no clips: {problem}" if problem else "ready", tell=bool(problem))
 
     def free(self, jobs: int) -> WorkerRecord | None:
-        """Return the ready worker with the fewest clips, if it may have another one, for which it needs a thread."""
-        ready = [r for r in self.records.values() if r.state == READY and r.running < min(jobs, r.threads)]
+        """Return the ready worker with the fewest clips, if it may have another one, for which it
+        needs a thread.
+        """
+        ready = [
+            r
+            for r in self.records.values()
+            if r.state == READY and r.running < min(jobs, r.threads)
+        ]
         return min(ready, key=lambda record: record.running, default=None)
 
     def all_refused(self) -> bool:

@@ -1,2 +1,4 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shared by the commands of `cli`: arguments made from the declared options, the terminal, signals, output files."""
+"""Shared by the commands of `cli`: arguments made from the declared options, the terminal, signals,
+output files.
+"""

@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The limit on a process's addresses. Standard library only: it is asked when other libraries could not be loaded."""
+"""The limit on a process's addresses. Standard library only: it is asked when other libraries could
+not be loaded.
+"""
 
 from __future__ import annotations
 
 
 def address_space_limit() -> int | None:
-    """Return the limit on this process's addresses (``ulimit -v``) in bytes; None if there is none."""
+    """Return the limit on this process's addresses (``ulimit -v``) in bytes; None if there is
+    none.
+    """
     try:
         import resource
     except ImportError:  # on Windows

@@ -24,7 +24,8 @@ _LONGEST_SHOWN = 60  # characters of a value in a message
 def path_argument(text: str) -> Path:
     """Convert an argument to a path.
 
-    :raises ArgumentTypeError: it is empty, as an unset variable of the shell is; it would mean the current folder.
+    :raises ArgumentTypeError: it is empty, as an unset variable of the shell is; it would mean the
+        current folder.
     """
     if not text:
         raise argparse.ArgumentTypeError("the path is empty; give a file or folder")
@@ -35,13 +36,17 @@ def add_options(parser: argparse.ArgumentParser, place: Place = Place.COMMAND_LI
     """Add an argument for each option of the command line, or of one of its commands."""
     for option in options_at(place):
         if option.value_type is bool:
-            parser.add_argument(option.flag, action="store_true", help=option.argument.help or option.help)
+            parser.add_argument(
+                option.flag, action="store_true", help=option.argument.help or option.help
+            )
         else:
             _add_valued(parser, option)
 
 
 def with_bare_values(argv: Sequence[str]) -> list[str]:
-    """Give the flags that may come without a value theirs: argparse would take what follows, such as the footage."""
+    """Give the flags that may come without a value theirs: argparse would take what follows, such
+    as the footage.
+    """
     bare = {option.flag: option for option in OPTIONS if option.argument.bare}
     out = list(argv)
     for k, text in enumerate(argv):
@@ -88,7 +93,8 @@ def body_and_options(args: argparse.Namespace) -> tuple[Body, CaptureOptions]:
 
 
 def option_values(args: argparse.Namespace, place: Place = Place.COMMAND_LINE) -> dict[str, Any]:
-    """Return the value of each option of the command line, or of one of its commands, by the option's name.
+    """Return the value of each option of the command line, or of one of its commands, by the
+    option's name.
 
     :raises UsageError: an argument cannot be parsed.
     """
@@ -108,7 +114,8 @@ def values_in_range(args: argparse.Namespace, place: Place) -> dict[str, Any]:
 
 
 def non_default_arguments(args: argparse.Namespace) -> dict[str, str | None]:
-    """Return the arguments that differ from their defaults, for the process that captures one clip of a batch.
+    """Return the arguments that differ from their defaults, for the process that captures one clip
+    of a batch.
 
     :return: flag to text; None for a flag that takes no value.
     """
@@ -122,7 +129,9 @@ def non_default_arguments(args: argparse.Namespace) -> dict[str, str | None]:
 
 def _text(option: Option, value: Any) -> str:
     """Return an argument's text for a process that may have another current folder."""
-    is_file = option.value_type is Path or (option.name == "body" and Path(value).suffix.lower() in BODY_SUFFIXES)
+    is_file = option.value_type is Path or (
+        option.name == "body" and Path(value).suffix.lower() in BODY_SUFFIXES
+    )
     return os.path.abspath(value) if is_file else str(value)
 
 

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The temporary folder of Blender's module: in a shell, inside a folder whose name tells the process that owns it.
+"""The temporary folder of Blender's module: in a shell, inside a folder whose name tells the
+process that owns it.
 
-Blender makes a folder ``blender_XXXXXX`` when its module is loaded, and removes it at a normal exit alone.
+Blender makes a folder ``blender_XXXXXX`` when its module is loaded, and removes it at a normal exit
+alone.
 """
 
 from __future__ import annotations
@@ -19,11 +21,14 @@ from ...solver.processes import is_abandoned, owner
 from ..job.private_folder import is_private
 
 _START = "scope-blender-"
-_VARIABLES = ("TMPDIR", "TEMP", "TMP")  # by which Blender finds the system's temporary folder, on Windows the others
+# by which Blender finds the system's temporary folder, on Windows the others
+_VARIABLES = ("TMPDIR", "TEMP", "TMP")
 
 
 def load_blender() -> None:
-    """Load Blender's module, if it is not loaded, and remove folders that killed processes have left."""
+    """Load Blender's module, if it is not loaded, and remove folders that killed processes have
+    left.
+    """
     if "bpy" in sys.modules:
         return
     with _temporary_folder():
@@ -31,15 +36,21 @@ def load_blender() -> None:
 
 
 def remove_blender_folder() -> None:
-    """Remove the temporary folder of Blender's module, before an exit without Blender's exit handlers."""
+    """Remove the temporary folder of Blender's module, before an exit without Blender's exit
+    handlers.
+    """
     folder = Path(sys.modules["bpy"].app.tempdir)
     if folder.name.startswith("blender_"):  # not a folder that the user has chosen
-        shutil.rmtree(folder.parent if folder.parent.name.startswith(_START) else folder, ignore_errors=True)
+        shutil.rmtree(
+            folder.parent if folder.parent.name.startswith(_START) else folder, ignore_errors=True
+        )
 
 
 @contextmanager
 def _temporary_folder() -> Iterator[None]:
-    """Have the system's temporary folder be a new one with the owner's name; as it is where none can be made."""
+    """Have the system's temporary folder be a new one with the owner's name; as it is where none
+    can be made.
+    """
     before = {name: os.environ.get(name) for name in _VARIABLES}
     with suppress(OSError):
         system = _system_folder()
@@ -57,7 +68,9 @@ def _temporary_folder() -> Iterator[None]:
 
 
 def _system_folder() -> Path:
-    """Return the system's temporary folder; `tempfile.gettempdir` would try it with a file, which a kill leaves."""
+    """Return the system's temporary folder; `tempfile.gettempdir` would try it with a file, which a
+    kill leaves.
+    """
     given = [Path(os.environ[name]) for name in _VARIABLES if os.environ.get(name)]
     return next((folder for folder in given if folder.is_dir()), Path("/tmp"))
 

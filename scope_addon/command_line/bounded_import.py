@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """End the process when Blender's importer takes too much time or memory for a file.
 
-A few bytes of a rig's file can ask for any work, which nothing can interrupt but the end of the process. This is for
-the check before the capture, when nothing has been done that could be lost.
+A few bytes of a rig's file can ask for any work, which nothing can interrupt but the end of the
+process. This is for the check before the capture, when nothing has been done that could be lost.
 """
 
 from __future__ import annotations
@@ -19,14 +19,17 @@ from ..capture.perception.adapters.network_server import used_bytes
 from ..errors import FAILED
 
 _INTERVAL_S = 0.1
-# A file may take these, and in addition as many seconds for a megabyte, and as many bytes for a byte.
+# A file may take these, and in addition as many seconds for a megabyte, and as many bytes for a
+# byte.
 BASE_S, S_PER_MB = 30.0, 1.0
 BASE_BYTES, BYTES_PER_BYTE = 2 << 30, 20
 
 
 @contextmanager
 def bounded_import(path: Path) -> Iterator[None]:
-    """End the process with one sentence when the block takes too long, or too much memory, for a file of its size."""
+    """End the process with one sentence when the block takes too long, or too much memory, for a
+    file of its size.
+    """
     size = path.stat().st_size
     longest_s = BASE_S + S_PER_MB * size / 1e6
     most_bytes = BASE_BYTES + BYTES_PER_BYTE * size
@@ -37,9 +40,14 @@ def bounded_import(path: Path) -> Iterator[None]:
         end = time.monotonic() + longest_s
         while not done.wait(_INTERVAL_S):
             if time.monotonic() > end:
-                _stop(f"{path}: Blender did not finish importing this file within {longest_s:.0f} s")
+                _stop(
+                    f"{path}: Blender did not finish importing this file within {longest_s:.0f} s"
+                )
             if used_bytes() - at_start > most_bytes:
-                _stop(f"{path}: importing this file takes more than {most_bytes / 1e9:.1f} GB of memory")
+                _stop(
+                    f"{path}: importing this file takes more than {most_bytes / 1e9:.1f} GB of "
+                    "memory"
+                )
 
     watcher = threading.Thread(target=watch, name="scope-import", daemon=True)
     watcher.start()
@@ -52,5 +60,7 @@ def bounded_import(path: Path) -> Iterator[None]:
 
 def _stop(what: str) -> None:
     remove_temporary_files()
-    os.write(2, f"scope: {what}; export it again or choose another\n".encode("utf-8", "surrogateescape"))
+    os.write(
+        2, f"scope: {what}; export it again or choose another\n".encode("utf-8", "surrogateescape")
+    )
     os._exit(FAILED)

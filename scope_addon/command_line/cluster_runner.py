@@ -32,7 +32,9 @@ def dask_runner(args: argparse.Namespace, program: Sequence[str] | None) -> Dask
     from ..cluster.runner import DaskRunner
 
     # As given, not resolved: a link may lead elsewhere on other machines.
-    folder, out = (path if is_url(path) else os.path.abspath(path) for path in (args.folder, args.out))
+    folder, out = (
+        path if is_url(path) else os.path.abspath(path) for path in (args.folder, args.out)
+    )
     return DaskRunner(connect(args.scheduler), folder, out, args.jobs, program, print_message)
 
 
@@ -52,7 +54,8 @@ def local_folders(args: argparse.Namespace, stack: ExitStack) -> tuple[Path, Pat
     if is_url(folder) or is_url(out):
         if args.scheduler is None:
             raise UsageError(
-                "footage and results at a URL need a cluster: give its --scheduler, or download the footage"
+                "footage and results at a URL need a cluster: give its --scheduler, or download "
+                "the footage"
             )
         check_cluster()
         from ..cluster.remote import mirror_footage, mirror_results

@@ -12,7 +12,14 @@ from ..counts import counted
 from ..options import Place
 from ..scene.export.output_paths import SUFFIXES
 from .arguments import add_options, path_argument, values_in_range
-from .outputs import check_blender, check_outputs, checked_rig, distinct_paths, stem_of, write_outputs
+from .outputs import (
+    check_blender,
+    check_outputs,
+    checked_rig,
+    distinct_paths,
+    stem_of,
+    write_outputs,
+)
 from .terminal import print_message
 
 
@@ -57,7 +64,11 @@ def run_import(args: argparse.Namespace) -> dict[str, Any]:
         print_message(f"warning: {note}")
     frames, rate = len(imported.motion), imported.motion.mocap_framerate
     if not args.json and not args.quiet:
-        print(f"{counted(frames, 'frame')} at {rate:g} frames/s; wrote {', '.join(map(str, written))}", file=sys.stderr)
+        print(
+            f"{counted(frames, 'frame')} at {rate:g} frames/s; wrote "
+            f"{', '.join(map(str, written))}",
+            file=sys.stderr,
+        )
     return {
         "source": str(args.motion),
         "body": imported.body.name,

@@ -32,14 +32,16 @@ def add_live(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "source",
         metavar="SOURCE",
-        help="camera number or device, stream (rtsp://, http://, ...), or video, which is played in real time",
+        help="camera number or device, stream (rtsp://, http://, ...), or video, which is played "
+        "in real time",
     )
     add_options(parser, Place.LIVE)
     parser.set_defaults(run=run_live_command)
 
 
 def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
-    """Run ``scope live`` until the source ends or Ctrl-C, or ask a camera for its formats; return the report.
+    """Run ``scope live`` until the source ends or Ctrl-C, or ask a camera for its formats; return
+    the report.
 
     :raises ScopeError: an argument is invalid, the source cannot be read, or an output failed.
     """
@@ -62,7 +64,11 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
     with ExitStack() as stack:
         outputs = _outputs(values, body, stack)
         recording = PeopleRecording(_paths(values), body, source) if values["record"] else None
-        footage = stack.enter_context(Footage(values["keep_footage"], source.fps)) if values["keep_footage"] else None
+        footage = (
+            stack.enter_context(Footage(values["keep_footage"], source.fps))
+            if values["keep_footage"]
+            else None
+        )
         page = _preview(body, stack) if values["preview"] else None
         line = stack.enter_context(ProgressLine(sys.stderr, show=not args.quiet))
         with_camera = [output for output in (recording, page) if output]
@@ -72,7 +78,9 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
         report = run_live(source, body, options, [*outputs, *with_camera], listeners)
         saved = [footage.save()] if footage else []
         if footage and footage.missing:
-            print_message(f"{footage.missing} in {values['keep_footage']}, since the computer was too busy")
+            print_message(
+                f"{footage.missing} in {values['keep_footage']}, since the computer was too busy"
+            )
     saved = [*(recording.save() if recording else []), *saved]
     report["outputs"] = [str(path) for path in saved if path]
     if not args.json:
@@ -105,7 +113,11 @@ def _each(functions: Sequence[Callable[..., None]]) -> Callable[..., None]:
 
 def _paths(values: Mapping[str, Any]) -> list[Path]:
     """Return the motion files to write, one for each person."""
-    return person_paths(values["record"], values["live_people"], separate=True) if values["record"] else []
+    return (
+        person_paths(values["record"], values["live_people"], separate=True)
+        if values["record"]
+        else []
+    )
 
 
 def _checked(values: Mapping[str, Any]) -> LiveOptions:
@@ -114,19 +126,31 @@ def _checked(values: Mapping[str, Any]) -> LiveOptions:
     :raises UsageError: a value is impossible, or contradicts another.
     """
     if values["record"] and values["record"].suffix.lower() not in MOTION_SUFFIXES:
-        raise UsageError(f"--record writes a motion file: give a name that ends in .npz, not {values['record'].name}")
+        raise UsageError(
+            "--record writes a motion file: give a name that ends in .npz, not "
+            f"{values['record'].name}"
+        )
     if values["keep_footage"] and values["keep_footage"].suffix.lower() != ".mp4":
         raise UsageError(
-            f"--keep-footage writes a video: give a name that ends in .mp4, not {values['keep_footage'].name}"
+            "--keep-footage writes a video: give a name that ends in .mp4, not "
+            f"{values['keep_footage'].name}"
         )
     if len(values["heights_m"]) > values["live_people"]:
-        raise UsageError(f"{len(values['heights_m'])} heights are given, but --people is {values['live_people']}")
+        raise UsageError(
+            f"{len(values['heights_m'])} heights are given, but --people is {values['live_people']}"
+        )
     from ..capture.camera.calibration import read_calibration
     from ..capture.camera.intrinsics import choose_camera
     from ..live.run import LiveOptions
 
     if values["focal_mm"] is not None or values["fov_deg"] is not None:
-        choose_camera(1, 1, focal_mm=values["focal_mm"], fov_deg=values["fov_deg"], calibration=values["calibration"])
+        choose_camera(
+            1,
+            1,
+            focal_mm=values["focal_mm"],
+            fov_deg=values["fov_deg"],
+            calibration=values["calibration"],
+        )
     elif values["calibration"]:
         read_calibration(values["calibration"])
     return LiveOptions.of(values)
@@ -141,7 +165,9 @@ def _outputs(values: Mapping[str, Any], body: Body, stack: ExitStack) -> list[Ou
     if values["json_port"] is not None:
         from ..live.outputs.json_lines import JsonServer
 
-        server = stack.enter_context(JsonServer(body, values["listen"], values["json_port"], values["live_people"]))
+        server = stack.enter_context(
+            JsonServer(body, values["listen"], values["json_port"], values["live_people"])
+        )
         print_message(f"lines of JSON on {values['listen']} port {server.port}")
         outputs.append(server)
     if values["vmc"] is not None:
@@ -168,8 +194,10 @@ def _preview(body: Body, stack: ExitStack) -> PreviewPage:
 def _summary(report: Mapping[str, Any]) -> str:
     latency = report["latency_ms"]
     return (
-        f"{counted(report['poses'], 'pose')}, {report['poses_per_second']:g}/s, latency {latency['median']:.0f} ms"
-        f" (p95 {latency['p95']:.0f} ms), {report['dropped']} of {counted(report['frames'], 'frame')} dropped"
+        f"{counted(report['poses'], 'pose')}, {report['poses_per_second']:g}/s, latency "
+        f"{latency['median']:.0f} ms"
+        f" (p95 {latency['p95']:.0f} ms), {report['dropped']} of "
+        f"{counted(report['frames'], 'frame')} dropped"
         + (f", {report['damaged']} more damaged and left out" if report["damaged"] else "")
         + "".join(f"; wrote {path}" for path in report["outputs"])
     )

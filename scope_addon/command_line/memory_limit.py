@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Refuse to begin where the shell limits memory so much that libraries would crash, or wait for it without end."""
+"""Refuse to begin where the shell limits memory so much that libraries would crash, or wait for it
+without end.
+"""
 
 from __future__ import annotations
 
 from ..errors import SetupError
 from .address_space import address_space_limit
 
-# Of addresses, most of which are never used: 1.6 to 2.1 GB were measured without a scene, 2.8 GB with one.
+# Of addresses, most of which are never used: 1.6 to 2.1 GB were measured without a scene, 2.8 GB
+# with one.
 _NEEDED_BYTES, _NEEDED_WITH_SCENE = 2_500_000_000, 3_200_000_000
 
 
@@ -20,6 +23,7 @@ def check_memory_limit(*, with_scene: bool) -> None:
     needed = _NEEDED_WITH_SCENE if with_scene else _NEEDED_BYTES
     if limit is not None and limit < needed:
         raise SetupError(
-            f"this shell limits a process to {limit / 1e9:.2f} GB of address space, but a capture needs "
+            f"this shell limits a process to {limit / 1e9:.2f} GB of address space, but a capture "
+            "needs "
             f"{needed / 1e9:.2f} GB: run ulimit -v unlimited first"
         )

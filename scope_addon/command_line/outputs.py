@@ -30,10 +30,11 @@ REPORT_SUFFIXES = (".html",)
 
 
 def default_outputs(video: Path) -> list[Path]:
-    """Return the outputs of a capture without ``-o``: a motion file and a character next to the video.
+    """Return the outputs of a capture without ``-o``: a motion file and a character next to the
+    video.
 
-    For footage that comes with Scope they lie in the current folder. Nothing is written into Scope's own folder, which
-    the next version replaces, and which may not be writable.
+    For footage that comes with Scope they lie in the current folder. Nothing is written into
+    Scope's own folder, which the next version replaces, and which may not be writable.
 
     :raises UsageError: the current folder is a part of Scope's own.
     """
@@ -41,12 +42,17 @@ def default_outputs(video: Path) -> list[Path]:
     if _is_shipped(folder):
         folder = Path()
         if _is_shipped(folder):
-            raise UsageError(f"{folder.resolve()} belongs to Scope and is replaced with it; choose an output with -o")
+            raise UsageError(
+                f"{folder.resolve()} belongs to Scope and is replaced with it; choose "
+                "an output with -o"
+            )
     return [folder / f"{stem_of(video)}{suffix}" for suffix in (".npz", ".glb")]
 
 
 def stem_of(path: Path) -> str:
-    """Return the name of a file without its suffix, or the whole name of a folder, also of ``.``."""
+    """Return the name of a file without its suffix, or the whole name of a folder, also of
+    ``.``.
+    """
     whole = Path(os.path.abspath(path))
     return whole.name if whole.is_dir() else whole.stem
 
@@ -55,7 +61,9 @@ def _is_shipped(folder: Path) -> bool:
     return folder.resolve().is_relative_to(ASSETS.resolve())
 
 
-def check_outputs(outputs: list[Path], video: Path, overlay: Path | None = None, report: Path | None = None) -> None:
+def check_outputs(
+    outputs: list[Path], video: Path, overlay: Path | None = None, report: Path | None = None
+) -> None:
     """Check, before the capture starts, that the outputs, overlay and page can be written after it.
 
     :raises UsageError: an output has an unknown suffix, is a folder, or is the footage itself.
@@ -82,7 +90,9 @@ def check_blender(outputs: list[Path]) -> None:
 
 
 def distinct_paths(outputs: list[Path]) -> list[Path]:
-    """Return the paths without duplicates of the same file, such as ``out/case.npz`` and ``out/x/../case.npz``."""
+    """Return the paths without duplicates of the same file, such as ``out/case.npz`` and
+    ``out/x/../case.npz``.
+    """
     by_real_path: dict[str, Path] = {}
     for path in outputs:
         by_real_path.setdefault(os.path.normcase(os.path.realpath(path)), path)
@@ -96,7 +106,11 @@ def checked_rig(args: argparse.Namespace, outputs: list[Path], fingers: bool) ->
     :raises ScopeError: the rig cannot be used, or the arguments contradict each other.
     """
     if args.retarget is None:
-        given = {"--bone-map": args.bone_map, "--rig-object": args.rig_object, "--expression-map": args.expression_map}
+        given = {
+            "--bone-map": args.bone_map,
+            "--rig-object": args.rig_object,
+            "--expression-map": args.expression_map,
+        }
         given["--retarget-root"] = args.retarget_root != option("retarget_root").default
         for flag, value in given.items():
             if value:
@@ -107,7 +121,10 @@ def checked_rig(args: argparse.Namespace, outputs: list[Path], fingers: bool) ->
     rig = rig_source(args.retarget, args.rig_object, args.bone_map, args.expression_map)
     scene_files = [p for p in outputs if p.suffix.lower() not in MOTION_SUFFIXES]
     if not scene_files:
-        raise UsageError("--retarget needs an output that can contain a rig, such as -o OUT.glb; a motion file cannot")
+        raise UsageError(
+            "--retarget needs an output that can contain a rig, such as -o OUT.glb; a "
+            "motion file cannot"
+        )
     for path in scene_files:
         if path.exists() and path.samefile(rig.path):
             raise UsageError(f"{path} is the rig's own file; choose another name")
@@ -128,7 +145,8 @@ def write_outputs(
     args: argparse.Namespace,
     rig: RigSource | None = None,
 ) -> list[Path]:
-    """Write every output and return the paths of the files; bpy is loaded only if an output needs a scene.
+    """Write every output and return the paths of the files; bpy is loaded only if an output needs a
+    scene.
 
     :raises OutputError: a file cannot be written.
     """
@@ -178,6 +196,7 @@ def summary(report: dict[str, Any]) -> str:
     people = counted(report["people"], "person", "people")
     return (
         f"{people}, {counted(report['frames'], 'frame')}, {report['fps']['total']:.1f} frames/s, "
-        f"reprojection error {report['reprojection_px']:.1f} px, networks on {report['execution']}; "
+        f"reprojection error {report['reprojection_px']:.1f} px, networks on "
+        f"{report['execution']}; "
         f"wrote {', '.join(report['outputs'])}"
     )

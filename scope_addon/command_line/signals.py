@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Convert SIGINT, SIGTERM and SIGHUP to a KeyboardInterrupt whose message says what has been written."""
+"""Convert SIGINT, SIGTERM and SIGHUP to a KeyboardInterrupt whose message says what has been
+written.
+"""
 
 from __future__ import annotations
 
@@ -25,22 +27,28 @@ def interrupted(message: str) -> Iterator[None]:
 
 
 def _interrupt(number: int, _: FrameType | None) -> None:
-    """Record the signal and raise: an exception raised within a callback of the interpreter is lost."""
+    """Record the signal and raise: an exception raised within a callback of the interpreter is
+    lost.
+    """
     received.append(number)
     raise KeyboardInterrupt
 
 
 def stopping_signals() -> list[signal.Signals]:
-    """Return the signals that end a command: Ctrl-C, a request, and a closed terminal, unless that is to be ignored."""
+    """Return the signals that end a command: Ctrl-C, a request, and a closed terminal, unless that
+    is to be ignored.
+    """
     found = [signal.SIGINT, signal.SIGTERM]
-    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # as nohup sets it
+    # as nohup sets it
+    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:
         found.append(signal.SIGHUP)
     return found
 
 
 @contextmanager
 def stopped_by_signals() -> Iterator[None]:
-    """Raise KeyboardInterrupt on SIGINT, SIGTERM and SIGHUP, so that no partial file and no process is left behind.
+    """Raise KeyboardInterrupt on SIGINT, SIGTERM and SIGHUP, so that no partial file and no process
+    is left behind.
 
     Blender's own handler of Ctrl-C only sets a flag, with which a batch would run to its end.
 

@@ -24,21 +24,24 @@ def print_message(text: str) -> None:
 def open_standard_streams() -> None:
     """Open those of the three standard streams that the caller has closed.
 
-    Otherwise the next files to be opened would take their numbers, and messages be written into results. What is
-    written to a closed standard output fails; messages are lost.
+    Otherwise the next files to be opened would take their numbers, and messages be written into
+    results. What is written to a closed standard output fails; messages are lost.
     """
     for number in range(3):
         try:
             os.fstat(number)
         except OSError:
-            os.open(os.devnull, os.O_RDWR if number == 2 else os.O_RDONLY)  # takes the lowest number that is free
+            # takes the lowest number that is free
+            os.open(os.devnull, os.O_RDWR if number == 2 else os.O_RDONLY)
     sys.stdin = sys.stdin or os.fdopen(0, "r", encoding="utf-8", closefd=False)
     sys.stdout = sys.stdout or os.fdopen(1, "w", encoding="utf-8", closefd=False)
     sys.stderr = sys.stderr or os.fdopen(2, "w", encoding="utf-8", closefd=False)
 
 
 class ProgressLine:
-    """One line on a terminal, each text of which replaces the one before; silent elsewhere. Stops after a signal."""
+    """One line on a terminal, each text of which replaces the one before; silent elsewhere. Stops
+    after a signal.
+    """
 
     def __init__(self, stream: TextIO, *, show: bool) -> None:
         self._stream, self._show = stream, show and stream.isatty()
@@ -63,7 +66,9 @@ class ProgressLine:
 
 
 class ProgressBar(ProgressLine):
-    """A one-line progress bar on a terminal; silent elsewhere. Stops work that continues after a signal."""
+    """A one-line progress bar on a terminal; silent elsewhere. Stops work that continues after a
+    signal.
+    """
 
     def __call__(self, stage: str, done: int, total: int) -> None:
         """Show the progress of a stage: ``done`` of ``total``, which is 0 if unknown.
@@ -90,7 +95,8 @@ def stdout_for_report() -> Iterator[TextIO]:
         yield sys.stdout
         return
     os.dup2(2, 1)
-    _flush_c()  # output buffered before, such as Blender's version, is not part of the report either
+    # output buffered before, such as Blender's version, is not part of the report either
+    _flush_c()
     try:
         with os.fdopen(os.dup(real), "w", encoding="utf-8") as stream:
             yield stream

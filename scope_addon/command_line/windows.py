@@ -42,16 +42,20 @@ def with_window_seconds(options: CaptureOptions, args: argparse.Namespace) -> Ca
     if args.window_seconds is None:
         return options
     if not _MIN_S <= args.window_seconds < math.inf:
-        raise UsageError(f"{WINDOW_SECONDS} must be at least {_MIN_S:g}, but is {args.window_seconds:g}")
+        raise UsageError(
+            f"{WINDOW_SECONDS} must be at least {_MIN_S:g}, but is {args.window_seconds:g}"
+        )
     return replace(options, window_s=args.window_seconds)
 
 
 def window_report(
     args: argparse.Namespace, video: Path, options: CaptureOptions, progress: Progress
 ) -> dict[str, Any] | None:
-    """Do what `WINDOWS` asks for, and return the report; None where the whole clip is to be captured.
+    """Do what `WINDOWS` asks for, and return the report; None where the whole clip is to be
+    captured.
 
-    :raises UsageError: the argument is neither `COUNT` nor a range FIRST:END, or there is no folder.
+    :raises UsageError: the argument is neither `COUNT` nor a range FIRST:END, or there is no
+        folder.
     :raises ScopeError: the footage cannot be used.
     """
     if not args.windows:
@@ -63,7 +67,11 @@ def window_report(
         return {"windows": count} if count > 1 else None
     numbers = re.fullmatch(r"(\d{1,9}):(\d{1,9})", args.windows, re.ASCII)
     if numbers is None or args.windows_folder is None:
-        raise UsageError(f"{WINDOWS} must be {COUNT} or FIRST:END with {WINDOWS_FOLDER}, but is {args.windows!r}")
+        raise UsageError(
+            f"{WINDOWS} must be {COUNT} or FIRST:END with {WINDOWS_FOLDER}, but is {args.windows!r}"
+        )
     first, end = map(int, numbers.groups())
-    files, frames = observe_windows(video, options, range(first, end), args.windows_folder, progress)
+    files, frames = observe_windows(
+        video, options, range(first, end), args.windows_folder, progress
+    )
     return {"frames": frames, "outputs": [str(file) for file in files], "warnings": []}

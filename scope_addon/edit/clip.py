@@ -40,10 +40,15 @@ class Clip:
         """Return the contact points of the feet.
 
         :param betas: (P,) shape coefficients.
-        :return: (T, 4, 3) left heel, left toe, right heel, right toe on the sole, metres, world frame.
+        :return: (T, 4, 3) left heel, left toe, right heel, right toe on the sole, metres, world
+            frame.
         """
-        R, t = body.forward_kinematics(self.rotations, self.root - body.rest_joints(betas)[0], betas)
-        points: NDArray[np.float64] = contact_point_positions(with_contact_points(body, betas), R, t)[:, : len(SOLES)]
+        R, t = body.forward_kinematics(
+            self.rotations, self.root - body.rest_joints(betas)[0], betas
+        )
+        points: NDArray[np.float64] = contact_point_positions(
+            with_contact_points(body, betas), R, t
+        )[:, : len(SOLES)]
         return points
 
     def joints(self, body: Body, betas: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
@@ -52,7 +57,9 @@ class Clip:
         :param betas: (P,) shape coefficients.
         :return: (T, K+1, 3) metres, world frame.
         """
-        return body.forward_kinematics(self.rotations, self.root - body.rest_joints(betas)[0], betas)[1]
+        return body.forward_kinematics(
+            self.rotations, self.root - body.rest_joints(betas)[0], betas
+        )[1]
 
 
 def clip_from_motion(body: Body, motion: Motion, raw: bool) -> Clip:
@@ -69,7 +76,9 @@ def keys_within(clip: Clip, start: float, end: float) -> NDArray[np.intp]:
     """
     found = np.flatnonzero((clip.times >= start - 1e-6) & (clip.times <= end + 1e-6))
     if not len(found):
-        raise UsageError("there are no keys in the chosen frames; choose frames within the captured motion")
+        raise UsageError(
+            "there are no keys in the chosen frames; choose frames within the captured motion"
+        )
     return found
 
 
@@ -99,7 +108,9 @@ def sample(clip: Clip, times: NDArray[np.float64]) -> Clip:
     if len(clip) == 1:
         after = before = np.zeros(len(times), int)
     length = clip.times[after] - clip.times[before]
-    share = np.where(length > 0, (times - clip.times[before]) / np.where(length > 0, length, 1.0), 0.0)
+    share = np.where(
+        length > 0, (times - clip.times[before]) / np.where(length > 0, length, 1.0), 0.0
+    )
     rotations = interpolate_rotations(clip.rotations[before], clip.rotations[after], share[:, None])
     root = clip.root[before] + share[:, None] * (clip.root[after] - clip.root[before])
     return Clip(times.astype(float), rotations, root)
@@ -112,14 +123,17 @@ def resample(clip: Clip, rate: float) -> Clip:
     :raises UsageError: when the rate is not positive.
     """
     if not np.isfinite(rate) or rate <= 0:
-        raise UsageError(f"a motion cannot be baked to {rate} frames per second; choose a rate above zero")
+        raise UsageError(
+            f"a motion cannot be baked to {rate} frames per second; choose a rate above zero"
+        )
     count = int(np.floor((clip.times[-1] - clip.times[0]) * rate + 1e-6)) + 1
     times = clip.times[0] + np.arange(count) / rate
     return sample(band_limited(clip, rate), times)
 
 
 def band_limited(clip: Clip, rate: float) -> Clip:
-    """Low-pass filter the rotations for sampling at ``rate`` keys per second, where the clip has many more keys.
+    """Low-pass filter the rotations for sampling at ``rate`` keys per second, where the clip has
+    many more keys.
 
     Without the filter, oscillations faster than the new rate would alias into slow motion.
     """

@@ -32,8 +32,8 @@ def refloor(
     """Move the motion so that the feet in contact are on the floor.
 
     :param betas: (P,) shape coefficients.
-    :param level: also rotate the whole motion about the mean contact point so that the soles in contact lie in a
-        horizontal plane, if they are spread widely enough to determine one.
+    :param level: also rotate the whole motion about the mean contact point so that the soles in
+        contact lie in a horizontal plane, if they are spread widely enough to determine one.
     :param lift: also raise frames whose feet penetrate the floor, smoothly.
     :param height: z of the floor, metres.
     """
@@ -47,7 +47,11 @@ def refloor(
         soles = (soles - middle) @ turn.T + middle
     standing = weight > 0.5
     heights = soles[..., 2]
-    floor = float(np.median(heights[standing])) if standing.any() else float(np.median(heights.min(axis=1)))
+    floor = (
+        float(np.median(heights[standing]))
+        if standing.any()
+        else float(np.median(heights.min(axis=1)))
+    )
     out.root[:, 2] -= floor - height
     if lift:
         below = np.maximum(0.0, floor - heights.min(axis=1))
@@ -69,7 +73,9 @@ def _levelling(
     if len(points) < 3:
         return np.eye(3), np.zeros(3)
     middle = (w[:, None] * points).sum(0) / w.sum()
-    values, vectors = np.linalg.eigh((w[:, None] * (points - middle)).T @ (points - middle) / w.sum())
+    values, vectors = np.linalg.eigh(
+        (w[:, None] * (points - middle)).T @ (points - middle) / w.sum()
+    )
     if np.sqrt(max(values[1], 0.0)) < _MIN_SPREAD_M / 2:
         return np.eye(3), middle
     normal = vectors[:, 0] * (1.0 if vectors[2, 0] > 0 else -1.0)

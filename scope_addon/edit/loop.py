@@ -16,7 +16,8 @@ from .clip import Clip, keys_within
 from .root_motion import floor_trajectory, relative_to_trajectory
 
 SPEED_WEIGHT_S = 0.1  # weighs a difference in velocity of 1 m/s like one in position of 0.1 m
-MIN_TURN = np.radians(5.0)  # a smaller turn per cycle is noise, and would bend a straight walk into a circle
+# a smaller turn per cycle is noise, and would bend a straight walk into a circle
+MIN_TURN = np.radians(5.0)
 MAX_SPAN_KEYS = 600  # a longer span is subsampled to limit the cost of comparing all pairs of keys
 
 
@@ -38,21 +39,26 @@ def best_cycle(
     shortest: float = 0.4,
     least_movement_m: float = 0.05,
 ) -> Cycle:
-    """Find the two keys within a span whose poses and velocities differ least, with movement between them.
+    """Find the two keys within a span whose poses and velocities differ least, with movement
+    between them.
 
-    Poses are compared by joint positions relative to the pelvis's projection on the floor, rotated to the same heading.
+    Poses are compared by joint positions relative to the pelvis's projection on the floor, rotated
+    to the same heading.
 
     :param betas: (P,) shape coefficients.
     :param start: start of the span, seconds.
     :param end: end of the span, seconds.
     :param shortest: minimum duration of the cycle, seconds.
-    :param least_movement_m: root mean square distance of the joints, metres, by which a pose between the two must
-        differ from the first; 0 also accepts a person who does not move.
+    :param least_movement_m: root mean square distance of the joints, metres, by which a pose
+        between the two must differ from the first; 0 also accepts a person who does not move.
     :raises UsageError: when the span is too short, or no movement in it is repeated.
     """
     span = keys_within(clip, start, end)
     if clip.times[span[-1]] - clip.times[span[0]] < shortest or len(span) < 4:
-        raise UsageError(f"a cycle of at least {shortest} s does not fit in the chosen frames; choose more of them")
+        raise UsageError(
+            f"a cycle of at least {shortest} s does not fit in the chosen frames; "
+            "choose more of them"
+        )
     span = span[:: max(1, len(span) // MAX_SPAN_KEYS)]
     part = clip.rows(span)
     joints = relative_to_trajectory(part, *floor_trajectory(part)).joints(body, betas)
@@ -65,10 +71,12 @@ def best_cycle(
         apart[~_moves(joints, least_movement_m)] = np.inf
     if not np.isfinite(apart).any():
         raise UsageError(
-            "no cycle was found: no movement is repeated within the chosen frames; choose frames in which the person "
+            "no cycle was found: no movement is repeated within the chosen frames; choose frames "
+            "in which the person "
             "does the same thing twice, such as two steps of a walk"
         )
-    # Prefer the longest of nearly equal cycles: a negligible difference must not select the shortest part of a walk.
+    # Prefer the longest of nearly equal cycles: a negligible difference must not select the
+    # shortest part of a walk.
     score = np.sqrt(apart / joints.shape[1]) - 0.002 * duration
     a, b = np.unravel_index(int(np.argmin(score)), score.shape)
     distance = np.sqrt(((joints[a] - joints[b]) ** 2).sum(-1).mean())
@@ -76,7 +84,8 @@ def best_cycle(
 
 
 def _moves(joints: NDArray[np.float64], least: float) -> NDArray[np.bool_]:
-    """Return (N, N): whether the body leaves pose a by ``least`` and comes back at least halfway by pose b.
+    """Return (N, N): whether the body leaves pose a by ``least`` and comes back at least halfway by
+    pose b.
 
     :param joints: (N, J, 3) metres.
     :param least: root mean square distance over the joints, metres.
@@ -90,16 +99,18 @@ def _moves(joints: NDArray[np.float64], least: float) -> NDArray[np.bool_]:
 def _squared_distances(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the squared distances (N, N) between points (N, D)."""
     squares = (points**2).sum(1)
-    apart: NDArray[np.float64] = np.maximum(squares[:, None] + squares[None] - 2 * points @ points.T, 0.0)
+    apart: NDArray[np.float64] = np.maximum(
+        squares[:, None] + squares[None] - 2 * points @ points.T, 0.0
+    )
     return apart
 
 
 def close_cycle(clip: Clip, cycle: Cycle, blend: float = 0.2) -> Clip:
     """Return the keys of a cycle, with times from zero and the last pose equal to the first.
 
-    The difference between the two poses is blended in over the last ``blend`` seconds. The horizontal root trajectory
-    is kept, and so is a turn of the body of more than 5 degrees: when the cycle repeats, it continues from where it
-    ended. Height is closed like rotations.
+    The difference between the two poses is blended in over the last ``blend`` seconds. The
+    horizontal root trajectory is kept, and so is a turn of the body of more than 5 degrees: when
+    the cycle repeats, it continues from where it ended. Height is closed like rotations.
     """
     chosen = slice(cycle.first, cycle.last + 1)
     times = clip.times[chosen] - clip.times[cycle.first]
@@ -118,6 +129,8 @@ def close_cycle(clip: Clip, cycle: Cycle, blend: float = 0.2) -> Clip:
 
 
 def _vertical_turn(a: NDArray[np.float64], b: NDArray[np.float64]) -> tuple[float, float]:
-    """Return sine and cosine of the rotation about the vertical that takes ``a`` (3, 3) closest to ``b`` (3, 3)."""
+    """Return sine and cosine of the rotation about the vertical that takes ``a`` (3, 3) closest to
+    ``b`` (3, 3).
+    """
     turn = b @ a.T
     return float(turn[1, 0] - turn[0, 1]), float(turn[0, 0] + turn[1, 1])

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Key reduction with an error bound: each curve keeps only the keys that linear interpolation needs.
+"""Key reduction with an error bound: each curve keeps only the keys that linear interpolation
+needs.
 
-Blender interpolates the four components of a quaternion linearly and normalizes; the bound holds for exactly that.
+Blender interpolates the four components of a quaternion linearly and normalizes; the bound holds
+for exactly that.
 """
 
 from __future__ import annotations
@@ -14,7 +16,9 @@ from numpy.typing import NDArray
 from ..errors import UsageError
 
 
-def select_quaternion_keys(times: NDArray[np.float64], q: NDArray[np.float64], bound: float) -> NDArray[np.intp]:
+def select_quaternion_keys(
+    times: NDArray[np.float64], q: NDArray[np.float64], bound: float
+) -> NDArray[np.intp]:
     """Select the keys that keep every rotation within an error bound.
 
     :param times: (T,) seconds.
@@ -24,10 +28,14 @@ def select_quaternion_keys(times: NDArray[np.float64], q: NDArray[np.float64], b
     :raises UsageError: when the bound is not positive.
     """
     _check(bound)
-    return _keep(times, lambda a, b, part: angles_between(_lerp(times, q, a, b, part), q[part]), bound)
+    return _keep(
+        times, lambda a, b, part: angles_between(_lerp(times, q, a, b, part), q[part]), bound
+    )
 
 
-def select_position_keys(times: NDArray[np.float64], p: NDArray[np.float64], bound: float) -> NDArray[np.intp]:
+def select_position_keys(
+    times: NDArray[np.float64], p: NDArray[np.float64], bound: float
+) -> NDArray[np.intp]:
     """Select the keys that keep every position within an error bound.
 
     :param times: (T,) seconds.
@@ -37,7 +45,11 @@ def select_position_keys(times: NDArray[np.float64], p: NDArray[np.float64], bou
     :raises UsageError: when the bound is not positive.
     """
     _check(bound)
-    return _keep(times, lambda a, b, part: np.linalg.norm(_lerp(times, p, a, b, part) - p[part], axis=1), bound)
+    return _keep(
+        times,
+        lambda a, b, part: np.linalg.norm(_lerp(times, p, a, b, part) - p[part], axis=1),
+        bound,
+    )
 
 
 def _check(bound: float) -> None:
@@ -46,7 +58,9 @@ def _check(bound: float) -> None:
 
 
 def _keep(
-    times: NDArray[np.float64], error: Callable[[int, int, slice], NDArray[np.float64]], bound: float
+    times: NDArray[np.float64],
+    error: Callable[[int, int, slice], NDArray[np.float64]],
+    bound: float,
 ) -> NDArray[np.intp]:
     """Split a span at its worst key while the error exceeds the bound (Ramer, Douglas and Peucker).
 
@@ -68,14 +82,17 @@ def _keep(
     return np.flatnonzero(keep)
 
 
-def _lerp(times: NDArray[np.float64], values: NDArray[np.float64], a: int, b: int, part: slice) -> NDArray[np.float64]:
+def _lerp(
+    times: NDArray[np.float64], values: NDArray[np.float64], a: int, b: int, part: slice
+) -> NDArray[np.float64]:
     share: NDArray[np.float64] = ((times[part] - times[a]) / (times[b] - times[a]))[:, None]
     interpolated: NDArray[np.float64] = values[a] + share * (values[b] - values[a])
     return interpolated
 
 
 def angles_between(q: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the angles between rotations, by the sine of a quarter of each: accurate for small angles.
+    """Return the angles between rotations, by the sine of a quarter of each: accurate for small
+    angles.
 
     :param q: (..., 4) quaternions of any length.
     :param wanted: (..., 4) unit quaternions.

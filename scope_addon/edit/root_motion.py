@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Root motion: the trajectory of the root on the floor and its heading, separated from the rest of the motion."""
+"""Root motion: the trajectory of the root on the floor and its heading, separated from the rest of
+the motion.
+"""
 
 from __future__ import annotations
 
@@ -13,23 +15,28 @@ from .clip import Clip
 _HEADING_CUTOFF_HZ = 1.0  # low enough to remove the rotation of the hips with each step
 
 
-def floor_trajectory(clip: Clip, *, heading: bool = True) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def floor_trajectory(
+    clip: Clip, *, heading: bool = True
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Project the pelvis on the floor.
 
     :param heading: also return the heading, smoothed; zeros otherwise.
-    :return: positions (T, 3), metres, with z = 0; angles (T,) about the vertical, radians, unwrapped, zero for the
-        heading of the rest pose.
+    :return: positions (T, 3), metres, with z = 0; angles (T,) about the vertical, radians,
+        unwrapped, zero for the heading of the rest pose.
     """
     positions = clip.root * [1.0, 1.0, 0.0]
     if not heading:
         return positions, np.zeros(len(clip))
-    # The model faces +z, so R_world_root maps z to the heading, and R_WORLD_MODEL maps it to that of the rest pose.
+    # The model faces +z, so R_world_root maps z to the heading, and R_WORLD_MODEL maps it to that
+    # of the rest pose.
     facing, rest = clip.rotations[:, 0] @ [0.0, 0.0, 1.0], R_WORLD_MODEL @ [0.0, 0.0, 1.0]
     angle = np.unwrap(np.arctan2(facing[:, 1], facing[:, 0]) - np.arctan2(rest[1], rest[0]))
     return positions, gaussian_smooth(angle, clip.times, _HEADING_CUTOFF_HZ)
 
 
-def relative_to_trajectory(clip: Clip, positions: NDArray[np.float64], angles: NDArray[np.float64]) -> Clip:
+def relative_to_trajectory(
+    clip: Clip, positions: NDArray[np.float64], angles: NDArray[np.float64]
+) -> Clip:
     """Express the motion in the moving frame of a trajectory.
 
     :param positions: (T, 3) origins of the frame, metres.
@@ -41,7 +48,9 @@ def relative_to_trajectory(clip: Clip, positions: NDArray[np.float64], angles: N
     return Clip(clip.times, rotations, np.einsum("tji,tj->ti", turn, clip.root - positions))
 
 
-def with_trajectory(clip: Clip, positions: NDArray[np.float64], angles: NDArray[np.float64]) -> Clip:
+def with_trajectory(
+    clip: Clip, positions: NDArray[np.float64], angles: NDArray[np.float64]
+) -> Clip:
     """Add a trajectory to the motion: the inverse of ``relative_to_trajectory``.
 
     :param positions: (T, 3) origins of the moving frame, metres.

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Changing the amount of smoothing, always from the captured motions, so that repeated changes do not accumulate."""
+"""Changing the amount of smoothing, always from the captured motions, so that repeated changes do
+not accumulate.
+"""
 
 from __future__ import annotations
 
@@ -12,23 +14,30 @@ from ...solver.body import Body
 from ..errors import UsageError
 from ..kinematics.frame_blocks import by_blocks
 from ..kinematics.leg_reach import move_feet
-from ..kinematics.smoothing import ROTATION_CUTOFF_HZ, gaussian_smooth, smooth_root, smooth_rotations
+from ..kinematics.smoothing import (
+    ROTATION_CUTOFF_HZ,
+    gaussian_smooth,
+    smooth_root,
+    smooth_rotations,
+)
 from ..motion import Motion
 from .clip import Clip, clip_from_motion, interpolate_rotations
 from .pins.corrected_motion import before_smoothing, corrected
 
-_REACH_S = 0.3  # of the filter beyond the finished motion, times its strength: four deviations of the slower one
+# of the filter beyond the finished motion, times its strength: four deviations of the slower one
+_REACH_S = 0.3
 
 
 def smoothed(body: Body, motion: Motion, strength: float) -> Clip:
     """Smooth a motion without phase shift, and correct it where the user did.
 
-    Strength 0 is the raw motion, of which every frame is fitted alone, 1 the finished one, of all frames together, and
-    3 very smooth. Below 1, the raw motion goes through a filter whose cut-off frequency is 4.5 Hz / strength, and a
-    share of what the finished motion has besides is added. Beyond 1, the finished motion goes through a filter, of 4.5
-    Hz / √(strength² − 1), so that it would be one of 4.5 Hz / strength after one of 4.5 Hz; feet that rest stay where
-    the finished motion has them. The distance from the camera, which a single camera measures inaccurately, is smoothed
-    more than the position in the image.
+    Strength 0 is the raw motion, of which every frame is fitted alone, 1 the finished one, of all
+    frames together, and 3 very smooth. Below 1, the raw motion goes through a filter whose cut-off
+    frequency is 4.5 Hz / strength, and a share of what the finished motion has besides is added.
+    Beyond 1, the finished motion goes through a filter, of 4.5 Hz / √(strength² − 1), so that it
+    would be one of 4.5 Hz / strength after one of 4.5 Hz; feet that rest stay where the finished
+    motion has them. The distance from the camera, which a single camera measures inaccurately, is
+    smoothed more than the position in the image.
 
     :raises UsageError: when the strength is negative or not a number.
     """
@@ -51,48 +60,71 @@ def _smoothed(motion: Motion, body: Body, raw: Clip, finished: Clip, strength: f
     """Smooth a motion without corrections; see `smoothed`."""
     if strength > 1.0:
         center = motion.world_from_camera[:, :3, 3]
-        calm = _smoothed_further(Clip(finished.times, finished.rotations, finished.root - center), strength)
+        calm = _smoothed_further(
+            Clip(finished.times, finished.rotations, finished.root - center), strength
+        )
         return _with_resting_feet(replace(calm, root=calm.root + center), finished, motion, body)
     plain, wanted = _filtered(raw, motion, 1.0), _filtered(raw, motion, strength)
     correction = np.swapaxes(plain.rotations, -1, -2) @ finished.rotations
     none = np.broadcast_to(np.eye(3), correction.shape)
     correction = interpolate_rotations(none, correction, np.full(correction.shape[:2], strength))
-    return Clip(raw.times, wanted.rotations @ correction, wanted.root + strength * (finished.root - plain.root))
+    return Clip(
+        raw.times,
+        wanted.rotations @ correction,
+        wanted.root + strength * (finished.root - plain.root),
+    )
 
 
 def _filtered(clip: Clip, motion: Motion, strength: float) -> Clip:
-    """Smooth without corrections; the position is taken relative to the camera, which may rotate but not travel."""
+    """Smooth without corrections; the position is taken relative to the camera, which may rotate
+    but not travel.
+    """
     rotations = smooth_rotations(clip.rotations, clip.times, ROTATION_CUTOFF_HZ / strength)
     center = motion.world_from_camera[:, :3, 3]
-    return Clip(clip.times, rotations, center + smooth_root(clip.root - center, clip.times, strength))
+    return Clip(
+        clip.times, rotations, center + smooth_root(clip.root - center, clip.times, strength)
+    )
 
 
 def _smoothed_further(clip: Clip, strength: float) -> Clip:
-    """Return a clip whose root is relative to the camera through a filter that keeps its first and its last frame.
+    """Return a clip whose root is relative to the camera through a filter that keeps its first and
+    its last frame.
 
-    The filter would move both ends of a path inwards, a walker by 12 cm, so the clip goes on at each of them as its
-    reflection in that frame's pose, direction, and logarithm of the distance.
+    The filter would move both ends of a path inwards, a walker by 12 cm, so the clip goes on at
+    each of them as its reflection in that frame's pose, direction, and logarithm of the distance.
     """
     beyond = float(np.sqrt(strength * strength - 1.0))
     times, R, T = clip.times, clip.rotations, len(clip)
     first, last = (int(np.sum(abs(times - end) <= _REACH_S * beyond)) - 1 for end in times[[0, -1]])
     before, after = slice(first, 0, -1), np.arange(T - 2, T - 2 - last, -1)
     times = np.concatenate([2 * times[0] - times[before], times, 2 * times[-1] - times[after]])
-    root = np.concatenate([
-        _reflected(clip.root[before], clip.root[0]), clip.root, _reflected(clip.root[after], clip.root[-1])
-    ])  # fmt: skip
-    R = np.concatenate([
-        R[0] @ np.swapaxes(R[before], -1, -2) @ R[0], R, R[-1] @ np.swapaxes(R[after], -1, -2) @ R[-1]
-    ])  # fmt: skip
+    root = np.concatenate(
+        [
+            _reflected(clip.root[before], clip.root[0]),
+            clip.root,
+            _reflected(clip.root[after], clip.root[-1]),
+        ]
+    )
+    R = np.concatenate(
+        [
+            R[0] @ np.swapaxes(R[before], -1, -2) @ R[0],
+            R,
+            R[-1] @ np.swapaxes(R[after], -1, -2) @ R[-1],
+        ]
+    )
     smooth_rotations(R, times, ROTATION_CUTOFF_HZ / beyond, out=R)
     inner = slice(first, first + T)
     return Clip(clip.times, R[inner], smooth_root(root, times, beyond)[inner])
 
 
 def _reflected(root: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return positions (n, 3) with directions turned by 180° about that of ``end``, and distances d as end² / d."""
+    """Return positions (n, 3) with directions turned by 180° about that of ``end``, and distances d
+    as end² / d.
+    """
     squared = np.maximum(np.sum(root * root, axis=1, keepdims=True), 1e-12)
-    reflected: NDArray[np.float64] = (2 * (root @ end)[:, None] * end - float(end @ end) * root) / squared
+    reflected: NDArray[np.float64] = (
+        2 * (root @ end)[:, None] * end - float(end @ end) * root
+    ) / squared
     return reflected
 
 
@@ -111,5 +143,7 @@ def _with_resting_feet(calm: Clip, finished: Clip, motion: Motion, body: Body) -
         held = body.forward_kinematics(R_held, root_held - pelvis_at_rest, motion.betas)[1]
         return (move_feet(body, R, poses, share[..., None] * (held - poses[1])[:, ankles]),)
 
-    rotations = by_blocks(bend, calm.rotations, calm.root, finished.rotations, finished.root, share)[0]
+    rotations = by_blocks(
+        bend, calm.rotations, calm.root, finished.rotations, finished.root, share
+    )[0]
     return Clip(calm.times, rotations, calm.root)

@@ -12,19 +12,31 @@ from ..errors import UsageError
 from .clip import Clip, keys_within
 
 LIMBS = {
-    "arms": ("collar", "shoulder", "elbow", "wrist", "hand", "index", "middle", "pinky", "ring", "thumb"),
+    "arms": (
+        "collar",
+        "shoulder",
+        "elbow",
+        "wrist",
+        "hand",
+        "index",
+        "middle",
+        "pinky",
+        "ring",
+        "thumb",
+    ),
     "legs": ("hip", "knee", "ankle", "foot"),
 }
-# The arms point in opposite directions at rest. A half turn about z maps one arm's rotations to the other's, and keeps
-# elbows bending the right way.
+# The arms point in opposite directions at rest. A half turn about z maps one arm's rotations to the
+# other's, and keeps elbows bending the right way.
 _HALF_ABOUT_Z = np.diag([-1.0, -1.0, 1.0])
 
 
 def interpolate(clip: Clip, start: float, end: float) -> Clip:
-    """Replace the motion between ``start`` and ``end`` (seconds) by an interpolation from its neighbours.
+    """Replace the motion between ``start`` and ``end`` (seconds) by an interpolation from its
+    neighbours.
 
-    Every joint follows a cubic Hermite spline in the tangent space of the key before the span, with the velocities
-    before and after the span; so does the pelvis.
+    Every joint follows a cubic Hermite spline in the tangent space of the key before the span, with
+    the velocities before and after the span; so does the pelvis.
 
     :raises UsageError: when the span has no key, or no key is left on one side of it.
     """
@@ -32,7 +44,8 @@ def interpolate(clip: Clip, start: float, end: float) -> Clip:
     a, b = span[0] - 1, span[-1] + 1
     if a < 0 or b >= len(clip):
         raise UsageError(
-            "the span reaches the motion's end and has nothing to interpolate to; leave a frame on both sides"
+            "the span reaches the motion's end and has nothing to interpolate to; leave a frame on "
+            "both sides"
         )
     length = clip.times[b] - clip.times[a]
     s = ((clip.times[span] - clip.times[a]) / length)[:, None, None]
@@ -52,9 +65,9 @@ def interpolate(clip: Clip, start: float, end: float) -> Clip:
 def swap_sides(clip: Clip, body: Body, start: float, end: float, limbs: str = "both") -> Clip:
     """Swap left and right limbs within a span: each limb moves to where the other one was.
 
-    A detector swaps labels, not positions. Therefore the left thigh takes the direction in space of the right one, and
-    so on down the limb. Legs keep their rotations; those of an arm are combined with a half turn about z, because the
-    arms point in opposite directions at rest.
+    A detector swaps labels, not positions. Therefore the left thigh takes the direction in space of
+    the right one, and so on down the limb. Legs keep their rotations; those of an arm are combined
+    with a half turn about z, because the arms point in opposite directions at rest.
 
     :param start: start of the span, seconds.
     :param end: end of the span, seconds.
@@ -73,7 +86,8 @@ def swap_sides(clip: Clip, body: Body, start: float, end: float, limbs: str = "b
             if bare == name or not bare.startswith(LIMBS[kind]) or f"right_{bare}" not in names:
                 continue
             right = names.index(f"right_{bare}")
-            # Omega' = before^T Omega turn: the parent of the limb's first joint is the trunk, which is not turned
+            # Omega' = before^T Omega turn: the parent of the limb's first joint is the trunk, which
+            # is not turned
             for to, source in ((left, right), (right, left)):
                 first = not names[body.parents[to]].startswith(("left_", "right_"))
                 before = np.eye(3) if first else turn
@@ -91,12 +105,19 @@ def _hermite(
     """Evaluate the cubic from p0 to p1 with derivatives v0, v1 with respect to s, 0 to 1."""
     s2, s3 = s * s, s * s * s
     value: NDArray[np.float64]
-    value = (2 * s3 - 3 * s2 + 1) * p0 + (s3 - 2 * s2 + s) * v0 + (3 * s2 - 2 * s3) * p1 + (s3 - s2) * v1
+    value = (
+        (2 * s3 - 3 * s2 + 1) * p0
+        + (s3 - 2 * s2 + s) * v0
+        + (3 * s2 - 2 * s3) * p1
+        + (s3 - s2) * v1
+    )
     return value
 
 
 def _limited(v: NDArray[np.float64], step: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Limit velocities to three times the step; above that a cubic overshoots (Fritsch and Carlson)."""
+    """Limit velocities to three times the step; above that a cubic overshoots (Fritsch and
+    Carlson).
+    """
     size = np.linalg.norm(v, axis=-1, keepdims=True)
     most = 3.0 * np.linalg.norm(step, axis=-1, keepdims=True)
     limited: NDArray[np.float64] = v * np.minimum(1.0, most / np.maximum(size, 1e-12))
@@ -104,7 +125,8 @@ def _limited(v: NDArray[np.float64], step: NDArray[np.float64]) -> NDArray[np.fl
 
 
 def _velocities(clip: Clip, k: int, side: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the velocities at key k, from the neighbouring key on ``side``; zeros where there is none.
+    """Return the velocities at key k, from the neighbouring key on ``side``; zeros where there is
+    none.
 
     :return: of the joints (K+1, 3), radians per second; of the pelvis (3,), metres per second.
     """

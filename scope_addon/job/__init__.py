@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Captures in a separate process: the request, the worker, the parent's side, and the cache. Never imports bpy.
+"""Captures in a separate process: the request, the worker, the parent's side, and the cache. Never
+imports bpy.
 
 The parent sends one JSON request; the worker answers with JSON lines on stdout:
 

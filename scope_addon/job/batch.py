@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Capture a folder of footage, one process per clip: a clip that fails affects no other, finished clips are skipped.
+"""Capture a folder of footage, one process per clip: a clip that fails affects no other, finished
+clips are skipped.
 
-``scope-batch.json`` in the output folder is rewritten as clips finish, so that an interrupted batch can continue. A
-clip is finished if its content (SHA-256), the options and the program are unchanged and its result files exist. Clips
-whose results were complete when a batch was killed, before it has written the report, are known by `clips.finished`.
+``scope-batch.json`` in the output folder is rewritten as clips finish, so that an interrupted batch
+can continue. A clip is finished if its content (SHA-256), the options and the program are unchanged
+and its result files exist. Clips whose results were complete when a batch was killed, before it has
+written the report, are known by `clips.finished`.
 """
 
 from __future__ import annotations
@@ -29,7 +31,8 @@ from .request import program_version
 REPORT_NAME = "scope-batch.json"
 STATUSES = ("done", "skipped", "no_person", "failed")
 ROOT = Path(__file__).resolve().parents[2]
-_WRITING_SHARE = 0.1  # of the time that may be spent on writing the report, which grows with the number of clips
+# of the time that may be spent on writing the report, which grows with the number of clips
+_WRITING_SHARE = 0.1
 _QUICK_S = 0.1  # a report that is written faster is written after every clip
 
 
@@ -77,7 +80,8 @@ class Batch:
         say: Callable[[str], None] = lambda text: None,
         runner: Runner | None = None,
     ) -> dict[str, Any]:
-        """Capture the clips that are not finished and return the report, which is also written to disk.
+        """Capture the clips that are not finished and return the report, which is also written to
+        disk.
 
         :param jobs: number of clips that are captured in parallel, by a runner of this machine.
         :param recursive: include subfolders.
@@ -85,26 +89,31 @@ class Batch:
         :param progress: called with the stage, the number of finished clips and that of all clips.
         :param say: called with messages for the user.
         :param runner: captures the clips; None for this machine.
-        :return: the report; its ``exit_status`` is 1 if a clip failed, else 3 if a clip showed no person, else 0.
+        :return: the report; its ``exit_status`` is 1 if a clip failed, else 3 if a clip showed no
+            person, else 0.
         :raises UsageError: the folder contains no footage.
         :raises OutputError: the output folder cannot be created, or the report cannot be written.
         """
         clips = self.clips(recursive)
         if not clips:
             raise UsageError(
-                f"no footage in {self.folder}: no file ends with one of {' '.join(FOOTAGE_SUFFIXES)}"
+                f"no footage in {self.folder}: no file ends with one of "
+                f"{' '.join(FOOTAGE_SUFFIXES)}"
                 + ("" if recursive else "; --recursive includes subfolders")
             )
         out = self.report_file.parent  # as it was given
         try:
             out.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise OutputError(f"cannot create the folder {out}: {error.strerror}; choose another with --out") from error
+            raise OutputError(
+                f"cannot create the folder {out}: {error.strerror}; choose another with --out"
+            ) from error
         previous = {} if again else self._previous_entries()
         entries: dict[str, Entry] = {}
         runner = runner or LocalRunner(self._program, jobs)
         try:
-            # The tasks are made within the try, because a signal can arrive as soon as the first clip has begun.
+            # The tasks are made within the try, because a signal can arrive as soon as the first
+            # clip has begun.
             for finished in runner.outcomes(self._tasks(clips, previous, again)):
                 for name, entry in finished.items():
                     entries[name] = entry
@@ -120,24 +129,34 @@ class Batch:
             raise
         return self._write_report(_in_order(entries, clips), previous, runner, last=True)
 
-    def _tasks(self, clips: dict[str, Path], previous: dict[str, Entry], again: bool) -> Iterator[ClipTask]:
+    def _tasks(
+        self, clips: dict[str, Path], previous: dict[str, Entry], again: bool
+    ) -> Iterator[ClipTask]:
         """Yield the task of each clip."""
         for name, path in clips.items():
             file, entry = path.relative_to(self.folder).as_posix(), previous.get(name)
             known = entry if entry and self._is_finished(entry) else None
-            yield ClipTask(name, file, str(path), str(self.out), self._basis, self.settings, known, again=again)
+            yield ClipTask(
+                name, file, str(path), str(self.out), self._basis, self.settings, known, again=again
+            )
 
     def _is_finished(self, entry: Entry) -> bool:
-        """Return whether an entry of the previous report is of a finished clip whose files still exist."""
+        """Return whether an entry of the previous report is of a finished clip whose files still
+        exist.
+        """
         if entry.get("status") not in FINISHED:
             return False
         outputs = entry.get("outputs")
         with suppress(OSError):  # of a name that no file can have
-            return isinstance(outputs, list) and all(isinstance(p, str) and (self.out / p).is_file() for p in outputs)
+            return isinstance(outputs, list) and all(
+                isinstance(p, str) and (self.out / p).is_file() for p in outputs
+            )
         return False
 
     def _previous_entries(self) -> dict[str, Entry]:
-        """Return the entries of the previous report by name; empty if the report is missing or damaged."""
+        """Return the entries of the previous report by name; empty if the report is missing or
+        damaged.
+        """
         try:
             entries = json.loads(self.report_file.read_text(encoding="utf-8"))["files"]
             return {e["name"]: e for e in entries if isinstance(e["status"], str)}
@@ -147,7 +166,8 @@ class Batch:
     def _write_report(
         self, entries: dict[str, Entry], previous: dict[str, Entry], runner: Runner, *, last: bool
     ) -> dict[str, Any]:
-        """Write and return the report. Clips that are still pending keep their entries of the previous report.
+        """Write and return the report. Clips that are still pending keep their entries of the
+        previous report.
 
         A report of many thousand clips is not written after every clip, unless it is the last one.
         """
@@ -160,7 +180,9 @@ class Batch:
             "folder": str(self.folder),
             "options": self.settings.options,
             "counts": {s: counts[s] for s in STATUSES},
-            "files": list(({n: e for n, e in previous.items() if n not in entries} | entries).values()),
+            "files": list(
+                ({n: e for n, e in previous.items() if n not in entries} | entries).values()
+            ),
             "exit_status": status,
             **runner.report(),
         }
@@ -168,11 +190,14 @@ class Batch:
             with atomic_path(self.report_file) as temporary:
                 temporary.write_text(json_text(report, indent=1), encoding="utf-8")
         except OSError as error:
-            raise OutputError(f"cannot write {self.report_file}: {error.strerror}; free some space") from error
+            raise OutputError(
+                f"cannot write {self.report_file}: {error.strerror}; free some space"
+            ) from error
         runner.report_written(self.report_file)
         written = {name for name, entry in entries.items() if entry["status"] in FINISHED}
         for name in written - self._reported:
-            with suppress(OSError, KeyError):  # a record remains harmless: an entry of its key is in the report
+            # a record remains harmless: an entry of its key is in the report
+            with suppress(OSError, KeyError):
                 finished_file(self.out, name, entries[name]["key"]).unlink(missing_ok=True)
         self._reported |= written
         taken = time.monotonic() - start
@@ -195,10 +220,15 @@ def _print_outcome(entry: Entry, number: str, say: Callable[[str], None]) -> Non
 
 
 def worker_table(report: dict[str, Any]) -> list[str]:
-    """Return the lines of the table of a cluster's workers for a terminal; empty for a batch on one machine."""
+    """Return the lines of the table of a cluster's workers for a terminal; empty for a batch on one
+    machine.
+    """
     if not report.get("workers"):
         return []
     columns = list(report["workers"][0])
     rows = [columns, *([str(row[name]) for name in columns] for row in report["workers"])]
     widths = [max(len(row[k]) for row in rows) for k in range(len(columns))]
-    return ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+    return [
+        "  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]

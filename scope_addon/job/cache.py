@@ -4,7 +4,8 @@
 - ``captures/<key>/report.json``, ``person1.npz``, …: a finished capture
 - ``jobs/<name>/``: a capture that is being written; it is moved to ``captures`` when it is complete
 - ``unfinished/<name>/``: what a capture that was cancelled or killed had found, see `unfinished`
-- ``kernels/``: the machine code that was compiled here. Clearing keeps it, except for that of replaced versions
+- ``kernels/``: the machine code that was compiled here. Clearing keeps it, except for that of
+    replaced versions
 - ``times.json``: how long the stages of the last captures took, see `progress`. Clearing keeps it
 
 Blender loads this when it starts, so that what only captures need is imported where it is used.
@@ -78,7 +79,9 @@ class Cache:
         except OSError as error:
             raise self._not_writable(error) from error
 
-    def keep(self, job_folder: Path, key: str, motions: list[str], report: dict[str, Any]) -> CachedCapture:
+    def keep(
+        self, job_folder: Path, key: str, motions: list[str], report: dict[str, Any]
+    ) -> CachedCapture:
         """Move a job's folder to the finished captures.
 
         :param motions: names of the motion files in the folder.
@@ -107,11 +110,14 @@ class Cache:
         return CachedCapture([target / name for name in motions], report)
 
     def size(self) -> int:
-        """Return in bytes what clearing frees: captures, finished or not, and code compiled by replaced versions."""
+        """Return in bytes what clearing frees: captures, finished or not, and code compiled by
+        replaced versions.
+        """
         return sum(_size(folder) for folder in self._owned())
 
     def clear(self) -> int:
-        """Remove captures, finished or not, and replaced versions' code; return the number of bytes freed.
+        """Remove captures, finished or not, and replaced versions' code; return the number of bytes
+        freed.
 
         Running jobs and the compiled code in use are kept.
         """
@@ -137,7 +143,8 @@ class Cache:
 
         reason = error.strerror or error
         return OutputError(
-            f"cannot write to the cache folder {self.root}: {reason}; free some space or choose another folder in the "
+            f"cannot write to the cache folder {self.root}: {reason}; free some space or choose "
+            "another folder in the "
             "preferences"
         )
 
@@ -145,7 +152,9 @@ class Cache:
         return [self.root / "captures", self.root / "unfinished", *self._replaced_kernels()]
 
     def _replaced_kernels(self) -> list[Path]:
-        """Return the folders of code that another version has replaced, or that numba's own cache had made."""
+        """Return the folders of code that another version has replaced, or that numba's own cache
+        had made.
+        """
         newest: set[str] = set()
         replaced = []
         for path in _by_time(self.kernels):
@@ -170,7 +179,9 @@ def _remove_abandoned(jobs: Path) -> None:
 
 
 def _by_time(folder: Path) -> list[Path]:
-    """Return the content of a folder, what was changed last first, without concurrently removed entries."""
+    """Return the content of a folder, what was changed last first, without concurrently removed
+    entries.
+    """
     times: dict[Path, float] = {}
     with suppress(OSError):
         for path in folder.iterdir():
@@ -180,7 +191,9 @@ def _by_time(folder: Path) -> list[Path]:
 
 
 def _size(folder: Path) -> int:
-    """Return the bytes of all files below a folder. One that is concurrently removed counts as empty."""
+    """Return the bytes of all files below a folder. One that is concurrently removed counts as
+    empty.
+    """
     total = 0
     for below, _, names in os.walk(folder):
         for name in names:

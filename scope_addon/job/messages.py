@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The worker's messages, checked before anything acts on them.
 
-The worker decodes footage of others with libraries in C. What it writes after one of them has gone wrong may be
-anything.
+The worker decodes footage of others with libraries in C. What it writes after one of them has gone
+wrong may be anything.
 """
 
 from __future__ import annotations
@@ -40,12 +40,19 @@ def is_text(value: object) -> bool:
 def _is_name(value: object) -> bool:
     """Whether it is the name of a file in the job's folder, not a way to another."""
     return (
-        isinstance(value, str) and 0 < len(value) < 200 and value.isprintable() and not set(value) & set('/\\:"*?<>|')
+        isinstance(value, str)
+        and 0 < len(value) < 200
+        and value.isprintable()
+        and not set(value) & set('/\\:"*?<>|')
     )
 
 
 def _are_names(value: object) -> bool:
-    return isinstance(value, list) and bool(value) and all(_is_name(name) and name.endswith(".npz") for name in value)
+    return (
+        isinstance(value, list)
+        and bool(value)
+        and all(_is_name(name) and name.endswith(".npz") for name in value)
+    )
 
 
 def _is_report(value: object) -> bool:
@@ -54,13 +61,18 @@ def _is_report(value: object) -> bool:
     warnings, rates = value.get("warnings", []), value.get("fps", {})
     if not isinstance(warnings, list) or not isinstance(rates, dict):
         return False
-    are_finite = all(type(rate) in (int, float) and 0 <= rate < _LARGEST_NUMBER for rate in rates.values())
+    are_finite = all(
+        type(rate) in (int, float) and 0 <= rate < _LARGEST_NUMBER for rate in rates.values()
+    )
     return are_finite and all(isinstance(text, str) for text in warnings)
 
 
 # The fields that a message must have, by its event, and what they may be.
 Fields = dict[str, dict[str, Callable[[object], bool]]]
-WARM_UP_FIELDS: Fields = {"progress": {"stage": is_text, "done": is_number, "total": is_number}, "result": {}}
+WARM_UP_FIELDS: Fields = {
+    "progress": {"stage": is_text, "done": is_number, "total": is_number},
+    "result": {},
+}
 CAPTURE_FIELDS: Fields = WARM_UP_FIELDS | {
     "preview": {"file": _is_name, "width": _is_side, "height": _is_side, "frame": is_number},
     "result": {"motions": _are_names, "report": _is_report},
@@ -68,15 +80,20 @@ CAPTURE_FIELDS: Fields = WARM_UP_FIELDS | {
 
 
 def is_result(content: object) -> bool:
-    """Return whether it has what the message of a finished capture must have: names of motions and a report."""
-    return isinstance(content, dict) and all(is_(content.get(field)) for field, is_ in CAPTURE_FIELDS["result"].items())
+    """Return whether it has what the message of a finished capture must have: names of motions and
+    a report.
+    """
+    return isinstance(content, dict) and all(
+        is_(content.get(field)) for field, is_ in CAPTURE_FIELDS["result"].items()
+    )
 
 
 def parse_message(line: bytes, fields: Fields = CAPTURE_FIELDS) -> dict[str, Any] | None:
     """Read a line of the worker.
 
     :param fields: what the messages of this job have.
-    :return: the message; None for a line that is none, such as a library may print, or one of an unknown event.
+    :return: the message; None for a line that is none, such as a library may print, or one of an
+        unknown event.
     :raises WorkerFailedError: the line is too long, or a message lacks what its event needs.
     """
     if len(line) > LONGEST_LINE:
@@ -103,4 +120,6 @@ def _one_line(text: object) -> str:
 
 def unreadable(what: str) -> WorkerFailedError:
     """Return the error for a message that cannot be used."""
-    return WorkerFailedError(f"the worker process sent a message that cannot be used ({what}); try again")
+    return WorkerFailedError(
+        f"the worker process sent a message that cannot be used ({what}); try again"
+    )

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """End a process when its parent ends, on every operating system and even if the parent crashes.
 
-The parent keeps the other end of the child's standard input open, and writes nothing to it, or commands. The operating
-system closes that end when the parent ends, killed or crashed parents included; the child waits for this in a thread.
+The parent keeps the other end of the child's standard input open, and writes nothing to it, or
+commands. The operating system closes that end when the parent ends, killed or crashed parents
+included; the child waits for this in a thread.
 """
 
 from __future__ import annotations
@@ -20,8 +21,11 @@ GRACE_S = 5.0  # time for the main thread to clean up, after which the process e
 _POLLING_INTERVAL_S = 0.2  # of the pipe, on Windows
 
 
-def when_parent_ends(end: Callable[[], object], receive: Callable[[bytes], object] = lambda _: None) -> None:
-    """Call ``end`` in a new thread when standard input, a pipe, is closed; immediately if it is closed already.
+def when_parent_ends(
+    end: Callable[[], object], receive: Callable[[bytes], object] = lambda _: None
+) -> None:
+    """Call ``end`` in a new thread when standard input, a pipe, is closed; immediately if it is
+    closed already.
 
     :param receive: gets what the parent writes before, in any pieces.
     """
@@ -39,7 +43,9 @@ def when_parent_ends(end: Callable[[], object], receive: Callable[[bytes], objec
 
 
 def stop_with_parent() -> None:
-    """Interrupt the main thread, as Ctrl-C does, when the parent ends; end the process ``GRACE_S`` later."""
+    """Interrupt the main thread, as Ctrl-C does, when the parent ends; end the process ``GRACE_S``
+    later.
+    """
 
     def stop() -> NoReturn:
         from ..atomic_write import remove_temporary_files
@@ -54,8 +60,9 @@ def stop_with_parent() -> None:
 
 def _wait_for_end_of_stdin(receive: Callable[[bytes], object]) -> None:
     if sys.platform == "win32":
-        # A blocking read would lock the pipe, and numpy's libraries, which query its state while they are loaded, would
-        # wait for the read to end: https://github.com/numpy/numpy/issues/24290
+        # A blocking read would lock the pipe, and numpy's libraries, which query its state while
+        # they are loaded, would wait for the read to end:
+        # https://github.com/numpy/numpy/issues/24290
         import _winapi
         import msvcrt
 

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The preview that the panel shows during a capture: the current frame, scaled down, with the fitted body over it.
+"""The preview that the panel shows during a capture: the current frame, scaled down, with the
+fitted body over it.
 
-Until the solver and the rasterizer are compiled, and where no body could be fitted, the keypoints' skeleton is drawn.
+Until the solver and the rasterizer are compiled, and where no body could be fitted, the keypoints'
+skeleton is drawn.
 """
 
 from __future__ import annotations
@@ -37,18 +39,27 @@ OPACITY = 0.75
 _SUPERSAMPLE = 2  # scale at which lines and bodies are drawn, for antialiasing
 
 _LEFT, _RIGHT, _MIDDLE = (255, 140, 40), (40, 150, 255), (235, 235, 235)
-_LIMBS = ("shoulder elbow", "elbow wrist", "wrist index", "shoulder hip", "hip knee", "knee ankle", "ankle foot_index")
+_LIMBS = (
+    "shoulder elbow",
+    "elbow wrist",
+    "wrist index",
+    "shoulder hip",
+    "hip knee",
+    "knee ankle",
+    "ankle foot_index",
+)
 _LINES = [("left_shoulder", "right_shoulder", _MIDDLE), ("left_hip", "right_hip", _MIDDLE)]
 for _side, _color in (("left", _LEFT), ("right", _RIGHT)):
     _LINES += [(f"{_side}_{a}", f"{_side}_{b}", _color) for a, b in map(str.split, _LIMBS)]
 
 
 class PreviewWriter:
-    """Write the preview at intervals, and report it: ``send("preview", file, width, height, frame)``.
+    """Write the preview at intervals, and report it: ``send("preview", file, width, height,
+    frame)``.
 
-    The file contains RGBA bytes, bottom row first, as Blender expects. Fitting, drawing and writing run in separate
-    threads, in parallel with the networks; frames that arrive while these are busy are skipped. On exit from the
-    context, the file is removed.
+    The file contains RGBA bytes, bottom row first, as Blender expects. Fitting, drawing and writing
+    run in separate threads, in parallel with the networks; frames that arrive while these are busy
+    are skipped. On exit from the context, the file is removed.
     """
 
     def __init__(self, folder: Path, send: Callable[..., None]) -> None:
@@ -62,7 +73,12 @@ class PreviewWriter:
     def __enter__(self) -> PreviewWriter:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        at: TracebackType | None,
+    ) -> None:
         with self._writing:
             self._open = False
             with suppress(OSError):  # Windows, while the parent reads it: it remains in its folder
@@ -70,15 +86,20 @@ class PreviewWriter:
         self._pool.shutdown(wait=False, cancel_futures=True)
 
     def __call__(self, frame: Frame, observation: Observation | None, live: LiveBody) -> None:
-        """Write the preview of a frame, unless it is too early or the previous one is not finished."""
+        """Write the preview of a frame, unless it is too early or the previous one is not
+        finished.
+        """
         now = time.monotonic()
-        if now - self._last < INTERVAL_S or (self._drawing is not None and not self._drawing.done()):
+        if now - self._last < INTERVAL_S or (
+            self._drawing is not None and not self._drawing.done()
+        ):
             return
         self._last = now
         self._drawing = self._pool.submit(self._show, frame, observation, live)
 
     def _show(self, frame: Frame, observation: Observation | None, live: LiveBody) -> None:
-        # After installation the rasterizer takes a while to compile; the preview does not wait for it.
+        # After installation the rasterizer takes a while to compile; the preview does not wait for
+        # it.
         pose = _pose(observation, live) if self._rasterizer.done() else None
         picture = draw(frame.image_rgb, observation, pose)
         height, width = picture.shape[:2]
@@ -89,14 +110,22 @@ class PreviewWriter:
                 with atomic_path(self._path) as temporary:
                     temporary.write_bytes(picture[::-1].tobytes())
             except OSError:
-                return  # disk full, or Windows while the parent reads it: a capture must not fail for its preview
+                # disk full, or Windows while the parent reads it: a capture must not fail for its
+                # preview
+                return
             self._send("preview", file=FILE, width=width, height=height, frame=frame.index)
 
 
 def load_rasterizer() -> None:
     """Compile the rasterizer by drawing a triangle."""
     corners = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]])
-    draw_overlay(np.zeros((8, 8, 3), np.uint8), corners, np.array([[0, 1, 2]]), np.diag([4.0, 4.0, 1.0]), np.zeros(5))
+    draw_overlay(
+        np.zeros((8, 8, 3), np.uint8),
+        corners,
+        np.array([[0, 1, 2]]),
+        np.diag([4.0, 4.0, 1.0]),
+        np.zeros(5),
+    )
 
 
 def _pose(observation: Observation | None, live: LiveBody) -> LivePose | None:
@@ -126,13 +155,17 @@ def draw(
         large = _with_body(large, pose, scale * _SUPERSAMPLE)
     elif observation is not None:
         _draw_skeleton(large, observation, scale * _SUPERSAMPLE)
-    rgba: NDArray[Any] = cv2.cvtColor(cv2.resize(large, size, interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2RGBA)
+    rgba: NDArray[Any] = cv2.cvtColor(
+        cv2.resize(large, size, interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2RGBA
+    )
     return rgba
 
 
 def _with_body(image: NDArray[np.uint8], pose: LivePose, scale: float) -> NDArray[np.uint8]:
     intrinsics, colors = scaled_intrinsics(pose.camera.intrinsics, scale), body_colors(pose.body, 0)
-    return draw_overlay(image, pose.vertices_cam, pose.body.faces, intrinsics, pose.camera.dist, colors, OPACITY)
+    return draw_overlay(
+        image, pose.vertices_cam, pose.body.faces, intrinsics, pose.camera.dist, colors, OPACITY
+    )
 
 
 def _draw_skeleton(image: NDArray[np.uint8], observation: Observation, scale: float) -> None:
@@ -141,4 +174,6 @@ def _draw_skeleton(image: NDArray[np.uint8], observation: Observation, scale: fl
     for a, b, color in _LINES:
         i, j = KEYPOINT_NAMES.index(a), KEYPOINT_NAMES.index(b)
         if min(observation.keypoints_confidence[[i, j]]) > 0.3:
-            cv2.line(image, pixels[i].tolist(), pixels[j].tolist(), color, 2 * _SUPERSAMPLE, cv2.LINE_AA)
+            cv2.line(
+                image, pixels[i].tolist(), pixels[j].tolist(), color, 2 * _SUPERSAMPLE, cv2.LINE_AA
+            )

@@ -14,10 +14,11 @@ _NAME = "scope-mocap"
 
 @cache
 def private_folder() -> Path:
-    """Return a folder of the user's own, with access for nobody else, that lasts from one session to the next.
+    """Return a folder of the user's own, with access for nobody else, that lasts from one session
+    to the next.
 
-    It is the system's folder for caches. If that belongs to someone else, or cannot be used, it is a new folder with a
-    name that cannot be predicted, for this session.
+    It is the system's folder for caches. If that belongs to someone else, or cannot be used, it is
+    a new folder with a name that cannot be predicted, for this session.
     """
     if lasting := lasting_folder():
         return lasting
@@ -27,7 +28,9 @@ def private_folder() -> Path:
 
 
 def lasting_folder() -> Path | None:
-    """Return the folder in the system's one for caches; None if that belongs to someone else, or cannot be used."""
+    """Return the folder in the system's one for caches; None if that belongs to someone else, or
+    cannot be used.
+    """
     try:
         folder = _caches() / _NAME
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)

@@ -16,7 +16,14 @@ from typing import Any
 from ..errors import SetupError
 from .live.formats_request import FormatsRequest
 from .live.request import LiveRequest
-from .messages import CAPTURE_FIELDS, LONGEST_LINE, WARM_UP_FIELDS, Fields, WorkerFailedError, parse_message
+from .messages import (
+    CAPTURE_FIELDS,
+    LONGEST_LINE,
+    WARM_UP_FIELDS,
+    Fields,
+    WorkerFailedError,
+    parse_message,
+)
 from .request import WARM_UP, JobRequest
 from .start_worker import worker_command
 
@@ -24,11 +31,15 @@ ROOT = Path(__file__).resolve().parents[2]
 START_SCRIPT = Path(__file__).with_name("start_worker.py")
 LOG = "worker.log"
 _LAST = ("result", "ended")  # events after which a worker ends
-_WINDOWS_FLAGS = getattr(subprocess, "CREATE_NO_WINDOW", 0) | getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)
+_WINDOWS_FLAGS = getattr(subprocess, "CREATE_NO_WINDOW", 0) | getattr(
+    subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0
+)
 
 
 class WorkerProcess:
-    """A worker process. Call ``poll`` regularly; ``close`` ends the process and removes its folder in any state."""
+    """A worker process. Call ``poll`` regularly; ``close`` ends the process and removes its folder
+    in any state.
+    """
 
     def __init__(
         self,
@@ -40,10 +51,12 @@ class WorkerProcess:
     ) -> None:
         """Start the worker.
 
-        :param request: the capture, or the question to a camera; None to compile what captures need.
+        :param request: the capture, or the question to a camera; None to compile what captures
+            need.
         :param job_folder: folder for the worker's files.
         :param kernels: folder for the code that numba compiles; if None, next to the sources.
-        :param python: interpreter and its arguments; inside Blender ``[sys.executable, *bpy.app.python_args]``.
+        :param python: interpreter and its arguments; inside Blender ``[sys.executable,
+            *bpy.app.python_args]``.
         :param script: what the interpreter runs.
         :raises SetupError: the process cannot be started.
         """
@@ -63,7 +76,9 @@ class WorkerProcess:
                 )
         except OSError as error:
             shutil.rmtree(job_folder, ignore_errors=True)
-            raise SetupError(f"cannot start {python[0]}: {error.strerror}; reinstall Blender") from error
+            raise SetupError(
+                f"cannot start {python[0]}: {error.strerror}; reinstall Blender"
+            ) from error
         self._lines: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         threading.Thread(target=self._read, name="scope-worker-lines", daemon=True).start()
         self._send_line((request.to_json() if request else WARM_UP).encode() + b"\n")
@@ -79,9 +94,11 @@ class WorkerProcess:
         return self._process.poll() is None
 
     def poll(self) -> list[dict[str, Any]]:
-        """Return the messages since the last call, and set ``finished`` when the last one is among them.
+        """Return the messages since the last call, and set ``finished`` when the last one is among
+        them.
 
-        :raises WorkerFailedError: the worker reported an error, ended without a result, or sent what is no message.
+        :raises WorkerFailedError: the worker reported an error, ended without a result, or sent
+            what is no message.
         """
         messages: list[dict[str, Any]] = []
         while True:
@@ -102,7 +119,9 @@ class WorkerProcess:
             messages.append(message)
 
     def wait(self, timeout_s: float = 5.0) -> None:
-        """Wait for the worker to end after its result, so that its files are closed before they are moved."""
+        """Wait for the worker to end after its result, so that its files are closed before they are
+        moved.
+        """
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(timeout_s)
         self._end()
@@ -133,7 +152,9 @@ class WorkerProcess:
             self._process.wait(timeout=5)
 
     def _read(self) -> None:
-        """Read the messages in a thread, because not every system can read pipes without blocking."""
+        """Read the messages in a thread, because not every system can read pipes without
+        blocking.
+        """
         assert self._process.stdout is not None
         with contextlib.suppress(OSError, ValueError), self._process.stdout as stream:
             while line := stream.readline(LONGEST_LINE + 1):
@@ -145,10 +166,21 @@ class WorkerProcess:
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(timeout=5)
         code = self._process.returncode
-        how = f"was terminated by signal {-code}" if code is not None and code < 0 else f"ended with status {code}"
+        how = (
+            f"was terminated by signal {-code}"
+            if code is not None and code < 0
+            else f"ended with status {code}"
+        )
         log = b""
         with contextlib.suppress(OSError):
             log = (self.job_folder / LOG).read_bytes()[-2000:]
-        last = next((text for text in reversed(log.decode("utf-8", "replace").splitlines()) if text.strip()), "")
+        last = next(
+            (
+                text
+                for text in reversed(log.decode("utf-8", "replace").splitlines())
+                if text.strip()
+            ),
+            "",
+        )
         hint = f" ({last.strip()[:200]})" if last else "; the system may have run out of memory"
         return f"the capture process {how} before it was finished{hint}; capture again"

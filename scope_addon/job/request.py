@@ -14,15 +14,20 @@ from typing import Any, ClassVar, Self
 from ..errors import SetupError, UsageError
 from ..options import Place, options_at
 
-WARM_UP = json.dumps({"warm_up": True})  # the request to compile what a capture needs, without capturing anything
-# What decides the result of a capture: folders, and how the names of the files end. The panel and the sample do not.
+# the request to compile what a capture needs, without capturing anything
+WARM_UP = json.dumps({"warm_up": True})
+# What decides the result of a capture: folders, and how the names of the files end. The panel and
+# the sample do not.
 _DECIDES = {"solver": (".py",), "scope_addon": (".py",), "assets": (".onnx", ".npz", ".json")}
 _DECIDE_NOTHING = ("scope_addon/ui", "assets/sample")
-_SAMPLE_BYTES = 1 << 20  # hashed at the beginning and end of the footage; reading gigabytes would block the window
+# hashed at the beginning and end of the footage; reading gigabytes would block the window
+_SAMPLE_BYTES = 1 << 20
 
 
 class LineRequest:
-    """What a worker is asked for: one line of JSON, whose keys are the arguments of the constructor."""
+    """What a worker is asked for: one line of JSON, whose keys are the arguments of the
+    constructor.
+    """
 
     called: ClassVar[str]  # in messages
     first_key: ClassVar[str]  # which begins it, and no other kind of request
@@ -52,14 +57,18 @@ class JobRequest(LineRequest):
     def __init__(self, footage: str, **values: Any) -> None:
         """Check the values, and fill in the defaults of the others.
 
-        :raises UsageError: an option does not exist, or its value has the wrong type or is none of the choices.
+        :raises UsageError: an option does not exist, or its value has the wrong type or is none of
+            the choices.
         """
         self.footage = footage
         self.values: dict[str, Any] = checked_values(values, Place.WORKER)
 
     def __eq__(self, other: object) -> bool:
         """Compare footage and values."""
-        return isinstance(other, JobRequest) and (self.footage, self.values) == (other.footage, other.values)
+        return isinstance(other, JobRequest) and (self.footage, self.values) == (
+            other.footage,
+            other.values,
+        )
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -68,7 +77,8 @@ class JobRequest(LineRequest):
         return json.dumps({"footage": self.footage, **self.values})
 
     def key(self, code_version: str) -> str:
-        """Return the hexadecimal key of the result: equal only for the same footage, options and program.
+        """Return the hexadecimal key of the result: equal only for the same footage, options and
+        program.
 
         :param code_version: differs between programs whose results may differ; see `code_version`.
         :raises OSError: the footage cannot be read.
@@ -77,9 +87,14 @@ class JobRequest(LineRequest):
         values = {option.name: self.values[option.name] for option in options}
         digest = hashlib.sha256(json.dumps([values, code_version], sort_keys=True).encode())
         _add_file(digest, Path(self.footage))
-        named = [values[option.name] for option in options if option.value_type is Path or option.name == "body"]
+        named = [
+            values[option.name]
+            for option in options
+            if option.value_type is Path or option.name == "body"
+        ]
         for path in map(Path, filter(None, named)):
-            for file in dict.fromkeys((path, path.with_suffix(".json"))):  # a network's description lies next to it
+            # a network's description lies next to it
+            for file in dict.fromkeys((path, path.with_suffix(".json"))):
                 if file.is_file():  # the worker reports a missing file
                     _add_file(digest, file)
         return digest.hexdigest()[:32]
@@ -88,16 +103,21 @@ class JobRequest(LineRequest):
 def checked_values(values: Mapping[str, Any], place: Place) -> dict[str, Any]:
     """Return the value of each option of a worker, with defaults.
 
-    :raises UsageError: an option does not exist, or its value has the wrong type or is none of the choices.
+    :raises UsageError: an option does not exist, or its value has the wrong type or is none of the
+        choices.
     """
     options = {option.name: option for option in options_at(place)}
     for name, value in values.items():
         if name not in options:
-            raise UsageError(f"a capture request has no option {name!r}; its options are {', '.join(options)}")
+            raise UsageError(
+                f"a capture request has no option {name!r}; its options are {', '.join(options)}"
+            )
         if problem := options[name].type_error(value):
             raise UsageError(f"{name} {problem}")
     filled = {name: values.get(name, option.default) for name, option in options.items()}
-    return {name: tuple(value) if options[name].several else value for name, value in filled.items()}
+    return {
+        name: tuple(value) if options[name].several else value for name, value in filled.items()
+    }
 
 
 def _add_file(digest: hashlib._Hash, path: Path) -> None:
@@ -111,7 +131,9 @@ def _add_file(digest: hashlib._Hash, path: Path) -> None:
 
 
 def code_version(root: Path) -> str:
-    """Hash the installed program: names, sizes and modification times of what decides the result of a capture."""
+    """Hash the installed program: names, sizes and modification times of what decides the result of
+    a capture.
+    """
     status = {name: file.stat() for name, file in _program_files(root)}
     stamps = [(name, s.st_size, s.st_mtime_ns) for name, s in status.items()]
     return hashlib.sha256(json.dumps(stamps).encode()).hexdigest()
@@ -119,7 +141,8 @@ def code_version(root: Path) -> str:
 
 @cache
 def program_version(root: Path) -> str:
-    """Hash names and contents of what decides the result of a capture: equal on machines with the same program.
+    """Hash names and contents of what decides the result of a capture: equal on machines with the
+    same program.
 
     :raises SetupError: a file cannot be read.
     """
@@ -128,7 +151,9 @@ def program_version(root: Path) -> str:
         try:
             content = file.read_bytes()
         except OSError as error:
-            raise SetupError(f"{file}, a part of Scope, cannot be read ({error.strerror}); install it again") from error
+            raise SetupError(
+                f"{file}, a part of Scope, cannot be read ({error.strerror}); install it again"
+            ) from error
         digest.update(json.dumps([name, hashlib.sha256(content).hexdigest()]).encode())
     return digest.hexdigest()
 
@@ -140,7 +165,11 @@ def _program_files(root: Path) -> list[tuple[str, Path]]:
         for place, folders, files in os.walk(root / top):
             below = Path(place).relative_to(root).as_posix()
             folders[:] = [
-                name for name in folders if name != "__pycache__" and f"{below}/{name}" not in _DECIDE_NOTHING
+                name
+                for name in folders
+                if name != "__pycache__" and f"{below}/{name}" not in _DECIDE_NOTHING
             ]
-            found += [(f"{below}/{name}", Path(place, name)) for name in files if name.endswith(suffixes)]
+            found += [
+                (f"{below}/{name}", Path(place, name)) for name in files if name.endswith(suffixes)
+            ]
     return sorted(found)

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The script that a worker process runs, in Blender's Python, isolated (``-I``) and without Blender.
+"""The script that a worker process runs, in Blender's Python, isolated (``-I``) and without
+Blender.
 
     python -I start_worker.py ROOT JOB_FOLDER SEARCH_PATH...      one line on stdin: the request
 
-Inside Blender the extension is the package ``bl_ext.<repository>.scope``, whose parent exists only there; this script
-loads the extension's root folder as the package ``scope``. Isolated Python ignores PYTHONPATH, so that the folders of
-numpy and of the extension's wheels are passed as arguments.
+Inside Blender the extension is the package ``bl_ext.<repository>.scope``, whose parent exists only
+there; this script loads the extension's root folder as the package ``scope``. Isolated Python
+ignores PYTHONPATH, so that the folders of numpy and of the extension's wheels are passed as
+arguments.
 """
 
 import importlib.util
@@ -16,7 +18,11 @@ from pathlib import Path
 
 
 def worker_command(
-    python: Sequence[str], root: Path, job_folder: Path, kernels: Path | None, script: Path = Path(__file__)
+    python: Sequence[str],
+    root: Path,
+    job_folder: Path,
+    kernels: Path | None,
+    script: Path = Path(__file__),
 ) -> tuple[list[str], dict[str, str]]:
     """Return the parent's command line for a worker, and the environment variables.
 
@@ -30,7 +36,9 @@ def worker_command(
 
 def load_package(root: Path) -> None:
     """Load the extension's root folder as the package ``scope``."""
-    spec = importlib.util.spec_from_file_location("scope", root / "__init__.py", submodule_search_locations=[str(root)])
+    spec = importlib.util.spec_from_file_location(
+        "scope", root / "__init__.py", submodule_search_locations=[str(root)]
+    )
     assert spec is not None
     assert spec.loader is not None
     package = importlib.util.module_from_spec(spec)
@@ -40,8 +48,8 @@ def load_package(root: Path) -> None:
 
 if __name__ == "__main__":
     root, job_folder, *search_path = sys.argv[1:]
-    # The parent's order is kept: the extension's wheels precede other installed packages. The script's own folder is
-    # removed, because its modules would shadow others.
+    # The parent's order is kept: the extension's wheels precede other installed packages. The
+    # script's own folder is removed, because its modules would shadow others.
     own = str(Path(__file__).resolve().parent)
     sys.path[:] = search_path + [p for p in sys.path if p not in search_path and p != own]
     load_package(Path(root))

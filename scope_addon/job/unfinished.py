@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Folders of captures in progress: what has been observed, with which the same capture continues after a kill."""
+"""Folders of captures in progress: what has been observed, with which the same capture continues
+after a kill.
+"""
 
 from __future__ import annotations
 
@@ -24,9 +26,11 @@ _RUNNING_S = 600.0  # within which a running capture has written
 
 @contextmanager
 def unfinished_capture(root: Path | None, footage: Path) -> Iterator[Path | None]:
-    """Give the folder of a capture, and remove it when the capture is finished, or has found nobody.
+    """Give the folder of a capture, and remove it when the capture is finished, or has found
+    nobody.
 
-    The folder is made by whoever first writes to it. It stays if the block is left by another exception.
+    The folder is made by whoever first writes to it. It stays if the block is left by another
+    exception.
 
     :param root: folder of caches; None: nothing is to be kept.
     """
@@ -74,7 +78,8 @@ def _remove_abandoned(parent: Path) -> None:
 
 
 def _size_and_time(folder: Path) -> tuple[int, float]:
-    """Return the bytes of a folder's files, and when a file was last written into it or its folders.
+    """Return the bytes of a folder's files, and when a file was last written into it or its
+    folders.
 
     :raises OSError: it is being removed.
     """

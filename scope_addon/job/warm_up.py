@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Compile what a capture and its corrections need, before the first one.
 
-Most computers need this only while an extension is built: its machine code comes with it. Where none does (another
-processor or Python), it runs once in the background, after the extension has been enabled.
+Most computers need this only while an extension is built: its machine code comes with it. Where
+none does (another processor or Python), it runs once in the background, after the extension has
+been enabled.
 """
 
 from __future__ import annotations
@@ -28,16 +29,19 @@ _SECONDS = 0.3  # of the sample clip: a few frames, so that every stage has its 
 
 
 def warm_up(progress: Progress) -> int:
-    """Capture the beginning of the sample clip and correct it; return how many kernels had to be compiled.
+    """Capture the beginning of the sample clip and correct it; return how many kernels had to be
+    compiled.
 
-    From then on, this process looks for garbage less often: it took a twelfth of the time of compiling.
+    From then on, this process looks for garbage less often: it took a twelfth of the time of
+    compiling.
 
     :raises ScopeError: the sample cannot be captured.
     """
     gc.freeze()
     gc.set_threshold(*_GARBAGE)
     load_rasterizer()
-    fill_silhouette(np.zeros((1, 1), np.bool_), np.zeros((1, 2)), np.zeros((0, 3), np.int32))  # of the preset best
+    # of the preset best
+    fill_silhouette(np.zeros((1, 1), np.bool_), np.zeros((1, 2)), np.zeros((0, 3), np.int32))
     options = CaptureOptions(quality="fast", wanted=VideoRange(end_s=_SECONDS), threads=1)
     body = load_body("scope")
     motion = capture(ASSETS / "sample" / "sample.mp4", body, options, progress).motions[0]

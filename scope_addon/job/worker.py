@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The worker's side of a job: read the request, capture, write motion files, and report progress."""
+"""The worker's side of a job: read the request, capture, write motion files, and report
+progress.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,8 @@ from .request import WARM_UP, JobRequest
 from .unfinished import unfinished_capture
 
 _REMOVAL_ATTEMPTS = 20  # an attempt fails if a file is created during it
-_NICENESS = 12  # of a capture: with 5, drawing without a graphics card waits for it; compiling ahead of it has 19
+# of a capture: with 5, drawing without a graphics card waits for it; compiling ahead of it has 19
+_NICENESS = 12
 _MIN_INTERVAL_S = 0.05  # between two progress messages of one stage
 
 
@@ -43,7 +46,9 @@ class Reporter:
             self._stream.flush()
 
     def progress(self, stage: str, done: int, total: int) -> None:
-        """Report the progress of a stage, at most every ``_MIN_INTERVAL_S`` except at its beginning and end."""
+        """Report the progress of a stage, at most every ``_MIN_INTERVAL_S`` except at its beginning
+        and end.
+        """
         now = time.monotonic()
         if stage == self._last_stage and done != total and now - self._last_time < _MIN_INTERVAL_S:
             return
@@ -54,8 +59,11 @@ class Reporter:
 Request = JobRequest | LiveRequest | FormatsRequest | None
 
 
-def run(request: Request, job_folder: Path, reporter: Reporter, commands: Commands | None = None) -> int:
-    """Do what is requested and return the exit status. Every failure is reported as an ``error`` message.
+def run(
+    request: Request, job_folder: Path, reporter: Reporter, commands: Commands | None = None
+) -> int:
+    """Do what is requested and return the exit status. Every failure is reported as an ``error``
+    message.
 
     :param request: the capture, or the question to a camera; None to compile what captures need.
     :param commands: of the parent, to a live capture.
@@ -85,14 +93,19 @@ def run(request: Request, job_folder: Path, reporter: Reporter, commands: Comman
         if lacks_memory(error):
             reporter.send("error", message=system_error_message(MemoryError()))
             return 1
-        reporter.send("error", message=f"a part of Scope cannot be loaded ({error}); reinstall the extension")
+        reporter.send(
+            "error", message=f"a part of Scope cannot be loaded ({error}); reinstall the extension"
+        )
     except (OSError, MemoryError) as error:
         reporter.send("error", message=system_error_message(error))
     except Exception as error:  # a defect is reported in the panel; the log has the traceback
         import traceback
 
         traceback.print_exc()
-        reporter.send("error", message=f"this is a bug in Scope ({type(error).__name__}: {error}); please report it")
+        reporter.send(
+            "error",
+            message=f"this is a bug in Scope ({type(error).__name__}: {error}); please report it",
+        )
     return 1
 
 
@@ -116,13 +129,18 @@ def _capture(request: JobRequest, job_folder: Path, reporter: Reporter) -> None:
 
 
 def _caches(job_folder: Path) -> Path | None:
-    """Return the cache folder that a job's folder lies in; None if it lies elsewhere, as in tests."""
+    """Return the cache folder that a job's folder lies in; None if it lies elsewhere, as in
+    tests.
+    """
     return job_folder.parents[1] if job_folder.parent.name == "jobs" else None
 
 
 def main(job_folder: Path) -> NoReturn:
-    """Run the worker process: the request on stdin, messages on stdout, everything else on stderr."""
-    # Everything that libraries print to stdout, including from C, goes to stderr; the messages get the real stdout.
+    """Run the worker process: the request on stdin, messages on stdout, everything else on
+    stderr.
+    """
+    # Everything that libraries print to stdout, including from C, goes to stderr; the messages get
+    # the real stdout.
     stream = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
     # Unbuffered, so that the commands after the request are not read with it.
@@ -158,14 +176,18 @@ def _parsed(line: str) -> Request:
 
 
 def _exit(status: int) -> NoReturn:
-    """Exit without exit handlers, which would wait for threads of the networks and of the decoder."""
+    """Exit without exit handlers, which would wait for threads of the networks and of the
+    decoder.
+    """
     with contextlib.suppress(OSError):
         sys.stderr.flush()
     os._exit(status)
 
 
 def _exit_with_parent(job_folder: Path, commands: Commands | None = None) -> None:
-    """Exit and remove the job's folder when the parent ends or closes the job; pass its commands on."""
+    """Exit and remove the job's folder when the parent ends or closes the job; pass its commands
+    on.
+    """
 
     def end() -> NoReturn:
         _remove(job_folder)
@@ -175,7 +197,9 @@ def _exit_with_parent(job_folder: Path, commands: Commands | None = None) -> Non
 
 
 def _remove(job_folder: Path) -> None:
-    """Remove the folder, even while another thread writes to it: once renamed, no new file can be created in it."""
+    """Remove the folder, even while another thread writes to it: once renamed, no new file can be
+    created in it.
+    """
     renamed = job_folder.with_name(f"{job_folder.name}.gone")
     with contextlib.suppress(OSError):
         job_folder.rename(renamed)
@@ -187,7 +211,9 @@ def _remove(job_folder: Path) -> None:
 
 
 def _lower_priority(niceness: int) -> None:
-    """Lower the priority, so that Blender stays responsive; on Windows the parent starts the process with it."""
+    """Lower the priority, so that Blender stays responsive; on Windows the parent starts the
+    process with it.
+    """
     if hasattr(os, "nice"):
         with contextlib.suppress(OSError):
             os.nice(niceness)

@@ -1,2 +1,4 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Axis conventions, contact, smoothing and optimal paths: what capture, editing and retargeting share."""
+"""Axis conventions, contact, smoothing and optimal paths: what capture, editing and retargeting
+share.
+"""

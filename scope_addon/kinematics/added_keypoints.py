@@ -19,7 +19,8 @@ def with_keypoints(
     """Add n keypoints to a body, after those that it has.
 
     :param parts: (n,) the joints that carry them.
-    :param template, shapedirs: (n, 3) metres, (n, 3, P): their places in the rest pose, and how the shape moves them.
+    :param template, shapedirs: (n, 3) metres, (n, 3, P): their places in the rest pose, and how the
+        shape moves them.
     """
     return replace(
         body,
@@ -31,7 +32,14 @@ def with_keypoints(
 
 
 def with_points_on_parts(
-    body: Body, names: Iterable[str], parts: NDArray[np.integer[Any]], offsets: NDArray[np.floating[Any]]
+    body: Body,
+    names: Iterable[str],
+    parts: NDArray[np.integer[Any]],
+    offsets: NDArray[np.floating[Any]],
 ) -> Body:
-    """Add n keypoints that keep their offsets (n, 3) from the joints of their parts (n,), whatever the shape."""
-    return with_keypoints(body, names, parts, body.J_template[parts] + offsets, body.J_shapedirs[parts])
+    """Add n keypoints that keep their offsets (n, 3) from the joints of their parts (n,), whatever
+    the shape.
+    """
+    return with_keypoints(
+        body, names, parts, body.J_template[parts] + offsets, body.J_shapedirs[parts]
+    )

@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The axis conventions of SMPL, OpenCV and the world, in one place; Blender's and glTF's are in ``scene/axes.py``.
+"""The axis conventions of SMPL, OpenCV and the world, in one place; Blender's and glTF's are in
+``scene/axes.py``.
 
-| frame    | right-handed axes                                    | used by                            |
+| frame    | right-handed axes                                    | used by
+                                                                  |
 |----------|------------------------------------------------------|------------------------------------|
-| camera   | OpenCV: x right, y down, z forward                   | solver, ``joints_cam``, intrinsics |
-| world    | x right, z up, floor at z = 0                        | motion file, Blender scenes        |
-| model    | SMPL: y up, x to the person's left, person faces +z  | rest pose of a body                |
+| camera   | OpenCV: x right, y down, z forward                   | solver, ``joints_cam``,
+                                                                  intrinsics |
+| world    | x right, z up, floor at z = 0                        | motion file, Blender scenes
+                                                                  |
+| model    | SMPL: y up, x to the person's left, person faces +z  | rest pose of a body
+                                                                  |
 
 ``R_a_b`` takes coordinates in frame b to coordinates in frame a: ``p_a = R_a_b @ p_b``.
 """
@@ -18,17 +23,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 UP = np.array([0.0, 0.0, 1.0])  # in the world
-# Model y up becomes world z up, (x, y, z) -> (x, -z, y): the person faces world −y, into Blender's front view.
+# Model y up becomes world z up, (x, y, z) -> (x, -z, y): the person faces world −y, into Blender's
+# front view.
 R_WORLD_MODEL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 # A level OpenCV camera in the world: x right stays, y down is −z, z forward is +y.
 R_WORLD_LEVELCAMERA = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 
 
 def world_from_level_camera(up_camera: ArrayLike, height: float = 0.0) -> NDArray[np.float64]:
-    """Return the camera pose in a world whose z axis is the given up direction and whose +y the camera faces.
+    """Return the camera pose in a world whose z axis is the given up direction and whose +y the
+    camera faces.
 
-    The heading keeps the optical axis in the world's y-z plane, so a level camera gives ``R_WORLD_LEVELCAMERA``. The
-    camera is at (0, 0, height).
+    The heading keeps the optical axis in the world's y-z plane, so a level camera gives
+    ``R_WORLD_LEVELCAMERA``. The camera is at (0, 0, height).
 
     :param up_camera: (3,) up direction in the camera frame, any length.
     :param height: metres of the camera above the floor.
@@ -37,7 +44,8 @@ def world_from_level_camera(up_camera: ArrayLike, height: float = 0.0) -> NDArra
     up = np.asarray(up_camera, float) / np.linalg.norm(up_camera)
     forward = np.array([0.0, 0.0, 1.0])
     forward = forward - up * (forward @ up)
-    if np.linalg.norm(forward) < 1e-6:  # looking straight up or down: use the image's vertical instead
+    # looking straight up or down: use the image's vertical instead
+    if np.linalg.norm(forward) < 1e-6:
         forward = np.array([0.0, 1.0, 0.0]) - up * up[1]
     forward /= np.linalg.norm(forward)
     right = np.cross(forward, up)

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The surface of trunk, legs and head, and the points of the arms that may not enter it.
 
-Depth is what one camera measures worst, so a hand that lies on a thigh or hangs beside the hips easily ends up some
-centimetres inside of them. That two parts do not overlap depends on the poses of both, which does not have the form
-r(T_i, Omega_i, beta) of section 3 of the paper. In a motion that is nearly right, though, the surface is where it will
-be: the tangent plane n^T p = d next to a point p of an arm is constant, and p stays above it as above a floor.
+Depth is what one camera measures worst, so a hand that lies on a thigh or hangs beside the hips
+easily ends up some centimetres inside of them. That two parts do not overlap depends on the poses
+of both, which does not have the form r(T_i, Omega_i, beta) of section 3 of the paper. In a motion
+that is nearly right, though, the surface is where it will be: the tangent plane n^T p = d next to a
+point p of an arm is constant, and p stays above it as above a floor.
 """
 
 from __future__ import annotations
@@ -23,47 +24,66 @@ from .frame_blocks import by_blocks
 
 SPACING_M = 0.05  # between the sampled vertices
 REACH_M = 0.15  # from a vertex on, up to which its tangent plane stands for the surface
-AHEAD_M = 0.05  # height from which on no plane is needed: so far, a point does not move in one more fit
+# height from which on no plane is needed: so far, a point does not move in one more fit
+AHEAD_M = 0.05
 _FRAMES = 256  # whose distances are computed at once: some 20 MB
 _TRUNK = ("pelvis", "spine1", "spine2", "spine3", "neck", "head")
 _LEGS = ("hip", "knee", "ankle")
 _ON_ARMS = ("elbow", "wrist", "index", "pinky", "thumb_tip", "middle_finger_tip")
-_FOREARMS = tuple(f"forearm/{side}_{which}" for side in ("left", "right") for which in ("upper", "lower"))
+_FOREARMS = tuple(
+    f"forearm/{side}_{which}" for side in ("left", "right") for which in ("upper", "lower")
+)
 
 
 def with_arm_points(body: Body) -> Body:
-    """Add four keypoints to a body: on each forearm, at a third and two thirds of the way from elbow to wrist."""
+    """Add four keypoints to a body: on each forearm, at a third and two thirds of the way from
+    elbow to wrist.
+    """
     parts, template, shapedirs = [], [], []
     for side in ("left", "right"):
         elbow, wrist = (body.joint_names.index(f"{side}_{joint}") for joint in ("elbow", "wrist"))
         for share in (1 / 3, 2 / 3):
             parts.append(elbow)
             template.append((1 - share) * body.J_template[elbow] + share * body.J_template[wrist])
-            shapedirs.append((1 - share) * body.J_shapedirs[elbow] + share * body.J_shapedirs[wrist])
+            shapedirs.append(
+                (1 - share) * body.J_shapedirs[elbow] + share * body.J_shapedirs[wrist]
+            )
     return with_keypoints(body, _FOREARMS, parts, np.array(template), np.array(shapedirs))
 
 
 @dataclass(frozen=True)
 class TangentPlanes:
-    """For each of C points of the arms in T frames: the plane normal^T p = offset that it stays above."""
+    """For each of C points of the arms in T frames: the plane normal^T p = offset that it stays
+    above.
+    """
 
     normal: NDArray[np.float64]  # (T, C, 3) unit, outwards
     offset: NDArray[np.float64]  # (T, C) metres, with the room that the arm needs around the point
-    height: NDArray[np.float64]  # (T, C) of the point above the plane, metres; negative inside the body
+    # (T, C) of the point above the plane, metres; negative inside the body
+    height: NDArray[np.float64]
     near: NDArray[np.bool_]  # (T, C) the surface is so near that the plane matters
 
 
 class BodySurface:
-    """Vertices of trunk, legs and head, spread evenly, and the keypoints on the arms, for one shape of a body."""
+    """Vertices of trunk, legs and head, spread evenly, and the keypoints on the arms, for one shape
+    of a body.
+    """
 
     def __init__(self, body: Body, betas: NDArray[np.floating[Any]]) -> None:
         """Choose the vertices, and measure the room that the arm needs around each keypoint.
 
-        :param body: whose keypoints on the arms are used, those of `with_arm_points` and the palms if it has them.
+        :param body: whose keypoints on the arms are used, those of `with_arm_points` and the palms
+            if it has them.
         :param betas: (P,) shape coefficients.
         """
-        v, J, normals = body.rest_vertices(betas), body.rest_joints(betas), _vertex_normals(body, betas)
-        sampled = [k for k, name in enumerate(body.joint_names) if name in _TRUNK or name.endswith(_LEGS)]
+        v, J, normals = (
+            body.rest_vertices(betas),
+            body.rest_joints(betas),
+            _vertex_normals(body, betas),
+        )
+        sampled = [
+            k for k, name in enumerate(body.joint_names) if name in _TRUNK or name.endswith(_LEGS)
+        ]
         rows = np.flatnonzero(np.isin(body.strongest_joints, sampled) & normals.any(axis=1))
         rows = rows[one_per_cell(v[rows], SPACING_M)]
         arms = v[np.isin(body.strongest_joints, _arm_parts(body))]
@@ -76,17 +96,24 @@ class BodySurface:
     def planes(self, R: NDArray[np.floating[Any]], t: NDArray[np.floating[Any]]) -> TangentPlanes:
         """Return the tangent planes next to the points `indices` of a posed body.
 
-        :param R, t: (T, K+1, 3, 3) and (T, K+1, 3) part poses in any frame; the result is in that frame.
+        :param R, t: (T, K+1, 3, 3) and (T, K+1, 3) part poses in any frame; the result is in that
+            frame.
         """
         if not len(self.indices):  # a body without skin on its arms or its trunk
             none = np.zeros((len(R), 0))
             return TangentPlanes(np.zeros((len(R), 0, 3)), none, none, none.astype(bool))
         return TangentPlanes(*by_blocks(self._planes, R, t, frames=_FRAMES))
 
-    def _planes(self, R: NDArray[np.floating[Any]], t: NDArray[np.floating[Any]]) -> tuple[NDArray[Any], ...]:
+    def _planes(
+        self, R: NDArray[np.floating[Any]], t: NDArray[np.floating[Any]]
+    ) -> tuple[NDArray[Any], ...]:
         v, normals = self._posed(R, t)
         points = self._body.keypoints(R, t, self._betas, self.indices.tolist())
-        squared = (points**2).sum(-1)[..., None] + (v**2).sum(-1)[:, None] - 2.0 * points @ np.swapaxes(v, 1, 2)
+        squared = (
+            (points**2).sum(-1)[..., None]
+            + (v**2).sum(-1)[:, None]
+            - 2.0 * points @ np.swapaxes(v, 1, 2)
+        )
         nearest = squared.argmin(-1)
         frame = np.arange(len(R))[:, None]
         normal = normals[frame, nearest]
@@ -97,7 +124,9 @@ class BodySurface:
     def _posed(
         self, R: NDArray[np.floating[Any]], t: NDArray[np.floating[Any]]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the vertices (T, V, 3) by linear blend skinning, and their unit normals (T, V, 3)."""
+        """Return the vertices (T, V, 3) by linear blend skinning, and their unit normals (T, V,
+        3).
+        """
         v, normals = np.zeros((2, len(R), self._count, 3))
         for joint, rows, weights, local, normal in self._skin:
             R_transposed = np.swapaxes(R[:, joint], 1, 2)
@@ -112,8 +141,13 @@ def _skin(
     v: NDArray[np.floating[Any]],
     J: NDArray[np.floating[Any]],
     normals: NDArray[np.floating[Any]],
-) -> Iterator[tuple[int, NDArray[np.intp], NDArray[np.floating[Any]], NDArray[np.float64], NDArray[np.float64]]]:
-    """Yield for each joint the chosen vertices that it moves, and their weights (n, 1), places and normals (n, 3).
+) -> Iterator[
+    tuple[
+        int, NDArray[np.intp], NDArray[np.floating[Any]], NDArray[np.float64], NDArray[np.float64]
+    ]
+]:
+    """Yield for each joint the chosen vertices that it moves, and their weights (n, 1), places and
+    normals (n, 3).
 
     Places are from the joint, and both are times the weight.
     """
@@ -126,7 +160,9 @@ def _skin(
 
 
 def _points_on_arms(body: Body) -> NDArray[np.intp]:
-    """Return the keypoints (C,) on forearms and hands that stay outside: one for each name, of whichever set."""
+    """Return the keypoints (C,) on forearms and hands that stay outside: one for each name, of
+    whichever set.
+    """
     chosen: dict[str, int] = {}
     for k, keypoint in enumerate(body.keypoint_names):
         side, _, name = keypoint.rpartition("/")[2].partition("_")
@@ -145,9 +181,11 @@ def _arm_parts(body: Body) -> list[int]:
 
 
 def _vertex_normals(body: Body, betas: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
-    """Return outward unit normals (V, 3) in the rest pose; zero where a vertex has no area around it.
+    """Return outward unit normals (V, 3) in the rest pose; zero where a vertex has no area around
+    it.
 
-    In plain numpy, unlike the rasterizer's, because motions are also edited where nothing is compiled.
+    In plain numpy, unlike the rasterizer's, because motions are also edited where nothing is
+    compiled.
     """
     v, triangles = body.rest_vertices(betas), body.triangles()
     a, b, c = (v[triangles[:, corner]] for corner in range(3))

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The points of feet and hands that may rest on the floor: heels, toes and palms.
 
-Depends on numpy and the solver only, because motions are also edited where nothing else is installed.
+Depends on numpy and the solver only, because motions are also edited where nothing else is
+installed.
 """
 
 from __future__ import annotations
@@ -23,9 +24,9 @@ CONTACT_POINTS = SOLES + PALMS
 def with_contact_points(body: Body, betas: NDArray[np.floating[Any]]) -> Body:
     """Add six keypoints to a body, `CONTACT_POINTS`.
 
-    Each is attached to an ankle, foot or hand part, in the centre of the part's lowest centimetre in the rest pose,
-    which is where it touches the floor: rest poses have their palms down. The points are exact for these betas; for
-    others, they keep their positions relative to the joints.
+    Each is attached to an ankle, foot or hand part, in the centre of the part's lowest centimetre
+    in the rest pose, which is where it touches the floor: rest poses have their palms down. The
+    points are exact for these betas; for others, they keep their positions relative to the joints.
 
     :param betas: (P,) shape coefficients.
     """
@@ -50,6 +51,7 @@ def contact_point_positions(
     """Return the (T, 6, 3) positions of the contact points of a posed body.
 
     :param body_with_contact_points: from `with_contact_points`.
-    :param R, t: (T, K+1, 3, 3) and (T, K+1, 3) part poses in any frame; the result is in that frame.
+    :param R, t: (T, K+1, 3, 3) and (T, K+1, 3) part poses in any frame; the result is in that
+        frame.
     """
     return body_with_contact_points.keypoints(R, t, which=slice(-len(CONTACT_POINTS), None))

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The lowest points of the feet's skin: how far a posed body's feet are above the floor, or below it.
+"""The lowest points of the feet's skin: how far a posed body's feet are above the floor, or below
+it.
 
-Contact points (`contact_points`) are where a flat foot touches the floor. A foot that rolls over its heel or its toes
-is lower at its end, by two centimetres and more, so the skin itself decides whether a foot is under the floor.
+Contact points (`contact_points`) are where a flat foot touches the floor. A foot that rolls over
+its heel or its toes is lower at its end, by two centimetres and more, so the skin itself decides
+whether a foot is under the floor.
 """
 
 from __future__ import annotations
@@ -24,7 +26,8 @@ from .standing import LEVEL_M
 
 UNDER_FLOOR_M = 0.01  # depth from which on a foot counts as under the floor
 MIN_REST_S = 0.3  # feet that rest more briefly may be at the turning point of a jump
-STEP_M = 0.1  # rests farther from the floor are no errors of a few centimetres, but may be on a step
+# rests farther from the floor are no errors of a few centimetres, but may be on a step
+STEP_M = 0.1
 DEPTH_ERROR_M = 0.5  # no foot is taken for lower than it is by more
 _DIRECTIONS = 400  # in which the skin's outermost points are kept
 
@@ -46,7 +49,10 @@ class FootSkin:
             self.points.append(own[np.unique((_directions() @ own.T).argmax(axis=1))])
 
     def heights(
-        self, R: NDArray[np.floating[Any]], t: NDArray[np.floating[Any]], up: NDArray[np.floating[Any]]
+        self,
+        R: NDArray[np.floating[Any]],
+        t: NDArray[np.floating[Any]],
+        up: NDArray[np.floating[Any]],
     ) -> NDArray[np.float64]:
         """Return the (T, 4) heights of each part's lowest point, relative to the origin.
 
@@ -60,9 +66,11 @@ class FootSkin:
         return np.stack(lowest, axis=1)
 
     def as_keypoints(self, body: Body) -> tuple[Body, NDArray[np.intp]]:
-        """Add the skin's outermost points to the body as keypoints, and return their numbers, (n,), too.
+        """Add the skin's outermost points to the body as keypoints, and return their numbers, (n,),
+        too.
 
-        They are exact for this skin's betas; for others, they keep their positions relative to the joints.
+        They are exact for this skin's betas; for others, they keep their positions relative to the
+        joints.
         """
         points = np.concatenate(self.points)
         parts = np.repeat(np.array(self.parts, np.int32), [len(own) for own in self.points])
@@ -72,7 +80,8 @@ class FootSkin:
 
 
 def foot_heights(motion: Motion, body: Body, raw: bool = False) -> NDArray[np.float64]:
-    """Return the (T, 4) heights of the lowest skin of left heel, left toes, right heel and right toes; z = 0 the floor.
+    """Return the (T, 4) heights of the lowest skin of left heel, left toes, right heel and right
+    toes; z = 0 the floor.
 
     :param body: that of the motion.
     :param raw: of the motion before smoothing and contact.
@@ -80,7 +89,9 @@ def foot_heights(motion: Motion, body: Body, raw: bool = False) -> NDArray[np.fl
     betas = np.asarray(motion.betas, float)
     skin = FootSkin(body, betas)
 
-    def heights(poses: NDArray[np.floating[Any]], trans: NDArray[np.floating[Any]]) -> tuple[NDArray[np.float64]]:
+    def heights(
+        poses: NDArray[np.floating[Any]], trans: NDArray[np.floating[Any]]
+    ) -> tuple[NDArray[np.float64]]:
         rotations = exp(poses.reshape(len(poses), -1, 3).astype(float))
         return (skin.heights(*body.forward_kinematics(rotations, trans.astype(float), betas), UP),)
 
@@ -89,12 +100,16 @@ def foot_heights(motion: Motion, body: Body, raw: bool = False) -> NDArray[np.fl
 
 
 def under_floor(motion: Motion, body: Body) -> NDArray[np.bool_]:
-    """Return the (T,) frames in which a foot is more than `UNDER_FLOOR_M` under the floor; none on uneven ground."""
+    """Return the (T,) frames in which a foot is more than `UNDER_FLOOR_M` under the floor; none on
+    uneven ground.
+    """
     return depth_under_floor(motion, body) > UNDER_FLOOR_M
 
 
 def depth_under_floor(motion: Motion, body: Body) -> NDArray[np.float64]:
-    """Return how far the lowest foot of each frame is under the floor, (T,) metres; 0 above it and on uneven ground."""
+    """Return how far the lowest foot of each frame is under the floor, (T,) metres; 0 above it and
+    on uneven ground.
+    """
     if motion.uneven_ground:
         return np.zeros(len(motion))
     depth: NDArray[np.float64] = np.maximum(-foot_heights(motion, body).min(axis=1), 0.0)
@@ -102,11 +117,15 @@ def depth_under_floor(motion: Motion, body: Body) -> NDArray[np.float64]:
 
 
 def lower_floors(
-    heights: NDArray[np.floating[Any]], contact: NDArray[np.floating[Any]], times: NDArray[np.float64]
+    heights: NDArray[np.floating[Any]],
+    contact: NDArray[np.floating[Any]],
+    times: NDArray[np.float64],
 ) -> list[tuple[int, int]]:
-    """Find the spans in which the feet walk or stand on another, lower floor, with the ways down and up.
+    """Find the spans in which the feet walk or stand on another, lower floor, with the ways down
+    and up.
 
-    A foot rests in them more than `LEVEL_M` under the floor, or is farther below it than depth errors reach.
+    A foot rests in them more than `LEVEL_M` under the floor, or is farther below it than depth
+    errors reach.
 
     :param heights: (T, F) of the feet's points above the floor, metres.
     :param contact: (T, F) probability that each of them rests on something.
@@ -116,7 +135,10 @@ def lower_floors(
     lowest, rests = heights.min(axis=1), ((contact > 0.5) & (heights < -LEVEL_M)).any(axis=1)
     found = []
     for first, end in runs(lowest < -LEVEL_M):
-        if lowest[first:end].min() < -DEPTH_ERROR_M or _duration(rests[first:end], times[first:end]) >= MIN_REST_S:
+        if (
+            lowest[first:end].min() < -DEPTH_ERROR_M
+            or _duration(rests[first:end], times[first:end]) >= MIN_REST_S
+        ):
             while first > 0 and lowest[first] < lowest[first - 1] < 0:
                 first -= 1
             while end < len(lowest) and lowest[end - 1] < lowest[end] < 0:
@@ -126,7 +148,9 @@ def lower_floors(
 
 
 def upper_floors(
-    heights: NDArray[np.floating[Any]], contact: NDArray[np.floating[Any]], times: NDArray[np.float64]
+    heights: NDArray[np.floating[Any]],
+    contact: NDArray[np.floating[Any]],
+    times: NDArray[np.float64],
 ) -> list[tuple[int, int]]:
     """Find the spans in which the lower foot rests clearly above the floor.
 
@@ -136,15 +160,20 @@ def upper_floors(
     :return: the first row and the row after the last one of each span.
     """
     rests = (contact > 0.5).any(axis=1) & (heights.min(axis=1) > LEVEL_M)
-    return [(first, end) for first, end in runs(rests) if times[end - 1] - times[first] >= MIN_REST_S]
+    return [
+        (first, end) for first, end in runs(rests) if times[end - 1] - times[first] >= MIN_REST_S
+    ]
 
 
 def steps(
-    heights: NDArray[np.floating[Any]], contact: NDArray[np.floating[Any]], times: NDArray[np.float64]
+    heights: NDArray[np.floating[Any]],
+    contact: NDArray[np.floating[Any]],
+    times: NDArray[np.float64],
 ) -> list[tuple[int, float]]:
     """Find where feet rest some centimetres above or below the floor, as on a step.
 
-    Such a step cannot be distinguished from an error of the depth, so a capture puts these feet on the floor.
+    Such a step cannot be distinguished from an error of the depth, so a capture puts these feet on
+    the floor.
 
     :param heights: (T, F) of the feet's points above the floor, metres.
     :param contact: (T, F) probability that each of them rests on something.

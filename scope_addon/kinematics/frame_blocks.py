@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Processing long clips a few thousand frames at a time.
 
-The rotation matrices of an hour's 108,000 frames take 190 MB, and numpy's intermediate results several times that.
+The rotation matrices of an hour's 108,000 frames take 190 MB, and numpy's intermediate results
+several times that.
 """
 
 from __future__ import annotations
@@ -16,9 +17,12 @@ BLOCK_FRAMES = 4096
 
 
 def by_blocks(
-    compute: Callable[..., tuple[NDArray[Any], ...]], *arrays: NDArray[Any], frames: int | None = None
+    compute: Callable[..., tuple[NDArray[Any], ...]],
+    *arrays: NDArray[Any],
+    frames: int | None = None,
 ) -> tuple[NDArray[Any], ...]:
-    """Evaluate ``compute(*arrays)`` one block of frames at a time, for functions that treat frames independently.
+    """Evaluate ``compute(*arrays)`` one block of frames at a time, for functions that treat frames
+    independently.
 
     :param compute: maps arrays (t, ...) to a tuple of arrays (t, ...), for any number t of frames.
     :param arrays: (T, ...) each.

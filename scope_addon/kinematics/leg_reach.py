@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Moving the feet of a body by bending or stretching its legs, while the rest of it and the feet's rotations stay.
+"""Moving the feet of a body by bending or stretching its legs, while the rest of it and the feet's
+rotations stay.
 
-The knee turns by θ about n, then the whole leg turns so that the ankle lies in the direction of its goal. With thigh u,
-shin s and the wanted distance d from hip to ankle, θ follows from
+The knee turns by θ about n, then the whole leg turns so that the ankle lies in the direction of its
+goal. With thigh u, shin s and the wanted distance d from hip to ankle, θ follows from
 
-    2 u·exp(nθ)s = d² − u² − s²,   u·exp(nθ)s = (u·n)(s·n) + cos θ (u·s − (u·n)(s·n)) + sin θ u·(n×s).
+    2 u·exp(nθ)s = d² − u² − s²,
+    u·exp(nθ)s = (u·n)(s·n) + cos θ (u·s − (u·n)(s·n)) + sin θ u·(n×s).
 
-A nearly straight knee hardly determines its plane, so n is the sum of the knee's present axis u×s/(|u||s|) and of the
-thigh's sideways axis times `HINGE`: straight knees bend forwards, bent ones in their plane.
+A nearly straight knee hardly determines its plane, so n is the sum of the knee's present axis
+u×s/(|u||s|) and of the thigh's sideways axis times `HINGE`: straight knees bend forwards, bent ones
+in their plane.
 """
 
 from __future__ import annotations
@@ -21,7 +24,8 @@ from ...solver.body import Body
 from ...solver.rotations import exp, shortest_turn
 
 HINGE = 0.3  # the sine of the angle from which on a knee bends mainly in its own plane
-LONGEST = 0.995  # of the stretched leg's length; a knee snaps beyond, unless the leg is longer already
+# of the stretched leg's length; a knee snaps beyond, unless the leg is longer already
+LONGEST = 0.995
 SHORTEST = 0.35  # of the stretched leg's length, a knee bent by 140 degrees
 
 
@@ -40,7 +44,9 @@ def move_feet(
     R, t = poses
     out = np.array(rotations, float)
     for side, name in enumerate(("left", "right")):
-        hip, knee, ankle = (body.joint_names.index(f"{name}_{part}") for part in ("hip", "knee", "ankle"))
+        hip, knee, ankle = (
+            body.joint_names.index(f"{name}_{part}") for part in ("hip", "knee", "ankle")
+        )
         moved = np.flatnonzero(np.linalg.norm(shift[:, side], axis=1) > 1e-6)
         if not len(moved):
             continue

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Limbs mirrored in depth: the other pose that looks almost the same in the image.
 
-A bone b from one joint to the next, seen along the line of sight v through its end, keeps its length and nearly its
-image if its depth changes sign:
+A bone b from one joint to the next, seen along the line of sight v through its end, keeps its
+length and nearly its image if its depth changes sign:
 
     b' = b - 2 (b · v) v,   v = (p_end - c) / |p_end - c|,   c the camera's center
 """
@@ -28,7 +28,9 @@ LIMBS = (
 
 
 def bone_depths(
-    starts: NDArray[np.floating[Any]], ends: NDArray[np.floating[Any]], center: NDArray[np.floating[Any]]
+    starts: NDArray[np.floating[Any]],
+    ends: NDArray[np.floating[Any]],
+    center: NDArray[np.floating[Any]],
 ) -> NDArray[np.float64]:
     """Calculate b · v (T,), positive where a bone points away from the camera; metres.
 
@@ -41,7 +43,9 @@ def bone_depths(
 
 
 def runs_of_one_sign(depths: NDArray[np.floating[Any]], shallow: float, deep: float) -> list[slice]:
-    """Return the runs of frames in which |depth| (T,) exceeds ``shallow`` on one side, and somewhere ``deep``."""
+    """Return the runs of frames in which |depth| (T,) exceeds ``shallow`` on one side, and
+    somewhere ``deep``.
+    """
     found = (slice(*run) for run in sorted(runs(depths > shallow) + runs(depths < -shallow)))
     return [run for run in found if np.abs(depths[run]).max() > deep]
 
@@ -55,7 +59,8 @@ def mirrored_limb(
     upper: bool,
     lower: bool,
 ) -> NDArray[np.float64]:
-    """Mirror one or both bones of a limb, each by the shortest turn; a bone that is not mirrored keeps its direction.
+    """Mirror one or both bones of a limb, each by the shortest turn; a bone that is not mirrored
+    keeps its direction.
 
     :param parents: (K+1,) the body's tree.
     :param R_part: (T, K+1, 3, 3) rotations of the parts, in any axes.
@@ -73,7 +78,9 @@ def mirrored_limb(
     if lower:
         R_second = _mirrored(R_second, joints[:, second], joints[:, end], center)
     R_parent = R_part[:, parents[first]]
-    return np.stack([np.swapaxes(R_parent, 1, 2) @ R_first, np.swapaxes(R_first, 1, 2) @ R_second], axis=1)
+    return np.stack(
+        [np.swapaxes(R_parent, 1, 2) @ R_first, np.swapaxes(R_first, 1, 2) @ R_second], axis=1
+    )
 
 
 def _mirrored(

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Filling gaps and zero-phase smoothing of a motion in time.
 
-The kernel is a Gaussian over presentation times, so variable frame rates need no resampling. Its gain at the cut-off
-frequency f is 1/√2: σ = √(ln 2) / (2 π f). Rotations are averaged as quaternions on one hemisphere and normalized (the
-chordal mean), which has no discontinuities, unlike axis-angle vectors.
+The kernel is a Gaussian over presentation times, so variable frame rates need no resampling. Its
+gain at the cut-off frequency f is 1/√2: σ = √(ln 2) / (2 π f). Rotations are averaged as
+quaternions on one hemisphere and normalized (the chordal mean), which has no discontinuities,
+unlike axis-angle vectors.
 """
 
 from __future__ import annotations
@@ -15,17 +16,20 @@ from numpy.typing import NDArray
 
 from ...solver.rotations import matrix_from_quaternion, quaternion_from_matrix
 
-# Human limb motion lies below about 6 Hz; detector noise is white. A Gaussian has a slow roll-off: at 4.5 Hz it passes
-# as much noise as the 6 Hz Butterworth filter that is usual for marker data.
+# Human limb motion lies below about 6 Hz; detector noise is white. A Gaussian has a slow roll-off:
+# at 4.5 Hz it passes as much noise as the 6 Hz Butterworth filter that is usual for marker data.
 ROTATION_CUTOFF_HZ = 4.5
-DEPTH_CUTOFF_HZ = 2.0  # from one camera, depth is an order of magnitude less accurate than the image position
-_ROTATIONS_AT_ONCE = 50_000  # some 50 MB with numpy's intermediate results; one joint at a time may exceed it
+# from one camera, depth is an order of magnitude less accurate than the image position
+DEPTH_CUTOFF_HZ = 2.0
+# some 50 MB with numpy's intermediate results; one joint at a time may exceed it
+_ROTATIONS_AT_ONCE = 50_000
 
 
 def fill_gaps(
     values: NDArray[np.floating[Any]], valid: NDArray[np.bool_], times: NDArray[np.float64]
 ) -> NDArray[np.floating[Any]]:
-    """Interpolate linearly over the frames that are not valid; extend the nearest valid value at both ends.
+    """Interpolate linearly over the frames that are not valid; extend the nearest valid value at
+    both ends.
 
     :param values: (T, ...) samples.
     :param valid: (T,) with at least one True.
@@ -36,7 +40,9 @@ def fill_gaps(
         return values
     flat = values.reshape(len(values), -1)
     good = np.flatnonzero(valid)
-    out = np.stack([np.interp(times, times[good], flat[good, k]) for k in range(flat.shape[1])], axis=1)
+    out = np.stack(
+        [np.interp(times, times[good], flat[good, k]) for k in range(flat.shape[1])], axis=1
+    )
     return out.reshape(values.shape)
 
 
@@ -56,7 +62,8 @@ def continuous_quaternions(R: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
 def fill_rotation_gaps(
     R: NDArray[np.floating[Any]], valid: NDArray[np.bool_], times: NDArray[np.float64]
 ) -> NDArray[np.floating[Any]]:
-    """Interpolate rotations over the frames that are not valid, along the shorter arc; see `fill_gaps`.
+    """Interpolate rotations over the frames that are not valid, along the shorter arc; see
+    `fill_gaps`.
 
     :param R: (T, J, 3, 3) rotation matrices.
     :param valid: (T,) with at least one True.
@@ -75,7 +82,9 @@ def fill_rotation_gaps(
 
 
 def _joint_blocks(R: NDArray[np.floating[Any]]) -> list[slice]:
-    """Divide the joints of rotations (T, J, 3, 3) so that a long clip's intermediate results stay small."""
+    """Divide the joints of rotations (T, J, 3, 3) so that a long clip's intermediate results stay
+    small.
+    """
     T, J = R.shape[:2]
     count = max(1, min(J, _ROTATIONS_AT_ONCE // max(T, 1)))
     return [slice(j, j + count) for j in range(0, J, count)]
@@ -101,7 +110,10 @@ def gaussian_smooth(
     flat = values.reshape(T, -1)
     total, weight = np.zeros_like(flat, float), np.zeros(T)
     for shift in range(-reach, reach + 1):
-        to, start = slice(max(0, -shift), T - max(0, shift)), slice(max(0, shift), T - max(0, -shift))
+        to, start = (
+            slice(max(0, -shift), T - max(0, shift)),
+            slice(max(0, shift), T - max(0, -shift)),
+        )
         w = np.exp(-0.5 * ((times[start] - times[to]) / sigma) ** 2)
         total[to] += w[:, None] * flat[start]
         weight[to] += w
@@ -134,8 +146,9 @@ def smooth_root(
 ) -> NDArray[np.floating[Any]]:
     """Apply a zero-phase low-pass filter to the root's position.
 
-    Direction and distance (its logarithm) are filtered separately: distance is noisier, and its errors must not move
-    the person in the image. The cut-off frequencies are divided by ``strength``.
+    Direction and distance (its logarithm) are filtered separately: distance is noisier, and its
+    errors must not move the person in the image. The cut-off frequencies are divided by
+    ``strength``.
 
     :param t_camera_root: (T, 3) relative to the camera's centre, in axes that do not rotate.
     :param times: (T,) seconds.

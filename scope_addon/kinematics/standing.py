@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The probability that a contact point rests on the floor: it is slow, low within its frame, and does not fall."""
+"""The probability that a contact point rests on the floor: it is slow, low within its frame, and
+does not fall.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +15,15 @@ from .smoothing import gaussian_smooth
 
 CONTACT_SPEED_M_S = 0.35  # v₀, across the line of sight; a swinging foot moves at 1 m/s and more
 CONTACT_HEIGHT_M = 0.05  # h₀, above the frame's lowest sole point
-PALM_HEIGHT_M = 0.12  # h_p, above the lowest sole point; larger, since the trunk's depth error lies in between as well
-CONTACT_CUTOFF_HZ = 4.0  # of the positions before their speed is computed, since noise is not motion
-# a₀: at the top of a jump, feet are as slow as on the floor, but they fall at 9.8 m/s². Feet on the floor are
-# accelerated upwards, by landing and taking off, but not downwards.
+# h_p, above the lowest sole point; larger, since the trunk's depth error lies in between as well
+PALM_HEIGHT_M = 0.12
+# of the positions before their speed is computed, since noise is not motion
+CONTACT_CUTOFF_HZ = 4.0
+# a₀: at the top of a jump, feet are as slow as on the floor, but they fall at 9.8 m/s². Feet on the
+# floor are accelerated upwards, by landing and taking off, but not downwards.
 FALL_M_S2 = 6.0
-# A foot in the air does not stay still. If one does for about a second, it may be higher than the lowest point because
-# its depth is wrong: it is then displaced up or down along its line of sight.
+# A foot in the air does not stay still. If one does for about a second, it may be higher than the
+# lowest point because its depth is wrong: it is then displaced up or down along its line of sight.
 STILL_M_S, STILL_CUTOFF_HZ = 0.12, 0.6  # v₁, and of the mean of the speed
 WRONG_DEPTH_M = 0.4  # d
 UNEVEN_M = 0.6  # h_u, by which one foot may rest higher than the other on stairs or boxes
@@ -27,8 +31,12 @@ LEVEL_M = 0.25  # h_l: feet standing farther above or below stand on something e
 
 
 def line_of_sight(position: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
-    """Return the (..., 3) unit vectors from the camera's centre to positions (..., 3) relative to it."""
-    unit: NDArray[np.floating[Any]] = position / np.maximum(np.linalg.norm(position, axis=-1, keepdims=True), 1e-9)
+    """Return the (..., 3) unit vectors from the camera's centre to positions (..., 3) relative to
+    it.
+    """
+    unit: NDArray[np.floating[Any]] = position / np.maximum(
+        np.linalg.norm(position, axis=-1, keepdims=True), 1e-9
+    )
     return unit
 
 
@@ -39,12 +47,14 @@ def standing_probability(
     center: NDArray[np.floating[Any]] | None = None,
     uneven_ground: bool = False,
 ) -> NDArray[np.floating[Any]]:
-    """Return the (T, F) probability that each sole point rests on the floor: it is slow, low, and does not fall.
+    """Return the (T, F) probability that each sole point rests on the floor: it is slow, low, and
+    does not fall.
 
-    p = s(4(1 − v/v₀)) s(4(1 − h/(h₀ + |g| d s(4(1 − v̄/v₁))))) s(8(1 − a/a₀)) / s(8) with the logistic function s. The
-    height h is relative to the frame's lowest sole point, because the floor is not known yet. If the points were seen
-    by a camera, the speed v and the downward acceleration a ≥ 0 exclude motion in depth, the noisy direction. The more
-    a point stays still, the more it may be higher than the lowest one by what a depth error d explains, with g the
+    p = s(4(1 − v/v₀)) s(4(1 − h/(h₀ + |g| d s(4(1 − v̄/v₁))))) s(8(1 − a/a₀)) / s(8) with the
+    logistic function s. The height h is relative to the frame's lowest sole point, because the
+    floor is not known yet. If the points were seen by a camera, the speed v and the downward
+    acceleration a ≥ 0 exclude motion in depth, the noisy direction. The more a point stays still,
+    the more it may be higher than the lowest one by what a depth error d explains, with g the
     upward component of its line of sight and v̄ the root mean square of v over a second.
 
     :param soles: (T, F, 3) metres.
@@ -62,7 +72,9 @@ def standing_probability(
         upwards = np.abs(line_of_sight(soles - np.expand_dims(center, -2)) @ up)
         mean_speed = np.sqrt(gaussian_smooth(np.square(speed), times, STILL_CUTOFF_HZ))
         allowed += WRONG_DEPTH_M * upwards * logistic(4 * (1 - mean_speed / STILL_M_S))
-    p: NDArray[np.floating[Any]] = logistic(4 * (1 - speed / CONTACT_SPEED_M_S)) * logistic(4 * (1 - height / allowed))
+    p: NDArray[np.floating[Any]] = logistic(4 * (1 - speed / CONTACT_SPEED_M_S)) * logistic(
+        4 * (1 - height / allowed)
+    )
     p *= logistic(8 * (1 - _downward_acceleration(velocity, up, times) / FALL_M_S2)) / logistic(8)
     return p
 
@@ -76,10 +88,10 @@ def resting_probability(
 ) -> NDArray[np.floating[Any]]:
     """Return the (T, 6) probability that each sole point and palm rests on something.
 
-    For soles, see `standing_probability`. A palm rests if it is slow and not higher than the lowest sole point:
-    p = s(4(1 − v/v₀)) s(4(1 − h/h_p)), with h the height above that point. Soles far above a palm, as in a handstand,
-    do not rest: their p is multiplied by s(8(1 − d/2h_l)) / s(8), with d ≥ 0 the height of the lowest sole point above
-    the lowest palm.
+    For soles, see `standing_probability`. A palm rests if it is slow and not higher than the lowest
+    sole point: p = s(4(1 − v/v₀)) s(4(1 − h/h_p)), with h the height above that point. Soles far
+    above a palm, as in a handstand, do not rest: their p is multiplied by s(8(1 − d/2h_l)) / s(8),
+    with d ≥ 0 the height of the lowest sole point above the lowest palm.
 
     :param contact_points: (T, 6, 3) metres.
     :param up: (3,) unit vector.
@@ -97,7 +109,9 @@ def resting_probability(
 
 
 def speed_across(
-    points: NDArray[np.floating[Any]], times: NDArray[np.float64], center: NDArray[np.floating[Any]] | None
+    points: NDArray[np.floating[Any]],
+    times: NDArray[np.float64],
+    center: NDArray[np.floating[Any]] | None,
 ) -> NDArray[np.floating[Any]]:
     """Return the (T, F) speed in m/s; see `velocity_across`.
 
@@ -105,14 +119,19 @@ def speed_across(
     :param times: (T,) seconds.
     :param center: (T, 3) or (3,) the camera's centre; None: the whole speed.
     """
-    speed: NDArray[np.floating[Any]] = np.linalg.norm(velocity_across(points, times, center), axis=-1)
+    speed: NDArray[np.floating[Any]] = np.linalg.norm(
+        velocity_across(points, times, center), axis=-1
+    )
     return speed
 
 
 def velocity_across(
-    points: NDArray[np.floating[Any]], times: NDArray[np.float64], center: NDArray[np.floating[Any]] | None
+    points: NDArray[np.floating[Any]],
+    times: NDArray[np.float64],
+    center: NDArray[np.floating[Any]] | None,
 ) -> NDArray[np.floating[Any]]:
-    """Return the (T, F, 3) velocity in m/s, across the line of sight of a camera; 0 in clips of one or two frames.
+    """Return the (T, F, 3) velocity in m/s, across the line of sight of a camera; 0 in clips of one
+    or two frames.
 
     :param points: (T, F, 3) metres.
     :param times: (T,) seconds.
@@ -120,7 +139,9 @@ def velocity_across(
     """
     if len(times) <= 2:
         return np.zeros(points.shape)
-    velocity: NDArray[np.floating[Any]] = np.gradient(gaussian_smooth(points, times, CONTACT_CUTOFF_HZ), times, axis=0)
+    velocity: NDArray[np.floating[Any]] = np.gradient(
+        gaussian_smooth(points, times, CONTACT_CUTOFF_HZ), times, axis=0
+    )
     if center is not None:
         sight = line_of_sight(points - np.expand_dims(center, -2))
         velocity = velocity - sight * (velocity * sight).sum(-1, keepdims=True)
@@ -130,11 +151,14 @@ def velocity_across(
 def _downward_acceleration(
     velocity: NDArray[np.floating[Any]], up: NDArray[np.floating[Any]], times: NDArray[np.float64]
 ) -> NDArray[np.floating[Any]]:
-    """Return the (T, F) downward acceleration, m/s², from velocities (T, F, 3); 0 where it is upward."""
+    """Return the (T, F) downward acceleration, m/s², from velocities (T, F, 3); 0 where it is
+    upward.
+    """
     if len(times) <= 2:
         return np.zeros(velocity.shape[:2])
     down = -np.gradient(velocity @ up, times, axis=0)
-    down[0], down[-1] = down[1], down[-2]  # differences of the two outermost frames alone are mostly noise
+    # differences of the two outermost frames alone are mostly noise
+    down[0], down[-1] = down[1], down[-2]
     falling: NDArray[np.floating[Any]] = np.maximum(down, 0.0)
     return falling
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sequence of states with the least total cost, where a step's cost depends on the previous state (Viterbi)."""
+"""The sequence of states with the least total cost, where a step's cost depends on the previous
+state (Viterbi).
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,8 @@ def least_cost_path(costs: NDArray[np.float64], switching: NDArray[np.float64]) 
     Ties are resolved in favour of lower state numbers.
 
     :param costs: (T, S) cost of each state.
-    :param switching: (T−1, S, S) cost of going from one state (row) to another (column); inf: impossible.
+    :param switching: (T−1, S, S) cost of going from one state (row) to another (column); inf:
+        impossible.
     :return: (T,) states.
     """
     T, S = costs.shape

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Focal length, shape, up direction and floor from what was seen so far, by the offline stages.
 
-They are estimated from a growing set of observations during the first two seconds. After that, focal length and shape
-stay as they are, and the world follows the last seconds slowly.
+They are estimated from a growing set of observations during the first two seconds. After that,
+focal length and shape stay as they are, and the world follows the last seconds slowly.
 """
 
 from __future__ import annotations
@@ -31,13 +31,16 @@ from ..kinematics.axes import transform_points, world_from_level_camera
 from ..kinematics.contact_points import SOLES
 
 STAGES = 3  # of the approach to an estimate
-SAME_FOCAL = 0.02  # relative difference of focal lengths, for which the lines of the background point alike
+# relative difference of focal lengths, for which the lines of the background point alike
+SAME_FOCAL = 0.02
 SAME_HEIGHT_M, SAME_UP_COS = 0.015, np.cos(np.radians(1.0))  # of two estimates of one floor
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """What all frames share: camera, shape, and the world as up direction, height and horizontal position."""
+    """What all frames share: camera, shape, and the world as up direction, height and horizontal
+    position.
+    """
 
     camera: Camera
     betas: NDArray[np.floating[Any]]  # (P,)
@@ -76,9 +79,11 @@ def _between(camera: Camera, target: Camera, share: float) -> Camera:
 
 
 class GradualCalibration:
-    """A calibration that approaches estimates; its velocity and acceleration continue where a new estimate comes.
+    """A calibration that approaches estimates; its velocity and acceleration continue where a new
+    estimate comes.
 
-    Calibrations x_k follow each other, x_k' = (x_{k-1} - x_k) / s, with the estimate before the first of them.
+    Calibrations x_k follow each other, x_k' = (x_{k-1} - x_k) / s, with the estimate before the
+    first of them.
 
     :param settling_s: s.
     """
@@ -93,9 +98,13 @@ class GradualCalibration:
         :param step_s: seconds since the step before.
         :param world_s: s of the first stage's world, at least that of all others.
         """
-        share, share_of_world = (float(1 - np.exp(-step_s / s)) for s in (self._settling_s, world_s))
+        share, share_of_world = (
+            float(1 - np.exp(-step_s / s)) for s in (self._settling_s, world_s)
+        )
         for k, stage in enumerate(self._stages):
-            self._stages[k] = target = stage.interpolated(target, share, share_of_world if k == 0 else share)
+            self._stages[k] = target = stage.interpolated(
+                target, share, share_of_world if k == 0 else share
+            )
         return target
 
 
@@ -106,7 +115,9 @@ class Calibrator:
     :param height_m: the person's stature, if it is known, metres.
     """
 
-    def __init__(self, body: Body, camera: Camera, size: tuple[int, int], height_m: float | None = None) -> None:
+    def __init__(
+        self, body: Body, camera: Camera, size: tuple[int, int], height_m: float | None = None
+    ) -> None:
         self._body, self._given, self._size, self._height_m = body, camera, size, height_m
         self._fits = FocalFits(body)
         self._costs: list[NDArray[np.float64]] = []
@@ -124,12 +135,17 @@ class Calibrator:
             self._longer_px = longer_content_side(bars, *self._size)
             self._by_edges = camera_by_edges(self._segments, *self._size, self._longer_px)
 
-    def estimate(self, times_s: Sequence[float], observations: Sequence[Observation]) -> Calibration:
+    def estimate(
+        self, times_s: Sequence[float], observations: Sequence[Observation]
+    ) -> Calibration:
         """Estimate everything from all observations so far, at least one."""
         if self._given.focal_deviation > 0.0:
             assumed = assumed_camera(*self._size, self._longer_px)
             for time_s, observation in zip(times_s, observations, strict=True):
-                if self._fits.is_due(time_s) and (costs := self._fits.costs(observation, assumed)) is not None:
+                if (
+                    self._fits.is_due(time_s)
+                    and (costs := self._fits.costs(observation, assumed)) is not None
+                ):
                     self._costs.append(costs)
             camera = camera_by_fits(self._by_edges, assumed, self._costs, self._longer_px)
         else:
@@ -137,13 +153,16 @@ class Calibrator:
         track = track_of(times_s, observations)
         prepared = prepare_track(self._body, track, camera, height_m=self._height_m)
         fitted = fit_track(prepared, lambda *_: None)
-        return self._with_world(Calibration(camera, fitted.betas, np.zeros(3), np.zeros(3)), track, fitted)
+        return self._with_world(
+            Calibration(camera, fitted.betas, np.zeros(3), np.zeros(3)), track, fitted
+        )
 
     def follow(self, calibration: Calibration, track: Track, fitted: FittedTrack) -> Calibration:
         """Estimate the floor's inclination and height again, from the last seconds.
 
-        The horizontal position stays: nothing in the picture says where the origin was. Small differences are ignored,
-        because frames were fitted to the floor as it is: a bias of millimetres would add up for as long as it runs.
+        The horizontal position stays: nothing in the picture says where the origin was. Small
+        differences are ignored, because frames were fitted to the floor as it is: a bias of
+        millimetres would add up for as long as it runs.
         """
         found = self._with_world(calibration, track, fitted)
         higher = abs(found.camera_position[2] - calibration.camera_position[2]) > SAME_HEIGHT_M
@@ -153,14 +172,24 @@ class Calibrator:
         position[2] = found.camera_position[2]
         return replace(calibration, up=found.up, camera_position=position)
 
-    def _with_world(self, calibration: Calibration, track: Track, fitted: FittedTrack) -> Calibration:
-        """Add the world: as offline where no lines tell which way is up, otherwise with their direction."""
+    def _with_world(
+        self, calibration: Calibration, track: Track, fitted: FittedTrack
+    ) -> Calibration:
+        """Add the world: as offline where no lines tell which way is up, otherwise with their
+        direction.
+        """
         placed = place_track(self._body, track, fitted, smoothing=True)
         T = find_world([placed]).T_world_camera
         focal_px = calibration.camera.intrinsics[0, 0]
-        # The search for the lines' direction takes long, so another one follows only where the focal length changes.
-        if len(self._segments.ends_px) and abs(np.log(focal_px / self._focal_of_lines)) > SAME_FOCAL:
-            self._up_of_lines = estimate_up_from_lines(self._segments.lines(calibration.camera), T[2, :3]).up
+        # The search for the lines' direction takes long, so another one follows only where the
+        # focal length changes.
+        if (
+            len(self._segments.ends_px)
+            and abs(np.log(focal_px / self._focal_of_lines)) > SAME_FOCAL
+        ):
+            self._up_of_lines = estimate_up_from_lines(
+                self._segments.lines(calibration.camera), T[2, :3]
+            ).up
             self._focal_of_lines = float(focal_px)
         if self._up_of_lines is not None:
             up, valid = self._up_of_lines, placed.valid

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The body fitted to one observation after another, each from the state of the one before.
 
-The lifting network's window ends with the newest frame, which stands for the samples after it: at the end of a clip,
-it is the same (see `lifter`). A frame whose fit contradicts the lifter is fitted again with the stages of a
-cold start, and keeps the fit of lower cost, as in `frame_sequence`; earlier frames stay as they were given.
+The lifting network's window ends with the newest frame, which stands for the samples after it: at
+the end of a clip, it is the same (see `lifter`). A frame whose fit contradicts the lifter is fitted
+again with the stages of a cold start, and keeps the fit of lower cost, as in `frame_sequence`;
+earlier frames stay as they were given.
 """
 
 from __future__ import annotations
@@ -29,11 +30,14 @@ from ..kinematics.contact_points import CONTACT_POINTS, with_contact_points
 from .feet.support import Support
 
 _SOLE_KEYPOINTS = [
-    KEYPOINT_NAMES.index(f"{side}_{name}") for side in ("left", "right") for name in ("heel", "foot_index")
+    KEYPOINT_NAMES.index(f"{side}_{name}")
+    for side in ("left", "right")
+    for name in ("heel", "foot_index")
 ]
-# Inverse variances of points at rest: 1 cm from their place, 3 mm from the floor. In the sample clip's squat, the
-# distance is wrong by up to 37 cm without them, and by 12 cm with them. Ten times the first lets feet slide no less,
-# and tilts bodies whose feet were first seen at a wrong distance.
+# Inverse variances of points at rest: 1 cm from their place, 3 mm from the floor. In the sample
+# clip's squat, the distance is wrong by up to 37 cm without them, and by 12 cm with them. Ten times
+# the first lets feet slide no less, and tilts bodies whose feet were first seen at a wrong
+# distance.
 _RESTING, _FLOOR = 1e4, 1e5
 SAME_SHAPE = 1e-3  # difference of shape coefficients below which the contact points stay the same
 
@@ -45,7 +49,8 @@ class FittedFrame:
     rotations: NDArray[np.floating[Any]]  # (K+1, 3, 3); row 0 R_camera_root
     root_cam: NDArray[np.floating[Any]]  # (3,) the pelvis, metres
     joint_confidence: NDArray[np.floating[Any]]  # (K+1,) 0..1
-    soles: NDArray[np.floating[Any]]  # (4, 2) where the image shows `SOLES`, normalized image coordinates
+    # (4, 2) where the image shows `SOLES`, normalized image coordinates
+    soles: NDArray[np.floating[Any]]
 
 
 class CausalFit:
@@ -55,12 +60,16 @@ class CausalFit:
     :param height_m: the person's stature, if it is known, metres.
     """
 
-    def __init__(self, body: Body, observation: Observation, camera: Camera, height_m: float | None = None) -> None:
+    def __init__(
+        self, body: Body, observation: Observation, camera: Camera, height_m: float | None = None
+    ) -> None:
         self._shape_of_points: NDArray[np.floating[Any]] | None = None
         prepared = prepare_track(body, single_frame_track(observation), camera, height_m=height_m)
         self._prepared, self._camera = prepared, camera
         weights = replace(prepared.weights, floor=_FLOOR, foot_contact=_RESTING)
-        self._cold, self._warm = (replace(ROBUST, stages=stages(weights)) for stages in (cold_stages, warm_stages))
+        self._cold, self._warm = (
+            replace(ROBUST, stages=stages(weights)) for stages in (cold_stages, warm_stages)
+        )
         # Confidences of joints are means of those of landmarks, here as a matrix (33, K+1).
         self._shares = prepared.measurer.joint_confidence(np.eye(KEYPOINT_COUNT))
         self._measurer = prepared.measurer
@@ -75,16 +84,26 @@ class CausalFit:
         self._camera, self._measurer = camera, Measurer(self._measurer.body, camera.intrinsics)
         if self._last is not None:
             state = self._last.state
-            self._last = replace(self._last, state=replace(state, t_camera_root=state.t_camera_root * [1, 1, ratio]))
+            self._last = replace(
+                self._last, state=replace(state, t_camera_root=state.t_camera_root * [1, 1, ratio])
+            )
 
     def set_shape(self, betas: NDArray[np.floating[Any]]) -> None:
         """Continue with another shape (P,)."""
         self._betas, self._priors = betas, self._prepared.priors_with_shape(betas)
-        if self._shape_of_points is None or np.abs(betas - self._shape_of_points).max(initial=0.0) > SAME_SHAPE:
+        if (
+            self._shape_of_points is None
+            or np.abs(betas - self._shape_of_points).max(initial=0.0) > SAME_SHAPE
+        ):
             self._shape_of_points = betas
             body = with_contact_points(self._prepared.body, betas)
-            self._measurer, self._solver = Measurer(body, self._camera.intrinsics), FrameSolver(body)
-            self._contact_points = np.arange(len(CONTACT_POINTS)) + len(body.keypoint_names) - len(CONTACT_POINTS)
+            self._measurer, self._solver = (
+                Measurer(body, self._camera.intrinsics),
+                FrameSolver(body),
+            )
+            self._contact_points = (
+                np.arange(len(CONTACT_POINTS)) + len(body.keypoint_names) - len(CONTACT_POINTS)
+            )
 
     def fit(
         self,
@@ -96,7 +115,8 @@ class CausalFit:
         """Fit the next observation; None if it does not suffice.
 
         :param time_s: of its frame, later than that of the observation before.
-        :param root_cam: (3,) about where the pelvis is, from feet that rest on the floor, camera frame, metres.
+        :param root_cam: (3,) about where the pelvis is, from feet that rest on the floor, camera
+            frame, metres.
         """
         measurements = self._measure(time_s, observation, root_cam)
         if support is not None and not observation.acquired:
@@ -122,7 +142,9 @@ class CausalFit:
 
     def soles(self, observation: Observation) -> NDArray[np.floating[Any]]:
         """Return where the image shows the soles (4, 2), normalized image coordinates."""
-        return self._measurer.rays(self._camera.undistort(observation.keypoints_px[_SOLE_KEYPOINTS]))
+        return self._measurer.rays(
+            self._camera.undistort(observation.keypoints_px[_SOLE_KEYPOINTS])
+        )
 
     def _solve(self, measurements: Measurements, initial: State | None, options: Options) -> Fit:
         return self._solver.fit(measurements, initial, self._priors, options)
@@ -130,7 +152,9 @@ class CausalFit:
     def _measure(
         self, time_s: float, observation: Observation, root_cam: NDArray[np.floating[Any]] | None
     ) -> Measurements:
-        """Lift the observation within the window that ends with it, and convert it to measurements."""
+        """Lift the observation within the window that ends with it, and convert it to
+        measurements.
+        """
         if observation.acquired:  # maybe of somebody else
             self._window.clear()
         self._window.append((time_s, observation))
@@ -141,6 +165,13 @@ class CausalFit:
         confidence = np.array([o.keypoints_confidence for o in seen])
         pixels = self._camera.undistort(np.array([o.keypoints_px for o in seen]))
         world = np.array([o.world_landmarks for o in seen])
-        windows, rays = windows_around(times, np.ones(len(times), bool)), self._measurer.rays(pixels)
-        lifted = default_lifter().lift_mixture(rays, confidence, world, windows, rows=np.array([len(seen) - 1]))
-        return self._measurer.measure(pixels[-1], confidence[-1], lifted.points[0], lifted.sigma_along[0], root_cam)
+        windows, rays = (
+            windows_around(times, np.ones(len(times), bool)),
+            self._measurer.rays(pixels),
+        )
+        lifted = default_lifter().lift_mixture(
+            rays, confidence, world, windows, rows=np.array([len(seen) - 1])
+        )
+        return self._measurer.measure(
+            pixels[-1], confidence[-1], lifted.points[0], lifted.sigma_along[0], root_cam
+        )

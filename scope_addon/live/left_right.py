@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Left-right swaps without looking ahead: the forward pass of the offline repair.
 
-The cost of reading a frame as detected, swapped, or swapped with reversed depth is that of `tracking/left_right`: how
-far the limbs move since the frame before, and how far they are from the reference network's. The least cost of all
-readings up to a frame decides how it is read,
+The cost of reading a frame as detected, swapped, or swapped with reversed depth is that of
+`tracking/left_right`: how far the limbs move since the frame before, and how far they are from the
+reference network's. The least cost of all readings up to a frame decides how it is read,
 
     C_t(x) = cost_t(x) + min_y (C_{t−1}(y) + d(w_{t−1}(y), w_t(x)) + change · [x ≠ y]).
 
-The reference network answers some frames later, and its answer then counts in its own frame. Only the frame in which a
-person is found waits for it, because nothing else distinguishes left from right there.
+The reference network answers some frames later, and its answer then counts in its own frame. Only
+the frame in which a person is found waits for it, because nothing else distinguishes left from
+right there.
 """
 
 from __future__ import annotations
@@ -40,7 +41,8 @@ class _Frame:
     """The readings of one frame, and what they cost."""
 
     readings: NDArray[np.floating[Any]]  # (3, 12, 3)
-    steps: NDArray[np.floating[Any]]  # (3, 3) of each reading (column) after each of the frame before (row)
+    # (3, 3) of each reading (column) after each of the frame before (row)
+    steps: NDArray[np.floating[Any]]
     costs: NDArray[np.floating[Any]]  # (3,) of each reading itself
     reference: PendingReference | None  # until its answer is added
 
@@ -56,7 +58,8 @@ class _Frame:
 class CausalLeftRight:
     """Reads the observations of one person, in order.
 
-    :param wait: for every answer of the reference network, so that results do not depend on the speed of threads.
+    :param wait: for every answer of the reference network, so that results do not depend on the
+        speed of threads.
     """
 
     def __init__(self, *, wait: bool = False) -> None:
@@ -75,7 +78,9 @@ class CausalLeftRight:
         if self._frames:
             steps = mean_distance(self._frames[-1].readings[:, None], readings[None])
             steps = steps + CHANGE_COST_M * (1 - np.eye(3))
-        self._frames.append(_Frame(readings, steps, reading_costs(), observation.reference_landmarks))
+        self._frames.append(
+            _Frame(readings, steps, reading_costs(), observation.reference_landmarks)
+        )
         for frame in self._frames:
             frame.add_reference(wait=self._wait or observation.acquired)
         label = self._label()
@@ -89,12 +94,16 @@ class CausalLeftRight:
         )
 
     def _label(self) -> int:
-        """Return the reading of the last frame, and forget frames that no answer can change any more."""
+        """Return the reading of the last frame, and forget frames that no answer can change any
+        more.
+        """
         totals = [self._before]
         for frame in self._frames:
             total = (totals[-1][:, None] + frame.steps).min(axis=0) + frame.costs
             totals.append(total - total.min())
-        while len(self._frames) > 1 and (self._frames[0].reference is None or len(self._frames) > _MAX_FRAMES):
+        while len(self._frames) > 1 and (
+            self._frames[0].reference is None or len(self._frames) > _MAX_FRAMES
+        ):
             self._frames.popleft()
             totals.pop(0)
             self._before = totals[0]

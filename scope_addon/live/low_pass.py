@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Causal low-pass filters that make up for most of their own delay.
 
-n first-order filters in a row, x̂ += a (x − x̂) with a = 1 / (1 + 1 / (2π f dt)) and the time step dt, suppress noise
-with the n-th power of its frequency, and delay steady motion by n / (2π f), whatever the frame rate. The result is
-moved on by its own velocity times a lead, which takes that much of the delay away. Rotations take the fraction a of
-the rotation from R̂ to R.
+n first-order filters in a row, x̂ += a (x − x̂) with a = 1 / (1 + 1 / (2π f dt)) and the time step
+dt, suppress noise with the n-th power of its frequency, and delay steady motion by n / (2π f),
+whatever the frame rate. The result is moved on by its own velocity times a lead, which takes that
+much of the delay away. Rotations take the fraction a of the rotation from R̂ to R.
 
-On fits of four clips at 60 frames/s and one at 30, compared with the offline motion, the delay decides: six filters of
-5.5 Hz with a delay of 60 ms have two thirds of the jitter of six of 7 Hz with 33 ms, and deviate as much. The best
-response of any form and of the same delay (fitted to three of the clips) has an eighth less jitter on the fourth.
-Cutoff frequencies that fall with speed add jitter of their own, and deviate more. A Kalman filter of constant velocity
-or acceleration with the same delay jitters twice as much, because every innovation is a jump in its derivatives.
+On fits of four clips at 60 frames/s and one at 30, compared with the offline motion, the delay
+decides: six filters of 5.5 Hz with a delay of 60 ms have two thirds of the jitter of six of 7 Hz
+with 33 ms, and deviate as much. The best response of any form and of the same delay (fitted to
+three of the clips) has an eighth less jitter on the fourth. Cutoff frequencies that fall with speed
+add jitter of their own, and deviate more. A Kalman filter of constant velocity or acceleration with
+the same delay jitters twice as much, because every innovation is a jump in its derivatives.
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ from numpy.typing import NDArray
 from ...solver import rotations
 
 LONGEST_STEP_S = 0.5  # after a longer pause, a filter starts again
-LEAD_FROM_S = 0.4  # after the start, until when the velocity is not yet known; the lead grows during this time
+# after the start, until when the velocity is not yet known; the lead grows during this time
+LEAD_FROM_S = 0.4
 
 
 @dataclass(frozen=True)
@@ -77,11 +79,15 @@ class VectorFilter:
             self._values[k] = x = self._between(state, x, share)
         return self._beyond(before, x, self._response.lead(self._age_s) / step_s)
 
-    def _between(self, a: NDArray[np.float64], b: NDArray[np.float64], share: float) -> NDArray[np.float64]:
+    def _between(
+        self, a: NDArray[np.float64], b: NDArray[np.float64], share: float
+    ) -> NDArray[np.float64]:
         """Return what lies between a and b, at a share of the way."""
         return a + share * (b - a)
 
-    def _beyond(self, a: NDArray[np.float64], b: NDArray[np.float64], lead: float) -> NDArray[np.float64]:
+    def _beyond(
+        self, a: NDArray[np.float64], b: NDArray[np.float64], lead: float
+    ) -> NDArray[np.float64]:
         """Return what lies beyond b, by a multiple of the way from a."""
         return b + lead * (b - a)
 
@@ -89,9 +95,13 @@ class VectorFilter:
 class RotationFilter(VectorFilter):
     """Filters rotations (J, 3, 3), each for itself."""
 
-    def _between(self, a: NDArray[np.float64], b: NDArray[np.float64], share: float) -> NDArray[np.float64]:
+    def _between(
+        self, a: NDArray[np.float64], b: NDArray[np.float64], share: float
+    ) -> NDArray[np.float64]:
         between = a @ rotations.exp(share * rotations.log(np.swapaxes(a, 1, 2) @ b))
         return rotations.nearest_rotation(between)  # without what rounding has added up
 
-    def _beyond(self, a: NDArray[np.float64], b: NDArray[np.float64], lead: float) -> NDArray[np.float64]:
+    def _beyond(
+        self, a: NDArray[np.float64], b: NDArray[np.float64], lead: float
+    ) -> NDArray[np.float64]:
         return b @ rotations.exp(lead * rotations.log(np.swapaxes(a, 1, 2) @ b))

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Several people of one source: a given number of sessions, and who is followed by which of them.
 
-Who is tracked from frame to frame keeps their session. Somebody who is found again gets the session of the person whose
-position, motion, size and clothes match best, by the costs with which offline captures link tracklets, but decided at
-once. Otherwise a new person gets the first session that has followed nobody yet, then one whose person has been away
-for long, and else none.
+Who is tracked from frame to frame keeps their session. Somebody who is found again gets the session
+of the person whose position, motion, size and clothes match best, by the costs with which offline
+captures link tracklets, but decided at once. Otherwise a new person gets the first session that has
+followed nobody yet, then one whose person has been away for long, and else none.
 
-The first person is who was largest when the capture began. Camera and floor are estimated from them, and the others
-stand in the same world.
+The first person is who was largest when the capture began. Camera and floor are estimated from
+them, and the others stand in the same world.
 """
 
 from __future__ import annotations
@@ -36,7 +36,9 @@ _NEW_SHARE = 0.3  # of the newest frame in the velocity of somebody who is seen
 
 @dataclass(eq=False)
 class _FollowedPerson:
-    """A session, and who is followed by it: their tracklet, where they were seen last, and the sum of appearances."""
+    """A session, and who is followed by it: their tracklet, where they were seen last, and the sum
+    of appearances.
+    """
 
     session: LiveSession
     tracklet: int | None = None
@@ -87,7 +89,9 @@ class LivePeople:
         self._tracker, self._exposure = tracker, AutoExposure()
         heights = [*heights_m, *[None] * count][:count]
         first = LiveSession(body, camera, size, heights[0], executor)
-        others = [LiveSession(body, camera, size, height, executor, first) for height in heights[1:]]
+        others = [
+            LiveSession(body, camera, size, height, executor, first) for height in heights[1:]
+        ]
         self._followed = [_FollowedPerson(session) for session in (first, *others)]
 
     @property
@@ -99,9 +103,12 @@ class LivePeople:
         """Return the poses in the next frame, one of each person."""
         image_rgb = self._exposure.brighten(frame.image_rgb)
         observations = dict(self._tracker.step(image_rgb, None, frame.timestamp_s))
-        if len(self._followed) == 1:  # who stays the same while they are seen, and then is the largest one
+        # who stays the same while they are seen, and then is the largest one
+        if len(self._followed) == 1:
             if self._followed[0].tracklet not in observations:
-                largest = max(observations, key=lambda k: observations[k].region.side_px, default=None)
+                largest = max(
+                    observations, key=lambda k: observations[k].region.side_px, default=None
+                )
                 self._followed[0].tracklet = largest
         else:
             self._assign_people(observations, frame.timestamp_s)
@@ -112,13 +119,22 @@ class LivePeople:
         return poses
 
     def _assign_people(self, observations: Mapping[int, Observation], time_s: float) -> None:
-        """Give sessions to those who have none, as far as there are free ones, and note who was seen."""
-        by_tracklet: dict[int | None, _FollowedPerson] = {person.tracklet: person for person in self._followed}
+        """Give sessions to those who have none, as far as there are free ones, and note who was
+        seen.
+        """
+        by_tracklet: dict[int | None, _FollowedPerson] = {
+            person.tracklet: person for person in self._followed
+        }
         new = [tracklet for tracklet in observations if tracklet not in by_tracklet]
         new.sort(key=lambda tracklet: -observations[tracklet].region.side_px)
         away = [person for person in self._followed if person.tracklet not in observations]
         known = [person for person in away if person.end is not None]
-        cost = np.array([[person.link_cost(observations[tracklet], time_s) for tracklet in new] for person in known])
+        cost = np.array(
+            [
+                [person.link_cost(observations[tracklet], time_s) for tracklet in new]
+                for person in known
+            ]
+        )
         links = cheapest_links(cost.reshape(len(known), len(new)), MAX_LINK_COST)
         found_again = {new[j]: known[i] for i, j in links.items()}
         free = [p for p in away if p not in found_again.values() and time_s - p.last_s > LONG_GAP_S]
@@ -134,7 +150,9 @@ class LivePeople:
 
 
 def _end(observation: Observation, time_s: float, before: End | None = None) -> End:
-    """Return where somebody is seen, and how fast they move if it is known where they were before."""
+    """Return where somebody is seen, and how fast they move if it is known where they were
+    before.
+    """
     center, velocity = trunk_px(observation.keypoints_px), np.zeros(2)
     if before is not None:
         velocity = before.velocity_px

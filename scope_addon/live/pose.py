@@ -21,13 +21,15 @@ class Presence(Enum):
 
 @dataclass(frozen=True)
 class LivePose:
-    """The body in one frame; lengths in metres. Before somebody was seen, the rest pose in front of the camera.
+    """The body in one frame; lengths in metres. Before somebody was seen, the rest pose in front of
+    the camera.
 
-    ``rotations`` (K+1, 3, 3): row 0 R_camera_root, the others relative to their parents; ``root_cam`` (3,) the pelvis;
-    ``joints`` (K+1, 3) world; ``contact`` (4,) probability that each point of the soles rests on the floor;
-    ``raw_rotations`` and ``raw_root_cam``: before smoothing and foot locking; ``keypoints`` (33, 3) pixels and
-    confidence, zeros where the person is not seen; ``is_settled``: whether size, focal length and floor have been
-    estimated from enough frames.
+    ``rotations`` (K+1, 3, 3): row 0 R_camera_root, the others relative to their parents;
+    ``root_cam`` (3,) the pelvis; ``joints`` (K+1, 3) world; ``contact`` (4,) probability that each
+    point of the soles rests on the floor; ``raw_rotations`` and ``raw_root_cam``: before smoothing
+    and foot locking; ``keypoints`` (33, 3) pixels and confidence, zeros where the person is not
+    seen; ``is_settled``: whether size, focal length and floor have been estimated from enough
+    frames.
     """
 
     index: int  # of the source's frame

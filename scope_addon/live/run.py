@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The loop of a live capture: the newest frame in, a pose out to everybody who listens, until the source or user ends.
+"""The loop of a live capture: the newest frame in, a pose out to everybody who listens, until the
+source or user ends.
 
-Networks and solver are loaded before the source is opened. The first pose takes longer than the others, because it
-includes the first estimates of focal length, shape and floor.
+Networks and solver are loaded before the source is opened. The first pose takes longer than the
+others, because it includes the first estimates of focal length, shape and floor.
 """
 
 from __future__ import annotations
@@ -48,7 +49,9 @@ class LiveOptions:
 
     @classmethod
     def of(cls, values: Mapping[str, Any]) -> LiveOptions:
-        """Return the options from their values by name, as the command line and a request have them."""
+        """Return the options from their values by name, as the command line and a request have
+        them.
+        """
         return cls(
             quality=values["live_quality"],
             people=values["live_people"],
@@ -92,12 +95,16 @@ class LiveProgress:
 
 @dataclass(frozen=True)
 class Listeners:
-    """Callbacks of a live capture: ``say`` gets sentences, ``progress`` the state of the capture, from time to time."""
+    """Callbacks of a live capture: ``say`` gets sentences, ``progress`` the state of the capture,
+    from time to time.
+    """
 
     say: Callable[[str], None] = lambda _: None
     progress: Callable[[LiveProgress], None] = lambda _: None
-    camera: Callable[[LivePeople, tuple[int, int]], None] = lambda *_: None  # once the first frame has come
-    received: Callable[[Picture], None] = lambda _: None  # every frame, from another thread, which must not be delayed
+    # once the first frame has come
+    camera: Callable[[LivePeople, tuple[int, int]], None] = lambda *_: None
+    # every frame, from another thread, which must not be delayed
+    received: Callable[[Picture], None] = lambda _: None
 
 
 def run_live(
@@ -108,7 +115,8 @@ def run_live(
     listeners: Listeners,
     clock: Clock | None = None,
 ) -> dict[str, Any]:
-    """Capture until the source ends, the clock is stopped, or a KeyboardInterrupt comes; return the report.
+    """Capture until the source ends, the clock is stopped, or a KeyboardInterrupt comes; return the
+    report.
 
     :raises ScopeError: an option is invalid, the source cannot be read, or an output failed.
     """
@@ -117,16 +125,28 @@ def run_live(
     clock = clock or Clock()
     execution = Execution(options.provider)
     people = options.people if options.people > 1 else None  # None: the largest one
-    tracker = PeopleTracker(options.quality, network_threads(options.threads, execution), people, execution=execution)
+    tracker = PeopleTracker(
+        options.quality, network_threads(options.threads, execution), people, execution=execution
+    )
     for warning in execution.warnings:  # fewer cores than threads, or a provider that fell back
         listeners.say(warning)
     LiveBody(body, assumed_camera(*CAMERA_SIZE, CAMERA_SIZE[0])).load()
     statistics = Statistics()
     reader = NewestFrame(source, clock, options.reconnect_s, listeners.say, listeners.received)
     stopped = False
-    with ThreadPoolExecutor(1, "scope-live-calibration") as executor, opencv_in_one_thread(), reader:
+    with (
+        ThreadPoolExecutor(1, "scope-live-calibration") as executor,
+        opencv_in_one_thread(),
+        reader,
+    ):
         try:
-            _loop(reader, _Poses(source, body, options, tracker, executor, listeners), outputs, statistics, listeners)
+            _loop(
+                reader,
+                _Poses(source, body, options, tracker, executor, listeners),
+                outputs,
+                statistics,
+                listeners,
+            )
         except KeyboardInterrupt:
             stopped = True
         finally:
@@ -145,7 +165,9 @@ def run_live(
 
 
 class _Poses:
-    """Opens sessions for the size of the frames, and other ones where that changes, as after a reconnection."""
+    """Opens sessions for the size of the frames, and other ones where that changes, as after a
+    reconnection.
+    """
 
     def __init__(
         self,
@@ -167,7 +189,8 @@ class _Poses:
         if self._people is None or self._size != (width, height):
             if self._people is not None:
                 self._listeners.say(
-                    f"{self._source.name} now delivers images of another shape ({width} × {height}): body, lens and"
+                    f"{self._source.name} now delivers images of another shape ({width} × "
+                    f"{height}): body, lens and"
                     " floor are estimated again, and a recording ends with the image before"
                 )
             options = self._options
@@ -195,7 +218,11 @@ class _Poses:
 
 
 def _loop(
-    reader: NewestFrame, poses: _Poses, outputs: Sequence[Output], statistics: Statistics, listeners: Listeners
+    reader: NewestFrame,
+    poses: _Poses,
+    outputs: Sequence[Output],
+    statistics: Statistics,
+    listeners: Listeners,
 ) -> None:
     shown_s = -PROGRESS_S
     while (picture := reader.take()) is not None:
@@ -209,5 +236,6 @@ def _loop(
             shown_s = now_s
             median_ms, p95_ms = statistics.latency_ms()
             rate, counts = statistics.recent_rate, (reader.dropped, reader.received, reader.damaged)
-            presence = min((pose.presence for pose in found), key=list(Presence).index)  # of whoever is seen best
+            # of whoever is seen best
+            presence = min((pose.presence for pose in found), key=list(Presence).index)
             listeners.progress(LiveProgress(presence, rate, median_ms, p95_ms, *counts))

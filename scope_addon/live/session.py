@@ -28,20 +28,24 @@ from .smoothing import PoseFilter
 
 CALIBRATED_S = 2.0  # after the person was first seen
 CALIBRATE_AT_S = (0.0, 0.3, 0.7, 1.2, CALIBRATED_S)
-FOLLOW_S, FOLLOWED_S = 1.0, 4.0  # between two estimates of the world afterwards, and how much each of them sees
+# between two estimates of the world afterwards, and how much each of them sees
+FOLLOW_S, FOLLOWED_S = 1.0, 4.0
 # Time constants towards the estimates, see `GradualCalibration`.
 SETTLING_S = 0.1
 FOLLOWING_S = 10.0  # at least
 SETTLED_S = 1.5  # after the last of the first estimates, when these have long been reached
 CERTAIN_S = 60.0  # for which the world has been known when it has moved almost for the last time
 HOLD_S = 0.5  # for which the pose of a person who is not seen is held, rather than lost
-FLOOR_MEMORY_S = 2.0  # for which somebody who stood on the floor and is not seen is still not below it
+# for which somebody who stood on the floor and is not seen is still not below it
+FLOOR_MEMORY_S = 2.0
 
 Start = Callable[..., "Future[Calibration]"]
 
 
 def start_at_once(function: Callable[..., Calibration], *args: object) -> Future[Calibration]:
-    """Call a function as an executor would, but before returning: results do not depend on the speed of threads."""
+    """Call a function as an executor would, but before returning: results do not depend on the
+    speed of threads.
+    """
     future: Future[Calibration] = Future()
     future.set_result(function(*args))
     return future
@@ -50,9 +54,9 @@ def start_at_once(function: Callable[..., Calibration], *args: object) -> Future
 def following_s(known_s: float) -> float:
     """Return the time constant with which a settled world follows its estimates.
 
-    With the weight 1 / t, the world is the mean of all estimates. They come from frames that were fitted to the floor
-    as it was: a bias b of theirs moves that mean by b ln(t), without end. After c = `CERTAIN_S`, the weight is c / t²,
-    and the world moves by b once more.
+    With the weight 1 / t, the world is the mean of all estimates. They come from frames that were
+    fitted to the floor as it was: a bias b of theirs moves that mean by b ln(t), without end. After
+    c = `CERTAIN_S`, the weight is c / t², and the world moves by b once more.
 
     :param known_s: for how long there have been estimates.
     """
@@ -74,8 +78,10 @@ class LiveSession:
     :param camera: as known from the user or the source.
     :param size: width and height of the frames, pixels.
     :param height_m: the person's stature, if it is known, metres.
-    :param executor: of one thread, in which everything but the first calibration runs; None: in the calling thread.
-    :param first_person: session of the source's first person, whose camera and world are taken; None: estimate them.
+    :param executor: of one thread, in which everything but the first calibration runs; None: in the
+        calling thread.
+    :param first_person: session of the source's first person, whose camera and world are taken;
+        None: estimate them.
     """
 
     def __init__(
@@ -87,7 +93,12 @@ class LiveSession:
         executor: Executor | None = None,
         first_person: LiveSession | None = None,
     ) -> None:
-        self._body, self._size, self._height_m, self._first_person = body, size, height_m, first_person
+        self._body, self._size, self._height_m, self._first_person = (
+            body,
+            size,
+            height_m,
+            first_person,
+        )
         self._start: Start = executor.submit if executor else start_at_once
         self._calibrator = Calibrator(body, camera, size, height_m)
         self._filter, self._feet = PoseFilter(), FootHold(body)
@@ -106,7 +117,8 @@ class LiveSession:
     def step(self, frame: Frame, observation: Observation | None) -> LivePose:
         """Return the pose in the next frame, in which the person was observed, or not."""
         observation = None if observation is None else self._left_right(observation)
-        if frame.timestamp_s - self._last_s > FLOOR_MEMORY_S:  # the computer slept, or the source was interrupted
+        # the computer slept, or the source was interrupted
+        if frame.timestamp_s - self._last_s > FLOOR_MEMORY_S:
             self._first_s += frame.timestamp_s - self._last_s
         fitted = self._fit_person(frame, observation) if observation is not None else None
         self._settle(frame.timestamp_s)
@@ -119,7 +131,11 @@ class LiveSession:
 
     def _fit_person(self, frame: Frame, observation: Observation) -> FittedFrame | None:
         time_s = frame.timestamp_s
-        values = (observation.keypoints_px, observation.keypoints_confidence, observation.world_landmarks)
+        values = (
+            observation.keypoints_px,
+            observation.keypoints_confidence,
+            observation.world_landmarks,
+        )
         if not all(np.isfinite(value).all() for value in values):
             return None
         if self._fit is None:
@@ -135,7 +151,9 @@ class LiveSession:
             self._fit = CausalFit(self._body, observation, self._current.camera, self._height_m)
             self._fit.set_shape(self._current.betas)
             self._first_s, self._calibrations = time_s, 1
-        fitted = self._fit.fit(time_s, observation, self._root_of_feet(time_s), self._support(time_s, observation))
+        fitted = self._fit.fit(
+            time_s, observation, self._root_of_feet(time_s), self._support(time_s, observation)
+        )
         if fitted is not None:
             self._seen.append(_Seen(time_s, observation, fitted))
             while self._seen[0].time_s < time_s - FOLLOWED_S:
@@ -143,12 +161,18 @@ class LiveSession:
         return fitted
 
     def _root_of_feet(self, time_s: float) -> NDArray[np.floating[Any]] | None:
-        """Return about where the pelvis is, camera frame, if feet rested on the floor in the frame before.
+        """Return about where the pelvis is, camera frame, if feet rested on the floor in the frame
+        before.
 
-        The size of a body in the picture does not tell a squat from a step back, but feet at rest do.
+        The size of a body in the picture does not tell a squat from a step back, but feet at rest
+        do.
         """
         is_recent = time_s - self._last_seen_s < HOLD_S
-        return self._last.root_cam if self._last is not None and is_recent and self._feet.is_holding else None
+        return (
+            self._last.root_cam
+            if self._last is not None and is_recent and self._feet.is_holding
+            else None
+        )
 
     def _support(self, time_s: float, observation: Observation) -> Support | None:
         """Return what the body stands on, if it was seen a moment ago."""
@@ -160,27 +184,40 @@ class LiveSession:
 
     def _settle(self, time_s: float) -> None:
         """Start estimates that are due, take those that are done, and approach the newest one."""
-        if self._fit is None or self._current is None or self._target is None or self._gradual is None:
+        if (
+            self._fit is None
+            or self._current is None
+            or self._target is None
+            or self._gradual is None
+        ):
             return
         if self._pending is not None and self._pending.done():
             self._target, self._pending = self._pending.result(), None
         if self._pending is None:
             self._start_estimate(time_s)
-        step_s = float(np.clip(time_s - self._last_s, 0.0, HOLD_S)) if np.isfinite(self._last_s) else 0.0
+        step_s = (
+            float(np.clip(time_s - self._last_s, 0.0, HOLD_S)) if np.isfinite(self._last_s) else 0.0
+        )
         world_s = following_s(time_s - self._first_s) if self.is_settled(time_s) else SETTLING_S
         before = self._current
-        self._current = self._in_first_persons_world(self._gradual.step(self._target, step_s, world_s))
+        self._current = self._in_first_persons_world(
+            self._gradual.step(self._target, step_s, world_s)
+        )
         if self._current.camera is not before.camera:
             self._fit.set_camera(self._current.camera)
         if not np.array_equal(self._current.betas, before.betas):
             self._fit.set_shape(self._current.betas)
 
     def _in_first_persons_world(self, calibration: Calibration) -> Calibration:
-        """Return the calibration with camera and world of the person from whom they are taken, if there is one."""
+        """Return the calibration with camera and world of the person from whom they are taken, if
+        there is one.
+        """
         world = self._first_person._current if self._first_person is not None else None
         if world is None:
             return calibration
-        return replace(calibration, camera=world.camera, up=world.up, camera_position=world.camera_position)
+        return replace(
+            calibration, camera=world.camera, up=world.up, camera_position=world.camera_position
+        )
 
     def _start_estimate(self, time_s: float) -> None:
         times, observations = [s.time_s for s in self._seen], [s.observation for s in self._seen]
@@ -188,14 +225,17 @@ class LiveSession:
             return
         if self._calibrations < len(CALIBRATE_AT_S):
             if time_s - self._first_s >= CALIBRATE_AT_S[self._calibrations]:
-                self._calibrations = int(np.searchsorted(CALIBRATE_AT_S, time_s - self._first_s, side="right"))
+                self._calibrations = int(
+                    np.searchsorted(CALIBRATE_AT_S, time_s - self._first_s, side="right")
+                )
                 self._pending = self._start(self._calibrator.estimate, times, observations)
                 self._next_follow_s = time_s + FOLLOW_S
         elif time_s >= self._next_follow_s and self._first_person is None:
             self._next_follow_s = time_s + FOLLOW_S
             track, fitted = track_of(times, observations), self._fitted_track()
             known, now = self._target, self._current
-            if self.is_settled(time_s) and now is not None:  # estimates that agree with the world as it is leave it so
+            # estimates that agree with the world as it is leave it so
+            if self.is_settled(time_s) and now is not None:
                 known = replace(known, up=now.up, camera_position=now.camera_position)
             self._pending = self._start(self._calibrator.follow, known, track, fitted)
 
@@ -213,7 +253,10 @@ class LiveSession:
 
     def is_settled(self, time_s: float) -> bool:
         """Whether the estimates of the first seconds have been reached at this time."""
-        return bool(self._calibrations == len(CALIBRATE_AT_S) and time_s - self._first_s > CALIBRATED_S + SETTLED_S)
+        return bool(
+            self._calibrations == len(CALIBRATE_AT_S)
+            and time_s - self._first_s > CALIBRATED_S + SETTLED_S
+        )
 
     @property
     def camera(self) -> Camera | None:
@@ -230,7 +273,9 @@ class LiveSession:
         rotations, root = self._filter(fitted.rotations, fitted.root_cam, time_s)
         smooth = replace(fitted, rotations=rotations, root_cam=root)
         rotations, contact = self._feet.hold(time_s, now.betas, smooth, T, self.is_settled(time_s))
-        keypoints = np.concatenate([observation.keypoints_px, observation.keypoints_confidence[:, None]], axis=1)
+        keypoints = np.concatenate(
+            [observation.keypoints_px, observation.keypoints_confidence[:, None]], axis=1
+        )
         return LivePose(
             frame.index,
             time_s,
@@ -267,7 +312,10 @@ class LiveSession:
         rotations = np.concatenate([state.R_camera_root[None], state.Omega])
         height = float(body.stature(state.beta)) / 2
         level = Calibration(
-            Camera(np.eye(3), np.zeros(5), ""), state.beta, np.array([0, -1.0, 0]), np.array([0, -3.0, height])
+            Camera(np.eye(3), np.zeros(5), ""),
+            state.beta,
+            np.array([0, -1.0, 0]),
+            np.array([0, -3.0, height]),
         )
         T, root = level.T_world_camera, state.t_camera_root
         joints = self._joints(state.beta, rotations, root, T)

@@ -12,7 +12,8 @@ from .low_pass import Response, RotationFilter, VectorFilter
 
 DELAY_S = 0.06  # of every pose, whatever the frame rate: later frames separate noise from motion
 MOTION = Response.delayed(stages=6, cutoff_hz=5.5, delay_s=DELAY_S)
-DISTANCE = Response.delayed(stages=5, cutoff_hz=3.5, delay_s=DELAY_S)  # its logarithm: noisier than the direction
+# its logarithm: noisier than the direction
+DISTANCE = Response.delayed(stages=5, cutoff_hz=3.5, delay_s=DELAY_S)
 
 
 class PoseFilter:
@@ -29,7 +30,10 @@ class PoseFilter:
             each.reset()
 
     def __call__(
-        self, rotations: NDArray[np.floating[Any]], root_cam: NDArray[np.floating[Any]], time_s: float
+        self,
+        rotations: NDArray[np.floating[Any]],
+        root_cam: NDArray[np.floating[Any]],
+        time_s: float,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return filtered rotations (K+1, 3, 3) and pelvis (3,).
 
@@ -40,4 +44,6 @@ class PoseFilter:
         distance = max(float(np.linalg.norm(root_cam)), 1e-6)
         ray = self._direction(root_cam / distance, step_s)
         log_distance = self._distance(np.array([np.log(distance)]), step_s)
-        return self._rotations(rotations, step_s), ray / np.linalg.norm(ray) * np.exp(log_distance[0])
+        return self._rotations(rotations, step_s), ray / np.linalg.norm(ray) * np.exp(
+            log_distance[0]
+        )

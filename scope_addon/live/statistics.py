@@ -48,7 +48,9 @@ class Statistics:
         return (self.poses - 1) / length if length > 0 else 0.0
 
     def latency_ms(self) -> tuple[float, float]:
-        """Return the median and the 95th percentile in milliseconds; zeros before the first pose."""
+        """Return the median and the 95th percentile in milliseconds; zeros before the first
+        pose.
+        """
         if not self._latencies:
             return 0.0, 0.0
         median, p95 = np.percentile(self._latencies, [50, 95])

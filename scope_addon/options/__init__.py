@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The options of a capture, each declared once. Standard library only: no bpy, no numpy, no other part of Scope.
+"""The options of a capture, each declared once. Standard library only: no bpy, no numpy, no other
+part of Scope.
 
-The arguments of the command line (`command_line.arguments`), the request to the worker (`job.request`), and the
-properties of the panel and of the preferences (`ui.declared_properties`) are made from these records. The typed fields
-of `capture.options.CaptureOptions` take their defaults from them; a test compares the two. To add an option, add a
-record to `capture`, `networks`, `output`, `motion_import` or `live`.
+The arguments of the command line (`command_line.arguments`), the request to the worker
+(`job.request`), and the properties of the panel and of the preferences (`ui.declared_properties`)
+are made from these records. The typed fields of `capture.options.CaptureOptions` take their
+defaults from them; a test compares the two. To add an option, add a record to `capture`,
+`networks`, `output`, `motion_import` or `live`.
 """
 
 from __future__ import annotations

@@ -28,7 +28,12 @@ PEOPLE = (
 _COUNT = Choice("count", "At Most", "The most prominent people, up to a number", 2)
 BODIES = (
     Choice("scope", "Body", "The built-in body with SMPL's 24 joints", 0),
-    Choice("scope_h", "Body with Hands", "The built-in body with SMPL+H's 52 joints, fingers included", 1),
+    Choice(
+        "scope_h",
+        "Body with Hands",
+        "The built-in body with SMPL+H's 52 joints, fingers included",
+        1,
+    ),
     Choice("file", "From File", "Your own SMPL, SMPL+H, SMPL-X or STAR file", 2),
 )
 HANDS = (  # the numbers of off and on are those that .blend files stored when hands were a checkbox
@@ -40,7 +45,12 @@ LENSES = (
     Choice("auto", "Automatic", "Read from the file's metadata if present, estimated otherwise", 0),
     Choice("focal", "Focal Length", "Enter the 35 mm equivalent focal length", 1),
     Choice("fov", "Field of View", "Enter the field of view along the longer side of the image", 2),
-    Choice("file", "Calibration", "Read focal lengths, principal point and distortion from a calibration file", 3),
+    Choice(
+        "file",
+        "Calibration",
+        "Read focal lengths, principal point and distortion from a calibration file",
+        3,
+    ),
 )
 
 
@@ -63,7 +73,9 @@ def _parse_heights(text: str) -> tuple[float, ...]:
     try:
         return tuple(float(number) / 100 for number in numbers)
     except ValueError as error:
-        raise ValueError("must be in centimetres, such as 175, or 175,162 for two people") from error
+        raise ValueError(
+            "must be in centimetres, such as 175, or 175,162 for two people"
+        ) from error
 
 
 def _range_limit(settings: Any, name: str) -> str | None:
@@ -85,13 +97,16 @@ CAPTURE_OPTIONS = (
         choices=PEOPLE,
         argument=Argument(
             metavar="N|all|largest",
-            help="people to capture: at most N, all, or largest, the most prominent person over the clip; candidates"
+            help="people to capture: at most N, all, or largest, the most prominent person over "
+            "the clip; candidates"
             " smaller than half the largest person are ignored",
             parse=_parse_people,
         ),
         blender=Property(
             choices=(*PEOPLE, _COUNT),
-            value=lambda settings: settings.people_count if settings.people == "COUNT" else settings.people.lower(),
+            value=lambda settings: (
+                settings.people_count if settings.people == "COUNT" else settings.people.lower()
+            ),
         ),
     ),
     Option(
@@ -110,7 +125,9 @@ CAPTURE_OPTIONS = (
         None,
         Place.COMMAND_LINE | Place.WORKER | Place.PANEL,
         "start of the captured part, in seconds",
-        argument=Argument(metavar="TIME", help="start time: seconds, MM:SS, HH:MM:SS.mmm or HH:MM:SS:FF"),
+        argument=Argument(
+            metavar="TIME", help="start time: seconds, MM:SS, HH:MM:SS.mmm or HH:MM:SS:FF"
+        ),
         blender=Property(
             "range_start",
             "From",
@@ -160,7 +177,10 @@ CAPTURE_OPTIONS = (
         "scope",
         Place.COMMAND_LINE | Place.WORKER | Place.PANEL | Place.IMPORT | _LIVE,
         "the body that is fitted to the person",
-        argument=Argument(help="body model: scope, scope_h, scope_child, scope_child_h, or your own .npz or .pkl file"),
+        argument=Argument(
+            help="body model: scope, scope_h, scope_child, scope_child_h, or your "
+            "own .npz or .pkl file"
+        ),
         blender=Property(choices=BODIES),
     ),
     Option(
@@ -179,7 +199,8 @@ CAPTURE_OPTIONS = (
         choices=HANDS,
         argument=Argument(
             metavar=f"{OFF}|{AUTO}|{ON}",
-            help="capture the fingers as well, on scope_h (or scope_child_h) unless --body names another body; auto:"
+            help="capture the fingers as well, on scope_h (or scope_child_h) unless --body names "
+            "another body; auto:"
             " only of hands that are large enough in the image; --hands alone means on",
             bare=ON,
         ),
@@ -206,7 +227,8 @@ CAPTURE_OPTIONS = (
         blender=Property(
             "height_cm",
             "Height (cm)",
-            "Height of the most prominent person in centimetres; sets the scale of the scene. 0: estimated from the"
+            "Height of the most prominent person in centimetres; sets the scale of the scene. 0: "
+            "estimated from the"
             " footage, for adults usually within 10 %; enter that of a child",
             unit="cm",
             default=0.0,
@@ -216,7 +238,14 @@ CAPTURE_OPTIONS = (
             keywords={"step": 100, "precision": 0},
         ),
     ),
-    Option("lens", str, "auto", Place.PANEL, "where the camera's focal length comes from", choices=LENSES),
+    Option(
+        "lens",
+        str,
+        "auto",
+        Place.PANEL,
+        "where the camera's focal length comes from",
+        choices=LENSES,
+    ),
     Option(
         "focal_mm",
         float,
@@ -229,7 +258,8 @@ CAPTURE_OPTIONS = (
         argument=Argument(metavar="MM"),
         blender=Property(
             label="Focal Length",
-            description="35 mm equivalent focal length in millimetres; a phone's main camera has about 26",
+            description="35 mm equivalent focal length in millimetres; a phone's main camera has "
+            "about 26",
             default=26.0,
             minimum=4.0,
             value=lambda settings: settings.focal_mm if settings.lens == "FOCAL" else None,
@@ -262,7 +292,8 @@ CAPTURE_OPTIONS = (
         Path,
         None,
         _EVERYWHERE | _LIVE,
-        "JSON file with OpenCV intrinsics (3x3), optionally dist (five values) and size (width, height)",
+        "JSON file with OpenCV intrinsics (3x3), optionally dist (five values) and size (width, "
+        "height)",
         argument=Argument(metavar="FILE", help="JSON file with intrinsics, dist and size"),
         blender=Property(
             "calibration_file",
@@ -284,8 +315,15 @@ CAPTURE_OPTIONS = (
         bool,
         False,
         _EVERYWHERE,
-        "people walk on stairs, steps or slopes: feet rest at any height instead of on one horizontal floor",
+        "people walk on stairs, steps or slopes: feet rest at any height instead of on one "
+        "horizontal floor",
         argument=Argument(help="feet rest at any height, as on stairs or slopes, not on one floor"),
     ),
-    Option("ablation", object, None, Place.CAPTURE, "parts of the pipeline to leave out; only experiments set it"),
+    Option(
+        "ablation",
+        object,
+        None,
+        Place.CAPTURE,
+        "parts of the pipeline to leave out; only experiments set it",
+    ),
 )

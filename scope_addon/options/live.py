@@ -37,7 +37,8 @@ LIVE_OPTIONS = (
         bool,
         False,
         Place.LIVE,
-        "print the camera's name and formats, and capture nothing; on macOS, the camera is opened for that",
+        "print the camera's name and formats, and capture nothing; on macOS, the camera is opened "
+        "for that",
     ),
     Option(
         "record",

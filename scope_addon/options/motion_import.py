@@ -9,7 +9,12 @@ UP_AXES = (
     Choice("auto", "Automatic", "The axis along which the person is upright", 0),
     Choice("z", "Z", "Z points up, as in AMASS", 1),
     Choice("y", "Y", "Y points up, as in AIST++ and most engines", 2),
-    Choice("camera", "Camera (-Y)", "Y points down, as in the camera's axes of pose estimation networks", 3),
+    Choice(
+        "camera",
+        "Camera (-Y)",
+        "Y points down, as in the camera's axes of pose estimation networks",
+        3,
+    ),
 )
 
 IMPORT_OPTIONS = (
@@ -32,7 +37,12 @@ IMPORT_OPTIONS = (
         unit="frames per second",
         minimum=0.0,
         maximum=1000.0,
-        argument=Argument("--rate", "N", help="frames per second, if the file does not state them", default_text="30"),
+        argument=Argument(
+            "--rate",
+            "N",
+            help="frames per second, if the file does not state them",
+            default_text="30",
+        ),
         blender=Property(label="Frame Rate"),
     ),
 )

@@ -47,7 +47,8 @@ NETWORK_OPTIONS = (
         blender=Property(
             "keypoints_file",
             "Keypoint Network",
-            "Custom keypoint network (.onnx): RTMPose, HRNet, ViTPose and similar; built-in if empty",
+            "Custom keypoint network (.onnx): RTMPose, HRNet, ViTPose and similar; built-in if "
+            "empty",
         ),
     ),
     Option(
@@ -61,7 +62,8 @@ NETWORK_OPTIONS = (
         argument=Argument(default_text="auto, the fastest available"),
         blender=Property(
             label="Execution Provider",
-            description="Execution provider for the networks; if unavailable, the CPU is used and the result shows a"
+            description="Execution provider for the networks; if unavailable, the CPU is used and "
+            "the result shows a"
             " warning",
         ),
     ),
@@ -73,7 +75,9 @@ NETWORK_OPTIONS = (
         "CPU threads for the networks; 0: all cores",
         minimum=0,
         decides_result=False,
-        argument=Argument(metavar="N", help="CPU threads for the networks", default_text="all cores"),
+        argument=Argument(
+            metavar="N", help="CPU threads for the networks", default_text="all cores"
+        ),
         blender=Property(maximum=256),
     ),
 )

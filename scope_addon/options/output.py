@@ -13,14 +13,18 @@ SHAPES = (
     Choice(
         "baked",
         "In the Mesh",
-        "No shape keys: the shape is applied to the mesh, for engines that limit shape keys to 0..1",
+        "No shape keys: the shape is applied to the mesh, for engines that limit shape keys to "
+        "0..1",
         2,
     ),
 )
 ROOTS = (
     Choice("bone", "In Bones", "The pelvis moves through the scene", 0),
     Choice(
-        "object", "On Object", "Root motion: an empty carries position and heading, the rig moves relative to it", 1
+        "object",
+        "On Object",
+        "Root motion: an empty carries position and heading, the rig moves relative to it",
+        1,
     ),
     Choice("in-place", "In Place", "No root motion: the character stays in place", 2),
 )
@@ -30,11 +34,24 @@ BVH_UNITS = (
 )
 FRAME_RATES = (
     Choice(
-        "auto", "Automatic", "Set the scene's frame rate to the footage's unless something in the scene is animated", 0
+        "auto",
+        "Automatic",
+        "Set the scene's frame rate to the footage's unless something in the scene is animated",
+        0,
     ),
     Choice("set", "Set from Footage", "Set the scene's frame rate to the footage's", 1),
-    Choice("keep", "Keep", "Leave the scene's frame rate; the motion keeps its speed, with keys between frames", 2),
-    Choice("resample", "Resample to Scene", "Leave the scene's frame rate; one key on each of its frames", 3),
+    Choice(
+        "keep",
+        "Keep",
+        "Leave the scene's frame rate; the motion keeps its speed, with keys between frames",
+        2,
+    ),
+    Choice(
+        "resample",
+        "Resample to Scene",
+        "Leave the scene's frame rate; one key on each of its frames",
+        3,
+    ),
 )
 
 OUTPUT_OPTIONS = (
@@ -47,7 +64,8 @@ OUTPUT_OPTIONS = (
         choices=SHAPES,
         argument=Argument(
             "--shape-keys",
-            help="shape keys keyed once, keyed per_frame, or baked into the mesh for engines that clamp morph targets",
+            help="shape keys keyed once, keyed per_frame, or baked into the mesh for engines that "
+            "clamp morph targets",
         ),
     ),
     Option(
@@ -55,7 +73,8 @@ OUTPUT_OPTIONS = (
         str,
         "",
         Place.PANEL,
-        "name of the next capture, its actions and the exported animation; if empty, the footage's name",
+        "name of the next capture, its actions and the exported animation; if empty, the footage's "
+        "name",
     ),
     Option(
         "bvh_unit",
@@ -67,7 +86,11 @@ OUTPUT_OPTIONS = (
         blender=Property(label="Unit"),
     ),
     Option(
-        "file_per_person", bool, False, Place.COMMAND_LINE, "write a separate file for each person, in every format"
+        "file_per_person",
+        bool,
+        False,
+        Place.COMMAND_LINE,
+        "write a separate file for each person, in every format",
     ),
     Option(
         "retarget",
@@ -109,7 +132,14 @@ OUTPUT_OPTIONS = (
         "root motion of the rig: in its pelvis bone, on its object, or none (in-place)",
         choices=ROOTS,
     ),
-    Option("frame_rate", str, "auto", Place.PANEL, "how the scene's frame rate is set", choices=FRAME_RATES),
+    Option(
+        "frame_rate",
+        str,
+        "auto",
+        Place.PANEL,
+        "how the scene's frame rate is set",
+        choices=FRAME_RATES,
+    ),
     Option(
         "start_frame",
         int,
@@ -119,7 +149,13 @@ OUTPUT_OPTIONS = (
         minimum=0,
         blender=Property(label="First Frame"),
     ),
-    Option("set_frame_range", bool, True, Place.PANEL, "set the scene's frame range to the captured frames"),
+    Option(
+        "set_frame_range",
+        bool,
+        True,
+        Place.PANEL,
+        "set the scene's frame range to the captured frames",
+    ),
     Option(
         "with_markers",
         bool,

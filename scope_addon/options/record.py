@@ -28,7 +28,9 @@ class Place(enum.Flag):
 
 
 class Choice(NamedTuple):
-    """One value of an option. A .blend file stores its ``number``, which therefore must never change."""
+    """One value of an option. A .blend file stores its ``number``, which therefore must never
+    change.
+    """
 
     value: str
     label: str
@@ -42,13 +44,17 @@ class Choice(NamedTuple):
 
 
 class Argument(NamedTuple):
-    """Appearance of an option on the command line, where it does not follow from the option's name and type.
+    """Appearance of an option on the command line, where it does not follow from the option's name
+    and type.
 
-    :param flag: such as ``--fov``; by default the option's name, with prefix ``no-`` if the option is on by default.
-    :param parse: converts the argument's text to the option's value; its ValueError says what the argument must be.
+    :param flag: such as ``--fov``; by default the option's name, with prefix ``no-`` if the option
+        is on by default.
+    :param parse: converts the argument's text to the option's value; its ValueError says what the
+        argument must be.
     :param default_text: how the help describes the default; by default its value.
     :param inherited: whether a batch passes the argument on to the process of each clip.
-    :param bare: the value of the flag alone, where none of the choices follows it; empty: one has to.
+    :param bare: the value of the flag alone, where none of the choices follows it; empty: one has
+        to.
     """
 
     flag: str = ""
@@ -63,9 +69,11 @@ class Argument(NamedTuple):
 class Property(NamedTuple):
     """Appearance of an option in Blender, where it does not follow from the option's name and type.
 
-    ``default``, ``minimum`` and ``maximum`` are in ``unit``; if it is empty, in the option's own unit.
+    ``default``, ``minimum`` and ``maximum`` are in ``unit``; if it is empty, in the option's own
+    unit.
 
-    :param value: returns the option's value, given the properties of the panel or of the preferences.
+    :param value: returns the option's value, given the properties of the panel or of the
+        preferences.
     :param keywords: further arguments of Blender's property, such as ``subtype``.
     """
 
@@ -84,7 +92,8 @@ class Property(NamedTuple):
 class Option(NamedTuple):
     """One option of a capture. A default of None means that the option is not set.
 
-    :param value_type: type of the value, or of its elements if ``several``; in requests, a Path is a string.
+    :param value_type: type of the value, or of its elements if ``several``; in requests, a Path is
+        a string.
     :param choices: the strings that are allowed; empty if all are.
     :param decides_result: False if the option does not change the result of a capture.
     """
@@ -125,7 +134,9 @@ class Option(NamedTuple):
         return self._element_error(value)
 
     def range_error(self, value: object) -> str:
-        """Describe the allowed range if a number, or an element of a list, is outside of it; empty otherwise."""
+        """Describe the allowed range if a number, or an element of a list, is outside of it; empty
+        otherwise.
+        """
         for each in value if isinstance(value, list | tuple) else (value,):
             if isinstance(each, int | float) and not isinstance(each, bool):
                 low = self.minimum is None or each >= self.minimum

@@ -1,2 +1,4 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A capture as one HTML page for its user: overlay, 3D view, plots, warnings and figures, readable offline."""
+"""A capture as one HTML page for its user: overlay, 3D view, plots, warnings and figures, readable
+offline.
+"""

@@ -47,7 +47,9 @@ _AT_TIME = re.compile(r"at (\d+\.\d) s")  # in warnings
 
 @dataclass(frozen=True)
 class CapturedClip:
-    """What the page is about: the footage, what the capture found in it, and the command that made it."""
+    """What the page is about: the footage, what the capture found in it, and the command that made
+    it.
+    """
 
     video: Path
     motions: Sequence[Motion]
@@ -58,7 +60,8 @@ class CapturedClip:
 
 
 def write_capture_page(path: Path, clip: CapturedClip, progress: Progress | None = None) -> None:
-    """Write the page about a capture. The write is atomic: a failure leaves an earlier file as it was.
+    """Write the page about a capture. The write is atomic: a failure leaves an earlier file as it
+    was.
 
     :param progress: called with (pictures done, pictures expected).
     :raises OutputError: the file cannot be written.
@@ -75,35 +78,55 @@ def write_capture_page(path: Path, clip: CapturedClip, progress: Progress | None
         raise OutputError(f"cannot write {path}: {reason(error)}") from error
 
 
-def capture_page(clip: CapturedClip, rows: NDArray[np.int64], pictures: Sequence[Picture]) -> Markup:
+def capture_page(
+    clip: CapturedClip, rows: NDArray[np.int64], pictures: Sequence[Picture]
+) -> Markup:
     """Return the page about a capture.
 
     :param rows: (n,) rows of the motions that the page shows.
     :param pictures: of the overlay.
     """
     name, first = Path(clip.video).name, clip.motions[0]
-    captions = [f"frame {first.frames[rows[p.row]]}, {first.timestamps[rows[p.row]]:.2f} s" for p in pictures]
+    captions = [
+        f"frame {first.frames[rows[p.row]]}, {first.timestamps[rows[p.row]]:.2f} s"
+        for p in pictures
+    ]
     spans = [_review(motion, clip.body) for motion in clip.motions]
     colors = [page.person_color(n) for n in range(len(clip.motions))]
     warnings = clip.report["warnings"]
-    thinned = "" if len(rows) == len(first) else f"Of this long clip, one frame in {rows[1]} is shown in 3D."
+    thinned = (
+        ""
+        if len(rows) == len(first)
+        else f"Of this long clip, one frame in {rows[1]} is shown in 3D."
+    )
     now = datetime.now().astimezone().strftime("%Y-%m-%d %H:%M")
     content = [
         page.header(name, f"Motion capture by Scope, {now}", header_facts(clip)),
         page.stage(len(rows), first.image_size.tolist()),
         page.strip(pictures, captions),
-        page.section("Over time", *over_time(clip.motions, marked_spans(clip.motions, spans, warnings)), note=thinned),
+        page.section(
+            "Over time",
+            *over_time(clip.motions, marked_spans(clip.motions, spans, warnings)),
+            note=thinned,
+        ),
         page.section("Warnings", *warning_list(warnings), review_table(clip.motions, spans)),
         page.section("Figures", figures_table(clip.motions, clip.body)),
         page.section(
             "How it was made",
             page.command_line(clip.command),
             page.fact_list(
-                {"Machine": machine(), "Versions": versions(), "Networks on": clip.report["execution"]}, single=True
+                {
+                    "Machine": machine(),
+                    "Versions": versions(),
+                    "Networks on": clip.report["execution"],
+                },
+                single=True,
             ),
         ),
     ]
-    return page.document(f"{name} – Scope", content, viewer_data(clip.motions, clip.body, rows, colors))
+    return page.document(
+        f"{name} – Scope", content, viewer_data(clip.motions, clip.body, rows, colors)
+    )
 
 
 def header_facts(clip: CapturedClip) -> dict[str, str]:
@@ -112,7 +135,8 @@ def header_facts(clip: CapturedClip) -> dict[str, str]:
     rate = report["frame_rate"][0] / report["frame_rate"][1]
     width, height = motion.image_size.tolist()
     return {
-        "Duration": f"{len(motion) / rate:.2f} s, {counted(len(motion), 'frame')} at {rate:.6g} per second",
+        "Duration": f"{len(motion) / rate:.2f} s, {counted(len(motion), 'frame')} at {rate:.6g} "
+        "per second",
         "Image": f"{width} × {height}",
         "People": counted(report["people"], "person", "people"),
         "Preset": str(report["quality"]),
@@ -124,43 +148,64 @@ def header_facts(clip: CapturedClip) -> dict[str, str]:
 
 
 def over_time(motions: Sequence[Motion], marked: Sequence[MarkedSpan] = ()) -> list[Markup]:
-    """Return the plots over time: confidence, reprojection error, contact of the feet, and the face if it was captured.
+    """Return the plots over time: confidence, reprojection error, contact of the feet, and the face
+    if it was captured.
 
     :param marked: intervals of time that the plots mark; their kinds are keys of ``_SHORT``.
     """
     times = motions[0].timestamps
     x_axis = time_axis(times)
     colors = [page.person_color(n) for n in range(len(motions))]
-    legend = {_name(n, motions): color for n, color in enumerate(colors)} if len(motions) > 1 else None
+    legend = (
+        {_name(n, motions): color for n, color in enumerate(colors)} if len(motions) > 1 else None
+    )
     confidence = [
         Curve(times, body_confidence(m).astype(float), color, _name(n, motions))
         for n, (m, color) in enumerate(zip(motions, colors, strict=True))
     ]
     error = [
-        Curve(times, np.where(m.valid, m.residual_px, np.nan).astype(float), color, _name(n, motions))
+        Curve(
+            times, np.where(m.valid, m.residual_px, np.nan).astype(float), color, _name(n, motions)
+        )
         for n, (m, color) in enumerate(zip(motions, colors, strict=True))
     ]
     far = FAR_SHARE * float(motions[0].image_size.max())
     known = [float(np.nanmax(curve.y)) for curve in error if np.isfinite(curve.y).any()]
     top = 1.1 * max([1.0, *known])
     plots = [
-        ("Confidence", line_plot(confidence, x_axis, Axis(0, 1), label="Confidence over time", spans=marked)),
+        (
+            "Confidence",
+            line_plot(confidence, x_axis, Axis(0, 1), label="Confidence over time", spans=marked),
+        ),
         (
             "Reprojection error in pixels",
-            line_plot(error, x_axis, Axis(0, top), label="Reprojection error over time", threshold=far, spans=marked),
+            line_plot(
+                error,
+                x_axis,
+                Axis(0, top),
+                label="Reprojection error over time",
+                threshold=far,
+                spans=marked,
+            ),
         ),
     ]
-    areas = {_SHORT[reason]: f"var(--{reason})" for reason in sorted({span.kind for span in marked})}
+    areas = {
+        _SHORT[reason]: f"var(--{reason})" for reason in sorted({span.kind for span in marked})
+    }
     figures = [page.plot_figure(title, svg, legend, areas) for title, svg in plots]
     for n, (motion, color) in enumerate(zip(motions, colors, strict=True)):
         rows = [(name, motion.foot_contact[:, k].astype(float)) for k, name in enumerate(CONTACTS)]
         of_whom = f", {_name(n, motions)}" if len(motions) > 1 else ""
         title = f"Contact of the feet{of_whom}"
-        figures.append(page.plot_figure(title, band_plot(rows, times, x_axis, label=title, color=color)))
+        figures.append(
+            page.plot_figure(title, band_plot(rows, times, x_axis, label=title, color=color))
+        )
         if motion.face:
             title = f"Face{of_whom}"
             figures.append(
-                page.plot_figure(title, band_plot(face_rows(motion), times, x_axis, label=title, color=color))
+                page.plot_figure(
+                    title, band_plot(face_rows(motion), times, x_axis, label=title, color=color)
+                )
             )
     return figures
 
@@ -169,20 +214,32 @@ def face_rows(motion: Motion) -> list[tuple[str, NDArray[np.float64]]]:
     """Return the shares of a face over time: name and values (T,) from 0 to 1."""
     names = motion.face["expression_names"].tolist()
     weights = motion.face["expressions"].astype(float)
-    shown_names = {"jaw open": "jawOpen", "left eye shut": "eyeBlinkLeft", "right eye shut": "eyeBlinkRight"}
-    rows = [(label, weights[:, names.index(name)]) for label, name in shown_names.items() if name in names]
+    shown_names = {
+        "jaw open": "jawOpen",
+        "left eye shut": "eyeBlinkLeft",
+        "right eye shut": "eyeBlinkRight",
+    }
+    rows = [
+        (label, weights[:, names.index(name)])
+        for label, name in shown_names.items()
+        if name in names
+    ]
     return [*rows, ("confidence", motion.face["expression_confidence"].astype(float))]
 
 
 def marked_spans(
     motions: Sequence[Motion], spans: Sequence[Sequence[Span]], warnings: Sequence[str]
 ) -> list[MarkedSpan]:
-    """Return what the plots mark: the spans of each motion that should be reviewed, and the times in warnings."""
+    """Return what the plots mark: the spans of each motion that should be reviewed, and the times
+    in warnings.
+    """
     times = motions[0].timestamps
     marked = [_marked(span, times, n, motions) for n, of_one in enumerate(spans) for span in of_one]
     for text in warnings:
         at = [float(match[1]) for match in _AT_TIME.finditer(text)]
-        marked += [MarkedSpan(time, time, "warned", text) for time in at if times[0] <= time <= times[-1]]
+        marked += [
+            MarkedSpan(time, time, "warned", text) for time in at if times[0] <= time <= times[-1]
+        ]
     return marked
 
 
@@ -200,7 +257,10 @@ def warning_list(warnings: Sequence[str]) -> list[Markup]:
     for text in warnings:
         parts, end = [], 0
         for match in _AT_TIME.finditer(text):
-            parts += [escape(text[end : match.start()]), page.seek_button(match[0], float(match[1]))]
+            parts += [
+                escape(text[end : match.start()]),
+                page.seek_button(match[0], float(match[1])),
+            ]
             end = match.end()
         items.append(f"<li>{''.join(parts)}{escape(text[end:])}</li>")
     return [Markup(f'<ul class="warnings">{"".join(items)}</ul>\n')]
@@ -213,7 +273,13 @@ def review_table(motions: Sequence[Motion], spans: Sequence[Sequence[Span]]) -> 
         for span in of_one:
             first, last = float(motion.timestamps[span.first]), float(motion.timestamps[span.last])
             frames = f"{motion.frames[span.first]} to {motion.frames[span.last]}"
-            rows.append([page.seek_button(f"{first:.2f} to {last:.2f} s", first), frames, REASONS[span.reason]])
+            rows.append(
+                [
+                    page.seek_button(f"{first:.2f} to {last:.2f} s", first),
+                    frames,
+                    REASONS[span.reason],
+                ]
+            )
             if len(motions) > 1:
                 rows[-1].append(_name(n, motions))
     if not rows:
@@ -235,9 +301,13 @@ def _review(motion: Motion, body: Body) -> list[Span]:
     return find_review_spans(motion, _GAP_S, under_floor(motion, body))
 
 
-def _marked(span: Span, times: NDArray[np.float64], person: int, motions: Sequence[Motion]) -> MarkedSpan:
+def _marked(
+    span: Span, times: NDArray[np.float64], person: int, motions: Sequence[Motion]
+) -> MarkedSpan:
     who = f"{_name(person, motions)}: " if len(motions) > 1 else ""
-    return MarkedSpan(float(times[span.first]), float(times[span.last]), span.reason, who + REASONS[span.reason])
+    return MarkedSpan(
+        float(times[span.first]), float(times[span.last]), span.reason, who + REASONS[span.reason]
+    )
 
 
 def _name(person: int, motions: Sequence[Motion]) -> str:

@@ -48,7 +48,8 @@ def overlay_pictures(
     wanted: FootageRange | None = None,
     progress: Progress | None = None,
 ) -> list[Picture]:
-    """Return at most `PICTURES` frames of the overlay, in chronological order, of at most `MAX_BYTES` together.
+    """Return at most `PICTURES` frames of the overlay, in chronological order, of at most
+    `MAX_BYTES` together.
 
     :param rows: (n,) rows of the motions that the page shows.
     :param wanted: the range of the footage that was captured.
@@ -68,8 +69,12 @@ def overlay_pictures(
 
 
 def spread_rows(count: int, most: int) -> NDArray[np.int64]:
-    """Return at most ``most`` of the rows from 0 to ``count`` − 1, (n,), spread evenly, the first and last included."""
-    rows: NDArray[np.int64] = np.unique(np.round(np.linspace(0, count - 1, min(count, most))).astype(np.int64))
+    """Return at most ``most`` of the rows from 0 to ``count`` − 1, (n,), spread evenly, the first
+    and last included.
+    """
+    rows: NDArray[np.int64] = np.unique(
+        np.round(np.linspace(0, count - 1, min(count, most))).astype(np.int64)
+    )
     return rows
 
 
@@ -82,14 +87,20 @@ def small_picture(row: int, image: NDArray[np.uint8], longest_side: int = LONGES
     scale = min(1.0, longest_side / max(height, width))
     size = max(1, round(width * scale)), max(1, round(height * scale))
     small = cv2.resize(image, size, interpolation=cv2.INTER_AREA) if scale < 1 else image
-    ok, data = cv2.imencode(".webp", cv2.cvtColor(small, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_WEBP_QUALITY, _QUALITY])
+    ok, data = cv2.imencode(
+        ".webp", cv2.cvtColor(small, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_WEBP_QUALITY, _QUALITY]
+    )
     if not ok:
-        raise OutputError("cannot make the report's images: this OpenCV cannot write WebP; install another")
+        raise OutputError(
+            "cannot make the report's images: this OpenCV cannot write WebP; install another"
+        )
     return Picture(row, data.tobytes(), *size)
 
 
 def bounded(pictures: list[Picture], most_bytes: int) -> list[Picture]:
-    """Return the pictures, or every second, fourth, ... of them, so that all together are at most ``most_bytes``."""
+    """Return the pictures, or every second, fourth, ... of them, so that all together are at most
+    ``most_bytes``.
+    """
     while len(pictures) > 1 and sum(len(picture.content) for picture in pictures) > most_bytes:
         pictures = pictures[::2]
     return pictures

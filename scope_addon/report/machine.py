@@ -17,7 +17,10 @@ def machine() -> str:
     """Describe the computer in one line: processor, cores, system."""
     cores = os.cpu_count() or 1
     name = _processor() or platform.machine()
-    return f"{name}, {cores} {'core' if cores == 1 else 'cores'}, {platform.system()} {platform.release()}"
+    return (
+        f"{name}, {cores} {'core' if cores == 1 else 'cores'}, {platform.system()} "
+        f"{platform.release()}"
+    )
 
 
 def versions() -> str:
@@ -26,7 +29,8 @@ def versions() -> str:
     for package in _PACKAGES:
         try:
             listed.append(f"{package} {version(package)}")
-        except PackageNotFoundError:  # an extension's packages may have no metadata, and bpy is optional
+        # an extension's packages may have no metadata, and bpy is optional
+        except PackageNotFoundError:
             continue
     return ", ".join(listed)
 
@@ -45,7 +49,9 @@ def scope_version() -> str:
 def _processor() -> str:
     """Return the processor's model; empty if the system does not say."""
     try:
-        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines():
+        for line in (
+            Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
+        ):
             if line.startswith("model name"):
                 return line.partition(":")[2].strip()
     except OSError:

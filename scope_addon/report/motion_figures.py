@@ -31,9 +31,13 @@ def motion_figures(motion: Motion, body: Body) -> dict[str, str]:
         "Highest speed": f"{highest_speed(pelvis[:, :2], motion.timestamps):.2f} m/s",
         "Pelvis height": f"{pelvis[:, 2].min():.2f} to {pelvis[:, 2].max():.2f} m",
         "Reprojection error, mean": f"{error.mean():.1f} px" if len(error) else "–",
-        "Reprojection error, 95th percentile": f"{np.percentile(error, 95):.1f} px" if len(error) else "–",
+        "Reprojection error, 95th percentile": f"{np.percentile(error, 95):.1f} px"
+        if len(error)
+        else "–",
         "Confidence, mean": f"{body_confidence(motion).mean():.2f}",
-        "Standard deviation of joints, mean": f"{100 * np.nanmean(sigma):.1f} cm" if np.isfinite(sigma).any() else "–",
+        "Standard deviation of joints, mean": f"{100 * np.nanmean(sigma):.1f} cm"
+        if np.isfinite(sigma).any()
+        else "–",
         "Left foot in contact": f"{100 * contact[:, :2].any(axis=1).mean():.0f} % of frames",
         "Right foot in contact": f"{100 * contact[:, 2:].any(axis=1).mean():.0f} % of frames",
         "Frames to review": f"{review}",
@@ -49,7 +53,9 @@ def height_text(height_m: float, sigma_m: float) -> str:
 
 
 def highest_speed(points: NDArray[np.float64], times: NDArray[np.float64]) -> float:
-    """Return the highest mean speed of points (T, 2) at times (T,) over half a second, or over the whole of less."""
+    """Return the highest mean speed of points (T, 2) at times (T,) over half a second, or over the
+    whole of less.
+    """
     if len(points) < 2:
         return 0.0
     ends = np.searchsorted(times, times + _SPEED_WINDOW_S - 1e-6)

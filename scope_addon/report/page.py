@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The parts of a self-contained HTML page: document, sections, tables, the stage with overlay and 3D view.
+"""The parts of a self-contained HTML page: document, sections, tables, the stage with overlay and
+3D view.
 
 Every text that is passed in is escaped here. Content that is markup already has the type `Markup`.
 The page's policy forbids every request to a network, so that it cannot come to need one.
@@ -28,7 +29,9 @@ def person_color(person: int) -> str:
     return f"var(--person{person % PEOPLE_COLORS + 1})"
 
 
-def document(title: str, content: Sequence[Markup], data: Mapping[str, Any] | None = None) -> Markup:
+def document(
+    title: str, content: Sequence[Markup], data: Mapping[str, Any] | None = None
+) -> Markup:
     """Return a whole page.
 
     :param data: for the 3D view, see `viewer_data`; None for a page without one.
@@ -44,7 +47,8 @@ def document(title: str, content: Sequence[Markup], data: Mapping[str, Any] | No
         f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         '<meta name="color-scheme" content="light dark">\n'
-        f'<title>{escape(title)}</title>\n<link rel="icon" href="data:,">\n<style>\n{_file("style.css")}</style>\n'
+        f'<title>{escape(title)}</title>\n<link rel="icon" '
+        f'href="data:,">\n<style>\n{_file("style.css")}</style>\n'
         f"</head>\n<body>\n<main>\n{''.join(content)}</main>\n{scripts}</body>\n</html>\n"
     )
 
@@ -52,13 +56,17 @@ def document(title: str, content: Sequence[Markup], data: Mapping[str, Any] | No
 def header(title: str, subtitle: str, facts: Mapping[str, str]) -> Markup:
     """Return the page's header: its title, a line below it, and a list of facts."""
     return Markup(
-        f'<header><h1>{escape(title)}</h1><p class="subtitle">{escape(subtitle)}</p>{fact_list(facts)}</header>\n'
+        f"<header><h1>{escape(title)}</h1><p "
+        f'class="subtitle">{escape(subtitle)}</p>{fact_list(facts)}</header>\n'
     )
 
 
 def fact_list(facts: Mapping[str, str], single: bool = False) -> Markup:
     """Return names and values as a list of definitions; with ``single``, in one column."""
-    items = "".join(f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>" for name, value in facts.items())
+    items = "".join(
+        f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>"
+        for name, value in facts.items()
+    )
     return Markup(f'<dl class="facts{" single" if single else ""}">{items}</dl>')
 
 
@@ -85,7 +93,11 @@ def table(
         first = f'<th scope="row">{cells[0]}</th>'
         lines.append(f"<tr>{first}{''.join(f'<td>{cell}</td>' for cell in cells[1:])}</tr>")
     kind, below = ' class="numbers"' if numbers else "", "".join(lines[1:])
-    return Markup(f'<div class="wide"><table{kind}><thead>{lines[0]}</thead><tbody>{below}</tbody></table></div>')
+    return Markup(
+        f'<div class="wide">'
+        f"<table{kind}><thead>{lines[0]}</thead><tbody>{below}</tbody></table>"
+        "</div>"
+    )
 
 
 def folded(title: str, *content: Markup) -> Markup:
@@ -94,15 +106,22 @@ def folded(title: str, *content: Markup) -> Markup:
 
 
 def plot_figure(
-    title: str, svg: str, legend: Mapping[str, str] | None = None, areas: Mapping[str, str] | None = None
+    title: str,
+    svg: str,
+    legend: Mapping[str, str] | None = None,
+    areas: Mapping[str, str] | None = None,
 ) -> Markup:
-    """Return a plot with its title and the legend of its curves and its marked areas, colour in CSS by name."""
+    """Return a plot with its title and the legend of its curves and its marked areas, colour in CSS
+    by name.
+    """
     entries = "".join(
         f'<span class="key{kind}"><i style="background:{color}"></i>{escape(name)}</span>'
         for kind, names in (("", legend), (" area", areas))
         for name, color in (names or {}).items()
     )
-    return Markup(f'<figure class="graph"><figcaption>{escape(title)}{entries}</figcaption>{svg}</figure>\n')
+    return Markup(
+        f'<figure class="graph"><figcaption>{escape(title)}{entries}</figcaption>{svg}</figure>\n'
+    )
 
 
 def paragraph(text: str) -> Markup:
@@ -122,20 +141,29 @@ def command_line(command: str) -> Markup:
 
 
 def command_text(command: str) -> Markup:
-    """Return a command whose lines do not end within an option, such as between the hyphens of ``--json``."""
+    """Return a command whose lines do not end within an option, such as between the hyphens of
+    ``--json``.
+    """
     words = [escape(word) for word in command.split(" ")]
-    return Markup(" ".join(f'<span class="option">{word}</span>' if word[:1] == "-" else word for word in words))
+    return Markup(
+        " ".join(
+            f'<span class="option">{word}</span>' if word[:1] == "-" else word for word in words
+        )
+    )
 
 
 def seek_button(text: str, time_s: float) -> Markup:
     """Return a button that moves the page to a time."""
-    return Markup(f'<button type="button" class="seek" data-time="{time_s:.4f}">{escape(text)}</button>')
+    return Markup(
+        f'<button type="button" class="seek" data-time="{time_s:.4f}">{escape(text)}</button>'
+    )
 
 
 def strip(pictures: Sequence[Picture], captions: Sequence[str]) -> Markup:
     """Return pictures in one row that can be scrolled; each moves the page to its frame."""
     items = "".join(
-        f'<button type="button" data-row="{picture.row}"><img src="{picture.url}" width="{picture.width}" '
+        f'<button type="button" data-row="{picture.row}"><img src="{picture.url}" '
+        f'width="{picture.width}" '
         f'height="{picture.height}" alt="{escape(caption)}"><span>{escape(caption)}</span></button>'
         for picture, caption in zip(pictures, captions, strict=True)
     )
@@ -151,26 +179,35 @@ def stage(count: int, image_size: Sequence[int]) -> Markup:
     aspect = min(max(image_size[0] / image_size[1], 1.0), 2.0)
     picture = (
         '<figure class="pane"><figcaption>Overlay <span id="picture-frame"></span></figcaption>'
-        '<div class="frame"><img id="picture" alt="The captured body over the footage"></div></figure>'
+        '<div class="frame"><img id="picture" alt="The captured body over the '
+        'footage"></div></figure>'
     )
     return Markup(
         f'<section class="stage" style="--aspect: {aspect:.4f}">{picture}'
         '<figure class="pane"><figcaption>3D view <span id="pose-state"></span></figcaption>'
-        '<div class="frame"><canvas id="view" tabindex="0" aria-label="The captured motion in 3D"></canvas>'
-        '<p id="no-view" hidden>This browser does not offer WebGL 2, so the 3D view is left out; everything else '
+        '<div class="frame"><canvas id="view" tabindex="0" aria-label="The captured motion in '
+        '3D"></canvas>'
+        '<p id="no-view" hidden>This browser does not offer WebGL 2, so the 3D view is left out; '
+        "everything else "
         "works without it.</p></div>"
-        '<div class="views"><button type="button" data-view="front" aria-pressed="true">Front</button>'
-        '<button type="button" data-view="side">Side</button><button type="button" data-view="top">Top</button>'
+        '<div class="views"><button type="button" data-view="front" '
+        'aria-pressed="true">Front</button>'
+        '<button type="button" data-view="side">Side</button><button type="button" '
+        'data-view="top">Top</button>'
         '<button type="button" data-view="camera">Camera</button>'
         '<label><input type="checkbox" id="follow">Follow</label>'
-        '<span class="hint">Drag to orbit, two fingers or Shift to pan, wheel or pinch to zoom</span></div></figure>'
+        '<span class="hint">Drag to orbit, two fingers or Shift to pan, wheel or pinch to '
+        "zoom</span></div></figure>"
         "</section>\n"
         '<div class="player"><button type="button" id="play" aria-label="Play">▶</button>'
-        f'<input type="range" id="row" min="0" max="{max(count - 1, 0)}" value="0" step="1" aria-label="Frame">'
+        f'<input type="range" id="row" min="0" max="{max(count - 1, 0)}" value="0" step="1" '
+        'aria-label="Frame">'
         '<output id="time"></output>'
-        '<select id="speed" aria-label="Speed"><option value="0.25">¼ ×</option><option value="0.5">½ ×</option>'
+        '<select id="speed" aria-label="Speed"><option value="0.25">¼ ×</option><option '
+        'value="0.5">½ ×</option>'
         '<option value="1" selected>1 ×</option></select></div>\n'
-        "<noscript><p>Without JavaScript, the 3D view cannot be shown and the page cannot be played.</p></noscript>\n"
+        "<noscript><p>Without JavaScript, the 3D view cannot be shown and the page cannot be "
+        "played.</p></noscript>\n"
     )
 
 

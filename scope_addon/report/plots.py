@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Line plots and bands over time as inline SVG, which scale with the page without scaling their text or strokes.
+"""Line plots and bands over time as inline SVG, which scale with the page without scaling their
+text or strokes.
 
-Curves are in the plot area's own coordinates: x from 0 to ``WIDTH`` and y from 0, at the top, to ``HEIGHT``. The area
-is stretched to the width of the page. Texts are placed in per cent of it.
+Curves are in the plot area's own coordinates: x from 0 to ``WIDTH`` and y from 0, at the top, to
+``HEIGHT``. The area is stretched to the width of the page. Texts are placed in per cent of it.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 WIDTH, HEIGHT = 1000.0, 100.0
-_AREA_PX, _TOP_PX, _AXIS_PX = 120, 10, 24  # heights of the plot area, of the space above it, and of the axis below it
+# heights of the plot area, of the space above it, and of the axis below it
+_AREA_PX, _TOP_PX, _AXIS_PX = 120, 10, 24
 _ROW_PX = 22  # of a band
 _MAX_POINTS = 1200  # of a curve; of more, the smallest and the largest of each interval are drawn
 
@@ -25,7 +27,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Axis:
-    """A linear or logarithmic axis from ``low`` to ``high``, which differ; a logarithmic one has ``low`` above 0.
+    """A linear or logarithmic axis from ``low`` to ``high``, which differ; a logarithmic one has
+    ``low`` above 0.
 
     ``unit`` is written after each value.
     """
@@ -44,12 +47,18 @@ class Axis:
         return linear
 
     def ticks(self, count: int = 5) -> list[float]:
-        """Return at most about ``count`` round values between the ends, both included where they are round."""
+        """Return at most about ``count`` round values between the ends, both included where they
+        are round.
+        """
         if self.logarithmic:
             decades = range(math.floor(math.log10(self.low)), math.ceil(math.log10(self.high)) + 1)
             values = [digit * 10.0**decade for decade in decades for digit in (1, 2, 5)]
             inside = [v for v in values if self.low * 0.999 <= v <= self.high * 1.001]
-            return inside if len(inside) <= count + 2 else [v for v in inside if f"{v:e}".startswith("1.0")]
+            return (
+                inside
+                if len(inside) <= count + 2
+                else [v for v in inside if f"{v:e}".startswith("1.0")]
+            )
         step = _round_step((self.high - self.low) / count)
         first = math.ceil(self.low / step - 1e-9)
         return [n * step for n in range(first, math.floor(self.high / step + 1e-9) + 1)]
@@ -106,11 +115,16 @@ def line_plot(
     texts = [_level_text(y_axis, level) for level in levels]
     if timed:
         texts.append(_cursor(_AREA_PX))
-    return _svg(label, _AREA_PX, [*marks, *lines, *drawn], [*_x_texts(x_axis, _AREA_PX), *texts], timed)
+    return _svg(
+        label, _AREA_PX, [*marks, *lines, *drawn], [*_x_texts(x_axis, _AREA_PX), *texts], timed
+    )
 
 
-def band_plot(rows: Sequence[tuple[str, Array]], x: Array, x_axis: Axis, *, label: str, color: str) -> str:
-    """Return an SVG element with a row for each of several shares over time, filled up to the share.
+def band_plot(
+    rows: Sequence[tuple[str, Array]], x: Array, x_axis: Axis, *, label: str, color: str
+) -> str:
+    """Return an SVG element with a row for each of several shares over time, filled up to the
+    share.
 
     :param rows: name and values (n,) from 0 to 1.
     :param x: (n,) in ascending order; each value holds until the next.
@@ -131,7 +145,9 @@ def band_plot(rows: Sequence[tuple[str, Array]], x: Array, x_axis: Axis, *, labe
 
 
 def line_path(x: Array, y: Array, x_axis: Axis, y_axis: Axis) -> str:
-    """Return the path of a curve, x (n,) and y (n,), in coordinates of the plot area; it has gaps where y has them."""
+    """Return the path of a curve, x (n,) and y (n,), in coordinates of the plot area; it has gaps
+    where y has them.
+    """
     x, y = thinned(np.asarray(x, float), np.asarray(y, float))
     shown = np.isfinite(y)
     u = WIDTH * x_axis.share(x)
@@ -146,9 +162,15 @@ def line_path(x: Array, y: Array, x_axis: Axis, y_axis: Axis) -> str:
 
 
 def area_path(x: Array, values: Array, x_axis: Axis, bottom: float, height: float) -> str:
-    """Return the path of steps of values (n,) from 0 to 1 over x (n,), above ``bottom`` and up to ``height`` high."""
-    x, values = thinned(np.asarray(x, float), np.nan_to_num(np.clip(np.asarray(values, float), 0, 1)))
-    ends = np.append(x[1:], x[-1] + (np.median(np.diff(x)) if len(x) > 1 else x_axis.high - x_axis.low))
+    """Return the path of steps of values (n,) from 0 to 1 over x (n,), above ``bottom`` and up to
+    ``height`` high.
+    """
+    x, values = thinned(
+        np.asarray(x, float), np.nan_to_num(np.clip(np.asarray(values, float), 0, 1))
+    )
+    ends = np.append(
+        x[1:], x[-1] + (np.median(np.diff(x)) if len(x) > 1 else x_axis.high - x_axis.low)
+    )
     u, w = (np.clip(WIDTH * x_axis.share(each), 0, WIDTH) for each in (x, ends))
     v = bottom - height * values
     steps = "".join(f"L{a:.1f} {y:.2f}L{b:.1f} {y:.2f}" for a, b, y in zip(u, w, v, strict=True))
@@ -156,7 +178,9 @@ def area_path(x: Array, values: Array, x_axis: Axis, bottom: float, height: floa
 
 
 def thinned(x: Array, y: Array) -> tuple[Array, Array]:
-    """Return fewer points of a long curve, x (n,) and y (n,): the smallest and the largest y of each interval."""
+    """Return fewer points of a long curve, x (n,) and y (n,): the smallest and the largest y of
+    each interval.
+    """
     count = len(x)
     if count <= _MAX_POINTS:
         return x, y
@@ -174,10 +198,17 @@ def thinned(x: Array, y: Array) -> tuple[Array, Array]:
 def _drawn(curve: Curve, x_axis: Axis, y_axis: Axis) -> str:
     name = f"<title>{escape(curve.name)}</title>" if curve.name else ""
     line = line_path(curve.x, curve.y, x_axis, y_axis)
-    path = f'<path class="curve" d="{line}" stroke="{curve.color}">{name}</path>' if curve.with_line else ""
+    path = (
+        f'<path class="curve" d="{line}" stroke="{curve.color}">{name}</path>'
+        if curve.with_line
+        else ""
+    )
     if not curve.with_points:
         return path
-    dots = [line_path(np.array([a]), np.array([b]), x_axis, y_axis) for a, b in zip(curve.x, curve.y, strict=True)]
+    dots = [
+        line_path(np.array([a]), np.array([b]), x_axis, y_axis)
+        for a, b in zip(curve.x, curve.y, strict=True)
+    ]
     # A line of no length with round ends: a circle would be stretched with the area.
     points = "".join(f"{dot}h0" for dot in dots if dot)
     return f'{path}<path class="points" d="{points}" stroke="{curve.color}"/>'
@@ -186,7 +217,8 @@ def _drawn(curve: Curve, x_axis: Axis, y_axis: Axis) -> str:
 def _marked(span: Span, x_axis: Axis) -> str:
     first, last = (float(WIDTH * x_axis.share(np.array([at]))[0]) for at in (span.first, span.last))
     return (
-        f'<rect class="span {escape(span.kind)}" x="{first:.1f}" y="0" width="{max(last - first, 1.5):.1f}" '
+        f'<rect class="span {escape(span.kind)}" x="{first:.1f}" y="0" '
+        f'width="{max(last - first, 1.5):.1f}" '
         f'height="{HEIGHT:g}"><title>{escape(span.title)}</title></rect>'
     )
 
@@ -210,7 +242,10 @@ def _x_texts(axis: Axis, area_px: int) -> list[str]:
         share = 100 * float(axis.share(np.array([value]))[0])
         text = f"{value:g} {axis.unit}".strip()
         anchor = "start" if share < 2 else "end" if share > 98 else "middle"
-        texts.append(f'<text x="{share:.2f}%" y="{_TOP_PX + area_px + 16}" text-anchor="{anchor}">{text}</text>')
+        texts.append(
+            f'<text x="{share:.2f}%" y="{_TOP_PX + area_px + 16}" '
+            f'text-anchor="{anchor}">{text}</text>'
+        )
     return texts
 
 
@@ -219,12 +254,17 @@ def _cursor(area_px: int) -> str:
 
 
 def _svg(label: str, area_px: int, drawn: Sequence[str], above: Sequence[str], timed: bool) -> str:
-    """Return the element: what is drawn in coordinates of the plot area, and what is above it in those of the page."""
+    """Return the element: what is drawn in coordinates of the plot area, and what is above it in
+    those of the page.
+    """
     height = _TOP_PX + area_px + _AXIS_PX
     return (
-        f'<svg class="plot{" timed" if timed else ""}" role="img" aria-label="{escape(label)}" width="100%" '
-        f'height="{height}"><svg class="area" viewBox="0 0 {WIDTH:g} {HEIGHT:g}" preserveAspectRatio="none" x="0" '
-        f'y="{_TOP_PX}" width="100%" height="{area_px}">{"".join(drawn)}</svg>{"".join(above)}</svg>'
+        f'<svg class="plot{" timed" if timed else ""}" role="img" aria-label="{escape(label)}" '
+        'width="100%" '
+        f'height="{height}"><svg class="area" viewBox="0 0 {WIDTH:g} {HEIGHT:g}" '
+        'preserveAspectRatio="none" x="0" '
+        f'y="{_TOP_PX}" width="100%" '
+        f'height="{area_px}">{"".join(drawn)}</svg>{"".join(above)}</svg>'
     )
 
 

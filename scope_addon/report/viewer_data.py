@@ -25,7 +25,9 @@ _QUATERNION = 32767
 
 
 def shown_rows(motions: Sequence[Motion]) -> NDArray[np.int64]:
-    """Return the rows of the motions that the page shows, (n,): all, or evenly spaced ones of a very long clip."""
+    """Return the rows of the motions that the page shows, (n,): all, or evenly spaced ones of a
+    very long clip.
+    """
     frames = len(motions[0])
     of_camera, of_root = 12 * 4 + 8, 3 * 4 + 1
     size = frames * (of_camera + sum(8 * motion.joint_count + of_root for motion in motions))
@@ -57,7 +59,10 @@ def viewer_data(
         "camera": encoded(camera[: 1 if static else None].astype(np.float32)),
         "intrinsics": first.intrinsics.tolist(),
         "imageSize": first.image_size.tolist(),
-        "people": [_person(motion, body, rows, color) for motion, color in zip(motions, colors, strict=True)],
+        "people": [
+            _person(motion, body, rows, color)
+            for motion, color in zip(motions, colors, strict=True)
+        ],
     }
 
 
@@ -70,7 +75,9 @@ def _person(motion: Motion, body: Body, rows: NDArray[np.int64], color: str) -> 
         "low": low.tolist(),
         "step": step.tolist(),
         "rest": np.round(body.rest_joints(betas), 6).tolist(),
-        "rotations": encoded(quantized_rotations(motion.poses[rows].reshape(len(rows), -1, 3).astype(float))),
+        "rotations": encoded(
+            quantized_rotations(motion.poses[rows].reshape(len(rows), -1, 3).astype(float))
+        ),
         "trans": encoded(motion.trans[rows].astype(np.float32)),
         "valid": encoded(motion.valid[rows].astype(np.uint8)),
     }
@@ -85,14 +92,18 @@ def encoded(array: NDArray[Any]) -> str:
 def quantized_positions(
     points: NDArray[np.float64],
 ) -> tuple[NDArray[np.uint16], NDArray[np.float64], NDArray[np.float64]]:
-    """Return (V, 3) integers n, and low (3,) and step (3,), so that the points (V, 3) are low + step · n."""
+    """Return (V, 3) integers n, and low (3,) and step (3,), so that the points (V, 3) are low +
+    step · n.
+    """
     low = points.min(axis=0)
     step = np.maximum(np.ptp(points, axis=0), 1e-9) / 65535
     return np.round((points - low) / step).astype(np.uint16), low, step
 
 
 def quantized_weights(weights: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """Return weights (V, 4), each row of which has the sum 1, as integers (V, 4) with the sum 255."""
+    """Return weights (V, 4), each row of which has the sum 1, as integers (V, 4) with the sum
+    255.
+    """
     integers = np.round(255 * weights).astype(int)
     largest = integers.argmax(axis=1)
     integers[np.arange(len(integers)), largest] += 255 - integers.sum(axis=1)
@@ -101,7 +112,9 @@ def quantized_weights(weights: NDArray[np.float64]) -> NDArray[np.uint8]:
 
 
 def quantized_rotations(poses: NDArray[np.float64]) -> NDArray[np.int16]:
-    """Return axis-angle vectors (T, K+1, 3) as unit quaternions (T, K+1, 4), w first and not negative, times 32767."""
+    """Return axis-angle vectors (T, K+1, 3) as unit quaternions (T, K+1, 4), w first and not
+    negative, times 32767.
+    """
     angle = np.linalg.norm(poses, axis=-1, keepdims=True)
     # sin(θ/2) / θ, which is 1/2 at 0; np.sinc(x) = sin(πx) / (πx).
     vector = 0.5 * np.sinc(angle / (2 * np.pi)) * poses

@@ -1,2 +1,4 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Retargeting in numpy: mapping a rig's bones to body parts and transferring the body's motion to them."""
+"""Retargeting in numpy: mapping a rig's bones to body parts and transferring the body's motion to
+them.
+"""

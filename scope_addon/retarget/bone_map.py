@@ -12,7 +12,8 @@ from ..json_file import load_map, save_map
 SIDED_PARTS = ("hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist")
 SPINE = ("spine1", "spine2", "spine3")
 FINGERS = ("thumb", "index", "middle", "ring", "pinky")
-PHALANGES = tuple(f"{finger}{k}" for finger in FINGERS for k in (1, 2, 3))  # named as in SMPL+H, from the knuckle on
+# named as in SMPL+H, from the knuckle on
+PHALANGES = tuple(f"{finger}{k}" for finger in FINGERS for k in (1, 2, 3))
 PARTS = (
     *("pelvis", *SPINE, "neck", "head"),
     *(f"{side}_{part}" for side in ("left", "right") for part in (*SIDED_PARTS, *PHALANGES)),
@@ -23,10 +24,13 @@ _KIND = "bone map"
 
 @dataclass
 class BoneMap:
-    """Bones and their body parts. Several bones may share a part of the spine, or the neck; other parts have one."""
+    """Bones and their body parts. Several bones may share a part of the spine, or the neck; other
+    parts have one.
+    """
 
     parts: dict[str, str]  # bone name -> body part
-    confidence: dict[str, float] = field(default_factory=dict)  # by bone name, 0 to 1; empty unless guessed
+    # by bone name, 0 to 1; empty unless guessed
+    confidence: dict[str, float] = field(default_factory=dict)
 
     def bone(self, part: str) -> str | None:
         """Return the first bone of a part, or None."""
@@ -35,20 +39,27 @@ class BoneMap:
     def check(self) -> None:
         """Check that the map can be used for retargeting.
 
-        :raises InputError: when a part is unknown, a part of a limb has two bones, or pelvis or legs are missing.
+        :raises InputError: when a part is unknown, a part of a limb has two bones, or pelvis or
+            legs are missing.
         """
         for bone, part in self.parts.items():
             if part not in PARTS:
                 raise InputError(
-                    f"bone '{bone}' is mapped to '{part}', which is not a body part; use one of {', '.join(PARTS)}"
+                    f"bone '{bone}' is mapped to '{part}', which is not a body part; use one of "
+                    f"{', '.join(PARTS)}"
                 )
         for part in PARTS:
             bones = [bone for bone, p in self.parts.items() if p == part]
             if len(bones) > 1 and part not in SPINE and part != "neck":
-                raise InputError(f"'{part}' has {len(bones)} bones, {' and '.join(bones)}; keep only one of them")
+                raise InputError(
+                    f"'{part}' has {len(bones)} bones, {' and '.join(bones)}; keep only one of them"
+                )
         missing = [part for part in REQUIRED if self.bone(part) is None]
         if missing:
-            raise InputError(f"the bone map has no bone for {', '.join(missing)}; choose one for each in the list")
+            raise InputError(
+                f"the bone map has no bone for {', '.join(missing)}; choose one for "
+                "each in the list"
+            )
 
 
 def save_bone_map(bone_map: BoneMap, path: str | Path) -> None:
@@ -68,8 +79,13 @@ def load_bone_map(path: str | Path) -> BoneMap:
     """
     path = Path(path)
     bones = load_map(path, _KIND).get("bones")
-    if not isinstance(bones, dict) or not all(is_name(bone) and is_name(part) for bone, part in bones.items()):
-        raise InputError(f"{path}: 'bones' must be an object that maps bone names to body parts; correct the file")
+    if not isinstance(bones, dict) or not all(
+        is_name(bone) and is_name(part) for bone, part in bones.items()
+    ):
+        raise InputError(
+            f"{path}: 'bones' must be an object that maps bone names to body parts; "
+            "correct the file"
+        )
     out = BoneMap(dict(bones))
     try:
         out.check()
@@ -79,5 +95,11 @@ def load_bone_map(path: str | Path) -> BoneMap:
 
 
 def is_name(text: object) -> bool:
-    """Return whether Blender can store the name: JSON may escape null characters and lone surrogates."""
-    return isinstance(text, str) and text != "" and not any(c == "\0" or "\ud800" <= c <= "\udfff" for c in text)
+    """Return whether Blender can store the name: JSON may escape null characters and lone
+    surrogates.
+    """
+    return (
+        isinstance(text, str)
+        and text != ""
+        and not any(c == "\0" or "\ud800" <= c <= "\udfff" for c in text)
+    )

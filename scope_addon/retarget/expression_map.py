@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The expression map: which shape key or control of a face follows which expressions, and how far.
 
-Guessing from names of shape keys, reading, writing. Of faces that bones move, see `face.face_controls`.
+Guessing from names of shape keys, reading, writing. Of faces that bones move, see
+`face.face_controls`.
 """
 
 from __future__ import annotations
@@ -23,13 +24,19 @@ from .bone_map import is_name
 LARGEST_FACTOR = 10.0
 LARGEST_ANGLE = 180.0  # degrees
 MOVED = ("left", "up", "forward")  # channels of a control: shares of a length of the face
-TURNED = ("pitch", "yaw", "roll")  # degrees about left, up and forward: down, to the left, with the left side up
+# degrees about left, up and forward: down, to the left, with the left side up
+TURNED = ("pitch", "yaw", "roll")
 _KIND = "expression map"
 _MIN_ARKIT = 5  # keys with ARKit's names from which others, such as visemes, are left alone
 _BOTH_BLINK = {"eyeBlinkLeft": 0.5, "eyeBlinkRight": 0.5}
 _SMILE = {"mouthSmileLeft": 0.5, "mouthSmileRight": 0.5}
 _STRETCH = {"mouthStretchLeft": 0.5, "mouthStretchRight": 0.5}
-_PRESS = {"mouthPressLeft": 0.5, "mouthPressRight": 0.5, "mouthRollLower": 0.5, "mouthRollUpper": 0.5}
+_PRESS = {
+    "mouthPressLeft": 0.5,
+    "mouthPressRight": 0.5,
+    "mouthRollLower": 0.5,
+    "mouthRollUpper": 0.5,
+}
 _ROUND = {"mouthFunnel": -0.8, "mouthPucker": -0.8}
 _BROWS_DOWN = {"browDownLeft": 0.5, "browDownRight": 0.5}
 # An open mouth that neither rounds nor widens, in a scale where talk reaches 1.
@@ -50,9 +57,20 @@ _OCULUS = {
     "ss": {name: 0.3 for name in _STRETCH},
 }
 _VRM = {
-    **{"aa": _A, "a": _A, "ih": _OCULUS["i"], "i": _OCULUS["i"], "ou": _OCULUS["u"], "u": _OCULUS["u"]},
+    **{
+        "aa": _A,
+        "a": _A,
+        "ih": _OCULUS["i"],
+        "i": _OCULUS["i"],
+        "ou": _OCULUS["u"],
+        "u": _OCULUS["u"],
+    },
     **{"ee": _OCULUS["e"], "e": _OCULUS["e"], "oh": _OCULUS["o"], "o": _OCULUS["o"]},
-    **{"blink": _BOTH_BLINK, "blinkleft": {"eyeBlinkLeft": 1.0}, "blinkright": {"eyeBlinkRight": 1.0}},
+    **{
+        "blink": _BOTH_BLINK,
+        "blinkleft": {"eyeBlinkLeft": 1.0},
+        "blinkright": {"eyeBlinkRight": 1.0},
+    },
     **{
         "happy": _SMILE,
         "joy": _SMILE,
@@ -60,15 +78,32 @@ _VRM = {
         "sad": {"browInnerUp": 1.0},
         "sorrow": {"browInnerUp": 1.0},
     },
-    "surprised": {"eyeWideLeft": 0.5, "eyeWideRight": 0.5, "browOuterUpLeft": 0.3, "browOuterUpRight": 0.3},
-    **{f"look{way}": {f"eyeLook{way.title()}Left": 0.5, f"eyeLook{way.title()}Right": 0.5} for way in ("up", "down")},
+    "surprised": {
+        "eyeWideLeft": 0.5,
+        "eyeWideRight": 0.5,
+        "browOuterUpLeft": 0.3,
+        "browOuterUpRight": 0.3,
+    },
+    **{
+        f"look{way}": {f"eyeLook{way.title()}Left": 0.5, f"eyeLook{way.title()}Right": 0.5}
+        for way in ("up", "down")
+    },
     "lookleft": {"eyeLookOutLeft": 0.5, "eyeLookInRight": 0.5},
     "lookright": {"eyeLookInLeft": 0.5, "eyeLookOutRight": 0.5},
 }
 _VROID = {  # as VRoid Studio names the keys of VRM models, after the prefix
     **{f"mth{vowel}": _VRM[vowel] for vowel in "aiueo"},
-    **{"eyeclose": _BOTH_BLINK, "eyecloseleft": {"eyeBlinkLeft": 1.0}, "eyecloseright": {"eyeBlinkRight": 1.0}},
-    **{"mthfun": _SMILE, "brwangry": _BROWS_DOWN, "brwsorrow": {"browInnerUp": 1.0}, "eyesurprised": _VRM["surprised"]},
+    **{
+        "eyeclose": _BOTH_BLINK,
+        "eyecloseleft": {"eyeBlinkLeft": 1.0},
+        "eyecloseright": {"eyeBlinkRight": 1.0},
+    },
+    **{
+        "mthfun": _SMILE,
+        "brwangry": _BROWS_DOWN,
+        "brwsorrow": {"browInnerUp": 1.0},
+        "eyesurprised": _VRM["surprised"],
+    },
     "brwsurprised": {"browOuterUpLeft": 0.5, "browOuterUpRight": 0.5},
 }
 _ARKIT = {name.lower(): name for name in EXPRESSIONS}
@@ -76,9 +111,11 @@ _ARKIT = {name.lower(): name for name in EXPRESSIONS}
 
 @dataclass
 class ExpressionMap:
-    """Shape keys and, for each, the factors of the expressions that it follows: value = Σ factor · weight.
+    """Shape keys and, for each, the factors of the expressions that it follows: value = Σ factor ·
+    weight.
 
-    ``controls`` are bones that move a face; each has such factors for some of the channels `MOVED` and `TURNED`.
+    ``controls`` are bones that move a face; each has such factors for some of the channels `MOVED`
+    and `TURNED`.
     """
 
     keys: dict[str, dict[str, float]]
@@ -87,18 +124,24 @@ class ExpressionMap:
     def check(self) -> None:
         """Check that the map can be used.
 
-        :raises InputError: when there is no key or control, a channel or an expression is unknown, or a factor is out
-            of range.
+        :raises InputError: when there is no key or control, a channel or an expression is unknown,
+            or a factor is out of range.
         """
-        if not any(self.keys.values()) and not any(any(channels.values()) for channels in self.controls.values()):
-            raise InputError("the expression map has no shape key and no control; add one, and choose its expression")
+        if not any(self.keys.values()) and not any(
+            any(channels.values()) for channels in self.controls.values()
+        ):
+            raise InputError(
+                "the expression map has no shape key and no control; add one, and "
+                "choose its expression"
+            )
         for key, factors in self.keys.items():
             _check_factors(f"shape key '{key}'", factors, LARGEST_FACTOR)
         for bone, channels in self.controls.items():
             for channel, factors in channels.items():
                 if channel not in (*MOVED, *TURNED):
                     raise InputError(
-                        f"control '{bone}' has the channel '{channel}'; use one of {', '.join((*MOVED, *TURNED))}"
+                        f"control '{bone}' has the channel '{channel}'; use one of "
+                        f"{', '.join((*MOVED, *TURNED))}"
                     )
                 largest = LARGEST_ANGLE if channel in TURNED else LARGEST_FACTOR
                 _check_factors(f"control '{bone}'", factors, largest)
@@ -110,14 +153,20 @@ class ExpressionMap:
         """
         place = {name: k for k, name in enumerate(EXPRESSIONS)}
         return {
-            key: np.clip(sum(f * weights[:, place[name]].astype(float) for name, f in factors.items()), 0.0, 1.0)
+            key: np.clip(
+                sum(f * weights[:, place[name]].astype(float) for name, f in factors.items()),
+                0.0,
+                1.0,
+            )
             for key, factors in self.keys.items()
             if factors
         }
 
 
 def guess_expression_map(keys: Iterable[str]) -> ExpressionMap:
-    """Guess the map from the names of shape keys: ARKit's, else Oculus' visemes, else VRM's and VRoid's expressions."""
+    """Guess the map from the names of shape keys: ARKit's, else Oculus' visemes, else VRM's and
+    VRoid's expressions.
+    """
     names = {key: _plain(key) for key in keys}
     arkit = {key: {_ARKIT[name]: 1.0} for key, name in names.items() if name in _ARKIT}
     if len(arkit) >= _MIN_ARKIT:
@@ -125,7 +174,11 @@ def guess_expression_map(keys: Iterable[str]) -> ExpressionMap:
     found = {}
     for key, name in names.items():
         viseme = name.partition("viseme")[2] if name.startswith("viseme") else ""
-        for table, looked_up in ((_OCULUS, viseme), (_VROID, name.rpartition("fcl")[2]), (_VRM, name)):
+        for table, looked_up in (
+            (_OCULUS, viseme),
+            (_VROID, name.rpartition("fcl")[2]),
+            (_VRM, name),
+        ):
             if looked_up in table:
                 found[key] = dict(table[looked_up])
                 break
@@ -153,19 +206,25 @@ def load_expression_map(path: str | Path) -> ExpressionMap:
     keys, controls = content.get("shape_keys", {}), content.get("controls", {})
     if not _are_named(keys) or not all(map(_are_factors, keys.values())):
         raise InputError(
-            f"{path}: 'shape_keys' must be an object that maps each shape key to expressions and factors; "
+            f"{path}: 'shape_keys' must be an object that maps each shape key to expressions and "
+            "factors; "
             "correct the file"
         )
     if not _are_named(controls) or not all(
-        _are_named(channels) and all(map(_are_factors, channels.values())) for channels in controls.values()
+        _are_named(channels) and all(map(_are_factors, channels.values()))
+        for channels in controls.values()
     ):
         raise InputError(
-            f"{path}: 'controls' must be an object that maps each control to channels, and these to expressions and "
+            f"{path}: 'controls' must be an object that maps each control to channels, and these "
+            "to expressions and "
             "factors; correct the file"
         )
     out = ExpressionMap(
         {key: _floats(factors) for key, factors in keys.items()},
-        {bone: {c: _floats(factors) for c, factors in channels.items()} for bone, channels in controls.items()},
+        {
+            bone: {c: _floats(factors) for c, factors in channels.items()}
+            for bone, channels in controls.items()
+        },
     )
     try:
         out.check()
@@ -175,9 +234,15 @@ def load_expression_map(path: str | Path) -> ExpressionMap:
 
 
 def _plain(key: str) -> str:
-    """Return a key's name in lower case, without prefixes such as ``head.``, separators, and ``_L`` written in full."""
+    """Return a key's name in lower case, without prefixes such as ``head.``, separators, and ``_L``
+    written in full.
+    """
     name = re.split(r"[.:|]", re.sub(r"[.](L|R)$", r"_\1", key))[-1]
-    side = re.search(r"(?:_|(?<=[a-z]))(L|R|l|r)$", name) if not name.islower() or "_" in name else None
+    side = (
+        re.search(r"(?:_|(?<=[a-z]))(L|R|l|r)$", name)
+        if not name.islower() or "_" in name
+        else None
+    )
     if side and (name[side.start()] == "_" or side[1].isupper()):
         name = name[: side.start()] + ("left" if side[1].lower() == "l" else "right")
     return re.sub(r"[^a-z0-9]", "", name.lower())
@@ -191,7 +256,8 @@ def _check_factors(what: str, factors: dict[str, float], largest: float) -> None
     for expression, factor in factors.items():
         if expression not in EXPRESSIONS:
             raise InputError(
-                f"{what} is mapped to '{expression}', which is not an expression; use one of {', '.join(EXPRESSIONS)}"
+                f"{what} is mapped to '{expression}', which is not an expression; use one of "
+                f"{', '.join(EXPRESSIONS)}"
             )
         if not abs(factor) <= largest:
             raise InputError(f"{what} has the factor {factor:g}; use at most {largest:g}")

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Check a binary FBX file before Blender's importer reads it, which unpacks whatever its arrays hold.
+"""Check a binary FBX file before Blender's importer reads it, which unpacks whatever its arrays
+hold.
 
-A file is a tree of nodes: end offset, number and size of properties, name, properties, children. A property is a letter
-for its type and a value; those of arrays have a number of elements, whether they are compressed with zlib, and the size
-in the file. Source: the description of the format by the Blender developers (Binary FBX file structure, 2013).
+A file is a tree of nodes: end offset, number and size of properties, name, properties, children. A
+property is a letter for its type and a value; those of arrays have a number of elements, whether
+they are compressed with zlib, and the size in the file. Source: the description of the format by
+the Blender developers (Binary FBX file structure, 2013).
 """
 
 from __future__ import annotations
@@ -23,7 +25,8 @@ _STEP = 1 << 20
 
 
 def check_fbx(path: Path) -> None:
-    """Check that nodes lie within the file, and that arrays unpack to what they say, a gigabyte in all at most.
+    """Check that nodes lie within the file, and that arrays unpack to what they say, a gigabyte in
+    all at most.
 
     :raises InputError: they do not.
     :raises OSError: the file cannot be read.
@@ -31,7 +34,9 @@ def check_fbx(path: Path) -> None:
     try:
         _Checker(memoryview(path.read_bytes())).check()
     except (ValueError, IndexError, struct.error, zlib.error) as error:
-        raise InputError(f"{path}: this FBX file is damaged ({error}); export it again or choose another") from error
+        raise InputError(
+            f"{path}: this FBX file is damaged ({error}); export it again or choose another"
+        ) from error
 
 
 class _Checker:
@@ -44,7 +49,8 @@ class _Checker:
     def check(self) -> None:
         """Check everything.
 
-        :raises ValueError: the file is damaged or too large; also struct.error, IndexError and zlib.error.
+        :raises ValueError: the file is damaged or too large; also struct.error, IndexError and
+            zlib.error.
         """
         self._check_nodes(_HEADER_BYTES, len(self._data), 0)
 
@@ -77,7 +83,9 @@ class _Checker:
                 at += 12 + size
                 if at > end:
                     raise ValueError("an array does not lie within its node")
-                self._check_array(at - size, at, length * _ELEMENT_BYTES[kind], compressed=encoding == 1)
+                self._check_array(
+                    at - size, at, length * _ELEMENT_BYTES[kind], compressed=encoding == 1
+                )
             elif kind in "SR":
                 at += 4 + struct.unpack_from("<I", self._data, at)[0]
             else:

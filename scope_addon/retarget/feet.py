@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Goals for a rig's ankles, where its feet differ in shape from the body's.
 
-A foot that rolls from the heel onto the ball rotates about the one that is on the floor, and that point must not move.
-The ankle follows from either point i, heel or ball:
+A foot that rolls from the heel onto the ball rotates about the one that is on the floor, and that
+point must not move. The ankle follows from either point i, heel or ball:
 
     a_i = G(p_i) + Y c_i − D q_i,      c_i = q_i − t s_i, with its height set to 0,
 
@@ -10,13 +10,15 @@ The ankle follows from either point i, heel or ball:
     s_i   from the body's ankle to the point, at rest;  q_i: the same on the rig
     s     the rig's leg length divided by the body's
     t     the scale of positions on the floor, usually s
-    G(p)  t p, but the height is that of the rig's point at rest plus s times the rise of p above its height at rest
+    G(p)  t p, but the height is that of the rig's point at rest plus s times the rise of p above
+          its height at rest
     D, Y  rotation of the foot from rest, and its rotation about the vertical alone (heading)
 
-So a point that is at rest on the body is at rest on the rig. On a flat foot both goals are the same: t times the body's
-ankle, at the height of the rig's ankle; so a longer foot extends at both ends, and nothing jumps. The two goals are
-blended by a logistic function of the difference in height of the points, in favour of the lower one. Neither point
-penetrates the floor, even where the captured foot does.
+So a point that is at rest on the body is at rest on the rig. On a flat foot both goals are the
+same: t times the body's ankle, at the height of the rig's ankle; so a longer foot extends at both
+ends, and nothing jumps. The two goals are blended by a logistic function of the difference in
+height of the points, in favour of the lower one. Neither point penetrates the floor, even where the
+captured foot does.
 """
 
 from __future__ import annotations
@@ -68,13 +70,15 @@ def ankle_goal(
     goals, heights, rolled = [], [], []
     for s, q in ((source.heel, rig.heel), (source.ball, rig.ball)):
         point, rig_point = ankle + rotated(turn, s), rotated(turn, q)
-        above = point[..., 2] - floor - (source.height + s[..., 2])  # height above its rest position on the floor
+        # height above its rest position on the floor
+        above = point[..., 2] - floor - (source.height + s[..., 2])
         place = scales * point
         place[..., 2] = scales[2] * above + rig.height + q[..., 2]
         goals.append(place + rotated(yaw, (q - scales * s) * _LEVEL) - rig_point)
         heights.append(above)
         rolled.append(rig_point[..., 2] - (rig.height + q[..., 2]))
-    share = 1.0 / (1.0 + np.exp(np.clip((heights[1] - heights[0]) / _SOFT_M, -50, 50)))  # 1: the ball is in contact
+    # 1: the ball is in contact
+    share = 1.0 / (1.0 + np.exp(np.clip((heights[1] - heights[0]) / _SOFT_M, -50, 50)))
     goal: NDArray[np.float64] = goals[0] + share[..., None] * (goals[1] - goals[0])
     if one_floor:
         goal[..., 2] = np.maximum(goal[..., 2], -np.minimum(rolled[0], rolled[1]))
@@ -82,11 +86,15 @@ def ankle_goal(
 
 
 def flat_toes(
-    toe: NDArray[np.float64], rest: NDArray[np.float64], ball: NDArray[np.float64], ball_rest: NDArray[np.float64]
+    toe: NDArray[np.float64],
+    rest: NDArray[np.float64],
+    ball: NDArray[np.float64],
+    ball_rest: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Raise toes whose tips would penetrate the floor.
 
-    A capture in which the toes never bend pushes them into the floor when the heel rises; here they stay flat on it.
+    A capture in which the toes never bend pushes them into the floor when the heel rises; here they
+    stay flat on it.
 
     :param toe: (..., 3, 3) rotations of the toes from rest.
     :param rest: (..., 3) from ball to tip at rest, metres.
@@ -104,15 +112,22 @@ def flat_toes(
         return toe
     angle = np.arcsin(np.clip(tip[..., 2] / length, -1, 1))
     lift = np.where(penetrates, np.arcsin(lowest / length) - angle, 0.0)
-    side = np.stack([tip[..., 1], -tip[..., 0], np.zeros_like(across)], axis=-1) / np.maximum(across, 1e-9)[..., None]
+    side = (
+        np.stack([tip[..., 1], -tip[..., 0], np.zeros_like(across)], axis=-1)
+        / np.maximum(across, 1e-9)[..., None]
+    )
     raised: NDArray[np.float64] = exp(side * lift[..., None]) @ toe
     return raised
 
 
 def pelvis_drop(
-    hips: NDArray[np.float64], goals: NDArray[np.float64], lengths: NDArray[np.float64], times: NDArray[np.float64]
+    hips: NDArray[np.float64],
+    goals: NDArray[np.float64],
+    lengths: NDArray[np.float64],
+    times: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Compute how far the pelvis has to be lowered, smoothly in time, for the legs to reach the goals of the ankles.
+    """Compute how far the pelvis has to be lowered, smoothly in time, for the legs to reach the
+    goals of the ankles.
 
     :param hips: (T, L, 3) of L legs, metres.
     :param goals: (T, L, 3) of the ankles, metres.
@@ -125,7 +140,8 @@ def pelvis_drop(
     needed: NDArray[np.float64] = np.maximum(0.0, (hips - goals)[..., 2] - upright).max(axis=1)
     if not needed.any() or len(needed) == 1:
         return needed
-    # A maximum filter, then a weighted mean of the same width: nowhere less than needed, and smooth.
+    # A maximum filter, then a weighted mean of the same width: nowhere less than needed, and
+    # smooth.
     frames = round(_DROP_S / float(np.median(np.diff(times))))
     width = np.arange(-frames, frames + 1)
     near = np.clip(np.arange(len(needed))[:, None] + width, 0, len(needed) - 1)
@@ -135,5 +151,7 @@ def pelvis_drop(
 
 
 def _heading(turn: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the rotations (..., 3, 3) about the vertical alone, from the sideways axis, which stays horizontal."""
+    """Return the rotations (..., 3, 3) about the vertical alone, from the sideways axis, which
+    stays horizontal.
+    """
     return about_z(np.arctan2(turn[..., 1, 0], turn[..., 0, 0])).reshape(turn.shape)

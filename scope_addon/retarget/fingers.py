@@ -17,7 +17,8 @@ _WORDS = {
     "ring": ("ring",),
     "pinky": ("pinky", "pinkie", "little"),
 }
-# Bones of a hand that are not phalanges. A thumb's metacarpal moves, and counts as its first phalanx.
+# Bones of a hand that are not phalanges. A thumb's metacarpal moves, and counts as its first
+# phalanx.
 _NO_PHALANX = re.compile(r"end|nub|tip|site|master|palm|twist|pole|ik|target", re.IGNORECASE)
 _METACARPAL = re.compile(r"carpal|\bmeta\b", re.IGNORECASE)
 _NUMBERED = re.compile(r"finger[ _.-]*(\d)", re.IGNORECASE)
@@ -54,7 +55,9 @@ def _by_name(names: list[str], parents: NDArray[np.intp], below: list[int]) -> d
         if any(_NO_PHALANX.fullmatch(word) for word in words):
             continue
         bare = name.lower()
-        finger = next((f for f, known in _WORDS.items() if any(word in bare for word in known)), None)
+        finger = next(
+            (f for f, known in _WORDS.items() if any(word in bare for word in known)), None
+        )
         number = _NUMBERED.search(name)
         if finger == "thumb" or (finger and not _METACARPAL.search(name)):
             own.setdefault(finger, set()).add(i)
@@ -68,7 +71,9 @@ def _by_name(names: list[str], parents: NDArray[np.intp], below: list[int]) -> d
 def _by_geometry(
     parents: NDArray[np.intp], heads: NDArray[np.float64], wrist: int, below: list[int]
 ) -> dict[str, list[int]]:
-    """Identify five chains: the thumb is the one that diverges most, the others are ordered by distance from it."""
+    """Identify five chains: the thumb is the one that diverges most, the others are ordered by
+    distance from it.
+    """
     leaves = [i for i in below if i not in set(parents[below].tolist())]
     chains = []
     for leaf in leaves:
@@ -76,7 +81,9 @@ def _by_geometry(
         while parents[chain[0]] != wrist:
             chain.insert(0, int(parents[chain[0]]))
         chains.append(chain)
-    if len(chains) != len(FINGERS) or any(not _PHALANGES <= len(chain) <= _PHALANGES + 2 for chain in chains):
+    if len(chains) != len(FINGERS) or any(
+        not _PHALANGES <= len(chain) <= _PHALANGES + 2 for chain in chains
+    ):
         return {}
     along = np.array([heads[chain[-1]] - heads[chain[0]] for chain in chains])
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Placing a rig's feet where the body's are, scaled, by lowering the pelvis and solving the legs."""
+"""Placing a rig's feet where the body's are, scaled, by lowering the pelvis and solving the
+legs.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,9 @@ _SIDES = ("left", "right")
 
 @dataclass(frozen=True)
 class Legs:
-    """The L legs of a rig that have an ankle, beside the body's, at rest. Bones are the rig's, by index."""
+    """The L legs of a rig that have an ankle, beside the body's, at rest. Bones are the rig's, by
+    index.
+    """
 
     hips: list[int]
     knees: list[int]
@@ -32,7 +36,8 @@ class Legs:
     rig: FootRest
     tips: NDArray[np.float64]  # (len(toed), 3) from the ball to the tip of the toes, metres
     lengths: NDArray[np.float64]  # (L,) of the legs, nearly stretched, metres
-    scales: NDArray[np.float64]  # (3,) of positions: on the floor, and the rig's leg length divided by the body's
+    # (3,) of positions: on the floor, and the rig's leg length divided by the body's
+    scales: NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -58,20 +63,27 @@ def legs_at_rest(
     :param row: the rig's bone of each body part.
     :param alignment: (B, 3, 3) A_b F.
     :param rest: the body's vertices (V, 3) and joints (K+1, 3) at rest, metres, world axes.
-    :param scales: (3,) of positions on the floor, twice, and the rig's leg length divided by the body's.
+    :param scales: (3,) of positions on the floor, twice, and the rig's leg length divided by the
+        body's.
     """
     sides = [side for side in _SIDES if f"{side}_ankle" in row]
     if not sides:
         return None
-    hips, knees, ankles = ([row[f"{side}_{part}"] for side in sides] for part in ("hip", "knee", "ankle"))
+    hips, knees, ankles = (
+        [row[f"{side}_{part}"] for side in sides] for part in ("hip", "knee", "ankle")
+    )
     toe_of = [row.get(f"{side}_foot") for side in sides]
     source = _body_feet(body, *rest, sides)
     pairs = zip(ankles, toe_of, source, strict=True)
-    feet = [_rig_foot(rig, alignment[ankle], ankle, toe, foot, float(scales[2])) for ankle, toe, foot in pairs]
+    feet = [
+        _rig_foot(rig, alignment[ankle], ankle, toe, foot, float(scales[2]))
+        for ankle, toe, foot in pairs
+    ]
     toed = [leg for leg, toe in enumerate(toe_of) if toe is not None]
     toes = [toe for toe in toe_of if toe is not None]
     sizes = [np.linalg.norm(rig.tails[toe] - rig.heads[toe]) for toe in toes]
-    # The tails of imported bones may point anywhere, so the direction of the toes is taken from the foot.
+    # The tails of imported bones may point anywhere, so the direction of the toes is taken from the
+    # foot.
     tips = [
         feet[leg].ball * [1, 1, 0] / np.linalg.norm(feet[leg].ball[:2]) * size
         for leg, size in zip(toed, sizes, strict=True)
@@ -92,8 +104,12 @@ def legs_at_rest(
     )
 
 
-def _body_feet(body: Body, v: NDArray[np.float64], J: NDArray[np.float64], sides: list[str]) -> list[FootRest]:
-    """Measure the feet of the body at rest. The heel is the rear end of what the foot, without its toes, stands on."""
+def _body_feet(
+    body: Body, v: NDArray[np.float64], J: NDArray[np.float64], sides: list[str]
+) -> list[FootRest]:
+    """Measure the feet of the body at rest. The heel is the rear end of what the foot, without its
+    toes, stands on.
+    """
     low = float(v[:, 2].min())
     feet = []
     for side in sides:
@@ -106,7 +122,12 @@ def _body_feet(body: Body, v: NDArray[np.float64], J: NDArray[np.float64], sides
 
 
 def _rig_foot(
-    rig: Skeleton, AF: NDArray[np.float64], ankle: int, toe: int | None, source: FootRest, scale: float
+    rig: Skeleton,
+    AF: NDArray[np.float64],
+    ankle: int,
+    toe: int | None,
+    source: FootRest,
+    scale: float,
 ) -> FootRest:
     """Measure the rig's foot; without a bone at the ball, its length is taken from the body's."""
     height = rig.heads[ankle, 2] - rig.floor
@@ -115,13 +136,16 @@ def _rig_foot(
     share = float(np.linalg.norm(ball[:2])) / length
     if not 0.3 * scale < share < 3 * scale or ball @ source.ball < 0:
         share, ball = scale, np.array([*(scale * source.ball[:2]), -0.8 * height])
-    heel = np.array([*(share * source.heel[:2]), -height])  # no bone ends at the heel: proportional to the body's
+    # no bone ends at the heel: proportional to the body's
+    heel = np.array([*(share * source.heel[:2]), -height])
     return FootRest(heel, ball, height)
 
 
 def _stacked(feet: list[FootRest]) -> FootRest:
     """Return several feet as one, with their number as the first axis."""
-    heels, balls, heights = zip(*((foot.heel, foot.ball, foot.height) for foot in feet), strict=True)
+    heels, balls, heights = zip(
+        *((foot.heel, foot.ball, foot.height) for foot in feet), strict=True
+    )
     return FootRest(np.array(heels), np.array(balls), np.array(heights))
 
 
@@ -142,7 +166,9 @@ def place_feet(
     """
     world, heads = motion.rotations.copy(), motion.heads.copy()
     turns = motion.turns[:, legs.ankles]
-    goals = ankle_goal(legs.body, legs.rig, legs.scales, turns, joints[:, legs.joints], one_floor=one_floor)
+    goals = ankle_goal(
+        legs.body, legs.rig, legs.scales, turns, joints[:, legs.joints], one_floor=one_floor
+    )
     if legs.toed and one_floor:
         balls = (goals + rotated(turns, legs.rig.ball))[:, legs.toed]
         rested = (legs.rig.height + legs.rig.ball[:, 2])[legs.toed]
@@ -161,5 +187,7 @@ def place_feet(
 
 
 def _rows(of_legs: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the entries (T·L, ...) of T frames and L legs, (T, L, ...), which are solved at once."""
+    """Return the entries (T·L, ...) of T frames and L legs, (T, L, ...), which are solved at
+    once.
+    """
     return of_legs.reshape(-1, *of_legs.shape[2:])

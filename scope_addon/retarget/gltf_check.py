@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Check a glTF file before Blender's importer reads it, which trusts every number and every file name in it.
+"""Check a glTF file before Blender's importer reads it, which trusts every number and every file
+name in it.
 
-Source: the glTF 2.0 specification, sections 3.6 (buffers, accessors), 3.8 (images) and 4 (binary files).
+Source: the glTF 2.0 specification, sections 3.6 (buffers, accessors), 3.8 (images) and 4 (binary
+files).
 """
 
 from __future__ import annotations
@@ -21,11 +23,21 @@ _COMPONENT_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 _COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 _LARGEST_JSON, _LARGEST_FILE = 200_000_000, 2 << 30
 _MAX_ELEMENTS = 50_000_000  # of an accessor without data, whose elements are all zero
-_DAMAGED = (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError, RecursionError, struct.error)
+_DAMAGED = (
+    KeyError,
+    IndexError,
+    TypeError,
+    ValueError,
+    AttributeError,
+    OverflowError,
+    RecursionError,
+    struct.error,
+)
 
 
 def check_gltf(path: Path) -> None:
-    """Check that all data a .gltf or .glb speaks of is there, in the file itself or in files beside it.
+    """Check that all data a .gltf or .glb speaks of is there, in the file itself or in files beside
+    it.
 
     :raises InputError: it is not.
     :raises OSError: the file cannot be read.
@@ -38,11 +50,16 @@ def check_gltf(path: Path) -> None:
                 _uri_bytes(path, image["uri"])
         views = gltf.get("bufferViews", [])
         for view in views:
-            _require(_natural(view.get("byteOffset", 0)) + _natural(view["byteLength"]) <= buffers[view["buffer"]])
+            _require(
+                _natural(view.get("byteOffset", 0)) + _natural(view["byteLength"])
+                <= buffers[view["buffer"]]
+            )
         for accessor in gltf.get("accessors", ()):
             _check_accessor(accessor, views)
     except _DAMAGED as error:
-        raise InputError(f"{path}: this glTF file is damaged; export it again or choose another") from error
+        raise InputError(
+            f"{path}: this glTF file is damaged; export it again or choose another"
+        ) from error
 
 
 def _read(path: Path) -> tuple[dict[str, Any], int]:
@@ -54,7 +71,9 @@ def _read(path: Path) -> tuple[dict[str, Any], int]:
         else:
             length = struct.unpack("<4xII", file.read(12))[1]
             json_bytes, kind = struct.unpack("<I4s", file.read(8))
-            _require(kind == b"JSON" and json_bytes <= _LARGEST_JSON and length <= path.stat().st_size)
+            _require(
+                kind == b"JSON" and json_bytes <= _LARGEST_JSON and length <= path.stat().st_size
+            )
             text = file.read(json_bytes)
             chunk = file.read(8)
             binary_bytes = struct.unpack("<I4x", chunk)[0] if len(chunk) == 8 else 0
@@ -70,7 +89,8 @@ def _buffer_bytes(path: Path, buffer: dict[str, Any], binary_bytes: int) -> int:
 
 
 def _uri_bytes(path: Path, uri: str) -> int:
-    """Return the size of what a URI names: data within it, or a file in the folder of ``path`` or below.
+    """Return the size of what a URI names: data within it, or a file in the folder of ``path`` or
+    below.
 
     :raises InputError: it names anything else.
     """
@@ -85,7 +105,9 @@ def _uri_bytes(path: Path, uri: str) -> int:
     folder = path.resolve().parent
     target = (folder / _decoded(uri)).resolve()
     if not target.is_relative_to(folder) or ":" in uri.partition("/")[0]:
-        raise InputError(f"{path} refers to {uri[:80]!r}, outside its own folder; export the rig as one .glb")
+        raise InputError(
+            f"{path} refers to {uri[:80]!r}, outside its own folder; export the rig as one .glb"
+        )
     if not target.exists():
         raise InputError(f"{path} needs {uri[:80]!r}, which is missing; put that file beside it")
     check_regular(target, InputError, "rig", _LARGEST_FILE)
@@ -95,7 +117,9 @@ def _uri_bytes(path: Path, uri: str) -> int:
 
 def _decoded(uri: str) -> str:
     """Replace a URI's %XX by the bytes of UTF-8 that they stand for."""
-    text = re.sub(rb"%([0-9A-Fa-f]{2})", lambda match: bytes.fromhex(match[1].decode()), uri.encode())
+    text = re.sub(
+        rb"%([0-9A-Fa-f]{2})", lambda match: bytes.fromhex(match[1].decode()), uri.encode()
+    )
     return text.decode()
 
 
@@ -103,7 +127,9 @@ def _check_accessor(accessor: dict[str, Any], views: list[dict[str, Any]]) -> No
     count = _natural(accessor["count"])
     item_bytes = _COMPONENT_BYTES[accessor["componentType"]] * _COMPONENTS[accessor["type"]]
     if "bufferView" in accessor:
-        _check_within(views[accessor["bufferView"]], accessor.get("byteOffset", 0), count, item_bytes)
+        _check_within(
+            views[accessor["bufferView"]], accessor.get("byteOffset", 0), count, item_bytes
+        )
     else:
         _require(count <= _MAX_ELEMENTS)
     if "sparse" in accessor:

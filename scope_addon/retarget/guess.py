@@ -25,7 +25,8 @@ _LIMBS = {
     "hip": ("thigh", "upleg", "upperleg", "hip"),
     "knee": ("shin", "calf", "leg", "lowerleg", "knee"),
     "ankle": ("ankle", "foot"),
-    "foot": ("toe", "toes", "toebase", "ball", "foot"),  # SMPL calls the toes "foot", and the foot "ankle"
+    # SMPL calls the toes "foot", and the foot "ankle"
+    "foot": ("toe", "toes", "toebase", "ball", "foot"),
     "collar": ("clavicle", "collar", "shoulder"),
     "shoulder": ("upperarm", "uparm", "arm", "shoulder"),
     "elbow": ("forearm", "lowerarm", "elbow"),
@@ -43,7 +44,9 @@ class RestBones:
 
 
 def tokens(name: str) -> tuple[str, str]:
-    """Return the name without prefix, side, digits and case, and its side ('left', 'right' or '')."""
+    """Return the name without prefix, side, digits and case, and its side ('left', 'right' or
+    '').
+    """
     words = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", name.rsplit(":", 1)[-1])
     words = [word.lower() for word in words]
     while len(words) > 1 and words[0] in _PREFIXES:
@@ -64,29 +67,50 @@ def guess(bones: RestBones) -> BoneMap:
         return BoneMap(shaped, dict.fromkeys(shaped, 0.5))
     if rigify is None:
         named |= _fingers(bones, named)
-    return BoneMap(named, {bone: 1.0 if shaped.get(bone) == part else 0.8 for bone, part in named.items()})
+    return BoneMap(
+        named, {bone: 1.0 if shaped.get(bone) == part else 0.8 for bone, part in named.items()}
+    )
 
 
 def _fingers(bones: RestBones, parts: dict[str, str]) -> dict[str, str]:
     """Find the fingers below the wrists of a map."""
-    wrists = {part.partition("_")[0]: bones.names.index(b) for b, part in parts.items() if part.endswith("_wrist")}
+    wrists = {
+        part.partition("_")[0]: bones.names.index(b)
+        for b, part in parts.items()
+        if part.endswith("_wrist")
+    }
     return find_fingers(bones.names, bones.parents, bones.heads, wrists)
 
 
 def _rigify(bones: RestBones) -> dict[str, str] | None:
-    """Map Rigify's bones, whose trunk, neck and head are numbered consecutively; None for other rigs."""
+    """Map Rigify's bones, whose trunk, neck and head are numbered consecutively; None for other
+    rigs.
+    """
     names = set(bones.names)
     if {"torso", "thigh_fk.L", "spine_fk.002"} <= names:
         found = {"torso": "pelvis", "spine_fk.002": "spine1", "spine_fk.003": "spine3"}
         found |= {"neck": "neck", "head": "head"}
         suffix = "_fk"
-    elif {"spine.001", "spine.003", "spine.006", "thigh.L"} <= {name.removeprefix("DEF-") for name in names}:
-        found = {"spine": "pelvis", "spine.001": "spine1", "spine.002": "spine2", "spine.003": "spine3"}
+    elif {"spine.001", "spine.003", "spine.006", "thigh.L"} <= {
+        name.removeprefix("DEF-") for name in names
+    }:
+        found = {
+            "spine": "pelvis",
+            "spine.001": "spine1",
+            "spine.002": "spine2",
+            "spine.003": "spine3",
+        }
         found |= {"spine.004": "neck", "spine.005": "neck", "spine.006": "head"}
         suffix = ""
     else:
         return None
-    limbs = {"thigh": "hip", "shin": "knee", "foot": "ankle", "toe": "foot", "upper_arm": "shoulder"}
+    limbs = {
+        "thigh": "hip",
+        "shin": "knee",
+        "foot": "ankle",
+        "toe": "foot",
+        "upper_arm": "shoulder",
+    }
     limbs |= {"forearm": "elbow", "hand": "wrist"}
     for letter, side in (("L", "left"), ("R", "right")):
         found[f"shoulder.{letter}"] = f"{side}_collar"
@@ -94,12 +118,14 @@ def _rigify(bones: RestBones) -> dict[str, str] | None:
         for finger in FINGERS:
             bone = finger if finger == "thumb" else f"f_{finger}"
             found |= {f"{bone}.{k:02d}.{letter}": f"{side}_{finger}{k}" for k in (1, 2, 3)}
-    prefix = "" if "thigh.L" in names or suffix else "DEF-"  # the metarig, or an export of the deform bones alone
+    # the metarig, or an export of the deform bones alone
+    prefix = "" if "thigh.L" in names or suffix else "DEF-"
     return {prefix + bone: part for bone, part in found.items() if prefix + bone in names}
 
 
 def by_name(bones: RestBones) -> dict[str, str]:
-    """Map the bones whose names are known; of several candidates for a part, the one nearest to the root.
+    """Map the bones whose names are known; of several candidates for a part, the one nearest to the
+    root.
 
     :return: bone name -> body part.
     """
@@ -109,14 +135,21 @@ def by_name(bones: RestBones) -> dict[str, str]:
     found = _limbs_by_name(bones, cores, order)
     found |= _centre_by_name(bones, cores, order)
     thighs = [bones.names.index(b) for b, part in found.items() if part.endswith("_hip")]
-    if "pelvis" not in found.values() and len(thighs) == 2:  # the nearest common ancestor of both legs
-        shared = [i for i in _ancestors(bones.parents, thighs[0]) if i in _ancestors(bones.parents, thighs[1])]
+    # the nearest common ancestor of both legs
+    if "pelvis" not in found.values() and len(thighs) == 2:
+        shared = [
+            i
+            for i in _ancestors(bones.parents, thighs[0])
+            if i in _ancestors(bones.parents, thighs[1])
+        ]
         if shared:
             found[bones.names[shared[0]]] = "pelvis"
     return found
 
 
-def _limbs_by_name(bones: RestBones, cores: list[tuple[str, str]], order: list[int]) -> dict[str, str]:
+def _limbs_by_name(
+    bones: RestBones, cores: list[tuple[str, str]], order: list[int]
+) -> dict[str, str]:
     """Map arms and legs.
 
     :param cores: the ``tokens`` of every bone.
@@ -138,13 +171,18 @@ def _limbs_by_name(bones: RestBones, cores: list[tuple[str, str]], order: list[i
     return found
 
 
-def _centre_by_name(bones: RestBones, cores: list[tuple[str, str]], order: list[int]) -> dict[str, str]:
+def _centre_by_name(
+    bones: RestBones, cores: list[tuple[str, str]], order: list[int]
+) -> dict[str, str]:
     """Map pelvis, spine, neck and head; parameters as in ``_limbs_by_name``."""
     found: dict[str, str] = {}
     for part, words in _CENTRE.items():
         candidates = [i for i in order if not cores[i][1] and cores[i][0] in words]
         if part == "spine":
-            found |= {bones.names[i]: name for i, name in zip(candidates, _spread(len(candidates)), strict=True)}
+            found |= {
+                bones.names[i]: name
+                for i, name in zip(candidates, _spread(len(candidates)), strict=True)
+            }
         elif part == "neck":
             found |= {bones.names[i]: "neck" for i in candidates}
         elif candidates:
@@ -153,7 +191,8 @@ def _centre_by_name(bones: RestBones, cores: list[tuple[str, str]], order: list[
 
 
 def by_geometry(bones: RestBones) -> dict[str, str]:
-    """Map bones by their positions: legs end lowest on either side, arms extend farthest, the head is highest.
+    """Map bones by their positions: legs end lowest on either side, arms extend farthest, the head
+    is highest.
 
     :return: bone name -> body part; empty if no pair of legs is found.
     """
@@ -170,7 +209,9 @@ def by_geometry(bones: RestBones) -> dict[str, str]:
         legs = [i for i in leaves if sign * across[i] > 0.01 * height and z[i] < 0.15]
         arms = [i for i in leaves if sign * across[i] > 0.1 * height and z[i] > 0.3]
         if legs:
-            chains[f"{side} leg"] = _chain(parents, min(legs, key=lambda i: len(_ancestors(parents, i))))
+            chains[f"{side} leg"] = _chain(
+                parents, min(legs, key=lambda i: len(_ancestors(parents, i)))
+            )
         if arms:
             chains[f"{side} arm"] = _chain(parents, max(arms, key=lambda i: sign * across[i]))
     if not {"left leg", "right leg"} <= chains.keys():
@@ -187,7 +228,10 @@ def by_geometry(bones: RestBones) -> dict[str, str]:
         if kind == "leg":
             parts = ("hip", "knee", "ankle", "foot")
         else:
-            lengths = [float(np.linalg.norm(heads[b] - heads[a])) for a, b in zip(own, own[1:], strict=False)]
+            lengths = [
+                float(np.linalg.norm(heads[b] - heads[a]))
+                for a, b in zip(own, own[1:], strict=False)
+            ]
             collar = len(own) > 3 and lengths[0] < 0.7 * lengths[1]
             parts = ("collar",) * collar + ("shoulder", "elbow", "wrist")
         found |= {bones.names[i]: f"{side}_{part}" for i, part in zip(own, parts, strict=False)}

@@ -36,7 +36,9 @@ def solve_leg(
     hip, knee, ankle = joints
     upper, lower = knee - hip, ankle - knee
     a, b = np.linalg.norm(upper, axis=1), np.linalg.norm(lower, axis=1)
-    distance = np.clip(np.linalg.norm(goal - hip, axis=1), np.abs(a - b) + 1e-6, _MAX_STRETCH * (a + b))
+    distance = np.clip(
+        np.linalg.norm(goal - hip, axis=1), np.abs(a - b) + 1e-6, _MAX_STRETCH * (a + b)
+    )
     at_knee = knee_turn(upper, lower, sideways, distance)
     lower = np.einsum("tij,tj->ti", at_knee, lower)
     normal = cross(upper, lower)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The rotations that align a rig's rest pose with the body's T-pose: F for the heading, A_b for each bone.
+"""The rotations that align a rig's rest pose with the body's T-pose: F for the heading, A_b for
+each bone.
 
 See ``transfer.py`` for their use.
 """
@@ -17,7 +18,8 @@ from .skeleton import Skeleton
 _NEXT = {"hip": "knee", "knee": "ankle", "shoulder": "elbow", "elbow": "wrist", "wrist": "hand"}
 # The fourth does not exist in any body: the last phalanx has no end joint.
 _NEXT |= {f"{finger}{k}": f"{finger}{k + 1}" for finger in FINGERS for k in (1, 2, 3)}
-_MAX_PALM_TURN = np.radians(100)  # between two palms at rest; a larger angle means that fingers were confused
+# between two palms at rest; a larger angle means that fingers were confused
+_MAX_PALM_TURN = np.radians(100)
 
 
 def heading_alignment(rig: Skeleton, row: dict[str, int]) -> NDArray[np.float64]:
@@ -55,21 +57,32 @@ def rest_alignment(
             A[b] = _heading_turn(along, rest[index[f"{side}_foot"]] - rest[index[f"{side}_ankle"]])
         elif kind in _NEXT:
             parent = int(rig.carriers[b])
-            before = A[parent] if parent >= 0 and part_of[parent].partition("_")[2] in _NEXT else np.eye(3)
+            before = (
+                A[parent]
+                if parent >= 0 and part_of[parent].partition("_")[2] in _NEXT
+                else np.eye(3)
+            )
             end = row.get(f"{side}_{_NEXT[kind]}")
             along = (rig.heads[end] if end is not None else rig.tails[b]) - rig.heads[b]
-            # Zero for the last phalanges, which have no end joint: they keep the rig's angle to the one before.
+            # Zero for the last phalanges, which have no end joint: they keep the rig's angle to the
+            # one before.
             wanted = rest[index.get(f"{side}_{_NEXT[kind]}", index[part])] - rest[index[part]]
             can_turn = np.linalg.norm(along) > 1e-9 and np.linalg.norm(wanted) > 1e-9
             A[b] = shortest_turn(before @ F @ along, wanted) @ before if can_turn else before
-            palm = _palm_alignment(rig.heads @ F.T, row, rest, index, side) if kind == "wrist" else None
+            palm = (
+                _palm_alignment(rig.heads @ F.T, row, rest, index, side)
+                if kind == "wrist"
+                else None
+            )
             if palm is not None and (np.trace(palm @ A[b].T) - 1) / 2 > np.cos(_MAX_PALM_TURN):
                 A[b] = palm
     return A
 
 
 def _heading_turn(along: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the turn (3, 3) about the vertical from one direction (3,) to another; none of a steep one."""
+    """Return the turn (3, 3) about the vertical from one direction (3,) to another; none of a steep
+    one.
+    """
     flat, goal = along * [1, 1, 0], wanted * [1, 1, 0]
     if np.linalg.norm(flat) <= 0.3 * np.linalg.norm(along):
         return np.eye(3)
@@ -79,9 +92,15 @@ def _heading_turn(along: NDArray[np.float64], wanted: NDArray[np.float64]) -> ND
 
 
 def _palm_alignment(
-    heads: NDArray[np.float64], row: dict[str, int], rest: NDArray[np.float64], index: dict[str, int], side: str
+    heads: NDArray[np.float64],
+    row: dict[str, int],
+    rest: NDArray[np.float64],
+    index: dict[str, int],
+    side: str,
 ) -> NDArray[np.float64] | None:
-    """Return the rotation (3, 3) of the rig's palm to the body's, from wrist and knuckles; None without fingers."""
+    """Return the rotation (3, 3) of the rig's palm to the body's, from wrist and knuckles; None
+    without fingers.
+    """
     parts = [f"{side}_{part}" for part in ("wrist", "index1", "pinky1")]
     if not all(part in row and part in index for part in parts):
         return None

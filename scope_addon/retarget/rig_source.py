@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The rig file that a motion is retargeted to. Free of bpy, so that the command line can check it first."""
+"""The rig file that a motion is retargeted to. Free of bpy, so that the command line can check it
+first.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,9 @@ _SIGNATURES = {
 
 @dataclass(frozen=True)
 class RigSource:
-    """A file with a rig, the name of the armature if there are several, and the maps unless they are to be guessed."""
+    """A file with a rig, the name of the armature if there are several, and the maps unless they
+    are to be guessed.
+    """
 
     path: Path
     armature: str = ""
@@ -47,12 +51,17 @@ def rig_source(
     """
     suffix = path.suffix.lower()
     if suffix not in RIG_SUFFIXES:
-        raise UsageError(f"cannot read a rig from '{path.name}': its suffix must be one of {', '.join(RIG_SUFFIXES)}")
+        raise UsageError(
+            f"cannot read a rig from '{path.name}': its suffix must be one of "
+            f"{', '.join(RIG_SUFFIXES)}"
+        )
     check_regular(path, InputError, "rig", _LARGEST_BYTES)
     try:
         _check_content(path, suffix)
     except OSError as error:
-        raise InputError(f"{path}: the rig cannot be read ({error.strerror}); choose another file") from error
+        raise InputError(
+            f"{path}: the rig cannot be read ({error.strerror}); choose another file"
+        ) from error
     return RigSource(
         path,
         armature,
@@ -68,7 +77,9 @@ def _check_content(path: Path, suffix: str) -> None:
     if suffix == ".fbx" and header.lstrip().startswith(b";"):
         raise InputError(f"{path}: Blender does not read FBX as text; save it as binary FBX")
     if suffix in _SIGNATURES and not header.startswith(_SIGNATURES[suffix]):
-        raise InputError(f"{path}: this is not a {suffix} file; choose the file that holds your rig")
+        raise InputError(
+            f"{path}: this is not a {suffix} file; choose the file that holds your rig"
+        )
     if suffix == ".fbx":
         check_fbx(path)
     elif suffix != ".blend":

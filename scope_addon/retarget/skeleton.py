@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A rig's mapped bones at rest, their motion, and the conversion between world rotations and bone channels."""
+"""A rig's mapped bones at rest, their motion, and the conversion between world rotations and bone
+channels.
+"""
 
 from __future__ import annotations
 
@@ -12,10 +14,11 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class Skeleton:
-    """The B mapped bones of a rig in its rest pose, in the world frame (z up, metres), parents before children.
+    """The B mapped bones of a rig in its rest pose, in the world frame (z up, metres), parents
+    before children.
 
-    ``parents`` are the mapped bones whose rotation each bone inherits, -1 for none. ``carriers`` are those that its
-    head moves with; they differ where a bone does not inherit rotation.
+    ``parents`` are the mapped bones whose rotation each bone inherits, -1 for none. ``carriers``
+    are those that its head moves with; they differ where a bone does not inherit rotation.
     """
 
     names: list[str]
@@ -28,7 +31,9 @@ class Skeleton:
 
     @cached_property
     def offsets(self) -> NDArray[np.float64]:
-        """From the head of each bone's carrier to its own (B, 3), metres, in its axes; undefined for roots."""
+        """From the head of each bone's carrier to its own (B, 3), metres, in its axes; undefined
+        for roots.
+        """
         out: NDArray[np.float64] = rotated(
             np.swapaxes(self.rotations[self.carriers], 1, 2), self.heads - self.heads[self.carriers]
         )
@@ -47,7 +52,8 @@ class Pose:
 
     rotations: NDArray[np.float64]  # (T, B, 3, 3) bone to world
     heads: NDArray[np.float64]  # (T, B, 3) metres
-    facing: float  # rotation about the vertical from the heading of the rig at rest to that of the body, radians
+    # rotation about the vertical from the heading of the rig at rest to that of the body, radians
+    facing: float
 
 
 def basis(rig: Skeleton, world: NDArray[np.float64]) -> NDArray[np.float64]:

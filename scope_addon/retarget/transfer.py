@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Transferring the body's motion to another skeleton.
 
-With D_i(t) the rotation of body part i from its T-pose in the world, R_b the rest orientation of bone b, F the rotation
-about the vertical that gives the rig the heading of the body, and A_b the smallest rotation, after that of its parent,
-that aligns the rig's limb at rest with the body's,
+With D_i(t) the rotation of body part i from its T-pose in the world, R_b the rest orientation of
+bone b, F the rotation about the vertical that gives the rig the heading of the body, and A_b the
+smallest rotation, after that of its parent, that aligns the rig's limb at rest with the body's,
 
     R_world_bone(t) = D_i(t) A_b F R_b.
 
-A limb therefore has the direction of the body's whatever the rest pose of the rig, and the twist of its own rest pose.
-Trunk and head keep the posture in which the rig was built (A_b = I). Feet are only rotated about the vertical, so soles
-stay flat. Where fingers are captured and the rig has them, the palms are aligned too, so that fingers bend about the
-right axes.
+A limb therefore has the direction of the body's whatever the rest pose of the rig, and the twist of
+its own rest pose. Trunk and head keep the posture in which the rig was built (A_b = I). Feet are
+only rotated about the vertical, so soles stay flat. Where fingers are captured and the rig has
+them, the palms are aligned too, so that fingers bend about the right axes.
 """
 
 from __future__ import annotations
@@ -29,15 +29,21 @@ from .rest_alignment import heading_alignment, rest_alignment
 from .skeleton import Pose, Skeleton, head_positions
 
 
-def leg_ratio(body: Body, betas: NDArray[np.floating[Any]], rig: Skeleton, bone_map: BoneMap) -> float:
+def leg_ratio(
+    body: Body, betas: NDArray[np.floating[Any]], rig: Skeleton, bone_map: BoneMap
+) -> float:
     """Return the rig's leg length divided by that of the body with the shape ``betas`` (P,)."""
-    rows = {part: rig.names.index(bone) for bone, part in bone_map.parts.items() if bone in rig.names}
+    rows = {
+        part: rig.names.index(bone) for bone, part in bone_map.parts.items() if bone in rig.names
+    }
     parts = {part: body.joint_names.index(part) for part in rows}
     return _leg_length(rig.heads, rows) / _leg_length(body.rest_joints(betas), parts)
 
 
 class Transfer:
-    """The transfer from one body to one rig, with everything that does not depend on the motion computed once."""
+    """The transfer from one body to one rig, with everything that does not depend on the motion
+    computed once.
+    """
 
     def __init__(
         self,
@@ -55,13 +61,18 @@ class Transfer:
         :param betas: (P,) shape coefficients of the body.
         :param feet: place the feet where the body's are, scaled; bends the legs a little.
         :param one_floor: with ``feet``, keep the feet above the floor; False on uneven ground.
-        :param travel: scale of positions on the floor; None: the ratio of leg lengths, by which heights are scaled in
-            any case. Rigs that share it keep the distances between the people in proportion.
+        :param travel: scale of positions on the floor; None: the ratio of leg lengths, by which
+            heights are scaled in any case. Rigs that share it keep the distances between the people
+            in proportion.
         """
         self._body, self._betas, self._rig, self._one_floor = body, betas, rig, one_floor
         index = {part: k for k, part in enumerate(body.joint_names)}
         rest = body.rest_joints(betas) @ R_WORLD_MODEL.T
-        row = {part: rig.names.index(bone) for bone, part in bone_map.parts.items() if bone in rig.names}
+        row = {
+            part: rig.names.index(bone)
+            for bone, part in bone_map.parts.items()
+            if bone in rig.names
+        }
         part_of = [bone_map.parts[name] for name in rig.names]
         self._first, self._second, self._shares = _between(part_of, index)
         F = heading_alignment(rig, row)
@@ -77,33 +88,47 @@ class Transfer:
         vertices = body.rest_vertices(betas) @ R_WORLD_MODEL.T
         rested = rest[self._source_hips, 2].mean() - vertices[:, 2].min()
         self._lift[2] = (rig.heads[self._hips, 2].mean() - rig.floor) - legs * rested
-        self._legs = legs_at_rest(rig, row, self._alignment, body, (vertices, rest), self._scales) if feet else None
+        self._legs = (
+            legs_at_rest(rig, row, self._alignment, body, (vertices, rest), self._scales)
+            if feet
+            else None
+        )
 
     def pose(self, clip: Clip) -> Pose:
         """Compute the rig's motion."""
         body, betas, rig = self._body, self._betas, self._rig
-        R, joints = body.forward_kinematics(clip.rotations, clip.root - body.rest_joints(betas)[0], betas)
+        R, joints = body.forward_kinematics(
+            clip.rotations, clip.root - body.rest_joints(betas)[0], betas
+        )
         turns = self._turns(R @ R_WORLD_MODEL.T)
         world = turns @ self._rested
         heads = head_positions(rig, world)
         source_hips = joints[:, self._source_hips].mean(axis=1)
-        heads += (self._scales * source_hips + self._lift - heads[:, self._hips].mean(axis=1))[:, None]
+        heads += (self._scales * source_hips + self._lift - heads[:, self._hips].mean(axis=1))[
+            :, None
+        ]
         if self._legs is not None:
             motion = RigMotion(turns, self._alignment, world, heads)
             world, heads = place_feet(rig, self._legs, motion, joints, clip.times, self._one_floor)
         return Pose(world, heads, self._facing)
 
     def _turns(self, D: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return D of each bone (T, B, 3, 3) from D of each joint; spine and neck are distributed over their bones."""
+        """Return D of each bone (T, B, 3, 3) from D of each joint; spine and neck are distributed
+        over their bones.
+        """
         out: NDArray[np.float64] = D[:, self._first]
         bones = np.flatnonzero(self._shares)
         if len(bones):
-            out[:, bones] = interpolate_rotations(out[:, bones], D[:, self._second[bones]], self._shares[bones])
+            out[:, bones] = interpolate_rotations(
+                out[:, bones], D[:, self._second[bones]], self._shares[bones]
+            )
         return out
 
 
 def _leg_length(points: NDArray[np.float64], rows: dict[str, int]) -> float:
-    """Return the length of both legs, metres; without an ankle, the shin is taken to be as long as the thigh."""
+    """Return the length of both legs, metres; without an ankle, the shin is taken to be as long as
+    the thigh.
+    """
     total = 0.0
     for side in ("left", "right"):
         hip, knee = points[rows[f"{side}_hip"]], points[rows[f"{side}_knee"]]
@@ -116,7 +141,8 @@ def _leg_length(points: NDArray[np.float64], rows: dict[str, int]) -> float:
 def _between(
     part_of: list[str], index: dict[str, int]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]:
-    """Return the two joints (B,) that each bone turns between, and its share (B,) of the way to the second, below 1.
+    """Return the two joints (B,) that each bone turns between, and its share (B,) of the way to the
+    second, below 1.
 
     Bones turn with the joint of their own part, except those of spine and neck.
     """

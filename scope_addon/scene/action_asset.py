@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Marking an action as an asset, with a picture of its pose and with metadata for the asset browser."""
+"""Marking an action as an asset, with a picture of its pose and with metadata for the asset
+browser.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,8 @@ CATALOGS_FILE = "blender_assets.cats.txt"
 _ID = re.compile(r"[0-9a-f]{8}(?:-[0-9a-f]{4}){3}-[0-9a-f]{12}", re.ASCII | re.IGNORECASE)
 _SIZE = 256  # pixels of Blender's large previews
 _MAX_BONES = 200
-_THICKNESS, _THIN, _THICK = 0.12, 0.012, 0.07  # of a bone without a ring: share of its length, and limits in metres
+# of a bone without a ring: share of its length, and limits in metres
+_THICKNESS, _THIN, _THICK = 0.12, 0.012, 0.07
 _RING_TO_LIMB = 0.7  # a ring lies around the surface; a thinner capsule shows the limbs apart
 
 
@@ -35,12 +38,16 @@ class AssetDetails:
 
 
 def mark_action(action: bpy.types.Action, details: AssetDetails) -> None:
-    """Mark an action as an asset, or change the metadata of one; tags that the user has given it stay.
+    """Mark an action as an asset, or change the metadata of one; tags that the user has given it
+    stay.
 
     :raises UsageError: the action is linked, or the catalog does not exist.
     """
     if action.library is not None:
-        raise UsageError(f"the action '{action.name}' is linked from {action.library.filepath}; make it local first")
+        raise UsageError(
+            f"the action '{action.name}' is linked from {action.library.filepath}; "
+            "make it local first"
+        )
     catalog = _catalog_id(details.catalog) if details.catalog else None
     action.asset_mark()
     data = action.asset_data
@@ -61,7 +68,9 @@ def set_preview(action: bpy.types.Action, armature: bpy.types.Object, frame: flo
     scene.frame_set(int(np.floor(frame)), subframe=float(frame - np.floor(frame)))
     try:
         posed = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
-        bones = [bone for bone in posed.pose.bones if bone.bone.use_deform] or list(posed.pose.bones)
+        bones = [bone for bone in posed.pose.bones if bone.bone.use_deform] or list(
+            posed.pose.bones
+        )
         bones = bones[:_MAX_BONES]
         if not bones:
             return
@@ -88,7 +97,9 @@ def first_reliable_frame(motion: Motion) -> int:
 
 
 def catalogs() -> dict[str, str]:
-    """Return the ids of the asset catalogs of the current file, by their paths; empty if it is not saved."""
+    """Return the ids of the asset catalogs of the current file, by their paths; empty if it is not
+    saved.
+    """
     folder = _library_folder()
     found: dict[str, str] = {}
     try:
@@ -105,23 +116,32 @@ def catalogs() -> dict[str, str]:
 def _catalog_id(path: str) -> str:
     known = catalogs()
     if path not in known:
-        names = ", ".join(sorted(known)) or "none yet: save the file and add one in the Asset Browser"
+        names = (
+            ", ".join(sorted(known)) or "none yet: save the file and add one in the Asset Browser"
+        )
         raise UsageError(f"there is no asset catalog '{path}'; there are {names}")
     return known[path]
 
 
 def _library_folder() -> Path | None:
-    """Return the folder of the current file's asset library: that of the preferences, or else the file's own."""
+    """Return the folder of the current file's asset library: that of the preferences, or else the
+    file's own.
+    """
     if not bpy.data.filepath:
         return None
     folder = Path(bpy.data.filepath).parent
-    libraries = [Path(bpy.path.abspath(each.path)) for each in bpy.context.preferences.filepaths.asset_libraries]
+    libraries = [
+        Path(bpy.path.abspath(each.path))
+        for each in bpy.context.preferences.filepaths.asset_libraries
+    ]
     around = [library for library in libraries if library == folder or library in folder.parents]
     return max(around, key=lambda library: len(library.parts), default=folder)
 
 
 def _radius(bone: bpy.types.PoseBone) -> float:
-    """Return the radius of a bone's capsule in the armature's units, from its ring if it has one."""
+    """Return the radius of a bone's capsule in the armature's units, from its ring if it has
+    one.
+    """
     if bone.custom_shape is not None and not bone.use_custom_shape_bone_size:
         return _RING_TO_LIMB * float(min(bone.custom_shape_scale_xyz))
     return float(np.clip(_THICKNESS * bone.length, _THIN, _THICK))

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The axis conventions of Blender's cameras and of glTF; see ``kinematics/axes.py`` for the others.
 
-| frame    | right-handed axes                                    | used by                            |
+| frame    | right-handed axes                                    | used by
+                                                                  |
 |----------|------------------------------------------------------|------------------------------------|
-| gltf     | y up, model faces +z                                 | .glb, .bvh                         |
-| blendcam | Blender camera: x right, y up, looks along −z        | Blender camera objects             |
+| gltf     | y up, model faces +z                                 | .glb, .bvh
+                                                                  |
+| blendcam | Blender camera: x right, y up, looks along −z        | Blender camera objects
+                                                                  |
 """
 
 from __future__ import annotations
@@ -16,7 +19,8 @@ from ..kinematics.axes import R_WORLD_MODEL
 
 # OpenCV camera axes in those of a Blender camera (which looks along its −z with y up).
 R_CAMERA_BLENDCAM = np.diag([1.0, -1.0, -1.0])
-# glTF and SMPL agree (y up, facing +z); Blender's exporters turn z up into y up with the inverse of R_WORLD_MODEL.
+# glTF and SMPL agree (y up, facing +z); Blender's exporters turn z up into y up with the inverse of
+# R_WORLD_MODEL.
 R_GLTF_WORLD = R_WORLD_MODEL.T.copy()
 
 
@@ -34,7 +38,8 @@ def blender_camera_matrix(world_from_camera: NDArray[np.float64]) -> NDArray[np.
 
 
 def blender_brown_distortion(dist: NDArray[np.float64]) -> tuple[float, float, float, float, float]:
-    """Convert OpenCV's (k1, k2, p1, p2, k3) to the coefficients k1, k2, k3, p1, p2 of Blender's Brown model.
+    """Convert OpenCV's (k1, k2, p1, p2, k3) to the coefficients k1, k2, k3, p1, p2 of Blender's
+    Brown model.
 
     Both add a tangential term to (x, y)(1 + k1 r² + k2 r⁴ + k3 r⁶), in units of the focal length:
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Building a Blender scene from motions: a collection with a camera, and an armature and a mesh for each person."""
+"""Building a Blender scene from motions: a collection with a camera, and an armature and a mesh for
+each person.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,15 @@ from . import camera
 from .animation_data import timing
 from .animation_data.actions import Channels
 from .animation_data.transaction import all_or_nothing
-from .character import animation, armature, body_mesh, bone_display, confidence_curves, expression_keys, shape_keys
+from .character import (
+    animation,
+    armature,
+    body_mesh,
+    bone_display,
+    confidence_curves,
+    expression_keys,
+    shape_keys,
+)
 from .character.correction_list import store_corrections
 from .character.keys import bake_whole_frames
 from .datablock_names import short_name
@@ -37,8 +47,8 @@ class BuildOptions:
     """Options of ``build_scene``."""
 
     name: str = ""  # of the capture; empty: the footage's or the motion's source name
-    # "keep": the scene's rate, with keys at the times of the pictures. "resample": the scene's rate, with a key on
-    # every whole frame. "set": the motion's rate.
+    # "keep": the scene's rate, with keys at the times of the pictures. "resample": the scene's
+    # rate, with a key on every whole frame. "set": the motion's rate.
     frame_rate: str = "keep"
     resolution: str = "keep"  # "keep": the scene's. "set": the footage's size and pixel aspect
     set_frame_range: bool = True
@@ -53,10 +63,16 @@ class BuildOptions:
 
         :raises UsageError: when a value is unknown.
         """
-        choices = {"frame_rate": timing.RATE_POLICIES, "resolution": timing.POLICIES, "shape": shape_keys.MODES}
+        choices = {
+            "frame_rate": timing.RATE_POLICIES,
+            "resolution": timing.POLICIES,
+            "shape": shape_keys.MODES,
+        }
         for option, valid in choices.items():
             if getattr(self, option) not in valid:
-                raise UsageError(f"{option} must be one of {', '.join(valid)}, but is '{getattr(self, option)}'")
+                raise UsageError(
+                    f"{option} must be one of {', '.join(valid)}, but is '{getattr(self, option)}'"
+                )
 
 
 NEW_SCENE = BuildOptions(frame_rate="set", resolution="set", active_camera=True)
@@ -94,10 +110,11 @@ def build_scene(
 ) -> BuildResult:
     """Build the motions of one capture in the active scene.
 
-    The options determine whether the scene's frame rate and resolution change. When anything fails, or ``progress``
-    raises ``CancelledError``, the scene is left as it was.
+    The options determine whether the scene's frame rate and resolution change. When anything fails,
+    or ``progress`` raises ``CancelledError``, the scene is left as it was.
 
-    :param body: the body that the motions were fitted with; it must have their joints and shape coefficients.
+    :param body: the body that the motions were fitted with; it must have their joints and shape
+        coefficients.
     :param footage: video or picture to show as the camera's background.
     :param progress: called with a fraction 0..1 and the current step; may raise to stop.
     :raises UsageError: when there are no motions, or the active scene is linked.
@@ -124,7 +141,9 @@ def _build(
     options: BuildOptions,
     report: Progress,
 ) -> BuildResult:
-    name = short_name(options.name or display_text(Path(str(footage or motions[0].source or "capture")).stem))
+    name = short_name(
+        options.name or display_text(Path(str(footage or motions[0].source or "capture")).stem)
+    )
     warnings = _face_warnings(motions, body)
     if options.frame_rate == "set":
         timing.set_scene_rate(scene, motions[0].mocap_framerate)
@@ -141,13 +160,16 @@ def _build(
     if options.with_markers:
         for index, person in enumerate(people):
             prefix = "" if len(people) == 1 else f"person {index + 1} "
-            confidence_curves.add_review_markers(scene, prefix, person.motion, person.frames, person.under_floor)
+            confidence_curves.add_review_markers(
+                scene, prefix, person.motion, person.frames, person.under_floor
+            )
     if options.with_camera:
         warnings += _build_cameras(name, people, collection, footage, options)
     unit = scene.unit_settings.scale_length
     if abs(unit - 1.0) > 1e-6:
         warnings.append(
-            f"the scene's unit is {unit:g} m, but the capture is in metres: scale the new objects by {1 / unit:g}, or "
+            f"the scene's unit is {unit:g} m, but the capture is in metres: scale the new objects "
+            f"by {1 / unit:g}, or "
             "set Unit Scale to 1 in the scene's properties; exported files have the true size"
         )
     if options.resolution == "set":
@@ -168,20 +190,30 @@ def _face_warnings(motions: list[Motion], body: Body) -> list[str]:
     if expressions_of(body) or not any(motion.face for motion in motions):
         return []
     return [
-        f"the body '{body.name}' has no expressions, so it does not show the face, which is in the motion file; the "
+        f"the body '{body.name}' has no expressions, so it does not show the face, which is in the "
+        "motion file; the "
         "built-in bodies do"
     ]
 
 
-def _set_frame_range(scene: bpy.types.Scene, collection: bpy.types.Collection, first: float, last: float) -> None:
+def _set_frame_range(
+    scene: bpy.types.Scene, collection: bpy.types.Collection, first: float, last: float
+) -> None:
     """Set the scene's frame range to a capture's, together with that of the captures before."""
-    if [each for each in scene.collection.children_recursive if CAPTURE_TAG in each] != [collection]:
+    if [each for each in scene.collection.children_recursive if CAPTURE_TAG in each] != [
+        collection
+    ]:
         first, last = min(first, scene.frame_start), max(last, scene.frame_end)
     timing.set_frame_range(scene, first, last)
 
 
 def _build_person(
-    label: str, motion: Motion, body: Body, collection: bpy.types.Collection, rate: float, options: BuildOptions
+    label: str,
+    motion: Motion,
+    body: Body,
+    collection: bpy.types.Collection,
+    rate: float,
+    options: BuildOptions,
 ) -> Person:
     rest = armature.rest_pose(body, motion.betas)
     rig = armature.build_armature(label, body, rest, collection)
@@ -193,7 +225,8 @@ def _build_person(
     shaped = body_mesh.rest_vertices_world(body, rest.lift, motion.betas)
     bone_display.show_bones(rig, body, rest, shaped)
     action = bpy.data.actions.new(label)
-    action.use_fake_user = True  # kept in the file when the armature gets another action or NLA strips
+    # kept in the file when the armature gets another action or NLA strips
+    action.use_fake_user = True
     channels = animation.animate_armature(rig, action, body, motion, rest, frames)
     confidence_curves.key_measurements(rig, channels, body, motion, frames)
     if options.frame_rate == "resample":
@@ -202,10 +235,14 @@ def _build_person(
     of_keys = None
     if not baked and body.P:
         shape_keys.add_shape_keys(mesh, drawn, motion.betas)
-        of_keys = shape_keys.key_shape(mesh, action, motion.betas, frames, per_frame=options.shape == "per_frame")
+        of_keys = shape_keys.key_shape(
+            mesh, action, motion.betas, frames, per_frame=options.shape == "per_frame"
+        )
     if motion.face and expression_keys.add_expression_keys(mesh, drawn):
         of_keys = of_keys or Channels(mesh.data.shape_keys, action)
-        expression_keys.key_expressions(mesh, of_keys, motion, frames, options.frame_rate == "resample")
+        expression_keys.key_expressions(
+            mesh, of_keys, motion, frames, options.frame_rate == "resample"
+        )
     body_mesh.skin_to_armature(mesh, rig, drawn)
     rig["scope_source"] = motion.source
     rig["scope_body"] = body.name
@@ -230,15 +267,21 @@ def _build_cameras(
     """Create the camera of every person, shared by people in the same clip; return warnings."""
     warnings: list[str] = []
     for index, person in enumerate(people):
-        shared = next((p.camera for p in people[:index] if camera.same_camera(p.motion, person.motion)), None)
+        shared = next(
+            (p.camera for p in people[:index] if camera.same_camera(p.motion, person.motion)), None
+        )
         if shared is not None:
             person.camera = shared
             continue
-        person.camera = camera.build_camera(f"{name}_camera", person.motion, collection, person.frames)
+        person.camera = camera.build_camera(
+            f"{name}_camera", person.motion, collection, person.frames
+        )
         if camera.pixel_aspect(person.motion) != (1.0, 1.0) and options.resolution == "keep":
             warnings.append(
-                "the footage's pixels are not square, and the pixel aspect belongs to the scene, not the camera: "
-                "set the scene's resolution from the footage, as Compare with Footage does, for an exact overlay"
+                "the footage's pixels are not square, and the pixel aspect belongs to the scene, "
+                "not the camera: "
+                "set the scene's resolution from the footage, as Compare with Footage does, for an "
+                "exact overlay"
             )
         if footage is not None:
             warnings += camera.show_footage(person.camera, footage, person.motion, person.frames)
@@ -263,4 +306,6 @@ def _check(motion: Motion, body: Body) -> None:
     motion.check_body(body)
     for name in ("poses", "trans", "betas", "intrinsics", "world_from_camera"):
         if not np.isfinite(getattr(motion, name)).all():
-            raise MotionFileError(f"the motion's {name} contain NaN or infinity; capture the video again")
+            raise MotionFileError(
+                f"the motion's {name} contain NaN or infinity; capture the video again"
+            )

@@ -1,19 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A Blender camera with the view of the footage's camera, and the footage in the background.
 
-OpenCV's pinhole ``u = fx x/z + cx, v = fy y/z + cy`` in a W × H picture is, with the horizontal sensor fit,
+OpenCV's pinhole ``u = fx x/z + cx, v = fy y/z + cy`` in a W × H picture is, with the horizontal
+sensor fit,
 
     lens / sensor_width = fx / W,     shift_x = 1/2 − cx / W,
     pixel_aspect_x / pixel_aspect_y = fy / fx,     shift_y = (cy − H/2) / W · fx / fy.
 
-Pixel aspect and resolution belong to the scene in Blender; the camera alone is exact for square pixels. The footage has
-a display aspect of its own, without which it would not fill the picture. A movie clip's lens has a third one, fy / fx,
-because it measures rows in units of columns. Source: Blender's BKE_camera_params_compute_viewplane, overlay_image.cc
-and tracking.cc.
+Pixel aspect and resolution belong to the scene in Blender; the camera alone is exact for square
+pixels. The footage has a display aspect of its own, without which it would not fill the picture. A
+movie clip's lens has a third one, fy / fx, because it measures rows in units of columns. Source:
+Blender's BKE_camera_params_compute_viewplane, overlay_image.cc and tracking.cc.
 
-Footage is shown as an image: the frame of an image can be keyed for any frame rate, its colours do not go through the
-scene's view transform, and Blender 4.3 crashes, also without this extension, when a movie clip is deleted that the
-viewport shows. Only a clip can be undistorted, so footage of a distorting lens is one.
+Footage is shown as an image: the frame of an image can be keyed for any frame rate, its colours do
+not go through the scene's view transform, and Blender 4.3 crashes, also without this extension,
+when a movie clip is deleted that the viewport shows. Only a clip can be undistorted, so footage of
+a distorting lens is one.
 """
 
 from __future__ import annotations
@@ -32,7 +34,8 @@ from .animation_data.stored_values import stored_numbers
 from .axes import blender_brown_distortion, blender_camera_matrix
 from .character.animation import on_one_hemisphere, quaternion_from_matrix
 
-_MAX_OFFSET = 0.6  # frames; footage that deviates less counts as synchronized, because 0.5 is rounding
+# frames; footage that deviates less counts as synchronized, because 0.5 is rounding
+_MAX_OFFSET = 0.6
 _MAX_DURATION = 1_000_000  # frames; after this duration Blender would show the last frame
 # Custom property of a capture's collection: width, height and pixel aspect of the footage.
 _PICTURE = "scope_picture"
@@ -40,7 +43,9 @@ SENSOR_WIDTH = 36.0  # millimetres; only its ratio to the focal length matters
 
 
 def pixel_aspect(motion: Motion) -> tuple[float, float]:
-    """Return the scene's ``pixel_aspect_x, pixel_aspect_y`` for the intrinsics; Blender requires at least 1."""
+    """Return the scene's ``pixel_aspect_x, pixel_aspect_y`` for the intrinsics; Blender requires at
+    least 1.
+    """
     fx, fy = motion.intrinsics[0, 0], motion.intrinsics[1, 1]
     ratio = fy / fx
     if abs(ratio - 1.0) < 1e-6:
@@ -54,7 +59,9 @@ def store_resolution(collection: bpy.types.Collection, motion: Motion) -> None:
 
 
 def set_resolution(scene: bpy.types.Scene, collection: bpy.types.Collection) -> None:
-    """Set the scene's resolution and pixel aspect to those of the footage, if the collection stores them."""
+    """Set the scene's resolution and pixel aspect to those of the footage, if the collection stores
+    them.
+    """
     picture = stored_numbers(collection, _PICTURE)
     if len(picture) != 4 or min(picture) <= 0:
         return
@@ -81,7 +88,9 @@ def build_camera(
     obj.location = locations[0]
     obj.rotation_quaternion = quaternion_from_matrix(T_world_blendcam[0, :3, :3])
     if np.ptp(T_world_blendcam, axis=0).max() > 1e-6:
-        rotations = on_one_hemisphere(np.stack([quaternion_from_matrix(T[:3, :3]) for T in T_world_blendcam]))
+        rotations = on_one_hemisphere(
+            np.stack([quaternion_from_matrix(T[:3, :3]) for T in T_world_blendcam])
+        )
         channels = Channels(obj, bpy.data.actions.new(name))
         channels.write("location", frames, locations, group="Object Transforms")
         channels.write("rotation_quaternion", frames, rotations, group="Object Transforms")
@@ -89,7 +98,9 @@ def build_camera(
 
 
 def set_lens(data: bpy.types.Camera, motion: Motion) -> None:
-    """Set focal length, sensor and principal point of a Blender camera from ``motion.intrinsics``."""
+    """Set focal length, sensor and principal point of a Blender camera from
+    ``motion.intrinsics``.
+    """
     width, height = (float(n) for n in motion.image_size)
     fx, fy, cx, cy = motion.intrinsics[[0, 1, 0, 1], [0, 1, 2, 2]]
     data.type = "PERSP"
@@ -104,7 +115,9 @@ def set_lens(data: bpy.types.Camera, motion: Motion) -> None:
 
 
 def same_camera(a: Motion, b: Motion) -> bool:
-    """Return whether two motions were captured with the same camera, as those of several people in one clip are."""
+    """Return whether two motions were captured with the same camera, as those of several people in
+    one clip are.
+    """
     return (
         np.array_equal(a.image_size, b.image_size)
         and np.allclose(a.intrinsics, b.intrinsics, rtol=0, atol=1e-6)
@@ -119,8 +132,8 @@ def show_footage(
 ) -> list[str]:
     """Show the footage as the camera's background, in step with the poses.
 
-    Blender shows one frame of a movie clip per frame of the scene, so footage of a distorting lens drifts in a scene
-    without the constant rate of the footage.
+    Blender shows one frame of a movie clip per frame of the scene, so footage of a distorting lens
+    drifts in a scene without the constant rate of the footage.
 
     :param footage: video or picture; the first one of numbered pictures.
     :param frames: (T,) scene frame of each pose.
@@ -129,7 +142,10 @@ def show_footage(
     """
     path = Path(footage).resolve()
     if not path.is_file():
-        raise VideoError(f"the footage {path} does not exist; give the video or image the motion was captured from")
+        raise VideoError(
+            f"the footage {path} does not exist; give the video or image the motion "
+            "was captured from"
+        )
     background = camera.data.background_images.new()
     background.alpha = 1.0
     background.display_depth = "BACK"
@@ -142,7 +158,8 @@ def show_footage(
         return [f"Blender cannot decode {path.name}, so the camera shows no footage"]
     if tuple(motion.image_size) != size:
         warnings.append(
-            f"Blender shows {path.name} at {size[0]} x {size[1]}, but it was captured at {motion.image_size[0]} x "
+            f"Blender shows {path.name} at {size[0]} x {size[1]}, but it was captured at "
+            f"{motion.image_size[0]} x "
             f"{motion.image_size[1]}: turn or scale the camera's background image"
         )
     return warnings
@@ -183,16 +200,20 @@ def _show_clip(
     if (drift := _drift(motion, frames)) <= 1.0:
         return size, []
     return size, [
-        f"the background image drifts from the motion by up to {drift:.0f} frames, because the scene does not have the "
+        f"the background image drifts from the motion by up to {drift:.0f} frames, because the "
+        "scene does not have the "
         "footage's constant frame rate and the lens distorts; the motion keeps its speed"
     ]
 
 
-def show_footage_again(camera: bpy.types.Object, motion: Motion, frames: NDArray[np.float64]) -> list[str]:
+def show_footage_again(
+    camera: bpy.types.Object, motion: Motion, frames: NDArray[np.float64]
+) -> list[str]:
     """Show the camera's footage in step with poses that were moved in time; keep how opaque it is.
 
     :param frames: (T,) scene frame of each pose.
-    :return: warnings as of ``show_footage``; none if the camera shows no footage, or its file is missing.
+    :return: warnings as of ``show_footage``; none if the camera shows no footage, or its file is
+        missing.
     :raises VideoError: as of ``show_footage``.
     """
     former = next(iter(camera.data.background_images), None)
@@ -210,8 +231,8 @@ def show_footage_again(camera: bpy.types.Object, motion: Motion, frames: NDArray
         camera.data.animation_data.action = None
         if action.users == 0:
             bpy.data.actions.remove(action)
-    # Blender goes on counting what a removed background image shows as used. A clip without users stays, because the
-    # viewport may show it, until Blender saves the file without it.
+    # Blender goes on counting what a removed background image shows as used. A clip without users
+    # stays, because the viewport may show it, until Blender saves the file without it.
     former.clip = former.image = None
     camera.data.background_images.remove(former)
     warnings = show_footage(camera, path, motion, frames)
@@ -221,12 +242,16 @@ def show_footage_again(camera: bpy.types.Object, motion: Motion, frames: NDArray
 
 
 def _start(motion: Motion, frames: NDArray[np.float64]) -> int:
-    """Return the scene frame of the footage's first frame, which need not be captured, if the rates are the same."""
+    """Return the scene frame of the footage's first frame, which need not be captured, if the rates
+    are the same.
+    """
     return round(float(frames[0] - motion.frames[0]))
 
 
 def _drift(motion: Motion, frames: NDArray[np.float64]) -> float:
-    """Return how many frames the poses deviate from footage of which each scene frame shows the next frame."""
+    """Return how many frames the poses deviate from footage of which each scene frame shows the
+    next frame.
+    """
     return float(np.abs(frames - (_start(motion, frames) + motion.frames)).max())
 
 
@@ -237,7 +262,8 @@ def _show_video(
     motion: Motion,
     frames: NDArray[np.float64],
 ) -> tuple[tuple[int, int], list[str]]:
-    """Show a video as an image, whose frame is keyed unless each frame of the scene shows the next one.
+    """Show a video as an image, whose frame is keyed unless each frame of the scene shows the next
+    one.
 
     :return: the size in pixels, and no warnings.
     """
@@ -251,7 +277,12 @@ def _show_video(
         _show_frames(background.image_user, _start(motion, frames))
         return size, []
     scene_frames = np.arange(np.floor(frames[0]), np.ceil(frames[-1]) + 1)
-    _key_footage(camera, background, scene_frames, np.round(np.interp(scene_frames, frames, motion.timestamps) * rate))
+    _key_footage(
+        camera,
+        background,
+        scene_frames,
+        np.round(np.interp(scene_frames, frames, motion.timestamps) * rate),
+    )
     return size, []
 
 
@@ -269,8 +300,10 @@ def _show_picture_sequence(
         return []
     if len(numbers) <= motion.frames.max() or numbers[-1] >= _MAX_DURATION:
         return [
-            f"Blender cannot show the image sequence from {first.name} on, because images are missing or their "
-            "numbers are too large, so the camera shows that image only; renumber the files consecutively to show all"
+            f"Blender cannot show the image sequence from {first.name} on, because images are "
+            "missing or their "
+            "numbers are too large, so the camera shows that image only; renumber the files "
+            "consecutively to show all"
         ]
     background.image.source = "SEQUENCE"
     scene_frames = np.arange(np.floor(frames[0]), np.ceil(frames[-1]) + 1)
@@ -286,7 +319,9 @@ def _key_footage(
     scene_frames: NDArray[np.float64],
     shown: NDArray[np.float64],
 ) -> None:
-    """Key the background image to show the frames ``shown`` (counted from 0) at ``scene_frames``, both (N,)."""
+    """Key the background image to show the frames ``shown`` (counted from 0) at ``scene_frames``,
+    both (N,).
+    """
     _show_frames(background.image_user, int(scene_frames[0]))
     offsets = shown - (scene_frames - scene_frames[0])
     changes = np.flatnonzero(np.diff(offsets, prepend=np.inf))
@@ -296,7 +331,8 @@ def _key_footage(
 
 
 def _show_frames(user: bpy.types.ImageUser, start: int) -> None:
-    """Show one frame after the other of a video or sequence, the first one at the scene frame ``start``.
+    """Show one frame after the other of a video or sequence, the first one at the scene frame
+    ``start``.
 
     At scene frame s Blender shows frame s − frame_start + frame_offset of a video, counted from 0.
     """

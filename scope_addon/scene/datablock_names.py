@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names of datablocks: no longer than Blender allows, and not unique where some are linked from another file."""
+"""Names of datablocks: no longer than Blender allows, and not unique where some are linked from
+another file.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +12,11 @@ SUFFIX_BYTES = 24  # room for what is appended to a capture's name, such as ``_p
 
 
 def short_name(name: str) -> str:
-    """Return the beginning of a capture's name to which Blender can append a suffix without truncating it.
+    """Return the beginning of a capture's name to which Blender can append a suffix without
+    truncating it.
 
-    Blender cuts off the end, so that the names of armature, body and camera would be the same but for a number.
+    Blender cuts off the end, so that the names of armature, body and camera would be the same but
+    for a number.
     """
     return name.encode("utf-8", "replace")[: _LONGEST - SUFFIX_BYTES].decode("utf-8", "ignore")
 
@@ -20,7 +24,8 @@ def short_name(name: str) -> str:
 def holds(collection: bpy.types.Collection, obj: bpy.types.Object) -> bool:
     """Return whether an object is in a collection or in one below it.
 
-    Looking it up by its name alone would also find an object of that name which is linked from another file.
+    Looking it up by its name alone would also find an object of that name which is linked from
+    another file.
     """
     return _contains(collection.all_objects, obj)
 
@@ -31,5 +36,6 @@ def is_in_layer(view_layer: bpy.types.ViewLayer, obj: bpy.types.Object) -> bool:
 
 
 def _contains(objects: bpy.types.bpy_prop_collection, obj: bpy.types.Object) -> bool:
-    named = objects.get(obj.name)  # the panel asks at every redraw, and only a namesake needs the whole scene
+    # the panel asks at every redraw, and only a namesake needs the whole scene
+    named = objects.get(obj.name)
     return named == obj or (named is not None and any(each == obj for each in objects))

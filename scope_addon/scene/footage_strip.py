@@ -15,11 +15,14 @@ from .local_scene import check_local
 _OURS = "scope_footage"  # custom property of the strips that are added here
 
 
-def add_footage_strips(scene: bpy.types.Scene, footage: str | Path, start_frame: float) -> list[bpy.types.Strip]:
-    """Add the footage on free channels above existing strips, and return its strips, the picture last.
+def add_footage_strips(
+    scene: bpy.types.Scene, footage: str | Path, start_frame: float
+) -> list[bpy.types.Strip]:
+    """Add the footage on free channels above existing strips, and return its strips, the picture
+    last.
 
-    Strips that were added before are moved instead. A scene without strips continues to render its camera; otherwise,
-    the render would show the footage alone.
+    Strips that were added before are moved instead. A scene without strips continues to render its
+    camera; otherwise, the render would show the footage alone.
 
     :param start_frame: scene frame of timestamp 0.
     :raises VideoError: when the file is missing, or Blender cannot read it.
@@ -28,7 +31,10 @@ def add_footage_strips(scene: bpy.types.Scene, footage: str | Path, start_frame:
     check_local(scene)
     path = Path(footage)
     if not path.is_file():
-        raise VideoError(f"the footage {path} does not exist; choose the video or image again and repeat the capture")
+        raise VideoError(
+            f"the footage {path} does not exist; choose the video or image again and "
+            "repeat the capture"
+        )
     had_editor, sounds = scene.sequence_editor is not None, set(bpy.data.sounds)
     editor = scene.sequence_editor or scene.sequence_editor_create()
     strips = strips_of(editor)
@@ -55,7 +61,9 @@ def add_footage_strips(scene: bpy.types.Scene, footage: str | Path, start_frame:
         bpy.data.batch_remove(list(set(bpy.data.sounds) - sounds))
         if not had_editor:
             scene.sequence_editor_clear()
-        raise VideoError(f"Blender cannot read {path}; convert a video to MP4 (H.264), an image to JPEG") from error
+        raise VideoError(
+            f"Blender cannot read {path}; convert a video to MP4 (H.264), an image to JPEG"
+        ) from error
     for strip in added:
         strip[_OURS] = True
     scene.render.use_sequencer = render_strips
@@ -63,18 +71,24 @@ def add_footage_strips(scene: bpy.types.Scene, footage: str | Path, start_frame:
 
 
 def strips_of(editor: bpy.types.SequenceEditor) -> Any:
-    """Return the editor's top-level strips; the attribute was renamed after 4.3, and the old one removed in 5.0."""
+    """Return the editor's top-level strips; the attribute was renamed after 4.3, and the old one
+    removed in 5.0.
+    """
     return editor.strips if hasattr(editor, "strips") else editor.sequences
 
 
 def _added_before(strips: Any, path: Path) -> list[bpy.types.Strip]:
-    """Return the strips that ``add_footage_strips`` has made of a file: its sound first, then its picture."""
+    """Return the strips that ``add_footage_strips`` has made of a file: its sound first, then its
+    picture.
+    """
     found = [strip for strip in strips if _OURS in strip and _file_of(strip) == path.resolve()]
     return sorted(found, key=lambda strip: strip.type != "SOUND")
 
 
 def _file_of(strip: bpy.types.Strip) -> Path | None:
-    """Return the file of a movie, sound or image strip, which may be stored relative to the .blend file."""
+    """Return the file of a movie, sound or image strip, which may be stored relative to the .blend
+    file.
+    """
     if strip.type == "SOUND":
         path = strip.sound.filepath if strip.sound else ""
     elif strip.type == "IMAGE":
@@ -94,7 +108,9 @@ def start_of(strip: bpy.types.Strip) -> int:
 
 def length_of(strip: bpy.types.Strip) -> int:
     """Return the number of frames of the strip's source."""
-    return int(strip.content_duration if hasattr(strip, "content_duration") else strip.frame_duration)
+    return int(
+        strip.content_duration if hasattr(strip, "content_duration") else strip.frame_duration
+    )
 
 
 def move_to(strip: bpy.types.Strip, frame: int) -> None:
@@ -103,7 +119,9 @@ def move_to(strip: bpy.types.Strip, frame: int) -> None:
 
 
 def _sound(strips: Any, path: Path, channel: int, start: int) -> bpy.types.Strip | None:
-    """Add the sound; return None for silent footage, for which Blender fails or adds a strip without length."""
+    """Add the sound; return None for silent footage, for which Blender fails or adds a strip
+    without length.
+    """
     try:
         strip = strips.new_sound(path.stem, str(path), channel, start)
     except RuntimeError:

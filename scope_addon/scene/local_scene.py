@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Refusing to change a scene that is linked from another file, whose changes Blender refuses or does not save."""
+"""Refusing to change a scene that is linked from another file, whose changes Blender refuses or
+does not save.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +17,7 @@ def check_local(scene: bpy.types.Scene) -> None:
     """
     if scene.library is not None:
         raise UsageError(
-            f"the scene is linked from {scene.library.filepath}, so nothing can be added to it; use a scene of this "
+            f"the scene is linked from {scene.library.filepath}, so nothing can be added to it; "
+            "use a scene of this "
             "file"
         )

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Changing a scene's frame rate while the captures in it keep their speed.
 
-Keys lie at ``start + timestamp · rate``. For another rate, everything of a capture moves to ``start + (frame - start) ·
-new / old``: keys, NLA strips, cycles, the camera and its footage, review frames and markers, and rigs that the motion
-was retargeted to. So each capture still starts at its frame. Other animation keeps its frames, as when Blender's own
-setting is changed, and plays faster or slower.
+Keys lie at ``start + timestamp · rate``. For another rate, everything of a capture moves to ``start
++ (frame - start) · new / old``: keys, NLA strips, cycles, the camera and its footage, review frames
+and markers, and rigs that the motion was retargeted to. So each capture still starts at its frame.
+Other animation keeps its frames, as when Blender's own setting is changed, and plays faster or
+slower.
 """
 
 from __future__ import annotations
@@ -29,7 +30,10 @@ from .character.shape_keys import shape_key_name
 from .datablock_names import holds
 from .rigs.rig_action import is_retargeted, retime_written_keys, source_of
 
-_MARKER = re.compile(rf"((?:person \d+ )?(?:{'|'.join(MARKER_NAMES.values())})) (-?\d+)(?:-(-?\d+))?")
+_MARKER = re.compile(
+    rf"((?:person \d+ )?(?:{'|'.join(MARKER_NAMES.values())})) "
+    rf"(-?\d+)(?:-(-?\d+))?"
+)
 
 
 def change_rate(
@@ -81,27 +85,42 @@ def change_rate(
 def retimed_spans(spans: str, person: bpy.types.Object, rate: float, former: float) -> str:
     """Move the frames of a result's spans, such as ``12-18,40``."""
     move = Retiming(start_frame(person), rate / former)
-    return re.sub(r"(?<!\d)-?\d{1,7}(?!\d)", lambda found: str(round(move.frame(int(found.group())))), spans)
+    return re.sub(
+        r"(?<!\d)-?\d{1,7}(?!\d)", lambda found: str(round(move.frame(int(found.group())))), spans
+    )
 
 
 def _played(scene: bpy.types.Scene, people: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
-    """Return the people of the capture whose keys the scene's frame range spans; none if it is another range."""
+    """Return the people of the capture whose keys the scene's frame range spans; none if it is
+    another range.
+    """
     people = list(people)
-    for together in [people, *([p for p in people if holds(c, p)] for c in scene.collection.children)]:
+    for together in [
+        people,
+        *([p for p in people if holds(c, p)] for c in scene.collection.children),
+    ]:
         span = frame_range(together)
-        if span and (math.floor(span[0]), math.ceil(span[1])) == (scene.frame_start, scene.frame_end):
+        if span and (math.floor(span[0]), math.ceil(span[1])) == (
+            scene.frame_start,
+            scene.frame_end,
+        ):
             return together
     return []
 
 
 def _datablocks(person: bpy.types.Object) -> list[bpy.types.ID]:
     """Return what a capture animates of a person: armature, root motion, and shape keys."""
-    keys = [getattr(child.data, "shape_keys", None) for child in person.children_recursive if child.type == "MESH"]
+    keys = [
+        getattr(child.data, "shape_keys", None)
+        for child in person.children_recursive
+        if child.type == "MESH"
+    ]
     root = root_object(person)
     shapes = [
         block
         for block in keys
-        if block is not None and (shape_key_name(0) in block.key_blocks or has_expression_keys(block))
+        if block is not None
+        and (shape_key_name(0) in block.key_blocks or has_expression_keys(block))
     ]
     return [person, *([root] if root is not None else []), *shapes]
 
@@ -129,15 +148,24 @@ def _retime_rigs(
     for rig, person in rigs:
         _retime_rig(rig, moves[person], sources, done)
     for action in bpy.data.actions:
-        if action.library is None and action not in done and is_retargeted(action) and source_of(action) in sources:
+        if (
+            action.library is None
+            and action not in done
+            and is_retargeted(action)
+            and source_of(action) in sources
+        ):
             done.add(action)
             retime_written_keys(action, sources[source_of(action)])
 
 
 def _retime_rig(
-    rig: bpy.types.Object, retiming: Retiming, sources: dict[str, Retiming], done: set[bpy.types.Action]
+    rig: bpy.types.Object,
+    retiming: Retiming,
+    sources: dict[str, Retiming],
+    done: set[bpy.types.Action],
 ) -> None:
-    """Move the keys that retargeting has written, and the strips that play them; the rig's other actions stay.
+    """Move the keys that retargeting has written, and the strips that play them; the rig's other
+    actions stay.
 
     :param retiming: of the capture that the rig was retargeted to last.
     :param sources: of every capture, by the name of its armature.
@@ -148,7 +176,11 @@ def _retime_rig(
     strips = [strip for strip in action_strips(animation) if is_retargeted(strip.action)]
     for strip in strips:
         retime_strip(strip, sources.get(source_of(strip.action), retiming))
-    own = [animation.action] if animation.action is not None and is_retargeted(animation.action) else []
+    own = (
+        [animation.action]
+        if animation.action is not None and is_retargeted(animation.action)
+        else []
+    )
     moved = {action for action in [*own, *(strip.action for strip in strips)] if action not in done}
     for action in moved:
         done.add(action)
@@ -165,17 +197,27 @@ def _retime_markers(
     ranges: dict[bpy.types.Object, tuple[float, float] | None],
     moves: dict[bpy.types.Object, Retiming],
 ) -> None:
-    """Move the markers of review spans, which are named after them, with the capture in whose keys they lie."""
+    """Move the markers of review spans, which are named after them, with the capture in whose keys
+    they lie.
+    """
     for marker in scene.timeline_markers:
         found = _MARKER.fullmatch(marker.name)
-        inside = [p for p, span in ranges.items() if span and span[0] - 1 <= marker.frame <= span[1] + 1]
+        inside = [
+            p for p, span in ranges.items() if span and span[0] - 1 <= marker.frame <= span[1] + 1
+        ]
         if found is None or int(found.group(2)) != marker.frame or not inside:
             continue
-        ends = [str(round(moves[inside[-1]].frame(int(end)))) for end in found.groups()[1:] if end is not None]
+        ends = [
+            str(round(moves[inside[-1]].frame(int(end))))
+            for end in found.groups()[1:]
+            if end is not None
+        ]
         marker.name, marker.frame = f"{found.group(1)} {'-'.join(ends)}", int(ends[0])
 
 
-def _show_footage(scene: bpy.types.Scene, people: dict[bpy.types.Object, Motion | None], rate: float) -> list[str]:
+def _show_footage(
+    scene: bpy.types.Scene, people: dict[bpy.types.Object, Motion | None], rate: float
+) -> list[str]:
     """Show the footage of every capture's cameras in step with the moved keys."""
     warnings: list[str] = []
     for collection in scene.collection.children_recursive:
@@ -193,11 +235,20 @@ def _show_footage(scene: bpy.types.Scene, people: dict[bpy.types.Object, Motion 
 
 
 def other_animation(
-    scene: bpy.types.Scene, people: Iterable[bpy.types.Object], rigs: Iterable[tuple[bpy.types.Object, object]]
+    scene: bpy.types.Scene,
+    people: Iterable[bpy.types.Object],
+    rigs: Iterable[tuple[bpy.types.Object, object]],
 ) -> bool:
-    """Return whether anything else in the scene has keys, which keep their frames at another rate."""
+    """Return whether anything else in the scene has keys, which keep their frames at another
+    rate.
+    """
     moved = {obj for person in people for c in person.users_collection for obj in c.objects}
     moved |= {rig for rig, _ in rigs}
     others = [obj for obj in scene.objects if obj not in moved]
-    blocks = (block for obj in others for block in (obj, obj.data) if getattr(block, "animation_data", None))
+    blocks = (
+        block
+        for obj in others
+        for block in (obj, obj.data)
+        if getattr(block, "animation_data", None)
+    )
     return any(map(fcurves, blocks))

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The captured motion inside the .blend file.
 
-The motion file's bytes are a custom property of a text datablock, to which a custom property of the armature points.
-Blender therefore saves, appends and links the text together with the armature, duplicates of the armature share it,
-and it is removed with the last of them. Bytes on the armature itself would be copied with each duplicate and each
-evaluation of the object; nothing evaluates or copies a text, and undo stores it again only if it changes.
+The motion file's bytes are a custom property of a text datablock, to which a custom property of the
+armature points. Blender therefore saves, appends and links the text together with the armature,
+duplicates of the armature share it, and it is removed with the last of them. Bytes on the armature
+itself would be copied with each duplicate and each evaluation of the object; nothing evaluates or
+copies a text, and undo stores it again only if it changes.
 """
 
 from __future__ import annotations
@@ -16,9 +17,11 @@ import bpy
 from ..errors import MotionFileError, UsageError
 from ..motion import Motion
 
-MOTION = "scope_motion"  # property of the armature: the text, or the path of a motion file in older .blend files
+# property of the armature: the text, or the path of a motion file in older .blend files
+MOTION = "scope_motion"
 _CONTENT = "motion"  # property of the text: bytes of the motion file
-_KEYS = "uncorrected_keys"  # property of the text: bytes of ``character/corrections/uncorrected_keys.py``
+# property of the text: bytes of ``character/corrections/uncorrected_keys.py``
+_KEYS = "uncorrected_keys"
 _LARGEST_BYTES = 1 << 30  # packed; an hour at 60 frames per second takes a tenth
 _NOTE = """\
 The captured motion of '{name}', which Scope stores in the custom property '{content}' of this text.
@@ -27,11 +30,13 @@ Smoothing and the export of motion files start from it. It is deleted with the a
 
 
 def pack_motion(armature: bpy.types.Object, content: bytes, keys: bytes = b"") -> None:
-    """Store a motion file's bytes with the armature. Duplicates of the armature keep the motion that they have.
+    """Store a motion file's bytes with the armature. Duplicates of the armature keep the motion
+    that they have.
 
     :param keys: bytes of the armature's ``UncorrectedKeys``.
 
-    A former text that nothing else uses is not saved with the file; until then, undo and a failed operator restore it.
+    A former text that nothing else uses is not saved with the file; until then, undo and a failed
+    operator restore it.
     """
     text = bpy.data.texts.new(f"{armature.name} motion")
     text.from_string(_NOTE.format(name=armature.name, content=_CONTENT))
@@ -39,11 +44,13 @@ def pack_motion(armature: bpy.types.Object, content: bytes, keys: bytes = b"") -
     if keys:
         text[_KEYS] = keys
     armature[MOTION] = text
-    text.use_fake_user = False  # texts have one when they are new, and would stay in the file for ever
+    # texts have one when they are new, and would stay in the file for ever
+    text.use_fake_user = False
 
 
 def stored_motion(armature: bpy.types.Object) -> Motion:
-    """Return the motion that is stored with the armature. A .blend file may be hostile: nothing is unpickled.
+    """Return the motion that is stored with the armature. A .blend file may be hostile: nothing is
+    unpickled.
 
     :raises UsageError: the armature stores none.
     :raises MotionFileError: what it stores is damaged or not a motion.
@@ -53,20 +60,28 @@ def stored_motion(armature: bpy.types.Object) -> Motion:
         content = stored.get(_CONTENT)
         name = f"the motion in the text '{stored.name}'"
         if not isinstance(content, bytes):
-            raise MotionFileError(f"{name} was removed or changed; undo that, or capture the footage again")
+            raise MotionFileError(
+                f"{name} was removed or changed; undo that, or capture the footage again"
+            )
         if len(content) > _LARGEST_BYTES:
-            raise MotionFileError(f"{name} has {len(content) >> 20} MiB, too much for a motion; capture again")
+            raise MotionFileError(
+                f"{name} has {len(content) >> 20} MiB, too much for a motion; capture again"
+            )
         return Motion.load(name, content)
-    if isinstance(stored, str) and os.path.isfile(stored):  # False, and no error, for any text that is no name
+    # False, and no error, for any text that is no name
+    if isinstance(stored, str) and os.path.isfile(stored):
         return Motion.load(stored)
     raise UsageError(
-        f"the captured motion of '{armature.name}' is stored neither in this .blend file nor in the cache; capture the "
+        f"the captured motion of '{armature.name}' is stored neither in this .blend file nor in "
+        "the cache; capture the "
         "footage again, or import its .npz file"
     )
 
 
 def stored_keys(armature: bpy.types.Object) -> object:
-    """Return the bytes of the armature's ``UncorrectedKeys`` as they are stored; None if there are none."""
+    """Return the bytes of the armature's ``UncorrectedKeys`` as they are stored; None if there are
+    none.
+    """
     stored = armature.get(MOTION)
     return stored.get(_KEYS) if isinstance(stored, bpy.types.Text) else None
 

@@ -7,8 +7,8 @@ import bpy
 
 from .datablock_names import is_in_layer
 
-# Custom property of objects hidden here, so that those hidden by the user stay hidden. Its value says whether the
-# object stays hidden or is only shown temporarily.
+# Custom property of objects hidden here, so that those hidden by the user stay hidden. Its value
+# says whether the object stays hidden or is only shown temporarily.
 _HIDDEN = "scope_hidden"
 _STAYS, _COMES_BACK = 1, 2
 
@@ -22,7 +22,9 @@ def hide(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> None:
         obj.hide_render = True
 
 
-def show(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer, *, temporarily: bool = False) -> None:
+def show(
+    armature: bpy.types.Object, view_layer: bpy.types.ViewLayer, *, temporarily: bool = False
+) -> None:
     """Show what ``hide`` has hidden.
 
     :param temporarily: until ``hide_again``.

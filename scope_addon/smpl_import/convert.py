@@ -28,7 +28,8 @@ from ..motion import REQUIRED_KEYS, SIGMA_KEYS, Motion
 from .layouts import SmplMotion, read_smpl_motion
 
 DEFAULT_RATE = 30.0  # frames per second
-R_WORLD_FILE = {"z": np.eye(3), "y": R_WORLD_MODEL, "camera": R_WORLD_LEVELCAMERA}  # by the axis that points up
+# by the axis that points up
+R_WORLD_FILE = {"z": np.eye(3), "y": R_WORLD_MODEL, "camera": R_WORLD_LEVELCAMERA}
 _AXIS_TEXT = {"z": "z", "y": "y", "camera": "minus y, as in a camera's axes,"}
 _UPRIGHT = 0.5  # mean cosine of the trunk with an axis, above which people stand or sit along it
 _CAMERA_DISTANCE_M = 10.0  # in front of the nearest position; motion files need a camera
@@ -46,8 +47,10 @@ class Imported:
 def import_motion(path: Path, body: str = "scope", up: str = "auto", rate: float = 0.0) -> Imported:
     """Read a motion file: our own, or an SMPL-style one of another tool.
 
-    :param body: ``scope``, the built-in body, with fingers if the motion has them; ``scope_h``; or a body's file.
-    :param up: the axis that points up in the file: ``z``, ``y``, ``camera`` (minus y) or ``auto``. Ours have z up.
+    :param body: ``scope``, the built-in body, with fingers if the motion has them; ``scope_h``; or
+        a body's file.
+    :param up: the axis that points up in the file: ``z``, ``y``, ``camera`` (minus y) or ``auto``.
+        Ours have z up.
     :param rate: frames per second, for a file that does not say; 0 for ``DEFAULT_RATE``.
     :raises MotionFileError: the file cannot be used.
     :raises ModelFileError: the body's file cannot be used.
@@ -63,7 +66,13 @@ def import_motion(path: Path, body: str = "scope", up: str = "auto", rate: float
         if body != "scope" or chosen in BUILT_IN:
             return _own(own, load_body(chosen), path)
     source = read_smpl_motion(path)
-    built_in = source.body_model if source.body_model in BUILT_IN else "scope_h" if source.has_fingers else "scope"
+    built_in = (
+        source.body_model
+        if source.body_model in BUILT_IN
+        else "scope_h"
+        if source.has_fingers
+        else "scope"
+    )
     return convert(source, load_body(built_in if body == "scope" else body), path, up, rate)
 
 
@@ -77,13 +86,19 @@ def _own(motion: Motion, body: Body, path: Path) -> Imported:
             and value.dtype.kind == "f"
             and not np.isfinite(value).all()
         ):
-            raise MotionFileError(f"{path}: {each.name} contains NaN or infinity; choose another file")
+            raise MotionFileError(
+                f"{path}: {each.name} contains NaN or infinity; choose another file"
+            )
     if not 0 < motion.mocap_framerate <= 10_000 or (np.diff(motion.timestamps) <= 0).any():
-        raise MotionFileError(f"{path}: its frame rate or timestamps cannot be used; choose another file")
+        raise MotionFileError(
+            f"{path}: its frame rate or timestamps cannot be used; choose another file"
+        )
     return Imported(motion, body)
 
 
-def convert(source: SmplMotion, body: Body, path: Path, up: str = "auto", rate: float = 0.0) -> Imported:
+def convert(
+    source: SmplMotion, body: Body, path: Path, up: str = "auto", rate: float = 0.0
+) -> Imported:
     """Convert an SMPL-style motion to a motion of a body.
 
     :param path: names the motion.
@@ -95,10 +110,13 @@ def convert(source: SmplMotion, body: Body, path: Path, up: str = "auto", rate: 
         count = min(body.P, source.betas.size)
         betas[:count] = source.betas[:count]
         if source.gender != body.gender:
-            notes.append(f"the motion is of a {source.gender} body, but '{body.name}' is {body.gender}")
+            notes.append(
+                f"the motion is of a {source.gender} body, but '{body.name}' is {body.gender}"
+            )
     else:
         notes.append(
-            "the poses were applied as they are to Scope's own body, whose rest pose and proportions differ from "
+            "the poses were applied as they are to Scope's own body, whose rest pose and "
+            "proportions differ from "
             "SMPL's; with your SMPL, SMPL+H or SMPL-X file as the body, the motion is exact"
         )
     poses, missing = _for_body(source, body)
@@ -106,13 +124,17 @@ def convert(source: SmplMotion, body: Body, path: Path, up: str = "auto", rate: 
         notes.append(f"the body '{body.name}' has no {missing}, whose motion was left out")
     frames_per_second = source.rate or rate or DEFAULT_RATE
     if source.rate is None and not rate:
-        notes.append(f"the file states no frame rate; {DEFAULT_RATE:g} frames per second were assumed")
+        notes.append(
+            f"the file states no frame rate; {DEFAULT_RATE:g} frames per second were assumed"
+        )
     if source.trans is None:
         notes.append("the file holds no translation: the pelvis stays in place")
     trans = np.zeros((len(source), 3)) if source.trans is None else source.trans
     axis, sure = (up, True) if up != "auto" else _up_axis(poses, body, source.usual_up)
     if not sure:
-        notes.append(f"the file's up axis is not clear from the motion; {_AXIS_TEXT[axis]} was assumed")
+        notes.append(
+            f"the file's up axis is not clear from the motion; {_AXIS_TEXT[axis]} was assumed"
+        )
     R = R_WORLD_FILE[axis]
     J0 = body.rest_joints(betas)[0]
     poses[:, 0] = log(R @ exp(poses[:, 0]))
@@ -122,14 +144,19 @@ def convert(source: SmplMotion, body: Body, path: Path, up: str = "auto", rate: 
     if not exact or axis != "z":
         root[:, 2] -= floor
     if axis != "z":
-        notes.append(f"{_AXIS_TEXT[axis]} points up in the file; the motion was placed on the floor by its feet")
+        notes.append(
+            f"{_AXIS_TEXT[axis]} points up in the file; the motion was placed on the "
+            "floor by its feet"
+        )
     motion = _motion(body, betas, poses, root - J0, contact, frames_per_second)
     motion.gender, motion.source = source.gender, path.name
     return Imported(motion, body, notes)
 
 
 def _for_body(source: SmplMotion, body: Body) -> tuple[NDArray[np.float64], str]:
-    """Return the axis-angle vectors of the body's joints, (T, K+1, 3), and what the body lacks of the source."""
+    """Return the axis-angle vectors of the body's joints, (T, K+1, 3), and what the body lacks of
+    the source.
+    """
     poses = np.zeros((len(source), body.K + 1, 3))
     names: Sequence[str] = body.joint_names
     for i, name in enumerate(source.joint_names):
@@ -143,7 +170,9 @@ def _for_body(source: SmplMotion, body: Body) -> tuple[NDArray[np.float64], str]
 
 
 def _up_axis(poses: NDArray[np.float64], body: Body, usual: str) -> tuple[str, bool]:
-    """Return the axis along which the trunk points on average and True; the usual axis and False if there is none."""
+    """Return the axis along which the trunk points on average and True; the usual axis and False if
+    there is none.
+    """
     J = body.rest_joints()
     trunk = J[body.joint_names.index("neck")] - J[0]
     trunk_file = (exp(poses[:, 0]) @ (trunk / np.linalg.norm(trunk))).mean(axis=0)
@@ -159,8 +188,12 @@ def _standing(
     root: NDArray[np.float64],
     times: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], float]:
-    """Return the (T, 4) probability that each sole point is in contact, and the height of the floor that follows."""
-    (soles,) = by_blocks(lambda p, r: (Clip(np.zeros(len(p)), exp(p), r).soles(body, betas),), poses, root)
+    """Return the (T, 4) probability that each sole point is in contact, and the height of the floor
+    that follows.
+    """
+    (soles,) = by_blocks(
+        lambda p, r: (Clip(np.zeros(len(p)), exp(p), r).soles(body, betas),), poses, root
+    )
     weight = standing_probability(soles, UP, times)
     heights, standing = soles[..., 2], weight > 0.5
     return weight, float(np.median(heights[standing] if standing.any() else heights.min(axis=1)))
@@ -174,7 +207,9 @@ def _motion(
     contact: NDArray[np.float64],
     rate: float,
 ) -> Motion:
-    """Fill a motion. It was not seen by a camera: there are no keypoints, and the image has no size."""
+    """Fill a motion. It was not seen by a camera: there are no keypoints, and the image has no
+    size.
+    """
     count = len(poses)
     world_from_camera = np.eye(4)
     world_from_camera[:3, :3] = R_WORLD_LEVELCAMERA

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reading SMPL-style .npz files: the names that other tools give to rotations, translation, shape and frame rate.
+"""Reading SMPL-style .npz files: the names that other tools give to rotations, translation, shape
+and frame rate.
 
-Rotations may be axis-angle vectors, (T, 3J) or (T, J, 3), or matrices, (T, J, 3, 3); for all joints in one array, or
-the root, the body and the hands in several. The files may come from anyone: only the arrays below are read, nothing
-is unpickled, and the first thing that is wrong is named.
+Rotations may be axis-angle vectors, (T, 3J) or (T, J, 3), or matrices, (T, J, 3, 3); for all joints
+in one array, or the root, the body and the hands in several. The files may come from anyone: only
+the arrays below are read, nothing is unpickled, and the first thing that is wrong is named.
 """
 
 from __future__ import annotations
@@ -31,7 +32,16 @@ _ORTHONORMAL = 0.01  # largest deviation of RᵀR from the identity
 _FARTHEST_M = 1e5  # from the origin; a number beyond that is not in metres
 
 # Names of one thing in the files of different tools, in the order in which they are preferred.
-_ALL_JOINTS = ("poses", "pose_world", "pose", "smpl_poses", "smpl_pose", "fullpose", "full_pose", "thetas")
+_ALL_JOINTS = (
+    "poses",
+    "pose_world",
+    "pose",
+    "smpl_poses",
+    "smpl_pose",
+    "fullpose",
+    "full_pose",
+    "thetas",
+)
 _ROOT = ("root_orient", "global_orient")
 _BODY = ("pose_body", "body_pose")
 _HANDS = ("pose_hand", "hand_pose")
@@ -41,11 +51,23 @@ _BETAS = ("betas", "beta", "smpl_betas", "shape")
 _RATES = ("mocap_framerate", "mocap_frame_rate", "frame_rate", "framerate", "fps")
 _SCALE = ("smpl_scaling",)  # AIST++: by which smpl_trans is to be divided
 _GENDER, _MODEL = "gender", "body_model"
-_READ = {*_ALL_JOINTS, *_ROOT, *_BODY, *_HANDS, *_LEFT_HAND, *_RIGHT_HAND, *_TRANS, *_BETAS, *_RATES, *_SCALE}
+_READ = {
+    *_ALL_JOINTS,
+    *_ROOT,
+    *_BODY,
+    *_HANDS,
+    *_LEFT_HAND,
+    *_RIGHT_HAND,
+    *_TRANS,
+    *_BETAS,
+    *_RATES,
+    *_SCALE,
+}
 _READ |= {_GENDER, _MODEL}
 
 HAND_JOINTS = {
-    side: tuple(f"{side}_{finger}{i}" for finger in HAND_ORDER for i in (1, 2, 3)) for side in ("left", "right")
+    side: tuple(f"{side}_{finger}{i}" for finger in HAND_ORDER for i in (1, 2, 3))
+    for side in ("left", "right")
 }
 _JOINTS_OF_BODY = {len(BODY_JOINTS) - 1: BODY_JOINTS[1:], 23: SKELETONS[24].joint_names[1:]}
 
@@ -55,8 +77,10 @@ class SmplMotion:
     """A motion of T frames as a file describes it, in the file's own axes; metres and radians."""
 
     joint_names: tuple[str, ...]  # J names, the root first
-    poses: NDArray[np.float32]  # (T, J, 3) axis-angle: the root in the file's world, the others relative to parents
-    trans: NDArray[np.float64] | None  # (T, 3) pelvis minus its rest position J_0(betas); None if the file has none
+    # (T, J, 3) axis-angle: the root in the file's world, the others relative to parents
+    poses: NDArray[np.float32]
+    # (T, 3) pelvis minus its rest position J_0(betas); None if the file has none
+    trans: NDArray[np.float64] | None
     betas: NDArray[np.float64]  # (B,) the mean over the frames; B may be 0
     rate: float | None  # frames per second; None if the file does not say
     gender: str
@@ -84,7 +108,8 @@ class SmplMotion:
 def read_smpl_motion(path: Path) -> SmplMotion:
     """Read an SMPL-style motion from a .npz file.
 
-    :raises MotionFileError: the file cannot be read, has no poses, or one of its arrays cannot be used.
+    :raises MotionFileError: the file cannot be read, has no poses, or one of its arrays cannot be
+        used.
     """
     return smpl_motion(read_npz(path, MotionFileError, "motion file", wanted=_READ), path)
 
@@ -92,7 +117,8 @@ def read_smpl_motion(path: Path) -> SmplMotion:
 def smpl_motion(arrays: Mapping[str, NDArray[Any]], path: Path) -> SmplMotion:
     """Interpret the arrays of a file.
 
-    :param arrays: poses (T, 72) or in another layout that `docs/motion_file.md` lists, and what goes with them.
+    :param arrays: poses (T, 72) or in another layout that `docs/motion_file.md` lists, and what
+        goes with them.
     :raises MotionFileError: there are no poses among them, or one of them cannot be used.
     """
     names, poses, usual_up = _poses(arrays, path)
@@ -102,11 +128,16 @@ def smpl_motion(arrays: Mapping[str, NDArray[Any]], path: Path) -> SmplMotion:
     if trans is not None:
         position = _numbers(arrays[trans], trans, path)
         if position.shape != (count, 3):
-            raise MotionFileError(f"{path}: {trans} must have shape ({count}, 3), as the poses, not {position.shape}")
-        position = position / (_positive(arrays, _SCALE, "a positive number", float(np.finfo(float).max), path) or 1.0)
+            raise MotionFileError(
+                f"{path}: {trans} must have shape ({count}, 3), as the poses, not {position.shape}"
+            )
+        position = position / (
+            _positive(arrays, _SCALE, "a positive number", float(np.finfo(float).max), path) or 1.0
+        )
         if np.abs(position).max() > _FARTHEST_M:
             raise MotionFileError(
-                f"{path}: {trans} is {np.abs(position).max():.3g} m from the origin; it must be in metres"
+                f"{path}: {trans} is {np.abs(position).max():.3g} m from the origin; it must be in "
+                "metres"
             )
     return SmplMotion(
         joint_names=names,
@@ -120,8 +151,12 @@ def smpl_motion(arrays: Mapping[str, NDArray[Any]], path: Path) -> SmplMotion:
     )
 
 
-def _poses(arrays: Mapping[str, NDArray[Any]], path: Path) -> tuple[tuple[str, ...], NDArray[np.float32], str]:
-    """Return the joints' names, their axis-angle vectors (T, J, 3), and the axis that usually points up."""
+def _poses(
+    arrays: Mapping[str, NDArray[Any]], path: Path
+) -> tuple[tuple[str, ...], NDArray[np.float32], str]:
+    """Return the joints' names, their axis-angle vectors (T, J, 3), and the axis that usually
+    points up.
+    """
     key = _first(arrays, _ALL_JOINTS)
     root, body = _first(arrays, _ROOT), _first(arrays, _BODY)
     if key is not None:
@@ -129,45 +164,69 @@ def _poses(arrays: Mapping[str, NDArray[Any]], path: Path) -> tuple[tuple[str, .
         skeleton = SKELETONS.get(poses.shape[1])
         if skeleton is None and poses.shape[1] != len(BODY_JOINTS):
             known = ", ".join(f"{3 * n} ({s.name})" for n, s in SKELETONS.items())
-            raise MotionFileError(f"{path}: {key} has {3 * poses.shape[1]} numbers per frame, but must have {known}")
-        return skeleton.joint_names if skeleton else BODY_JOINTS, poses, "y" if key.startswith("smpl_") else "z"
+            raise MotionFileError(
+                f"{path}: {key} has {3 * poses.shape[1]} numbers per frame, but must have {known}"
+            )
+        return (
+            skeleton.joint_names if skeleton else BODY_JOINTS,
+            poses,
+            "y" if key.startswith("smpl_") else "z",
+        )
     if root is None or body is None:
         raise MotionFileError(
-            f"{path} holds no SMPL-style motion: it needs poses, or root_orient and pose_body, or global_orient and "
+            f"{path} holds no SMPL-style motion: it needs poses, or root_orient and pose_body, or "
+            "global_orient and "
             "body_pose; choose another file"
         )
     parts = [_axis_angles(arrays[name], name, path) for name in (root, body)]
     if parts[0].shape[1] != 1 or parts[1].shape[1] not in _JOINTS_OF_BODY:
         raise MotionFileError(
-            f"{path}: {root} must have 1 joint and {body} 21 or 23, but they have {parts[0].shape[1]} and "
+            f"{path}: {root} must have 1 joint and {body} 21 or 23, but they have "
+            f"{parts[0].shape[1]} and "
             f"{parts[1].shape[1]}"
         )
     names = [BODY_JOINTS[0], *_JOINTS_OF_BODY[parts[1].shape[1]]]
-    for hands, sides in ((_HANDS, ("left", "right")), (_LEFT_HAND, ("left",)), (_RIGHT_HAND, ("right",))):
+    for hands, sides in (
+        (_HANDS, ("left", "right")),
+        (_LEFT_HAND, ("left",)),
+        (_RIGHT_HAND, ("right",)),
+    ):
         found = _first(arrays, hands)
         joints = [joint for side in sides for joint in HAND_JOINTS[side]]
-        if found is None or joints[0] in names or arrays[found].shape[-1:] == (6 * len(sides),):  # 6: MANO's components
+        # 6: MANO's components
+        if found is None or joints[0] in names or arrays[found].shape[-1:] == (6 * len(sides),):
             continue
         parts.append(_axis_angles(arrays[found], found, path))
         if parts[-1].shape[1] != len(joints):
-            raise MotionFileError(f"{path}: {found} must have {len(joints)} joints, but has {parts[-1].shape[1]}")
+            raise MotionFileError(
+                f"{path}: {found} must have {len(joints)} joints, but has {parts[-1].shape[1]}"
+            )
         names += joints
     if len({len(part) for part in parts}) > 1:
         counts = ", ".join(str(len(part)) for part in parts)
-        raise MotionFileError(f"{path}: the poses of {root}, {body} and hands must have as many frames, not {counts}")
+        raise MotionFileError(
+            f"{path}: the poses of {root}, {body} and hands must have as many frames, not {counts}"
+        )
     return tuple(names), np.concatenate(parts, axis=1), "z" if root == "root_orient" else "camera"
 
 
 def _axis_angles(array: NDArray[Any], name: str, path: Path) -> NDArray[np.float32]:
-    """Return axis-angle vectors (T, J, 3) of an array of them, or of rotation matrices (T, J, 3, 3)."""
+    """Return axis-angle vectors (T, J, 3) of an array of them, or of rotation matrices (T, J, 3,
+    3).
+    """
     if array.ndim == 0 or len(array) == 0:
         raise MotionFileError(f"{path}: {name} has no frames; choose another file")
     if len(array) > MAX_FRAMES:
         raise MotionFileError(
-            f"{path}: {name} has {len(array)} frames, but at most {MAX_FRAMES} can be imported; cut it"
+            f"{path}: {name} has {len(array)} frames, but at most {MAX_FRAMES} can be imported; "
+            "cut it"
         )
     values = _numbers(array, name, path)
-    if values.ndim >= 3 and values.shape[-2:] == (3, 3) and (values.ndim == 4 or values.shape[1:] == (3, 3)):
+    if (
+        values.ndim >= 3
+        and values.shape[-2:] == (3, 3)
+        and (values.ndim == 4 or values.shape[1:] == (3, 3))
+    ):
         matrices = values.reshape(len(values), -1, 3, 3)
         return by_blocks(lambda block: (_logarithms(block, name, path),), matrices)[0]
     if values.ndim == 2 and values.shape[1] and values.shape[1] % 3 == 0:
@@ -175,7 +234,8 @@ def _axis_angles(array: NDArray[Any], name: str, path: Path) -> NDArray[np.float
     if values.ndim == 3 and values.shape[2] == 3 and values.shape[1]:
         return values.astype(np.float32)
     raise MotionFileError(
-        f"{path}: {name} has shape {array.shape}, but must hold one person's axis-angle vectors, (frames, 3 x joints), "
+        f"{path}: {name} has shape {array.shape}, but must hold one person's axis-angle vectors, "
+        "(frames, 3 x joints), "
         "or rotation matrices, (frames, joints, 3, 3)"
     )
 
@@ -183,7 +243,9 @@ def _axis_angles(array: NDArray[Any], name: str, path: Path) -> NDArray[np.float
 def _logarithms(matrices: NDArray[np.float64], name: str, path: Path) -> NDArray[np.float32]:
     gram = np.swapaxes(matrices, -1, -2) @ matrices
     if np.abs(gram - np.eye(3)).max() > _ORTHONORMAL or np.linalg.det(matrices).min() < 0.5:
-        raise MotionFileError(f"{path}: {name} holds matrices that are not rotations; choose another file")
+        raise MotionFileError(
+            f"{path}: {name} holds matrices that are not rotations; choose another file"
+        )
     return log(matrices).astype(np.float32)
 
 
@@ -193,7 +255,9 @@ def _numbers(array: NDArray[Any], name: str, path: Path) -> NDArray[np.float64]:
     array = np.atleast_1d(array)
     bad = np.flatnonzero(~np.isfinite(array).all(axis=tuple(range(1, array.ndim))))
     if len(bad):
-        raise MotionFileError(f"{path}: {name} contains NaN or infinity, first in frame {bad[0]}; repair or cut it")
+        raise MotionFileError(
+            f"{path}: {name} contains NaN or infinity, first in frame {bad[0]}; repair or cut it"
+        )
     return array.astype(np.float64)
 
 
@@ -202,21 +266,35 @@ def _betas(arrays: Mapping[str, NDArray[Any]], count: int, path: Path) -> NDArra
     if key is None:
         return np.zeros(0)
     values = _numbers(arrays[key], key, path)
-    if values.ndim > 2 or values.shape[-1] > _MAX_BETAS or (values.ndim == 2 and len(values) not in (1, count)):
-        raise MotionFileError(f"{path}: {key} has shape {values.shape}, but must have (10,) or ({count}, 10), or 16")
+    if (
+        values.ndim > 2
+        or values.shape[-1] > _MAX_BETAS
+        or (values.ndim == 2 and len(values) not in (1, count))
+    ):
+        raise MotionFileError(
+            f"{path}: {key} has shape {values.shape}, but must have (10,) or ({count}, 10), or 16"
+        )
     return values if values.ndim == 1 else values.mean(axis=0)
 
 
 def _positive(
-    arrays: Mapping[str, NDArray[Any]], names: tuple[str, ...], wanted: str, largest: float, path: Path
+    arrays: Mapping[str, NDArray[Any]],
+    names: tuple[str, ...],
+    wanted: str,
+    largest: float,
+    path: Path,
 ) -> float | None:
-    """Return the first of these numbers that the file has, which must be positive; None if it has none."""
+    """Return the first of these numbers that the file has, which must be positive; None if it has
+    none.
+    """
     key = _first(arrays, names)
     if key is None:
         return None
     array = arrays[key]
     if array.size != 1 or array.dtype.kind not in "fiu":
-        raise MotionFileError(f"{path}: {key} must be {wanted}, but has shape {array.shape} and holds {array.dtype}")
+        raise MotionFileError(
+            f"{path}: {key} must be {wanted}, but has shape {array.shape} and holds {array.dtype}"
+        )
     number = float(array.reshape(-1)[0])
     if not 0 < number <= largest:
         raise MotionFileError(f"{path}: {key} must be {wanted}, but is {number:g}")
@@ -224,7 +302,11 @@ def _positive(
 
 
 def _text(array: NDArray[Any] | None) -> str:
-    return str(array.reshape(-1)[0]) if array is not None and array.size == 1 and array.dtype.kind == "U" else ""
+    return (
+        str(array.reshape(-1)[0])
+        if array is not None and array.size == 1 and array.dtype.kind == "U"
+        else ""
+    )
 
 
 def _first(arrays: Mapping[str, NDArray[Any]], names: tuple[str, ...]) -> str | None:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The interface in Blender: properties, preferences, panels, operators, the modal job. Modules list their ``CLASSES``.
+"""The interface in Blender: properties, preferences, panels, operators, the modal job. Modules list
+their ``CLASSES``.
 
-Only bpy and the standard library are loaded when the extension is enabled. The solver's libraries are loaded at the
-first use, so that Blender starts as fast as without them.
+Only bpy and the standard library are loaded when the extension is enabled. The solver's libraries
+are loaded at the first use, so that Blender starts as fast as without them.
 """
 
 from __future__ import annotations
@@ -32,16 +33,68 @@ from .capture import (
 from .edit import action_operators, asset_operators, edit_operators, edit_panel, key_operators
 from .files import drop, file_field
 from .live import camera_formats, live_operators, live_panel, live_properties
-from .pins import correction_operators, correction_panel, floor_operators, kept_edits, pin_tool, upright_operators
-from .retarget import face_operators, face_panel, retarget_operators, retarget_panel, retarget_properties
+from .pins import (
+    correction_operators,
+    correction_panel,
+    floor_operators,
+    kept_edits,
+    pin_tool,
+    upright_operators,
+)
+from .retarget import (
+    face_operators,
+    face_panel,
+    retarget_operators,
+    retarget_panel,
+    retarget_properties,
+)
 from .view import view_after_undo, view_operators
 
 _MODULES = (
-    *(capture_properties, preferences, capture_operators, export_operators, import_operators, view_operators, drop),
-    *(file_field, video_import, presets, menus, action_operators, asset_operators, frame_rate_operators),
-    *(edit_operators, key_operators, kept_edits, correction_operators, pin_tool, upright_operators, floor_operators),
-    *(retarget_properties, retarget_operators, face_operators, live_properties, live_operators, camera_formats),
-    *(captures, capture_panel, live_panel, edit_panel, correction_panel, retarget_panel, face_panel),
+    *(
+        capture_properties,
+        preferences,
+        capture_operators,
+        export_operators,
+        import_operators,
+        view_operators,
+        drop,
+    ),
+    *(
+        file_field,
+        video_import,
+        presets,
+        menus,
+        action_operators,
+        asset_operators,
+        frame_rate_operators,
+    ),
+    *(
+        edit_operators,
+        key_operators,
+        kept_edits,
+        correction_operators,
+        pin_tool,
+        upright_operators,
+        floor_operators,
+    ),
+    *(
+        retarget_properties,
+        retarget_operators,
+        face_operators,
+        live_properties,
+        live_operators,
+        camera_formats,
+    ),
+    *(
+        captures,
+        capture_panel,
+        live_panel,
+        edit_panel,
+        correction_panel,
+        retarget_panel,
+        face_panel,
+    ),
 )
 
 

@@ -17,12 +17,15 @@ if TYPE_CHECKING:
     from ..motion import Motion
 
 
-# Custom property of a rig: the captured armature that it was retargeted from; its name in older .blend files.
+# Custom property of a rig: the captured armature that it was retargeted from; its name in older
+# .blend files.
 PERSON = "scope_person"
 
 
 def captured_armature(context: bpy.types.Context) -> bpy.types.Object | None:
-    """Return the captured armature of the active object, or else the only one of the selected capture or scene."""
+    """Return the captured armature of the active object, or else the only one of the selected
+    capture or scene.
+    """
     obj = context.view_layer.objects.active if context.view_layer else None
     while obj is not None:
         if "scope_source" in obj:
@@ -52,7 +55,9 @@ def _retargeted_from(scene: bpy.types.Scene, rig: bpy.types.Object) -> bpy.types
 
 def captured_people(context: bpy.types.Context) -> list[bpy.types.Object]:
     """Return the captured armatures of the scene."""
-    return [obj for obj in context.scene.objects if obj.type == "ARMATURE" and "scope_source" in obj]
+    return [
+        obj for obj in context.scene.objects if obj.type == "ARMATURE" and "scope_source" in obj
+    ]
 
 
 def has_captured_person(context: bpy.types.Context) -> bool:
@@ -60,16 +65,24 @@ def has_captured_person(context: bpy.types.Context) -> bool:
     return captured_armature(context) is not None or bool(captured_people(context))
 
 
-def draw_active_person(layout: bpy.types.UILayout, context: bpy.types.Context) -> bpy.types.Object | None:
-    """Draw the name of the active captured armature, or a request to select one; return the armature."""
+def draw_active_person(
+    layout: bpy.types.UILayout, context: bpy.types.Context
+) -> bpy.types.Object | None:
+    """Draw the name of the active captured armature, or a request to select one; return the
+    armature.
+    """
     armature = captured_armature(context)
     text = armature.name if armature else "Select a Captured Person"
-    layout.label(text=text, icon="OUTLINER_OB_ARMATURE" if armature else "INFO", translate=armature is None)
+    layout.label(
+        text=text, icon="OUTLINER_OB_ARMATURE" if armature else "INFO", translate=armature is None
+    )
     return armature
 
 
 def library_of(armature: bpy.types.Object) -> bpy.types.Library | None:
-    """Return the library that the armature or its action is linked from, overridden or not; None if both are local."""
+    """Return the library that the armature or its action is linked from, overridden or not; None if
+    both are local.
+    """
     blocks = [armature, armature.animation_data.action if armature.animation_data else None]
     for block in filter(None, blocks):
         original = block.override_library.reference if block.override_library else block
@@ -90,7 +103,10 @@ def body_of(armature: bpy.types.Object) -> Body:
 
     which = stored_text(armature, "scope_body_file") or stored_text(armature, "scope_body")
     if not which:
-        raise UsageError(f"'{armature.name}' does not store which body it is; undo what changed it, or capture again")
+        raise UsageError(
+            f"'{armature.name}' does not store which body it is; undo what changed "
+            "it, or capture again"
+        )
     return load_body(which)
 
 
@@ -122,9 +138,11 @@ def motion_of(armature: bpy.types.Object) -> Motion:
 
 
 def set_motion_of(armature: bpy.types.Object, motion: Motion, keys: bytes = b"") -> None:
-    """Store a motion as the armature's captured one. Undo restores the former one, and its duplicates keep it.
+    """Store a motion as the armature's captured one. Undo restores the former one, and its
+    duplicates keep it.
 
-    :param keys: the keys from before the motion's corrections, see ``scene/character/corrections/uncorrected_keys.py``.
+    :param keys: the keys from before the motion's corrections, see
+        ``scene/character/corrections/uncorrected_keys.py``.
     """
     from ..scene.packed_motion import pack_motion
 

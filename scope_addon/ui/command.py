@@ -14,7 +14,9 @@ _handle: object | None = None
 
 
 def run(argv: list[str]) -> int:
-    """Run the command line with the arguments after ``scope``; return the exit status. Blender calls this."""
+    """Run the command line with the arguments after ``scope``; return the exit status. Blender
+    calls this.
+    """
     from ..job.start_worker import load_package
     from .preferences import cache
 

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The solver with its machine code, for operators that solve inside Blender.
 
-Machine code contains the name of its package. It is shipped, and compiled by captures, for the package ``scope``,
-whereas Blender calls the extension ``bl_ext.<repository>.scope``: under that name, all of it would have to be compiled
-once more. So the extension's folder is also loaded as ``scope``, from the first such operator on until the extension is
-disabled.
+Machine code contains the name of its package. It is shipped, and compiled by captures, for the
+package ``scope``, whereas Blender calls the extension ``bl_ext.<repository>.scope``: under that
+name, all of it would have to be compiled once more. So the extension's folder is also loaded as
+``scope``, from the first such operator on until the extension is disabled.
 """
 
 from __future__ import annotations
@@ -22,7 +22,9 @@ _loaded: list[str] = []  # the package, if it was loaded here
 
 
 def load() -> None:
-    """Load the solver as the package ``scope``; keep what it compiles in the cache folder, never in the extension's."""
+    """Load the solver as the package ``scope``; keep what it compiles in the cache folder, never in
+    the extension's.
+    """
     if OWN_NAME == NAME:
         return
     if NAME not in sys.modules:
@@ -37,7 +39,9 @@ def load() -> None:
 
 
 def is_ours() -> bool:
-    """Return whether the package ``scope`` is this extension and not somebody else's package of that name."""
+    """Return whether the package ``scope`` is this extension and not somebody else's package of
+    that name.
+    """
     paths = list(getattr(sys.modules.get(NAME), "__path__", []))
     return bool(paths) and Path(paths[0]).resolve() == ROOT
 
@@ -46,5 +50,7 @@ def detach() -> None:
     """Forget the package, so that another version of the extension is not mixed with it."""
     while _loaded:
         package = _loaded.pop()
-        for name in [name for name in sys.modules if name == package or name.startswith(f"{package}.")]:
+        for name in [
+            name for name in sys.modules if name == package or name.startswith(f"{package}.")
+        ]:
             del sys.modules[name]

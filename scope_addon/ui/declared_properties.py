@@ -15,7 +15,8 @@ from .files.file_field import path_text, text_name
 from .translations import CONTEXT
 
 _NOT_ANIMATABLE: set[str] = set()  # the options of a property without ANIMATABLE
-# Since 4.5, properties declare whether their path may begin with "//", the folder of the .blend file.
+# Since 4.5, properties declare whether their path may begin with "//", the folder of the .blend
+# file.
 PATH_OPTIONS = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set()
 _Class = TypeVar("_Class", bound=type)
 

@@ -18,11 +18,22 @@ from .declared_properties import with_options
 from .reporting import ReportingOperator, rpt_, tip_
 
 FORMATS = (
-    ("FBX", "FBX", "For Unreal Engine, Unity, Maya and MotionBuilder: armature, mesh and animation", 0),
+    (
+        "FBX",
+        "FBX",
+        "For Unreal Engine, Unity, Maya and MotionBuilder: armature, mesh and animation",
+        0,
+    ),
     ("GLB", "glTF", "For the web, Godot and other engines: one .glb file with everything", 1),
     ("BVH", "BVH", "Only the motion of the skeleton, one file per person", 2),
     ("USDC", "USD", "For Omniverse, Houdini and other studio tools", 3),
-    ("NPZ", "NPZ", "For research: SMPL-style arrays of the captured motion before any editing, one file per person", 4),
+    (
+        "NPZ",
+        "NPZ",
+        "For research: SMPL-style arrays of the captured motion before any editing, one "
+        "file per person",
+        4,
+    ),
 )
 _NO_USD = "This Blender was built without USD; use a build from blender.org, or another format"
 _SUFFIX = {"FBX": ".fbx", "GLB": ".glb", "BVH": ".bvh", "USDC": ".usdc", "NPZ": ".npz"}
@@ -40,24 +51,44 @@ class SCOPE_OT_export(ReportingOperator):
     filter_glob: StringProperty(default="*.fbx", options={"HIDDEN", "SKIP_SAVE"})
     check_existing: BoolProperty(default=True, options={"HIDDEN"})
     format: EnumProperty(
-        name="Format", items=FORMATS, default="FBX", description="File format", options={"HIDDEN", "SKIP_SAVE"}
+        name="Format",
+        items=FORMATS,
+        default="FBX",
+        description="File format",
+        options={"HIDDEN", "SKIP_SAVE"},
     )
     which: EnumProperty(
         name="Captures",
         items=(
-            ("SHOWN", "Selected", "The capture that is selected in the panel, with all its people", 3),
+            (
+                "SHOWN",
+                "Selected",
+                "The capture that is selected in the panel, with all its people",
+                3,
+            ),
             ("ALL", "All in the Scene", "Every capture of the scene, with all its people", 0),
             ("ACTIVE", "Active", "The capture that the active object belongs to", 1),
-            ("RIG", "My Rig", "The rig chosen under Retarget, with its current animation and its meshes", 2),
+            (
+                "RIG",
+                "My Rig",
+                "The rig chosen under Retarget, with its current animation and its meshes",
+                2,
+            ),
         ),
         default="SHOWN",
         description="What to export",
-        options={"SKIP_SAVE"},  # or what was exported last would be written under the selected capture's name
+        # or what was exported last would be written under the selected capture's name
+        options={"SKIP_SAVE"},
     )
     shape: EnumProperty(
         name="Shape",
         items=(
-            ("AUTO", "Automatic", "Shape keys, or in the mesh for formats whose readers limit shape keys", 0),
+            (
+                "AUTO",
+                "Automatic",
+                "Shape keys, or in the mesh for formats whose readers limit shape keys",
+                0,
+            ),
             ("KEYS", "Shape Keys", "Morph targets whose values are the shape coefficients", 1),
             ("BAKED", "In the Mesh", "For engines that limit morph targets to 0..1", 2),
         ),
@@ -65,10 +96,14 @@ class SCOPE_OT_export(ReportingOperator):
         description="How the body's shape is exported",
     )
     camera: BoolProperty(name="Camera", default=False, description="Export the estimated camera")
-    separate: BoolProperty(name="File per Person", default=False, description="Write a separate file for each person")
+    separate: BoolProperty(
+        name="File per Person", default=False, description="Write a separate file for each person"
+    )
 
     @classmethod
-    def description(cls, context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
+    def description(
+        cls, context: bpy.types.Context, properties: bpy.types.OperatorProperties
+    ) -> str:
         """Return the tooltip of the button for the format, and why the format is not available."""
         text = next(text for key, _, text, _ in FORMATS if key == properties.format)
         return tip_(text) if is_available(properties.format) else f"{tip_(text)}. {tip_(_NO_USD)}"
@@ -114,7 +149,8 @@ class SCOPE_OT_export(ReportingOperator):
     def work(self, context: bpy.types.Context) -> str:
         """Write the files.
 
-        :raises UsageError: the file has no name or folder, or there is nothing of what is to be written.
+        :raises UsageError: the file has no name or folder, or there is nothing of what is to be
+            written.
         """
         from ..errors import UsageError
         from ..scene.export.export import ExportOptions, captures, export
@@ -125,20 +161,29 @@ class SCOPE_OT_export(ReportingOperator):
         if not is_available(self.format):
             raise UsageError(_NO_USD[0].lower() + _NO_USD[1:])
         options = ExportOptions(
-            camera=self.camera, shape=self.shape.lower(), separate=self.separate, bvh_unit=self.bvh_unit.lower()
+            camera=self.camera,
+            shape=self.shape.lower(),
+            separate=self.separate,
+            bvh_unit=self.bvh_unit.lower(),
         )
         collections, rig = captures(context.scene), context.scene.scope_retarget.rig
         if self.which == "RIG" and self.format == "NPZ":
-            raise UsageError("a motion file contains the captured motion, not a rig; choose another format")
+            raise UsageError(
+                "a motion file contains the captured motion, not a rig; choose another format"
+            )
         if self.which == "RIG" and rig is None:
-            raise UsageError("no rig is chosen under Retarget; choose a rig there and press Retarget first")
+            raise UsageError(
+                "no rig is chosen under Retarget; choose a rig there and press Retarget first"
+            )
         if self.which == "SHOWN":
             collections = [c for c in collections if c == shown_capture(context.scene)]
         if self.which == "ACTIVE":
             active = context.view_layer.objects.active
             collections = [c for c in collections if active and holds(c, active)]
             if not collections:
-                raise UsageError("the active object belongs to no capture; select one of a capture's objects")
+                raise UsageError(
+                    "the active object belongs to no capture; select one of a capture's objects"
+                )
         if self.format == "NPZ":
             people = [obj for c in collections for obj in c.all_objects if "scope_source" in obj]
             written = export(path, collections, [motion_of(obj) for obj in people])
@@ -146,7 +191,11 @@ class SCOPE_OT_export(ReportingOperator):
             written = export_rig(path, rig, replace(options, take=_take_of(rig, collections)))
         else:
             written = export(path, collections, options=options)
-        return rpt_("Wrote {files} in {folder}", files=", ".join(p.name for p in written), folder=written[0].parent)
+        return rpt_(
+            "Wrote {files} in {folder}",
+            files=", ".join(p.name for p in written),
+            folder=written[0].parent,
+        )
 
 
 def is_available(kind: str) -> bool:
@@ -159,7 +208,9 @@ def _take_of(rig: bpy.types.Object, collections: list[bpy.types.Collection]) -> 
     person = rig.get(PERSON)  # an object, or its name in older .blend files; None if it was deleted
     if isinstance(person, bpy.types.Object):
         return next((c.name for c in collections if holds(c, person)), "")
-    return next((c.name for c in collections if isinstance(person, str) and person in c.all_objects), "")
+    return next(
+        (c.name for c in collections if isinstance(person, str) and person in c.all_objects), ""
+    )
 
 
 CLASSES = (SCOPE_OT_export,)

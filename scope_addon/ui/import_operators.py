@@ -23,7 +23,9 @@ if TYPE_CHECKING:
 
 
 class SCOPE_OT_import_motion(ReportingOperator):
-    """Import captured motions of Scope, AMASS or other tools that use SMPL's joints, as animated bodies"""
+    """Import captured motions of Scope, AMASS or other tools that use SMPL's joints, as animated
+    bodies
+    """
 
     bl_idname = "scope.import_motion"
     bl_label = "Import Motion"
@@ -31,7 +33,9 @@ class SCOPE_OT_import_motion(ReportingOperator):
 
     filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
     directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
-    files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"})
+    files: CollectionProperty(
+        type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"}
+    )
     filter_glob: StringProperty(default="*.npz", options={"HIDDEN", "SKIP_SAVE"})
     up_axis: blender_property(option("up_axis"), {})
     motion_rate: blender_property(option("motion_rate"), {})
@@ -39,7 +43,8 @@ class SCOPE_OT_import_motion(ReportingOperator):
     set_rate: BoolProperty(
         name="Set Scene Frame Rate",
         default=False,
-        description="Set the scene's frame rate to the motion's; otherwise keys may be between frames",
+        description="Set the scene's frame rate to the motion's; otherwise keys may be between "
+        "frames",
     )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -59,7 +64,9 @@ class SCOPE_OT_import_motion(ReportingOperator):
 
         body = self._body(context)
         paths = self._paths()
-        found = [import_motion(path, body, self.up_axis.lower(), self.motion_rate) for path in paths]
+        found = [
+            import_motion(path, body, self.up_axis.lower(), self.motion_rate) for path in paths
+        ]
         with all_or_nothing(context.scene):
             for path, imported in zip(paths, found, strict=True):
                 _build(context.scene, path, imported, self._build_options(context.scene))
@@ -98,7 +105,9 @@ class SCOPE_OT_import_motion(ReportingOperator):
         chosen = preferences()
         path = context.scene.scope.body_file or (chosen.body_file if chosen else "")
         if not path:
-            raise UsageError("no body file is chosen; choose one under Options or in the preferences")
+            raise UsageError(
+                "no body file is chosen; choose one under Options or in the preferences"
+            )
         return str(bpy.path.abspath(path))
 
     def _build_options(self, scene: bpy.types.Scene) -> BuildOptions:
@@ -125,8 +134,14 @@ def _build(scene: bpy.types.Scene, path: Path, imported: Imported, options: Buil
     options = replace(options, name=path.stem, with_camera=options.with_camera and seen)
     result = build_scene([motion], imported.body, footage, options)
     pack_motion(result.people[0].armature, motion.to_bytes())
-    rate = float(motion.mocap_framerate) if options.frame_rate == "keep" and len(motion) > 1 else 0.0
-    warnings = [*imported.notes, *rate_warnings(result.frame_rate, rate, "motion"), *result.warnings]
+    rate = (
+        float(motion.mocap_framerate) if options.frame_rate == "keep" and len(motion) > 1 else 0.0
+    )
+    warnings = [
+        *imported.notes,
+        *rate_warnings(result.frame_rate, rate, "motion"),
+        *result.warnings,
+    ]
     report = {"warnings": warnings}
     show_result(result.collection.scope_result, str(footage or ""), report, result)
     scene.scope.capture = result.collection

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The keyboard shortcut of Compare with Footage in the 3D viewport, which the user can change in the preferences."""
+"""The keyboard shortcut of Compare with Footage in the 3D viewport, which the user can change in
+the preferences.
+"""
 
 from __future__ import annotations
 

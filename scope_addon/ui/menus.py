@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Entries in Blender's own menus; its search (key F3) finds operators by the menus that lead to them."""
+"""Entries in Blender's own menus; its search (key F3) finds operators by the menus that lead to
+them.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,9 @@ class SCOPE_MT_export(bpy.types.Menu):
         for key, label, _, _ in FORMATS:
             row = layout.row()
             row.enabled = is_available(key)
-            text = iface_("Captured Motion as {format} (.{suffix})", format=label, suffix=key.lower())
+            text = iface_(
+                "Captured Motion as {format} (.{suffix})", format=label, suffix=key.lower()
+            )
             row.operator("scope.export", text=text).format = key
 
 
@@ -60,8 +64,12 @@ class SCOPE_MT_motion_capture(bpy.types.Menu):
 
 
 def draw_import_video(layout: bpy.types.UILayout, icon: str) -> None:
-    """Draw the entry with the words people search for: its own count more than those of the menus that lead to it."""
-    layout.operator("scope.import_video", text="Motion from Video (Motion Capture, Mocap)", icon=icon)
+    """Draw the entry with the words people search for: its own count more than those of the menus
+    that lead to it.
+    """
+    layout.operator(
+        "scope.import_video", text="Motion from Video (Motion Capture, Mocap)", icon=icon
+    )
 
 
 def _draw_import(self: bpy.types.Menu, _context: bpy.types.Context) -> None:

@@ -20,11 +20,13 @@ from .reporting import iface_, rpt_
 if TYPE_CHECKING:
     from ..job.cache import Cache
 
-PACKAGE = __package__.rpartition(".scope_addon")[0]  # "bl_ext.<repository>.scope" in Blender, "scope" outside
+# "bl_ext.<repository>.scope" in Blender, "scope" outside
+PACKAGE = __package__.rpartition(".scope_addon")[0]
 DEFAULT_CACHE_GB = 2
 _BODY_FILE = {
     "name": "Body File",
-    "description": "Custom SMPL, SMPL+H, SMPL-X or STAR model, for scenes without a body file of their own",
+    "description": "Custom SMPL, SMPL+H, SMPL-X or STAR model, for scenes without a body file of "
+    "their own",
 }
 _measured: dict[Path, tuple[int, float]] = {}  # cache folder: bytes, and time of the measurement
 
@@ -40,7 +42,8 @@ class SCOPE_AP_preferences(bpy.types.AddonPreferences):
     cache_folder: StringProperty(
         name="Cache Folder",
         subtype="DIR_PATH",
-        description="Folder for captured motion, so the same footage is not captured twice; if empty, Blender's user "
+        description="Folder for captured motion, so the same footage is not captured twice; if "
+        "empty, Blender's user "
         "folder",
     )
     cache_limit_gb: IntProperty(
@@ -49,7 +52,8 @@ class SCOPE_AP_preferences(bpy.types.AddonPreferences):
         min=1,
         max=1000,
         subtype="UNSIGNED",
-        description="Gigabytes of captured motion to keep; the least recently used is removed first",
+        description="Gigabytes of captured motion to keep; the least recently used is removed "
+        "first",
     )
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -76,7 +80,9 @@ class SCOPE_AP_preferences(bpy.types.AddonPreferences):
 
 
 class SCOPE_OT_clear_cache(bpy.types.Operator):
-    """Remove captured motion from the cache. Existing scenes and the compiled solver are not affected"""
+    """Remove captured motion from the cache. Existing scenes and the compiled solver are not
+    affected
+    """
 
     bl_idname = "scope.clear_cache"
     bl_label = "Clear Cache"
@@ -102,14 +108,18 @@ class SCOPE_OT_documentation(bpy.types.Operator):
 
 
 def guide() -> Path:
-    """Return the file of the guide: a page of the extension, or in a checkout the text from which that is made."""
+    """Return the file of the guide: a page of the extension, or in a checkout the text from which
+    that is made.
+    """
     docs = Path(__file__).resolve().parents[2] / "docs"
     page = docs / "guide.html"
     return page if page.is_file() else page.with_suffix(".md")
 
 
 def preferences() -> SCOPE_AP_preferences | None:
-    """Return the user's preferences; None if the package is registered without being enabled as an extension."""
+    """Return the user's preferences; None if the package is registered without being enabled as an
+    extension.
+    """
     addon = bpy.context.preferences.addons.get(PACKAGE)
     return addon.preferences if addon else None
 
@@ -126,7 +136,9 @@ def cache() -> Cache:
 
 
 def user_folder() -> Path:
-    """Return a folder that upgrades keep; one among the user's caches if Scope is not enabled as an extension."""
+    """Return a folder that upgrades keep; one among the user's caches if Scope is not enabled as an
+    extension.
+    """
     from ..job.private_folder import private_folder
 
     try:
@@ -136,7 +148,9 @@ def user_folder() -> Path:
 
 
 def _cache_size(root: Path) -> int:
-    """Measure the cache, at most every few seconds: the window is redrawn at every movement of the mouse."""
+    """Measure the cache, at most every few seconds: the window is redrawn at every movement of the
+    mouse.
+    """
     from ..job.cache import Cache
 
     size, when = _measured.get(root, (0, -math.inf))

@@ -25,10 +25,14 @@ class SCOPE_PT_capture_presets(PresetPanel, bpy.types.Panel):
     preset_add_operator = "scope.add_capture_preset"
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Draw the presets. Without a folder for them, Blender would complain of missing paths before the first one."""
+        """Draw the presets. Without a folder for them, Blender would complain of missing paths
+        before the first one.
+        """
         if not bpy.utils.preset_paths(self.preset_subdir):
             with contextlib.suppress(OSError):
-                bpy.utils.user_resource("SCRIPTS", path=f"presets/{self.preset_subdir}", create=True)
+                bpy.utils.user_resource(
+                    "SCRIPTS", path=f"presets/{self.preset_subdir}", create=True
+                )
         PresetPanel.draw(self, context)
 
 
@@ -39,7 +43,8 @@ class SCOPE_OT_add_capture_preset(AddPresetBase, bpy.types.Operator):
     bl_label = "Add Capture Preset"
     preset_menu = "SCOPE_PT_capture_presets"
     preset_subdir = "scope/capture"
-    # Whole paths: a Blender before 4.4 does not find what ``preset_defines`` defines if its Python is 3.13.
+    # Whole paths: a Blender before 4.4 does not find what ``preset_defines`` defines if its Python
+    # is 3.13.
     preset_values = [
         f"bpy.context.scene.scope.{property_name(option)}"
         for option in options_at(Place.PANEL)

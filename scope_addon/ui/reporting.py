@@ -31,9 +31,11 @@ def tip_(text: str, **values: object) -> str:
 
 
 def sentence(error: Exception | str, name: str = "") -> str:
-    """Return an error's message with a capital first letter, as the panel shows it; a file's name keeps its own.
+    """Return an error's message with a capital first letter, as the panel shows it; a file's name
+    keeps its own.
 
-    :param name: of a file with which the message may begin; without it, a first word such as ``walk.mp4`` is one.
+    :param name: of a file with which the message may begin; without it, a first word such as
+        ``walk.mp4`` is one.
     """
     text = display_text(str(error).strip()) or type(error).__name__
     first = text.split()[0].rstrip(":,")
@@ -43,7 +45,9 @@ def sentence(error: Exception | str, name: str = "") -> str:
 
 
 class ReportingOperator(bpy.types.Operator):
-    """An operator that runs ``work`` and reports the result, or the error's message. Not registered."""
+    """An operator that runs ``work`` and reports the result, or the error's message. Not
+    registered.
+    """
 
     bl_options = {"REGISTER", "UNDO"}
 

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Compiling the solver in the background after the extension was enabled, so that the first capture need not wait.
+"""Compiling the solver in the background after the extension was enabled, so that the first capture
+need not wait.
 
-Where machine code for this computer comes with the extension, that takes a few seconds and compiles nothing. It happens
-once for each installed version, at the lowest priority, never in Blenders without a window, and ends with Blender, or
-when a capture begins. Only the standard library is loaded: the solver's libraries would stop the window for a second.
+Where machine code for this computer comes with the extension, that takes a few seconds and compiles
+nothing. It happens once for each installed version, at the lowest priority, never in Blenders
+without a window, and ends with Blender, or when a capture begins. Only the standard library is
+loaded: the solver's libraries would stop the window for a second.
 """
 
 from __future__ import annotations
@@ -40,7 +42,8 @@ class WarmUp:
 def attach() -> None:
     """Begin in a few seconds, in a Blender with a window where Scope is enabled as an extension."""
     if not bpy.app.background and preferences() is not None:
-        bpy.app.timers.register(step, first_interval=_DELAY_S, persistent=True)  # also if a file is opened meanwhile
+        # also if a file is opened meanwhile
+        bpy.app.timers.register(step, first_interval=_DELAY_S, persistent=True)
 
 
 def detach() -> None:
@@ -51,7 +54,9 @@ def detach() -> None:
 
 
 def step() -> float | None:
-    """Start the process, or see whether it has ended; return in how many seconds to call again. A timer calls this."""
+    """Start the process, or see whether it has ended; return in how many seconds to call again. A
+    timer calls this.
+    """
     if WarmUp.process is None:
         if _marker().exists() or not start():
             return None
@@ -60,28 +65,40 @@ def step() -> float | None:
             with contextlib.suppress(OSError):
                 _marker().touch()
         stop()
-    redraw_sidebars()  # the panel alone: drawing a viewport without a graphics card takes a fifth of a second
+    # the panel alone: drawing a viewport without a graphics card takes a fifth of a second
+    redraw_sidebars()
     return _INTERVAL_S if WarmUp.process else None
 
 
 def start() -> bool:
-    """Start the process; return whether that worked. If not, the first capture compiles the solver."""
+    """Start the process; return whether that worked. If not, the first capture compiles the
+    solver.
+    """
     import subprocess
     import tempfile
 
     from ..job.start_worker import worker_command
 
-    windows_flags = getattr(subprocess, "CREATE_NO_WINDOW", 0) | getattr(subprocess, "IDLE_PRIORITY_CLASS", 0)
+    windows_flags = getattr(subprocess, "CREATE_NO_WINDOW", 0) | getattr(
+        subprocess, "IDLE_PRIORITY_CLASS", 0
+    )
     python = [sys.executable, *getattr(bpy.app, "python_args", ("-I",))]
     kernels = cache().kernels
     try:
         kernels.mkdir(parents=True, exist_ok=True)
         WarmUp.files_before = _files()
-        WarmUp.folder = tempfile.TemporaryDirectory(prefix="scope-warm-up-", ignore_cleanup_errors=True)
+        WarmUp.folder = tempfile.TemporaryDirectory(
+            prefix="scope-warm-up-", ignore_cleanup_errors=True
+        )
         command, environment = worker_command(python, ROOT, Path(WarmUp.folder.name), kernels)
         quiet = subprocess.DEVNULL
         WarmUp.process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=quiet, stderr=quiet, env=environment, creationflags=windows_flags
+            command,
+            stdin=subprocess.PIPE,
+            stdout=quiet,
+            stderr=quiet,
+            env=environment,
+            creationflags=windows_flags,
         )
         assert WarmUp.process.stdin is not None
         WarmUp.process.stdin.write(_REQUEST)  # it stays open: the process ends when Blender does
@@ -111,7 +128,9 @@ def draw(layout: bpy.types.UILayout) -> None:
     """Show the progress while the solver is being compiled."""
     if WarmUp.process is not None and (compiled := _files() - WarmUp.files_before) > 0:
         share = min(1.0, compiled / KERNELS)
-        text = iface_("Compiling the solver in the background, {percent:.0f} %", percent=100 * share)
+        text = iface_(
+            "Compiling the solver in the background, {percent:.0f} %", percent=100 * share
+        )
         layout.progress(text=text, factor=share)
 
 
@@ -120,7 +139,9 @@ def _files() -> int:
 
 
 def _marker() -> Path:
-    """Return the file that says that everything is compiled for this installation and this Blender's Python."""
+    """Return the file that says that everything is compiled for this installation and this
+    Blender's Python.
+    """
     import hashlib
 
     installed = (ROOT / "__init__.py").stat().st_mtime_ns

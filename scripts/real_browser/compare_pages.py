@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pages to open in a browser, and the comparison of what it shows with the body model's own results.
+"""Pages to open in a browser, and the comparison of what it shows with the body model's own
+results.
 
-``compare_pages.py expect FOLDER`` writes a page about a made motion, a run of ./scripts/report with made measurements,
-from which its page is written, and ``expected.json``: what joints, vertices and silhouettes of these and of the
-captured sample are. ``compare_pages.py compare FOLDER`` compares what the browser
-found: joints and vertices to 1 mm, silhouettes in the view through the capture's camera by their overlap.
+``compare_pages.py expect FOLDER`` writes a page about a made motion, a run of ./scripts/report with
+made measurements, from which its page is written, and ``expected.json``: what joints, vertices and
+silhouettes of these and of the captured sample are. ``compare_pages.py compare FOLDER`` compares
+what the browser found: joints and vertices to 1 mm, silhouettes in the view through the capture's
+camera by their overlap.
 """
 
 from __future__ import annotations
@@ -35,11 +37,18 @@ LIMIT_MM, OVERLAP = 1.0, 0.9
 
 
 def made_people(motion: Motion) -> list[Motion]:
-    """Return two people before a camera that moves sideways, from a captured person; the second is lost for a while."""
+    """Return two people before a camera that moves sideways, from a captured person; the second is
+    lost for a while.
+    """
     T = len(motion)
     world = motion.world_from_camera.copy()
     world[:, 0, 3] += np.linspace(-0.5, 0.5, T)
-    other = replace(motion, trans=motion.trans + [0.9, 0.4, 0], valid=np.arange(T) % 50 > 9, world_from_camera=world)
+    other = replace(
+        motion,
+        trans=motion.trans + [0.9, 0.4, 0],
+        valid=np.arange(T) % 50 > 9,
+        world_from_camera=world,
+    )
     return [replace(motion, world_from_camera=world), other]
 
 
@@ -58,7 +67,8 @@ def people_of(folder: Path) -> dict[str, list[Motion]]:
 
 
 def made_run(report: dict[str, Any]) -> Run:
-    """Return a run of the report: the captured sample, made measurements with every kind of table and plot, a failure.
+    """Return a run of the report: the captured sample, made measurements with every kind of table
+    and plot, a failure.
 
     :param report: of the capture.
     """
@@ -67,13 +77,31 @@ def made_run(report: dict[str, Any]) -> Run:
         for K in (23, 51)
         for P in range(0, 11, 5)
     ]
-    clip = [{"K": K, "frames": T, "linearize_ms": K / 100, "step_ms": K / 50} for K in (23, 51) for T in (75, 150, 600)]
-    methods = {"<dense> & slow": {"mpjpe_root": 120.0, "ms": 400.0}, "Scope": {"mpjpe_root": 60.0, "ms": 4.0}}
-    worse = table(("figure", "recorded", "now"), [("sample pa_mpjpe", 48.1, 60.0), ("<b>&amp;</b>", 1.0, None)])
+    clip = [
+        {"K": K, "frames": T, "linearize_ms": K / 100, "step_ms": K / 50}
+        for K in (23, 51)
+        for T in (75, 150, 600)
+    ]
+    methods = {
+        "<dense> & slow": {"mpjpe_root": 120.0, "ms": 400.0},
+        "Scope": {"mpjpe_root": 60.0, "ms": 4.0},
+    }
+    worse = table(
+        ("figure", "recorded", "now"),
+        [("sample pa_mpjpe", 48.1, 60.0), ("<b>&amp;</b>", 1.0, None)],
+    )
     return Run(
-        [("sample", SAMPLE, Outcome(Command(SAMPLE.name, "capture", (str(SAMPLE),)), "", "", report, 9.0, 0))],
         [
-            Outcome(Command("Gate", "gate", ()), worse, "gate: pa_mpjpe is worse </script>", {}, 30.0, 1),
+            (
+                "sample",
+                SAMPLE,
+                Outcome(Command(SAMPLE.name, "capture", (str(SAMPLE),)), "", "", report, 9.0, 0),
+            )
+        ],
+        [
+            Outcome(
+                Command("Gate", "gate", ()), worse, "gate: pa_mpjpe is worse </script>", {}, 30.0, 1
+            ),
             Outcome(
                 Command("Solver", "bench", ("solver", "--quick")),
                 experiment_lines(3, rows),
@@ -82,7 +110,14 @@ def made_run(report: dict[str, Any]) -> Run:
                 60.0,
                 0,
             ),
-            Outcome(Command("SMPLify", "bench", ("smplify",)), "", "", {"a": methods, "b": methods}, 60.0, 0),
+            Outcome(
+                Command("SMPLify", "bench", ("smplify",)),
+                "",
+                "",
+                {"a": methods, "b": methods},
+                60.0,
+                0,
+            ),
         ],
         "2026-01-02 03:04",
         {"Machine": "made", "Load before": "none"},
@@ -94,13 +129,20 @@ def expect(folder: Path) -> None:
     """Write the page of the made motion, and what the pages must show."""
     body, of_page = load_body("scope"), people_of(folder)
     report: dict[str, Any] = json.loads((folder / "captured.json").read_text("utf-8"))
-    warnings = ["made.mp4 cuts to another scene at 2.0 s and at 3.5 s: </script><script>alert(1)</script>"]
-    clip = CapturedClip(SAMPLE, of_page[MADE], body, report | {"people": 2, "warnings": warnings}, "made & 'two'")
+    warnings = [
+        "made.mp4 cuts to another scene at 2.0 s and at 3.5 s: </script><script>alert(1)</script>"
+    ]
+    clip = CapturedClip(
+        SAMPLE, of_page[MADE], body, report | {"people": 2, "warnings": warnings}, "made & 'two'"
+    )
     write_capture_page(folder / MADE, clip)
     (folder / "run").mkdir(exist_ok=True)
     shutil.copyfile(folder / "captured.npz", folder / "run" / "sample.npz")
     write_run(folder / "run", made_run(report))
-    wanted = {name: {"rows": ROWS, "people": len(people), "vertices": VERTICES} for name, people in of_page.items()}
+    wanted = {
+        name: {"rows": ROWS, "people": len(people), "vertices": VERTICES}
+        for name, people in of_page.items()
+    }
     (folder / "expected.json").write_text(json.dumps(wanted))
 
 
@@ -115,19 +157,33 @@ def compare(folder: Path) -> list[str]:
             for row in ROWS:
                 joints, vertices = posed(motion, body, row)
                 for what, wanted in (("joints", joints), ("vertices", vertices[list(VERTICES)])):
-                    off = 1e3 * float(np.linalg.norm(np.array(of_page[what][f"{n} {row}"]) - wanted, axis=1).max())
+                    off = 1e3 * float(
+                        np.linalg.norm(np.array(of_page[what][f"{n} {row}"]) - wanted, axis=1).max()
+                    )
                     worst = max(worst, off)
                     if not off < LIMIT_MM:
-                        problems.append(f"{name}: {what} of person {n + 1} at row {row} are {off:.2f} mm off")
+                        problems.append(
+                            f"{name}: {what} of person {n + 1} at row {row} are {off:.2f} mm off"
+                        )
         share = overlap(folder, name, people, body, of_page["view"])
-        print(f"{name}: joints and vertices at most {worst:.2f} mm off, silhouettes overlap by {share:.3f}")
+        print(
+            f"{name}: joints and vertices at most {worst:.2f} mm off, silhouettes overlap by "
+            f"{share:.3f}"
+        )
         if not share > OVERLAP:
-            problems.append(f"{name}: the view through the camera shows the people elsewhere: overlap {share:.2f}")
+            problems.append(
+                f"{name}: the view through the camera shows the people elsewhere: "
+                f"overlap {share:.2f}"
+            )
     return problems
 
 
-def overlap(folder: Path, name: str, people: list[Motion], body: Body, view: dict[str, float]) -> float:
-    """Return intersection over union of the bodies in the browser's 3D view and those of the overlay's rasterizer."""
+def overlap(
+    folder: Path, name: str, people: list[Motion], body: Body, view: dict[str, float]
+) -> float:
+    """Return intersection over union of the bodies in the browser's 3D view and those of the
+    overlay's rasterizer.
+    """
     picture = cv2.imread(str(folder / f"{Path(name).stem}.camera.png"))
     left, top, width, height = (round(view[key]) for key in ("left", "top", "width", "height"))
     drawn = picture[top : top + height, left : left + width].astype(int)
@@ -138,13 +194,18 @@ def overlap(folder: Path, name: str, people: list[Motion], body: Body, view: dic
     K[:2, 2] += [(width - scale * size[0]) / 2, (height - scale * size[1]) / 2]
     blank = np.zeros((height, width, 3), np.uint8)
     bodies = [camera_vertices(motion, body, ROWS[0]) for motion in people]
-    wanted = draw_overlay(blank, bodies, body.faces, K, None, [np.ones(3)] * len(bodies), 1.0).any(axis=2)
-    opened = cv2.morphologyEx(shown.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) > 0  # not the paths
+    wanted = draw_overlay(blank, bodies, body.faces, K, None, [np.ones(3)] * len(bodies), 1.0).any(
+        axis=2
+    )
+    # not the paths
+    opened = cv2.morphologyEx(shown.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) > 0
     return float((opened & wanted).sum() / (opened | wanted).sum())
 
 
 def main() -> int:
-    """Run the command line; return 1 if the browser shows something else than the body model says."""
+    """Run the command line; return 1 if the browser shows something else than the body model
+    says.
+    """
     command, folder = sys.argv[1], Path(sys.argv[2])
     if command == "expect":
         expect(folder)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A headless Chromium, driven over a pipe by its DevTools protocol. Standard library only: it runs in a bare Debian."""
+"""A headless Chromium, driven over a pipe by its DevTools protocol. Standard library only: it runs
+in a bare Debian.
+"""
 
 from __future__ import annotations
 
@@ -16,9 +18,25 @@ from pathlib import Path
 from typing import Any
 
 _FLAGS = (
-    *("--headless=new", "--no-sandbox", "--remote-debugging-pipe", "--no-first-run", "--disable-extensions"),
-    *("--disable-background-networking", "--disable-component-update", "--disable-sync", "--mute-audio"),
-    *("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage"),
+    *(
+        "--headless=new",
+        "--no-sandbox",
+        "--remote-debugging-pipe",
+        "--no-first-run",
+        "--disable-extensions",
+    ),
+    *(
+        "--disable-background-networking",
+        "--disable-component-update",
+        "--disable-sync",
+        "--mute-audio",
+    ),
+    *(
+        "--use-gl=angle",
+        "--use-angle=swiftshader",
+        "--enable-unsafe-swiftshader",
+        "--disable-dev-shm-usage",
+    ),
     *("--hide-scrollbars", "--force-color-profile=srgb"),
 )
 _LOCAL = ("file:", "data:", "about:")
@@ -50,7 +68,9 @@ class Browser:
         self._buffer, self._last, self._session = b"", 0, None
         self.events: list[dict[str, Any]] = []
         target = self.call("Target.createTarget", url="about:blank")["targetId"]
-        self._session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        self._session = self.call("Target.attachToTarget", targetId=target, flatten=True)[
+            "sessionId"
+        ]
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.call(f"{domain}.enable")
 
@@ -60,7 +80,8 @@ class Browser:
     def __exit__(self, *_: object) -> None:
         self._session = None
         with suppress(RuntimeError, OSError, subprocess.TimeoutExpired):
-            self.call("Browser.close")  # with all its processes, which otherwise write into the profile for a moment
+            # with all its processes, which otherwise write into the profile for a moment
+            self.call("Browser.close")
             self._process.wait(20)
         self._process.kill()
         self._process.wait()
@@ -93,7 +114,9 @@ class Browser:
     def _read(self, end: float, method: str) -> dict[str, Any]:
         while b"\0" not in self._buffer:
             if not select.select([self._answers], [], [], max(0.0, end - time.monotonic()))[0]:
-                raise RuntimeError(f"{method}: the browser did not answer within {_TIMEOUT_S:.0f} s")
+                raise RuntimeError(
+                    f"{method}: the browser did not answer within {_TIMEOUT_S:.0f} s"
+                )
             data = os.read(self._answers, 1 << 20)
             if not data:
                 raise RuntimeError(f"{method}: the browser ended")
@@ -102,7 +125,9 @@ class Browser:
         answer: dict[str, Any] = json.loads(text)
         return answer
 
-    def open(self, path: Path, width: int, height: int, *, dark: bool = False, touch: bool = False) -> None:
+    def open(
+        self, path: Path, width: int, height: int, *, dark: bool = False, touch: bool = False
+    ) -> None:
         """Open a page from a file, and wait until it is complete."""
         self.call(
             "Emulation.setDeviceMetricsOverride",
@@ -114,7 +139,13 @@ class Browser:
         self.call("Emulation.setTouchEmulationEnabled", enabled=touch)
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
         self.call("Emulation.setEmulatedMedia", features=[scheme])
-        self.call("Network.emulateNetworkConditions", offline=True, latency=0, downloadThroughput=0, uploadThroughput=0)
+        self.call(
+            "Network.emulateNetworkConditions",
+            offline=True,
+            latency=0,
+            downloadThroughput=0,
+            uploadThroughput=0,
+        )
         self.call("Page.navigate", url=path.as_uri())
         end = time.monotonic() + _TIMEOUT_S
         while self.evaluate("document.readyState + location.protocol") != "completefile:":
@@ -127,10 +158,14 @@ class Browser:
 
         :raises RuntimeError: it throws.
         """
-        done = self.call("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
+        done = self.call(
+            "Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True
+        )
         if "exceptionDetails" in done:
             details = done["exceptionDetails"]
-            raise RuntimeError(f"{expression}: {details.get('exception', {}).get('description', details['text'])}")
+            raise RuntimeError(
+                f"{expression}: {details.get('exception', {}).get('description', details['text'])}"
+            )
         return done["result"].get("value")
 
     def screenshot(self, path: Path, *, whole: bool = False) -> None:
@@ -139,7 +174,9 @@ class Browser:
         path.write_bytes(base64.b64decode(done["data"]))
 
     def box(self, selector: str) -> dict[str, float]:
-        """Return left, top, width and height of an element in the window, after scrolling it into view."""
+        """Return left, top, width and height of an element in the window, after scrolling it into
+        view.
+        """
         found: dict[str, float] = self.evaluate(
             f"(() => {{ const e = document.querySelector({json.dumps(selector)});"
             " e.scrollIntoView({block: 'center'});"
@@ -156,12 +193,24 @@ class Browser:
         if touch:
             moves = [("touchMove", [point]) for point in points[1:]]
             for kind, where in (("touchStart", points[:1]), *moves, ("touchEnd", [])):
-                self.call("Input.dispatchTouchEvent", type=kind, touchPoints=[{"x": a, "y": b} for a, b in where])
+                self.call(
+                    "Input.dispatchTouchEvent",
+                    type=kind,
+                    touchPoints=[{"x": a, "y": b} for a, b in where],
+                )
             return
         moves = [("mouseMoved", point) for point in points]
         for kind, (a, b) in (("mousePressed", points[0]), *moves, ("mouseReleased", points[-1])):
             pressed = 1 if kind != "mouseReleased" else 0
-            self.call("Input.dispatchMouseEvent", type=kind, x=a, y=b, button="left", buttons=pressed, clickCount=1)
+            self.call(
+                "Input.dispatchMouseEvent",
+                type=kind,
+                x=a,
+                y=b,
+                button="left",
+                buttons=pressed,
+                clickCount=1,
+            )
 
     def click(self, selector: str, share: float = 0.5) -> None:
         """Click an element at a share of its width."""
@@ -171,18 +220,28 @@ class Browser:
             self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
 
     def complaints(self) -> list[str]:
-        """List errors and warnings on the console, exceptions, and requests to anything but files and data."""
+        """List errors and warnings on the console, exceptions, and requests to anything but files
+        and data.
+        """
         self.evaluate("new Promise((done) => requestAnimationFrame(() => setTimeout(done, 50)))")
         found = []
         for event in self.events:
             method, of = event.get("method"), event.get("params", {})
             if method == "Runtime.exceptionThrown":
                 details = of["exceptionDetails"]
-                found.append(f"exception: {details.get('exception', {}).get('description', details['text'])}")
-            elif method == "Runtime.consoleAPICalled" and of["type"] in ("error", "warning", "assert"):
+                found.append(
+                    f"exception: {details.get('exception', {}).get('description', details['text'])}"
+                )
+            elif method == "Runtime.consoleAPICalled" and of["type"] in (
+                "error",
+                "warning",
+                "assert",
+            ):
                 found.append(f"console: {[each.get('value') for each in of['args']]}")
             elif method == "Log.entryAdded" and of["entry"]["level"] in ("error", "warning"):
                 found.append(f"log: {of['entry']['text']}")
-            elif method == "Network.requestWillBeSent" and not of["request"]["url"].startswith(_LOCAL):
+            elif method == "Network.requestWillBeSent" and not of["request"]["url"].startswith(
+                _LOCAL
+            ):
                 found.append(f"request: {of['request']['url'][:200]}")
         return found

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The machine code of one kernel on disk, in place of numba's own cache.
 
-Numba's cache fails on damaged files, for ever; throws a kernel's code away when its own file has changed, but not when
-one of those has that are inlined into it; and depends on the sources' times and the exact processor.
+Numba's cache fails on damaged files, for ever; throws a kernel's code away when its own file has
+changed, but not when one of those has that are inlined into it; and depends on the sources' times
+and the exact processor.
 """
 
 from __future__ import annotations
@@ -26,10 +27,13 @@ from .code_folders import PACKAGE, SOLVER, Area, digest_of, mark_used
 _rebuild: Any = CompileResult._rebuild  # these declare no types
 _dumps: Callable[[Any], bytes] = serialize.dumps
 _LOG = logging.getLogger(__name__)
-_ANNOTATION = 6  # index in what numba reduces a result to: the annotated source, of no use and with the machine's paths
+# index in what numba reduces a result to: the annotated source, of no use and with the machine's
+# paths
+_ANNOTATION = 6
 
 
-_compiling: list[Path] = []  # of each kernel that this process had to compile so far: the folder of its source
+# of each kernel that this process had to compile so far: the folder of its source
+_compiling: list[Path] = []
 _refused: list[OSError] = []  # why code could not be kept
 _announced: list[Path] = []  # the folder of which that has been said, once in a process
 
@@ -43,7 +47,9 @@ def compiled_kernels(sources: Path = SOLVER) -> int:
 
 
 class CodeCache(_Cache):
-    """The code of a kernel's signatures, one file for each. What cannot be read or kept is compiled again."""
+    """The code of a kernel's signatures, one file for each. What cannot be read or kept is compiled
+    again.
+    """
 
     def __init__(self, function: Callable[..., Any]) -> None:
         code = function.__code__
@@ -63,7 +69,9 @@ class CodeCache(_Cache):
     def has_code(self) -> bool:
         """Whether there is code of any signature."""
         return self._enabled and any(
-            any(folder.glob(f"{self._name}-*{SUFFIX}")) for folder, _ in self._area.folders() if folder.is_dir()
+            any(folder.glob(f"{self._name}-*{SUFFIX}"))
+            for folder, _ in self._area.folders()
+            if folder.is_dir()
         )
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
@@ -87,7 +95,11 @@ class CodeCache(_Cache):
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep the code of a signature, if there is a place for it."""
-        if not self._enabled or data.library.has_dynamic_globals or any(not x.can_cache for x in data.lifted):
+        if (
+            not self._enabled
+            or data.library.has_dynamic_globals
+            or any(not x.can_cache for x in data.lifted)
+        ):
             return
         payload = _payload(data)
         for folder in self._area.own_folders():
@@ -101,7 +113,11 @@ class CodeCache(_Cache):
         if not _announced:
             _announced.append(folder)
             reason = _refused[-1].strerror or _refused[-1]
-            _LOG.warning("The compiled solver cannot be kept in %s (%s): it works, but starts slowly.", folder, reason)
+            _LOG.warning(
+                "The compiled solver cannot be kept in %s (%s): it works, but starts slowly.",
+                folder,
+                reason,
+            )
 
     def enable(self) -> None:
         """Use the files."""
@@ -125,7 +141,9 @@ class CodeCache(_Cache):
 
 
 def _payload(result: Any) -> bytes:
-    """Return the machine code, what else numba keeps of a result, and the names that the code defines."""
+    """Return the machine code, what else numba keeps of a result, and the names that the code
+    defines.
+    """
     reduced = list(result._reduce())
     reduced[_ANNOTATION] = ""
     module = result.library._get_module_for_linking()
@@ -136,7 +154,8 @@ def _payload(result: Any) -> bytes:
 def _loaded(target_context: Any, reduced: tuple[Any, ...], names: set[str]) -> Any:
     """Return what was kept of a result; as numba's `_rebuild`, but without reading LLVM's code.
 
-    Only kernels that are compiled later and call this one need that, and to read it takes a third of the time.
+    Only kernels that are compiled later and call this one need that, and to read it takes a third
+    of the time.
     """
     (name, kind, (code, bitcode)), *others = reduced
     target_context.codegen()._engine._defined_symbols |= names
@@ -168,7 +187,9 @@ def _area_of(module: str, sources: Path) -> Area:
 
 @cache
 def _used(area: Area, folder: Path) -> None:
-    """Note, once in a process, that a folder is in use; remove what it replaces, and what a kill left in it."""
+    """Note, once in a process, that a folder is in use; remove what it replaces, and what a kill
+    left in it.
+    """
     mark_used(folder)
     remove_drafts(folder)
     area.remove_stale(folder)

@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Files of machine code, which are checked before they are used.
 
-What is trusted. A file's content is unpickled and run, so whoever can write it can run anything as the user:
+What is trusted. A file's content is unpickled and run, so whoever can write it can run anything as
+the user:
 
-- A folder that comes with the program is trusted as the program's sources are: who can write there can change those.
-- Anywhere else only a file of the user's own, or the system's, that nobody else may write to is opened, wherever it
-  lies: a folder in which others can write, such as the system's temporary one, is no way in. (Windows, which keeps the
-  user's folders from others by itself, reports no owner.)
-- The checksum finds damage (a full disk, a power cut, flipped bits), which would crash the process. It is not a
-  signature: it says nothing about who wrote the file.
+- A folder that comes with the program is trusted as the program's sources are: who can write there
+    can change those.
+- Anywhere else only a file of the user's own, or the system's, that nobody else may write to is
+  opened, wherever it lies: a folder in which others can write, such as the system's temporary one,
+  is no way in. (Windows, which keeps the user's folders from others by itself, reports no owner.)
+- The checksum finds damage (a full disk, a power cut, flipped bits), which would crash the process.
+  It is not a signature: it says nothing about who wrote the file.
 """
 
 from __future__ import annotations
@@ -24,7 +26,8 @@ from ..processes import is_abandoned, owner
 
 SUFFIX = ".code"
 _MAGIC = b"Scope machine code 1\n"
-_OPEN = os.O_RDONLY | getattr(os, "O_BINARY", 0) | getattr(os, "O_NONBLOCK", 0)  # a named pipe must not block
+# a named pipe must not block
+_OPEN = os.O_RDONLY | getattr(os, "O_BINARY", 0) | getattr(os, "O_NONBLOCK", 0)
 _CREATE = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
 
 
@@ -33,7 +36,8 @@ def read_code(path: Path, key: str, *, trusted: bool) -> bytes | None:
 
     A damaged file is removed, so that it is written anew.
 
-    :param key: what the code was compiled from and for; part of the checksum, so that a renamed file does not pass.
+    :param key: what the code was compiled from and for; part of the checksum, so that a renamed
+        file does not pass.
     :param trusted: whether the folder came with the program.
     """
     try:
@@ -56,14 +60,16 @@ def read_code(path: Path, key: str, *, trusted: bool) -> bytes | None:
 
 
 def write_code(path: Path, key: str, payload: bytes) -> None:
-    """Write a file that is either complete or not there. What a kill leaves, `remove_drafts` removes.
+    """Write a file that is either complete or not there. What a kill leaves, `remove_drafts`
+    removes.
 
     :raises OSError: the system refused.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f"{path.name}.{owner()}-{uuid.uuid4().hex[:8]}")
     try:
-        # Nobody else may write to it, also where new files are the group's as well: it would not be read again.
+        # Nobody else may write to it, also where new files are the group's as well: it would not be
+        # read again.
         with open(os.open(temporary, _CREATE, 0o644), "wb") as file:
             file.write(_header(key, payload) + payload)
         os.replace(temporary, path)

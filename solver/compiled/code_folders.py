@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The folders in which machine code lies, named after everything that it depends on.
 
-Some code comes with the program (`SHIPPED`), compiled for a processor that nearly every computer's includes (`LEVELS`).
-What is missing there is compiled on first use, for the computer's own processor, and kept in a folder of the user.
+Some code comes with the program (`SHIPPED`), compiled for a processor that nearly every computer's
+includes (`LEVELS`). What is missing there is compiled on first use, for the computer's own
+processor, and kept in a folder of the user.
 
-Each version has a folder of its own, ``<area>-<environment>-<program>``: the area is the package whose sources count,
-the environment Python, system and processor, the program the sources' content and the versions of numba and numpy.
-Sources count by content alone, since an installer gives files new times.
+Each version has a folder of its own, ``<area>-<environment>-<program>``: the area is the package
+whose sources count, the environment Python, system and processor, the program the sources' content
+and the versions of numba and numpy. Sources count by content alone, since an installer gives files
+new times.
 """
 
 from __future__ import annotations
@@ -34,14 +36,20 @@ llvm: Any = llvmlite.binding
 user_folder: Any = appdirs.AppDirs
 
 SOLVER = Path(__file__).parent.parent
-PACKAGE = __name__.rpartition(".compiled.")[0].rpartition(".")[0]  # the package that contains the solver
+# the package that contains the solver
+PACKAGE = __name__.rpartition(".compiled.")[0].rpartition(".")[0]
 SHIPPED = SOLVER.parent / "assets" / "kernels"
-# By machine: LLVM's name of the processor that shipped code is compiled for, and the features that it needs of another.
+# By machine: LLVM's name of the processor that shipped code is compiled for, and the features that
+# it needs of another.
 LEVELS = {
-    "x86_64": ("x86-64-v3", ("avx2", "bmi", "bmi2", "cx16", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sse4.2")),
+    "x86_64": (
+        "x86-64-v3",
+        ("avx2", "bmi", "bmi2", "cx16", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sse4.2"),
+    ),
     "arm64": ("apple-m1", ()),  # macOS, whose every ARM processor is this one or a later one
 }
-WITHOUT_KERNELS = {"examples", "loaders"}  # folders whose sources do not count; an installation may lack the first
+# folders whose sources do not count; an installation may lack the first
+WITHOUT_KERNELS = {"examples", "loaders"}
 _chosen: list[Path] = []  # at most one
 _STALE_S = 14 * 24 * 3600.0  # unused for so long, another version's code is removed
 
@@ -52,9 +60,15 @@ def digest_of(*parts: object) -> str:
 
 
 def sources_digest(folder: Path) -> str:
-    """Return a digest of the names and contents of all sources below a folder, whatever their line ends."""
-    files = sorted(f for f in folder.rglob("*.py") if not WITHOUT_KERNELS & set(f.relative_to(folder).parts))
-    texts = [(f.relative_to(folder).as_posix(), f.read_bytes().replace(b"\r\n", b"\n")) for f in files]
+    """Return a digest of the names and contents of all sources below a folder, whatever their line
+    ends.
+    """
+    files = sorted(
+        f for f in folder.rglob("*.py") if not WITHOUT_KERNELS & set(f.relative_to(folder).parts)
+    )
+    texts = [
+        (f.relative_to(folder).as_posix(), f.read_bytes().replace(b"\r\n", b"\n")) for f in files
+    ]
     return digest_of(*texts)
 
 
@@ -72,7 +86,8 @@ class Area:
         """
         self._name = package.rpartition(".")[2]
         own = "" if sources == SOLVER else sources_digest(sources)
-        # Kernels see arrays through numba alone, so that only the rules of numpy's major version matter.
+        # Kernels see arrays through numba alone, so that only the rules of numpy's major version
+        # matter.
         versions = numba.__version__, llvmlite.__version__, np.__version__.partition(".")[0]
         self._program = digest_of(package, _SOLVER_DIGEST, own, versions)[:12]
 
@@ -84,11 +99,15 @@ class Area:
             yield place / self._folder_name(_processor()), False
 
     def own_folders(self) -> list[Path]:
-        """Return the folders to write to, the first that can be written to, for the processor to compile for."""
+        """Return the folders to write to, the first that can be written to, for the processor to
+        compile for.
+        """
         return [place / self._folder_name(_processor()) for place in places()]
 
     def remove_stale(self, folder: Path) -> None:
-        """Remove what lies beside the folder of an area, is of another program, and has not been used for long."""
+        """Remove what lies beside the folder of an area, is of another program, and has not been
+        used for long.
+        """
         prefix = folder.name[: -len(self._program)]
         with suppress(OSError):
             for other in folder.parent.glob(f"{prefix}*"):
@@ -106,12 +125,17 @@ def keep_in(folder: Path) -> None:
 
 
 def places() -> list[Path]:
-    """Return the folders in which code may be kept: `keep_in`'s, or NUMBA_CACHE_DIR, or else numba's own choices."""
+    """Return the folders in which code may be kept: `keep_in`'s, or NUMBA_CACHE_DIR, or else
+    numba's own choices.
+    """
     if _chosen:
         return list(_chosen)
     if config.CACHE_DIR:
         return [Path(config.CACHE_DIR)]
-    return [Path(__file__).parent / "__pycache__", Path(user_folder(appname="numba", appauthor=False).user_cache_dir)]
+    return [
+        Path(__file__).parent / "__pycache__",
+        Path(user_folder(appname="numba", appauthor=False).user_cache_dir),
+    ]
 
 
 @cache
@@ -122,15 +146,23 @@ def _machine() -> str:
 
 def shipped_processor() -> str:
     """Return LLVM's name of the processor that code is shipped for; empty where none is."""
-    return "" if _machine() == "arm64" and sys.platform != "darwin" else LEVELS.get(_machine(), ("", ()))[0]
+    return (
+        ""
+        if _machine() == "arm64" and sys.platform != "darwin"
+        else LEVELS.get(_machine(), ("", ()))[0]
+    )
 
 
 @cache
 def can_run_shipped() -> bool:
-    """Whether the processor has everything that shipped code needs, and numba is not configured to use less."""
+    """Whether the processor has everything that shipped code needs, and numba is not configured to
+    use less.
+    """
     if config.CPU_NAME not in (None, "", shipped_processor()) or not config.ENABLE_AVX:
         return False
-    return bool(shipped_processor()) and all(_host_features().get(feature) for feature in LEVELS[_machine()][1])
+    return bool(shipped_processor()) and all(
+        _host_features().get(feature) for feature in LEVELS[_machine()][1]
+    )
 
 
 @cache

@@ -10,8 +10,9 @@ from numba import njit
 from .code_cache import CodeCache
 from .pipeline import KernelCompiler
 
-# Reordering sums and fusing multiplications is allowed; assuming that no NaN or infinity occurs is not, because the
-# optimizer must recognise them. The GIL is released, so that frames can be solved in threads.
+# Reordering sums and fusing multiplications is allowed; assuming that no NaN or infinity occurs is
+# not, because the optimizer must recognise them. The GIL is released, so that frames can be solved
+# in threads.
 _OPTIONS: dict[str, Any] = {
     "nogil": True,
     "error_model": "numpy",
@@ -27,11 +28,11 @@ _LOG = logging.getLogger(__name__)
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile a kernel on its first call, and keep the machine code for later sessions.
 
-    It may not create arrays; views of those it is given are fine. So no references need to be counted, which would be
-    two atomic operations for every array at every call.
+    It may not create arrays; views of those it is given are fine. So no references need to be
+    counted, which would be two atomic operations for every array at every call.
 
-    Kernels are inlined into their callers in other files, so that a change of any file of the solver makes all of their
-    code stale. Where no folder can be written to, nothing is kept.
+    Kernels are inlined into their callers in other files, so that a change of any file of the
+    solver makes all of their code stale. Where no folder can be written to, nothing is kept.
     """
     return _compiled(function, _nrt=False)
 
@@ -42,7 +43,8 @@ def allocating_kernel(function: Callable[..., Any]) -> Any:
 
 
 def inlined_kernel(function: Callable[..., Any]) -> Any:
-    """Compile a kernel that only others call: as `kernel`, but kept on disk within its callers alone.
+    """Compile a kernel that only others call: as `kernel`, but kept on disk within its callers
+    alone.
 
     For functions made in a loop, which numba's cache cannot tell apart. Python cannot call it.
     """
@@ -53,7 +55,8 @@ def inlined_kernel(function: Callable[..., Any]) -> Any:
 def expanded_kernel(function: Callable[..., Any]) -> Any:
     """Compile a kernel that only others call, expanded into their code before LLVM sees it.
 
-    For pieces of a hot loop that pass many numbers to each other: a call might pass them through memory.
+    For pieces of a hot loop that pass many numbers to each other: a call might pass them through
+    memory.
     """
     options = dict(_OPTIONS, _nrt=False, inline="always")
     return njit(**options)(function)

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What every residual r(T_i, Omega_i, beta) is a function of, its derivatives, and the sums they go into.
+"""What every residual r(T_i, Omega_i, beta) is a function of, its derivatives, and the sums they go
+into.
 
 Derivatives are with respect to
-    x     (6,) twist (w, nu) of the part in camera axes about `origin`: R <- exp(w) R, t <- t + w x (t - origin) + nu.
+    x     (6,) twist (w, nu) of the part in camera axes about `origin`: R <- exp(w) R,
+          t <- t + w x (t - origin) + nu.
           `origin` is the pelvis t_0, so that they do not grow with the distance from the camera
-    u     (3,) rotation of the joint in camera axes, Omega <- R_par^T exp(u) R_par Omega, with T_i held fixed
+    u     (3,) rotation of the joint in camera axes, Omega <- R_par^T exp(u) R_par Omega, with
+          T_i held fixed
     beta  (P,) total derivative, including the motion D dbeta of the part's origin
 """
 
@@ -53,7 +56,8 @@ class Pose(NamedTuple):
 class Blocks(NamedTuple):
     """Gauss-Newton blocks of 1/2 sum |r|^2: JᵀJ and Jᵀr by part, and one C, c for all parts.
 
-    The columns of A and H_u are [6 for x | gradient | 0 | W for beta]; of C only the upper triangle is kept.
+    The columns of A and H_u are [6 for x | gradient | 0 | W for beta]; of C only the upper triangle
+    is kept.
     """
 
     A: Array  # (K+1, 6, 8+W): [M | m | 0 | N]

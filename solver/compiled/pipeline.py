@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How numba compiles kernels, with one change: a kernel always runs its own copies of the kernels that it calls.
+"""How numba compiles kernels, with one change: a kernel always runs its own copies of the kernels
+that it calls.
 
-Each kernel's machine code contains copies of its callees, which LLVM optimizes once more within it, so that they round
-differently from the callee's own code. Numba lets the copies of all kernels have one name, and the process may run one
-that was loaded before. Results then depend, in the last digits, on what a process has compiled or called earlier.
+Each kernel's machine code contains copies of its callees, which LLVM optimizes once more within it,
+so that they round differently from the callee's own code. Numba lets the copies of all kernels have
+one name, and the process may run one that was loaded before. Results then depend, in the last
+digits, on what a process has compiled or called earlier.
 """
 
 from typing import Any
@@ -20,11 +22,14 @@ _passes: Any = numba.core.typed_passes
 
 
 class _Library(_codegen.JITCodeLibrary):  # type: ignore[misc]
-    """The machine code of one kernel, in which the copies of callees are invisible to other code."""
+    """The machine code of one kernel, in which the copies of callees are invisible to other
+    code.
+    """
 
     def _finalize_final_module(self) -> None:
         """Make the module ready to use: after its optimization, before its compilation."""
-        shared = self._final_module.clone()  # what callers of this kernel copy from; see `_get_module_for_linking`
+        # what callers of this kernel copy from; see `_get_module_for_linking`
+        shared = self._final_module.clone()
         for function in shared.functions:
             if not function.is_declaration and function.linkage == _codegen.ll.Linkage.external:
                 function.linkage = "linkonce_odr"

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Short rows of doubles in vector registers: the few operations that carry the solver's arithmetic.
 
-The number of shape columns is known only at run time, and a compiler leaves a run-time loop of ten turns scalar.
-All rows are therefore padded with zeros to a multiple of `WIDTH`, and these intrinsics work on `WIDTH` doubles at a
-time; LLVM lowers such a vector to whatever the processor has (AVX, two NEON registers, ...).
+The number of shape columns is known only at run time, and a compiler leaves a run-time loop of ten
+turns scalar. All rows are therefore padded with zeros to a multiple of `WIDTH`, and these
+intrinsics work on `WIDTH` doubles at a time; LLVM lowers such a vector to whatever the processor
+has (AVX, two NEON registers, ...).
 
-Arrays are C-contiguous float64 of any rank; positions are flat element offsets, so `a[i, r, :]` of an array
-(n, 3, W) starts at `(3 * i + r) * W`. Nothing is checked: these are for kernels whose sizes are already known.
+Arrays are C-contiguous float64 of any rank; positions are flat element offsets, so `a[i, r, :]` of
+an array (n, 3, W) starts at `(3 * i + r) * W`. Nothing is checked: these are for kernels whose
+sizes are already known.
 """
 
 from typing import Any
@@ -31,13 +33,20 @@ def splat_of(builder: Any, scalar: Any) -> Any:
     """Return a vector whose lanes are all `scalar`."""
     undefined = ir.Constant(VECTOR, ir.Undefined)
     one = builder.insert_element(undefined, scalar, ir.Constant(_INT32, 0))
-    return builder.shuffle_vector(one, undefined, ir.Constant(ir.VectorType(_INT32, WIDTH), [0] * WIDTH))
+    return builder.shuffle_vector(
+        one, undefined, ir.Constant(ir.VectorType(_INT32, WIDTH), [0] * WIDTH)
+    )
 
 
 def _combine(context: Any, builder: Any, sig: Any, args: Any, terms: int) -> Any:
     """Emit dst[d:d+n] += sum_k a_k src[s_k:s_k+n]."""
     dst, d = args[0], args[1]
-    scales, src, offsets, n = args[2 : 2 + terms], args[2 + terms], args[3 + terms : 3 + 2 * terms], args[-1]
+    scales, src, offsets, n = (
+        args[2 : 2 + terms],
+        args[2 + terms],
+        args[3 + terms : 3 + 2 * terms],
+        args[-1],
+    )
     dst_data = context.make_array(sig.args[0])(context, builder, dst).data
     src_data = context.make_array(sig.args[2 + terms])(context, builder, src).data
 
@@ -79,7 +88,9 @@ def copy(typingctx, dst, d, src, s, n):  # type: ignore[no-untyped-def]
     """dst[d:d+n] = src[s:s+n]."""
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        to, source = (context.make_array(sig.args[k])(context, builder, args[k]).data for k in (0, 2))
+        to, source = (
+            context.make_array(sig.args[k])(context, builder, args[k]).data for k in (0, 2)
+        )
         width = ir.Constant(args[4].type, WIDTH)
         with cgutils.for_range(builder, builder.sdiv(args[4], width)) as loop:
             shift = builder.mul(loop.index, width)
@@ -103,4 +114,6 @@ def add1(typingctx, dst, d, a, src, s, n):  # type: ignore[no-untyped-def]
 def add3(typingctx, dst, d, a0, a1, a2, src, s0, s1, s2, n):  # type: ignore[no-untyped-def]
     """dst[d:d+n] += a0 src[s0:s0+n] + a1 src[s1:s1+n] + a2 src[s2:s2+n]."""
     i, f = types.intp, types.float64
-    return types.void(dst, i, f, f, f, src, i, i, i, i), lambda c, b, sig, args: _combine(c, b, sig, args, 3)
+    return types.void(dst, i, f, f, f, src, i, i, i, i), lambda c, b, sig, args: _combine(
+        c, b, sig, args, 3
+    )

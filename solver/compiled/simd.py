@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Explicit SIMD in compiled kernels: one formula for several joints at once, on vectors of `WIDTH` doubles.
+"""Explicit SIMD in compiled kernels: one formula for several joints at once, on vectors of `WIDTH`
+doubles.
 
-A formula is a plain function of numbers, `formula(q, s) -> list`, with parameters q(k) and a state s, a list. It uses
-+, -, *, / and `sqrt` and no branches. Called with floats or numpy arrays it computes at once; `vectorized` turns it
-into a function for kernels that applies it to a state whose entry k is the vector state[k * WIDTH : (k + 1) * WIDTH].
-LLVM lowers the vectors to whatever the processor has, as for rows.py.
+A formula is a plain function of numbers, `formula(q, s) -> list`, with parameters q(k) and a state
+s, a list. It uses +, -, *, / and `sqrt` and no branches. Called with floats or numpy arrays it
+computes at once; `vectorized` turns it into a function for kernels that applies it to a state whose
+entry k is the vector state[k * WIDTH : (k + 1) * WIDTH]. LLVM lowers the vectors to whatever the
+processor has, as for rows.py.
 """
 
 from __future__ import annotations
@@ -75,11 +77,14 @@ def sqrt(x: Any) -> Any:
     return x.sqrt() if isinstance(x, Vector) else np.sqrt(x)
 
 
-def vectorized(formula: Callable[[Callable[[int], Any], list[Any]], Sequence[Any]], reads: int) -> Any:
-    """Return `apply(table, at, state)` for kernels: state <- formula(q, state[:reads]), written from entry 0 on.
+def vectorized(
+    formula: Callable[[Callable[[int], Any], list[Any]], Sequence[Any]], reads: int
+) -> Any:
+    """Return `apply(table, at, state)` for kernels: state <- formula(q, state[:reads]), written
+    from entry 0 on.
 
-    q(k) is the vector of `table`'s elements at + k WIDTH and following. Both arrays are C-contiguous float64 of any
-    rank, read and written as flat; nothing is checked.
+    q(k) is the vector of `table`'s elements at + k WIDTH and following. Both arrays are
+    C-contiguous float64 of any rank, read and written as flat; nothing is checked.
     """
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -94,7 +99,10 @@ def vectorized(formula: Callable[[Callable[[int], Any], list[Any]], Sequence[Any
             offset = builder.add(args[1], ir.Constant(index, k * WIDTH))
             return Vector(builder, builder.load(at(table, offset), align=8))
 
-        given = [Vector(builder, builder.load(at(state, ir.Constant(index, k * WIDTH)), align=8)) for k in range(reads)]
+        given = [
+            Vector(builder, builder.load(at(state, ir.Constant(index, k * WIDTH)), align=8))
+            for k in range(reads)
+        ]
         for k, value in enumerate(formula(parameter, given)):
             builder.store(value.value, at(state, ir.Constant(index, k * WIDTH)), align=8)
         return context.get_dummy_value()

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The kinematic tree as flat arrays for the kernels. Any number of joints, any shape basis, any tree par(i) < i."""
+"""The kinematic tree as flat arrays for the kernels. Any number of joints, any shape basis, any
+tree par(i) < i.
+"""
 
 from typing import Any, NamedTuple, Protocol
 
@@ -15,9 +17,9 @@ from .rows import padded
 class BodyArrays(Protocol):
     """What the solver reads of a body; `scope.solver.Body` has it, and so may any other object.
 
-    Properties, because reading is all the solver does: (K+1,) parents, -1 for part 0; (K+1, 3, P) S, joint offsets by
-    shape; (K+1, 3) l, joint offsets at beta = 0, metres; (M,) keypoint_part; (M, 3) v_bar, keypoints relative to
-    their part's origin at beta = 0, metres; (M, 3, P) V.
+    Properties, because reading is all the solver does: (K+1,) parents, -1 for part 0; (K+1, 3, P)
+    S, joint offsets by shape; (K+1, 3) l, joint offsets at beta = 0, metres; (M,) keypoint_part;
+    (M, 3) v_bar, keypoints relative to their part's origin at beta = 0, metres; (M, 3, P) V.
     """
 
     @property
@@ -35,10 +37,12 @@ class BodyArrays(Protocol):
 
 
 class Tree(NamedTuple):
-    """A body for the kernels. W is P, plus one if the focal length is unknown, padded to whole vectors.
+    """A body for the kernels. W is P, plus one if the focal length is unknown, padded to whole
+    vectors.
 
-    Part i has the pose (R_i, t_i) in the camera; its relative pose is (Omega_i, S_i beta + l_i). A keypoint j of part i
-    is at v_j = R_i (V_j beta + v_bar_j) + t_i. `points` below are the keypoints, then the K+1 part origins.
+    Part i has the pose (R_i, t_i) in the camera; its relative pose is (Omega_i, S_i beta + l_i). A
+    keypoint j of part i is at v_j = R_i (V_j beta + v_bar_j) + t_i. `points` below are the
+    keypoints, then the K+1 part origins.
     """
 
     parents: NDArray[np.int64]  # (K+1,)
@@ -53,19 +57,27 @@ class Tree(NamedTuple):
 
 
 def make_tree(body: BodyArrays, focal: bool = False) -> Tree:
-    """Check a body's arrays and lay them out for the kernels; `focal` adds a column for an unknown focal length.
+    """Check a body's arrays and lay them out for the kernels; `focal` adds a column for an unknown
+    focal length.
 
-    :raises ShapeError: an array is missing, does not fit the others, or a parent does not come before its child.
+    :raises ShapeError: an array is missing, does not fit the others, or a parent does not come
+        before its child.
     :raises InvalidValueError: an array holds NaN or infinity, or `focal` is neither True nor False.
     """
     check_switch(focal, "focal")
     missing = [name for name in _ARRAYS if not hasattr(body, name)]
     if missing:
-        raise ShapeError(f"A body needs the arrays {', '.join(_ARRAYS)}, but {type(body).__name__} lacks {missing[0]}.")
+        raise ShapeError(
+            f"A body needs the arrays {', '.join(_ARRAYS)}, but {type(body).__name__} "
+            f"lacks {missing[0]}."
+        )
     parents = as_integers(body.parents, "The body's parents")
     n = parents.shape[0]
     if n == 0 or parents[0] != -1 or any(not 0 <= parents[i] < i for i in range(1, n)):
-        raise ShapeError(f"Parents must be -1 for part 0 and come before their children, but got {parents.tolist()}.")
+        raise ShapeError(
+            "Parents must be -1 for part 0 and come before their children, but got "
+            f"{parents.tolist()}."
+        )
     s = _check(body.S, (n, 3, None), "S")
     p = s.shape[2]
     offsets = _check(body.l, (n, 3), "l")
@@ -92,7 +104,8 @@ def make_tree(body: BodyArrays, focal: bool = False) -> Tree:
 
 
 def with_fixed_shape(tree: Tree, beta: ArrayLike) -> Tree:
-    """Return the tree at shape beta (P,), with no shape columns left: poses alone, at a fraction of the cost.
+    """Return the tree at shape beta (P,), with no shape columns left: poses alone, at a fraction of
+    the cost.
 
     :raises ShapeError: beta has another shape.
     :raises InvalidValueError: beta is not finite.

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Residuals that other programs register: compiled ones, and plain Python ones with finite differences (numeric.py).
+"""Residuals that other programs register: compiled ones, and plain Python ones with finite
+differences (numeric.py).
 
-The solver's machine code calls them through their address, with plain pointers and sizes, in the order of `_PROTOTYPE`.
-So it stays as it is on disk whatever is registered, and without rows of such a residual it makes no call.
+The solver's machine code calls them through their address, with plain pointers and sizes, in the
+order of `_PROTOTYPE`. So it stays as it is on disk whatever is registered, and without rows of such
+a residual it makes no call.
 """
 
 import ctypes
@@ -36,14 +38,20 @@ _PROTOTYPE = _F(
     _PF, _PF, _PF, _PF, _PF, _PF,  # of `Pose`
     _PF, _PF, _PF, _PF, _PF, _PI,  # of `Blocks`
 )  # fmt: skip
-_C_TYPES: dict[Any, Any] = {_I: ctypes.c_int64, _F: ctypes.c_double, _PI: ctypes.c_void_p, _PF: ctypes.c_void_p}
+_C_TYPES: dict[Any, Any] = {
+    _I: ctypes.c_int64,
+    _F: ctypes.c_double,
+    _PI: ctypes.c_void_p,
+    _PF: ctypes.c_void_p,
+}
 _CALLBACK = ctypes.CFUNCTYPE(ctypes.c_double, *(_C_TYPES[kind] for kind in _PROTOTYPE.args))
 
 
 class External(NamedTuple):
     """The rows of external residuals for the kernels."""
 
-    calls: Array  # (m, 5): address, how many rows, where they begin in ints and in floats, column of the weights
+    # (m, 5): address, how many rows, where they begin in ints and in floats, column of the weights
+    calls: Array
     ints: Array  # (n,)
     floats: Array  # (n,)
 
@@ -82,39 +90,93 @@ class Registered:
         accumulate = given if hasattr(given, "signatures") else inlined_kernel(given)
 
         def entry(  # type: ignore[no-untyped-def]
-            i, rows, f, weight, inv_sigma, triggs, n, points, W, keypoints, shape, globals_, parents, S, l, point_part,
-            v_bar, V, Omega, R, t, D, beta, log_focal, A, H_u, H_uu, C, c, cross,
-        ):  # fmt: skip
+            i,
+            rows,
+            f,
+            weight,
+            inv_sigma,
+            triggs,
+            n,
+            points,
+            W,
+            keypoints,
+            shape,
+            globals_,
+            parents,
+            S,
+            l,
+            point_part,
+            v_bar,
+            V,
+            Omega,
+            R,
+            t,
+            D,
+            beta,
+            log_focal,
+            A,
+            H_u,
+            H_uu,
+            C,
+            c,
+            cross,
+        ):
             tree = Tree(
-                carray(parents, (n,)), carray(S, (n, 3, W)), carray(l, (n, 3)), carray(point_part, (points,)),
-                carray(v_bar, (points, 3)), carray(V, (points, 3, W)), keypoints, shape, globals_,
-            )  # fmt: skip
+                carray(parents, (n,)),
+                carray(S, (n, 3, W)),
+                carray(l, (n, 3)),
+                carray(point_part, (points,)),
+                carray(v_bar, (points, 3)),
+                carray(V, (points, 3, W)),
+                keypoints,
+                shape,
+                globals_,
+            )
             pose = Pose(
-                carray(Omega, (n, 3, 3)), carray(R, (n, 3, 3)), carray(t, (n, 3)), carray(D, (n, 3, W)),
-                carray(beta, (W,)), carray(log_focal, (1,)),
-            )  # fmt: skip
+                carray(Omega, (n, 3, 3)),
+                carray(R, (n, 3, 3)),
+                carray(t, (n, 3)),
+                carray(D, (n, 3, W)),
+                carray(beta, (W,)),
+                carray(log_focal, (1,)),
+            )
             blocks = Blocks(
-                carray(A, (n, 6, 8 + W)), carray(H_u, (n, 3, 8 + W)), carray(H_uu, (n, 3, 3)), carray(C, (W, W)),
-                carray(c, (W,)), carray(cross, (1,)),
-            )  # fmt: skip
+                carray(A, (n, 6, 8 + W)),
+                carray(H_u, (n, 3, 8 + W)),
+                carray(H_uu, (n, 3, 3)),
+                carray(C, (W, W)),
+                carray(c, (W,)),
+                carray(cross, (1,)),
+            )
             table, numbers = carray(i, (rows, ints)), carray(f, (rows, floats))
             return accumulate(tree, table, numbers, weight, inv_sigma, triggs, pose, blocks)
 
         try:
             return cfunc(_PROTOTYPE)(entry)
         except NumbaError as error:
-            lines = [line for line in str(error).splitlines() if line and not line.startswith("Failed in")]
+            lines = [
+                line
+                for line in str(error).splitlines()
+                if line and not line.startswith("Failed in")
+            ]
             reason = lines[0] if lines else type(error).__name__  # the whole of it is the cause
-            raise InvalidValueError(f"The kernel of residual {self.name!r} does not compile: {reason}") from error
+            raise InvalidValueError(
+                f"The kernel of residual {self.name!r} does not compile: {reason}"
+            ) from error
 
     def _callback(self) -> Any:
         name, function, ints, floats = self.name, self.function, self.INTS, self.FLOATS
 
-        def call(i: int, rows: int, f: int, weight: float, _s: float, _t: float, *sizes_and_arrays: int) -> float:
+        def call(
+            i: int, rows: int, f: int, weight: float, _s: float, _t: float, *sizes_and_arrays: int
+        ) -> float:
             try:
                 assert function is not None
-                return numeric.accumulate(function, (i, f), (rows, ints, floats), weight, sizes_and_arrays)
-            except Exception as error:  # it cannot pass through machine code: `raise_failure` does it
+                return numeric.accumulate(
+                    function, (i, f), (rows, ints, floats), weight, sizes_and_arrays
+                )
+            # it cannot pass through machine code: `raise_failure` does it
+            except Exception as error:
                 _failure.error = name, error
                 return float("nan")
 
@@ -140,7 +202,9 @@ def raise_failure() -> None:
     if failed is not None:
         _failure.error = None
         name, error = failed
-        raise InvalidValueError(f"The residual {name!r} raised {type(error).__name__}: {error}") from error
+        raise InvalidValueError(
+            f"The residual {name!r} raised {type(error).__name__}: {error}"
+        ) from error
 
 
 def pack_external(tables: list[tuple[Registered, Array, Array]], first_column: int) -> External:
@@ -155,7 +219,9 @@ def pack_external(tables: list[tuple[Registered, Array, Array]], first_column: i
 
 @intrinsic
 def _call(typingctx, address, arguments):  # type: ignore[no-untyped-def]
-    """Call the function at an address; of arrays among the arguments, a tuple, it gets the pointer to their data."""
+    """Call the function at an address; of arrays among the arguments, a tuple, it gets the pointer
+    to their data.
+    """
 
     def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
         values = []
@@ -177,11 +243,36 @@ def accumulate_external(tree, external, weights, inv_sigma, triggs, pose, blocks
     for k in range(external.calls.shape[0]):
         address, rows, i, f, column = external.calls[k]
         arguments = (
-            external.ints[i:], rows, external.floats[f:], weights[column], inv_sigma[column], triggs,
-            n, points, W, tree.keypoints, tree.shape, tree.globals,
-            tree.parents, tree.S, tree.l, tree.point_part, tree.v_bar, tree.V,
-            pose.Omega, pose.R, pose.t, pose.D, pose.beta, pose.log_focal,
-            blocks.A, blocks.H_u, blocks.H_uu, blocks.C, blocks.c, blocks.cross,
-        )  # fmt: skip
+            external.ints[i:],
+            rows,
+            external.floats[f:],
+            weights[column],
+            inv_sigma[column],
+            triggs,
+            n,
+            points,
+            W,
+            tree.keypoints,
+            tree.shape,
+            tree.globals,
+            tree.parents,
+            tree.S,
+            tree.l,
+            tree.point_part,
+            tree.v_bar,
+            tree.V,
+            pose.Omega,
+            pose.R,
+            pose.t,
+            pose.D,
+            pose.beta,
+            pose.log_focal,
+            blocks.A,
+            blocks.H_u,
+            blocks.H_uu,
+            blocks.C,
+            blocks.c,
+            blocks.cross,
+        )
         cost += _call(address, arguments)  # type: ignore[call-arg]
     return cost

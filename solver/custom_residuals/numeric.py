@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A residual that is a plain Python function: its derivatives by central differences, added to the same blocks.
+"""A residual that is a plain Python function: its derivatives by central differences, added to the
+same blocks.
 
-    function(part, ints, floats) -> r (n,)      of R, t, Omega and beta of `part`, and of one row of its tables
-Every evaluation costs 1 + 2 (9 + P) calls for each row, in Python: a hundred times what a kernel takes.
+    function(part, ints, floats) -> r (n,)      of R, t, Omega and beta of `part`, and of one row of
+                                                its tables
+Every evaluation costs 1 + 2 (9 + P) calls for each row, in Python: a hundred times what a kernel
+takes.
 """
 
 import ctypes
@@ -21,7 +24,8 @@ STEP = 1e-6  # of the differences, radians and metres: their error is its square
 
 
 def differentiate(function: Callable[[Part], Any], part: Part) -> Linearization:
-    """Return r (n,) and its derivatives, as part.py defines them: J_x (n, 6), J_u (n, 3) and J_beta (n, P).
+    """Return r (n,) and its derivatives, as part.py defines them: J_x (n, 6), J_u (n, 3) and J_beta
+    (n, P).
 
     :raises ShapeError: the function does not return numbers (n,), n the same at every call.
     :raises InvalidValueError: r is not finite.
@@ -38,7 +42,9 @@ def differentiate(function: Callable[[Part], Any], part: Part) -> Linearization:
         return replace(part, R=exp(w) @ part.R, t=part.t + np.cross(w, part.t - part.origin) + nu)
 
     def turned(k: int, h: float) -> Part:
-        return replace(part, Omega=part.R_parent.T @ exp(h * np.eye(3)[k]) @ part.R_parent @ part.Omega)
+        return replace(
+            part, Omega=part.R_parent.T @ exp(h * np.eye(3)[k]) @ part.R_parent @ part.Omega
+        )
 
     def shaped(k: int, h: float) -> Part:
         beta = part.beta.copy()
@@ -59,30 +65,45 @@ def accumulate(
 ) -> float:
     """Add every row's JᵀJ and Jᵀr to the blocks and return the cost, 1/2 weight |r|^2.
 
-    :param tables: addresses of ints and floats. :param extent: how many rows, columns of ints, columns of floats.
-    :param sizes_and_arrays: as the prototype in external.py has them from the sizes on, arrays as addresses.
+    :param tables: addresses of ints and floats. :param extent: how many rows, columns of ints,
+        columns of floats.
+    :param sizes_and_arrays: as the prototype in external.py has them from the sizes on, arrays as
+        addresses.
     :raises ShapeError: the function does not return numbers (n,).
     :raises InvalidValueError: they are not finite.
     """
     n, _, W, _, P, _ = sizes_and_arrays[:6]
-    parents, _, _, _, _, _, Omega, R, t, D, beta, _, A, H_u, H_uu, C, c, cross = sizes_and_arrays[6:]
+    parents, _, _, _, _, _, Omega, R, t, D, beta, _, A, H_u, H_uu, C, c, cross = sizes_and_arrays[
+        6:
+    ]
     ints = _view(tables[0], extent[0], extent[1], whole=True)
     floats = _view(tables[1], extent[0], extent[2])
     up = _view(parents, n, whole=True)
     rotation, position, state = _view(R, n, 3, 3), _view(t, n, 3), _view(Omega, n, 3, 3)
     by_shape, shape = _view(D, n, 3, W), _view(beta, W)
-    blocks_A, blocks_Hu, blocks_Huu = _view(A, n, 6, SHAPE + W), _view(H_u, n, 3, SHAPE + W), _view(H_uu, n, 3, 3)
+    blocks_A, blocks_Hu, blocks_Huu = (
+        _view(A, n, 6, SHAPE + W),
+        _view(H_u, n, 3, SHAPE + W),
+        _view(H_uu, n, 3, 3),
+    )
     blocks_C, blocks_c, crossed = _view(C, W, W), _view(c, W), _view(cross, 1, whole=True)
     cost, s = 0.0, math.sqrt(weight)
     for k in range(extent[0] if weight > 0.0 else 0):
         i = int(ints[k, 0])
         parent = np.eye(3) if up[i] < 0 else rotation[up[i]].copy()
         part = Part(
-            rotation[i].copy(), position[i].copy(), by_shape[i, :, :P].copy(), state[i].copy(), parent,
-            position[0].copy(), shape[:P].copy(),
-        )  # fmt: skip
+            rotation[i].copy(),
+            position[i].copy(),
+            by_shape[i, :, :P].copy(),
+            state[i].copy(),
+            parent,
+            position[0].copy(),
+            shape[:P].copy(),
+        )
         row = ints[k].copy(), floats[k].copy()
-        r, J_x, J_u, J_beta = (s * a for a in differentiate(lambda p, row=row: function(p, *row), part))  # type: ignore[misc]
+        r, J_x, J_u, J_beta = (
+            s * a for a in differentiate(lambda p, row=row: function(p, *row), part)
+        )  # type: ignore[misc]
         cost += 0.5 * float(r @ r)
         for block, J in ((blocks_A[i], J_x), (blocks_Hu[i], J_u)):
             block[:, GRADIENT] += J.T @ r
@@ -102,7 +123,9 @@ def _numbers(value: Any, n: int | None) -> Array:
     try:
         r = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
-        raise ShapeError(f"it must return numbers of shape (n,), but returned a {type(value).__name__}") from None
+        raise ShapeError(
+            f"it must return numbers of shape (n,), but returned a {type(value).__name__}"
+        ) from None
     if r.ndim != 1 or n not in (None, len(r)):
         wanted = "(n,)" if n is None else f"({n},), as at first"
         raise ShapeError(f"it must return numbers of shape {wanted}, but returned shape {r.shape}")

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An SMPL+H hand: 21 keypoints of one hand in space, 51 joints in the tree, the rest known by its joints."""
+"""An SMPL+H hand: 21 keypoints of one hand in space, 51 joints in the tree, the rest known by its
+joints.
+"""
 
 import numpy as np
 
@@ -11,8 +13,13 @@ def main() -> float:
     """Fit, print, and return the mean error of the left hand's joints in millimetres."""
     body = load_body("scope_h")
     truth = person.pose(body, seed=7)
-    fingers = [i for i, name in enumerate(body.joint_names) if name.startswith("left_") and name[-1] in "123"]
-    grip = rotations.exp([0.0, 0.0, -0.6])  # about the finger's own axis: the palm of the left hand faces down
+    fingers = [
+        i
+        for i, name in enumerate(body.joint_names)
+        if name.startswith("left_") and name[-1] in "123"
+    ]
+    # about the finger's own axis: the palm of the left hand faces down
+    grip = rotations.exp([0.0, 0.0, -0.6])
     for i in fingers:
         truth.Omega[i - 1] = truth.Omega[i - 1] @ grip
     R, t = person.place(body, truth)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A marker set: 41 reflective markers on the skin, each stuck to a vertex of the mesh, one of them lost.
+"""A marker set: 41 reflective markers on the skin, each stuck to a vertex of the mesh, one of them
+lost.
 
-A marker belongs to the part that moves its vertex most; it becomes a keypoint of that part. The skin between two parts
-bends, and no point of the solver does: markers on it cost a few millimetres.
+A marker belongs to the part that moves its vertex most; it becomes a keypoint of that part. The
+skin between two parts bends, and no point of the solver does: markers on it cost a few millimetres.
 """
 
 from dataclasses import replace
@@ -44,11 +45,15 @@ def main() -> float:
     markers[7] = np.nan  # lost: a value that is not finite is left out
 
     seen = Measurements(keypoints3d=Keypoints3D(np.arange(41), markers, np.ones(41)))
-    weights = Weights(keypoints3d=1.0 / 0.005**2, shape=1.0, joint_limits=100.0)  # one over a variance
+    # one over a variance
+    weights = Weights(keypoints3d=1.0 / 0.005**2, shape=1.0, joint_limits=100.0)
     found = fit(marked, seen, options=Options(stages=[Stage(weights)]))
 
     error = person.joint_error_mm(body, found.t_camera_part, truth)
-    print(f"{found.status.name}: {found.measurements} of 41 markers, joints off by {error:.1f} mm on average")
+    print(
+        f"{found.status.name}: {found.measurements} of 41 markers, joints off by {error:.1f} mm "
+        "on average"
+    )
     return error
 
 

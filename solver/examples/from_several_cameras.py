@@ -1,13 +1,26 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Three calibrated cameras around a moving person: all frames and one shape at once, with the joints' uncertainty.
+"""Three calibrated cameras around a moving person: all frames and one shape at once, with the
+joints' uncertainty.
 
-Each camera has its own intrinsics and its own place in the world; in some frames nobody sees the person.
+Each camera has its own intrinsics and its own place in the world; in some frames nobody sees the
+person.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import Keypoints2D, Measurements, Options, Stage, State, View, Weights, fit_motion, load_body, rotations
+from .. import (
+    Keypoints2D,
+    Measurements,
+    Options,
+    Stage,
+    State,
+    View,
+    Weights,
+    fit_motion,
+    load_body,
+    rotations,
+)
 from . import person
 
 RATE, FRAMES, NOISE_PX = 30.0, 24, 3.0
@@ -15,7 +28,9 @@ LOST = range(10, 14)
 
 
 def cameras() -> list[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]]:
-    """Return intrinsics (3, 3), R_camera_world (3, 3) and t_camera_world (3,) of each; the first is the world's."""
+    """Return intrinsics (3, 3), R_camera_world (3, 3) and t_camera_world (3,) of each; the first is
+    the world's.
+    """
     found = []
     for angle, focal in ((0.0, 1100.0), (1.2, 900.0), (-1.4, 1300.0)):
         R = rotations.exp([0.0, angle, 0.0])
@@ -34,9 +49,16 @@ def main() -> float:
     frames: list[list[View]] = []
     truth = []
     for f, t in enumerate(times):
-        swing = rotations.exp(np.outer(np.linspace(-0.3, 0.3, body.K), [0.3, 0.1, 1.0]) * np.sin(4.0 * t))
+        swing = rotations.exp(
+            np.outer(np.linspace(-0.3, 0.3, body.K), [0.3, 0.1, 1.0]) * np.sin(4.0 * t)
+        )
         moved = start.t_camera_root + [0.4 * t, 0.02 * np.sin(9.0 * t), 0.2 * t]
-        state = State(start.R_camera_root @ rotations.exp([0.0, 0.5 * t, 0.0]), moved, start.Omega @ swing, start.beta)
+        state = State(
+            start.R_camera_root @ rotations.exp([0.0, 0.5 * t, 0.0]),
+            moved,
+            start.Omega @ swing,
+            start.beta,
+        )
         R, joints = person.place(body, state)
         truth.append(joints)
         points = body.keypoints(R, joints, state.beta, index)
@@ -48,16 +70,21 @@ def main() -> float:
             views.append(View(seen, R_camera_world, t_camera_world))
         frames.append(views)
 
-    weights = Weights(keypoints2d=(1100.0 / NOISE_PX) ** 2)  # one over the variance of normalized coordinates
-    found = fit_motion(body, frames, times, options=Options(stages=[Stage(weights)]), covariance=True)
+    # one over the variance of normalized coordinates
+    weights = Weights(keypoints2d=(1100.0 / NOISE_PX) ** 2)
+    found = fit_motion(
+        body, frames, times, options=Options(stages=[Stage(weights)]), covariance=True
+    )
 
     errors = 1e3 * np.linalg.norm(found.t_world_part - truth, axis=-1)
     assert found.joint_covariance is not None
     sigma = 1e3 * np.sqrt(np.trace(found.joint_covariance, axis1=2, axis2=3))
     lost = np.isin(np.arange(FRAMES), LOST)
     print(
-        f"{found.status.name}: joints off by {errors[~lost].mean():.1f} mm on average where seen, expected "
-        f"{sigma[~lost].mean():.1f}; {errors[lost].mean():.1f} mm where unseen, expected {sigma[lost].mean():.1f}"
+        f"{found.status.name}: joints off by {errors[~lost].mean():.1f} mm on average where seen, "
+        "expected "
+        f"{sigma[~lost].mean():.1f}; {errors[lost].mean():.1f} mm where unseen, expected "
+        f"{sigma[lost].mean():.1f}"
     )
     return float(errors.mean())
 

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A residual of one's own: the height of some joints is known, say of hands on a rail, and nothing else of them.
+"""A residual of one's own: the height of some joints is known, say of hands on a rail, and nothing
+else of them.
 
     r = sqrt(w) (t_y - height),   metres, camera frame (y down)
-Once as a kernel, as fast as the solver's own, and once as a plain function of the part's pose, to try an idea.
+Once as a kernel, as fast as the solver's own, and once as a plain function of the part's pose, to
+try an idea.
 """
 
 from dataclasses import replace
@@ -17,14 +19,18 @@ from . import person
 
 
 def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # type: ignore[no-untyped-def]
-    """Add every row's JᵀJ and Jᵀr to the blocks and return the cost. ints (n, 1): part; floats (n, 2): height, w."""
+    """Add every row's JᵀJ and Jᵀr to the blocks and return the cost. ints (n, 1): part; floats (n,
+    2): height, w.
+    """
     cost = 0.0
     for k in range(ints.shape[0]):
         i, w = ints[k, 0], weight * floats[k, 1]
         r = pose.t[i, 1] - floats[k, 0]
         cost += 0.5 * w * r * r
         origin = tree.keypoints + i  # a joint is a point too
-        add_to_point(tree, pose, blocks, origin, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, w, 0.0, 0.0, 0.0, w * r, 0.0)
+        add_to_point(
+            tree, pose, blocks, origin, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, w, 0.0, 0.0, 0.0, w * r, 0.0
+        )
     return cost
 
 
@@ -41,7 +47,9 @@ def register() -> None:
 
 
 def main() -> tuple[float, float]:
-    """Fit without the heights and with them, print, and return the error of the hands' heights in millimetres."""
+    """Fit without the heights and with them, print, and return the error of the hands' heights in
+    millimetres.
+    """
     register()
     body = load_body("scope")
     truth = person.pose(body)
@@ -59,7 +67,8 @@ def main() -> tuple[float, float]:
         errors.append(float(np.abs(found.t_camera_part[hands, 1] - joints[hands, 1]).mean() * 1e3))
     share = found.cost_by_term["height"] / found.cost
     print(
-        f"hands off their height by {errors[0]:.1f} mm, and {errors[1]:.1f} mm with it known ({share:.0%} of the cost)"
+        f"hands off their height by {errors[0]:.1f} mm, and {errors[1]:.1f} mm with it known "
+        f"({share:.0%} of the cost)"
     )
     return errors[0], errors[1]
 

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Refine what a regression network estimates (HMR, SPIN and similar ones) with the keypoints of a detector.
+"""Refine what a regression network estimates (HMR, SPIN and similar ones) with the keypoints of a
+detector.
 
-Such a network's file holds, for each picture, pose (24, 3, 3) rotations, betas (10,) and a weak-perspective camera
-(s, t_x, t_y) of a square crop; its body is plausible but displaced from the person. The fit starts there, and the
-network's joints are a prior of their own: they know the depth that keypoints in the picture do not.
+Such a network's file holds, for each picture, pose (24, 3, 3) rotations, betas (10,) and a
+weak-perspective camera (s, t_x, t_y) of a square crop; its body is plausible but displaced from the
+person. The fit starts there, and the network's joints are a prior of their own: they know the depth
+that keypoints in the picture do not.
 """
 
 import tempfile
@@ -23,15 +25,17 @@ CROP = 700.0  # pixels
 def read_states(body: Body, file: Path) -> list[State]:
     """Return the network's states in the full picture's camera.
 
-    A crop of b pixels about (c_x, c_y) sees s (x + t_x, y + t_y) in [-1, 1]; a camera of focal length f, principal
-    point (u, v), sees the same with
+    A crop of b pixels about (c_x, c_y) sees s (x + t_x, y + t_y) in [-1, 1]; a camera of focal
+    length f, principal point (u, v), sees the same with
         t = (t_x + 2 (c_x - u) / (s b), t_y + 2 (c_y - v) / (s b), 2 f / (s b)).
     """
     f, u, v = person.INTRINSICS[0, 0], person.INTRINSICS[0, 2], person.INTRINSICS[1, 2]
     with np.load(file) as data:
         s, tx, ty = data["camera"].T
         x, y, b = data["crop"].T
-        trans = np.stack([tx + 2 * (x - u) / (s * b), ty + 2 * (y - v) / (s * b), 2 * f / (s * b)], axis=1)
+        trans = np.stack(
+            [tx + 2 * (x - u) / (s * b), ty + 2 * (y - v) / (s * b), 2 * f / (s * b)], axis=1
+        )
         return [
             State(R[0], body.rest_joints(beta)[0] + t, R[1:], beta)
             for R, beta, t in zip(data["pose"], data["betas"], trans, strict=True)
@@ -39,7 +43,9 @@ def read_states(body: Body, file: Path) -> list[State]:
 
 
 def write_network_output(file: Path, body: Body, truth: list[State]) -> None:
-    """Write what a network might estimate: every joint some 10 degrees off, and half of the true shape."""
+    """Write what a network might estimate: every joint some 10 degrees off, and half of the true
+    shape.
+    """
     rng = np.random.default_rng(9)
     rows: dict[str, list[Any]] = {"pose": [], "betas": [], "camera": [], "crop": []}
     f = person.INTRINSICS[0, 0]
@@ -57,7 +63,9 @@ def write_network_output(file: Path, body: Body, truth: list[State]) -> None:
 
 
 def main() -> tuple[float, float]:
-    """Refine, print, and return the mean joint error before and after, in millimetres, pelvis aligned."""
+    """Refine, print, and return the mean joint error before and after, in millimetres, pelvis
+    aligned.
+    """
     body = load_body("scope")
     truth = [person.pose(body, seed=20 + k) for k in range(PICTURES)]
     with tempfile.TemporaryDirectory() as folder:
@@ -81,9 +89,17 @@ def main() -> tuple[float, float]:
         )
     fits = fit_batch(body, pictures, init=network)
 
-    before = [_error(body, person.place(body, guess)[1], state) for guess, state in zip(network, truth, strict=True)]
-    after = [_error(body, found.t_camera_part, state) for found, state in zip(fits, truth, strict=True)]
-    print(f"{PICTURES} pictures: joints off by {np.mean(before):.1f} mm, refined {np.mean(after):.1f} mm")
+    before = [
+        _error(body, person.place(body, guess)[1], state)
+        for guess, state in zip(network, truth, strict=True)
+    ]
+    after = [
+        _error(body, found.t_camera_part, state) for found, state in zip(fits, truth, strict=True)
+    ]
+    print(
+        f"{PICTURES} pictures: joints off by {np.mean(before):.1f} mm, refined "
+        f"{np.mean(after):.1f} mm"
+    )
     return float(np.mean(before)), float(np.mean(after))
 
 

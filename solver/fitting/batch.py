@@ -37,7 +37,8 @@ def fit_batch(
 
     :param init: a state for each frame, None where there is none.
     :param threads: how many; 0 is one for each core.
-    :raises ShapeError: an array does not fit the body, whichever frame it belongs to, or `init` has another length.
+    :raises ShapeError: an array does not fit the body, whichever frame it belongs to, or `init` has
+        another length.
     :raises InvalidValueError: a value that no fit can use, in whichever frame.
     """
     check_list(measurements, "measurements", "frame")
@@ -72,7 +73,8 @@ def fit_clips(
     focal_weight: float = 1.0,
     threads: int = 0,
 ) -> list[ClipFit]:
-    """`fit_clip` on several clips of the same kind of body, one clip a thread; each comes out as alone.
+    """`fit_clip` on several clips of the same kind of body, one clip a thread; each comes out as
+    alone.
 
     :param clips: the measurements of each clip's frames; all other arguments as of `fit_clip`.
     :param threads: how many; 0 is one for each core.
@@ -84,14 +86,22 @@ def fit_clips(
 
     def one(clip: Sequence[Measurements]) -> ClipFit:
         return fit_clip(
-            body, clip, priors=priors, options=options, temporal=temporal, focal=focal, focal_weight=focal_weight
+            body,
+            clip,
+            priors=priors,
+            options=options,
+            temporal=temporal,
+            focal=focal,
+            focal_weight=focal_weight,
         )
 
     return _spread(one, clips, threads)
 
 
 def _spread(work: Callable[[_T], _R], jobs: Iterable[_T], threads: int) -> list[_R]:
-    """Results in the jobs' order. The first job runs alone, so that kernels are compiled once, not by every thread."""
+    """Results in the jobs' order. The first job runs alone, so that kernels are compiled once, not
+    by every thread.
+    """
     queue = list(jobs)
     check_count(threads, "threads", 0)
     threads = min(threads if threads > 0 else os.cpu_count() or 1, max(1, len(queue)))

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One shape, and if asked one focal length, over a clip: O(T (K + N)) for a step of all poses and the shape.
+"""One shape, and if asked one focal length, over a clip: O(T (K + N)) for a step of all poses and
+the shape.
 
-Given beta (and the focal length) the frames are independent, so each frame's pose is eliminated by itself and leaves
+Given beta (and the focal length) the frames are independent, so each frame's pose is eliminated by
+itself and leaves
     (C - N_0ᵀ M_0^-1 N_0) dbeta = -(c - N_0ᵀ M_0^-1 m_0)
-These systems add up over the frames; the shape prior enters once. Their solution is substituted back in every frame.
-That is the exact Gauss-Newton step of the clip. Causally, the information matrix summed so far is the prior of the
-next frame (`carry`).
+These systems add up over the frames; the shape prior enters once. Their solution is substituted
+back in every frame. That is the exact Gauss-Newton step of the clip. Causally, the information
+matrix summed so far is the prior of the next frame (`carry`).
 """
 
 from collections.abc import Sequence
@@ -21,7 +23,14 @@ from ..custom_residuals.external import raise_failure
 from ..errors import ShapeError
 from ..gauss_newton.linearize import linearize, make_blocks, make_pose
 from ..gauss_newton.optimizer import MIN_DAMPING, make_settings
-from ..gauss_newton.recursion import Workspace, eliminate, make_workspace, retract, solve_globals, substitute
+from ..gauss_newton.recursion import (
+    Workspace,
+    eliminate,
+    make_workspace,
+    retract,
+    solve_globals,
+    substitute,
+)
 from ..gauss_newton.several_frames import SeveralFrames, SharedPriors
 from ..gauss_newton.terms import Terms, fill_terms, pack_priors, usable
 from ..measurements import Measurements
@@ -35,13 +44,14 @@ from .report import Outcome, cost_by_term, make_fit
 
 
 def carry(priors: Priors, fitted: Fit, shape_weight: float) -> Priors:
-    """Return the priors of the next frame: the shape at this frame's estimate, with its information added.
+    """Return the priors of the next frame: the shape at this frame's estimate, with its information
+    added.
 
     `shape_weight` is `Weights.shape` of the fit, over which the information is kept.
 
     :raises ShapeError: the shape's information in `priors` does not fit the shape.
-    :raises InvalidValueError: `priors` or `fitted` is of another type, or the weight is negative, infinite or not a
-        number.
+    :raises InvalidValueError: `priors` or `fitted` is of another type, or the weight is negative,
+        infinite or not a number.
     """
     check_type(priors, Priors, "priors")
     check_type(fitted, Fit, "fitted")
@@ -51,7 +61,9 @@ def carry(priors: Priors, fitted: Fit, shape_weight: float) -> Priors:
         return priors
     _, information = priors.packed_shape(P)
     total = information + fitted.beta_information / shape_weight
-    return replace(priors, shape_mean=fitted.state.beta.copy(), shape_information=0.5 * (total + total.T))
+    return replace(
+        priors, shape_mean=fitted.state.beta.copy(), shape_information=0.5 * (total + total.T)
+    )
 
 
 def fit_clip(
@@ -68,13 +80,14 @@ def fit_clip(
 ) -> ClipFit:
     """Fit every frame's pose and one shape, and with `focal` one focal length, to a clip.
 
-    First every frame is fitted in order, from the frame before and with the shape's information carried along (not if
-    `init` is given); then all poses and the shape are optimized together. `temporal` adds the pull towards the frame
-    before, as it came out of the first pass. A frame without measurements gets the pose of the last frame before it
-    that has some, or of the first after it; its status is `NO_MEASUREMENTS`. With `temporal` the pull is a
-    measurement of its own: see `Fit.measurements`.
-    `focal_weight` is a prior on the squared logarithm of the focal scale.
-    At most `shape_frames` frames, evenly spaced, decide the shape; the others are then fitted with it fixed.
+    First every frame is fitted in order, from the frame before and with the shape's information
+    carried along (not if `init` is given); then all poses and the shape are optimized together.
+    `temporal` adds the pull towards the frame before, as it came out of the first pass. A frame
+    without measurements gets the pose of the last frame before it that has some, or of the first
+    after it; its status is `NO_MEASUREMENTS`. With `temporal` the pull is a measurement of its own:
+    see `Fit.measurements`. `focal_weight` is a prior on the squared logarithm of the focal scale.
+    At most `shape_frames` frames, evenly spaced, decide the shape; the others are then fitted with
+    it fixed.
 
     :return: the frames' fits and the shape they share.
     :raises ShapeError: when there is no frame, or when an array does not fit the body.
@@ -98,33 +111,49 @@ def fit_clip(
     if init is None:
         init = fit_in_order(tree, measurements, priors, options, temporal)
     if temporal is not None:
-        pulled = [with_previous(m, s, temporal) for m, s in zip(measurements[1:], init, strict=False)]
+        pulled = [
+            with_previous(m, s, temporal) for m, s in zip(measurements[1:], init, strict=False)
+        ]
         measurements = [measurements[0], *pulled]
     clip_tree = make_tree(body, focal)
     packed = pack_priors(clip_tree, priors)
     frames = [
-        _Frame(clip_tree, fill_terms(clip_tree, m, packed, None)[0], s) for m, s in zip(measurements, init, strict=True)
+        _Frame(clip_tree, fill_terms(clip_tree, m, packed, None)[0], s)
+        for m, s in zip(measurements, init, strict=True)
     ]
     seen = [k for k, frame in enumerate(frames) if frame.count]
     chosen = seen
     if len(seen) > shape_frames:
         chosen = [seen[k] for k in np.linspace(0, len(seen) - 1, shape_frames).round().astype(int)]
-    joint = _Joint(clip_tree, [frames[k] for k in chosen], priors, options, focal_weight if focal else 0.0)
+    joint = _Joint(
+        clip_tree, [frames[k] for k in chosen], priors, options, focal_weight if focal else 0.0
+    )
     joint.optimize()
     beta, scale = joint.beta[: tree.shape].copy(), float(np.exp(joint.log_focal))
     together = dict(zip(chosen, joint.fits(), strict=True))
     fixed = with_fixed_shape(tree, beta)
     fits = [
-        together[k] if k in together else _fit_with_shape(fixed, measurements[k], init[k], beta, scale, priors, options)
+        together[k]
+        if k in together
+        else _fit_with_shape(fixed, measurements[k], init[k], beta, scale, priors, options)
         for k in range(len(frames))
     ]
     shares = joint.cost_by_term() if options.report else {}
     return ClipFit(
-        fits, beta, joint.information(), scale, joint.status, joint.cost, joint.iterations, joint.rejected, shares
+        fits,
+        beta,
+        joint.information(),
+        scale,
+        joint.status,
+        joint.cost,
+        joint.iterations,
+        joint.rejected,
+        shares,
     )
 
 
-Camera = tuple[NDArray[np.float64], NDArray[np.float64]]  # R_camera_world (3, 3), t_camera_world (3,)
+# R_camera_world (3, 3), t_camera_world (3,)
+Camera = tuple[NDArray[np.float64], NDArray[np.float64]]
 _AT_ORIGIN: Camera = np.eye(3), np.zeros(3)
 
 
@@ -136,13 +165,16 @@ def fit_in_order(
     temporal: Temporal | None,
     cameras: Sequence[Camera] | None = None,
 ) -> list[State]:
-    """Fit each frame from the one before, carrying the shape's information; a lost person starts afresh.
+    """Fit each frame from the one before, carrying the shape's information; a lost person starts
+    afresh.
 
     Frames without measurements hold the last state that was measured, before the first the first.
 
-    :param cameras: the camera in whose axes each frame's measurements are; without it, all are in the states' axes.
+    :param cameras: the camera in whose axes each frame's measurements are; without it, all are in
+        the states' axes.
     :return: states in the axes of the world.
-    :raises InvalidValueError: the weight of the shape in ``options`` is negative, infinite or not a number.
+    :raises InvalidValueError: the weight of the shape in ``options`` is negative, infinite or not a
+        number.
     """
     states: list[State] = []
     last: State | None = None
@@ -167,11 +199,19 @@ def fit_in_order(
 
 def _moved(state: State, R: NDArray[np.float64], t: NDArray[np.float64]) -> State:
     """Return the state in other axes, in which a point p is at R p + t."""
-    return replace(state, R_camera_root=R @ state.R_camera_root, t_camera_root=R @ state.t_camera_root + t)
+    return replace(
+        state, R_camera_root=R @ state.R_camera_root, t_camera_root=R @ state.t_camera_root + t
+    )
 
 
 def _fit_with_shape(
-    tree: Tree, m: Measurements, init: State, beta: NDArray[np.float64], scale: float, priors: Priors, options: Options
+    tree: Tree,
+    m: Measurements,
+    init: State,
+    beta: NDArray[np.float64],
+    scale: float,
+    priors: Priors,
+    options: Options,
 ) -> Fit:
     """Fit one frame with shape and focal length fixed; `tree` has them built in."""
     if m.intrinsics is not None and scale != 1.0:
@@ -182,7 +222,11 @@ def _fit_with_shape(
     empty = np.zeros(0)
     without = replace(priors, shape_mean=None, shape_information=None)
     fitted = fit_tree(tree, m, replace(init, beta=empty), without, options)
-    return replace(fitted, state=replace(fitted.state, beta=beta.copy()), beta_information=np.zeros((len(beta),) * 2))
+    return replace(
+        fitted,
+        state=replace(fitted.state, beta=beta.copy()),
+        beta_information=np.zeros((len(beta),) * 2),
+    )
 
 
 @dataclass
@@ -215,7 +259,14 @@ class _Active:
 class _Joint(SeveralFrames):
     """The poses of several frames and the global columns they share, optimized together."""
 
-    def __init__(self, tree: Tree, frames: list[_Frame], priors: Priors, options: Options, focal_weight: float) -> None:
+    def __init__(
+        self,
+        tree: Tree,
+        frames: list[_Frame],
+        priors: Priors,
+        options: Options,
+        focal_weight: float,
+    ) -> None:
         super().__init__()
         self.tree, self.report, self.P = tree, options.report, tree.shape
         self.shared = SharedPriors(*priors.packed_shape(tree.shape), focal_weight)
@@ -223,16 +274,24 @@ class _Joint(SeveralFrames):
         self.stages = self.settings.stages
         self.shape_weights = self.stages[:, 0, SHAPE_PRIOR].copy()
         self.stages[:, 0, SHAPE_PRIOR] = 0.0  # once for the clip, not in every frame
-        self.beta, self.log_focal, self.status = np.zeros(tree.S.shape[2]), 0.0, Status.NO_MEASUREMENTS
+        self.beta, self.log_focal, self.status = (
+            np.zeros(tree.S.shape[2]),
+            0.0,
+            Status.NO_MEASUREMENTS,
+        )
         # the last frame's shape has seen most, when the frames were fitted in order
-        first = as_array(frames[-1].init.beta, (self.P,), "beta") if frames else self.shared.shape_mean
+        first = (
+            as_array(frames[-1].init.beta, (self.P,), "beta") if frames else self.shared.shape_mean
+        )
         self.beta[: self.P] = first
         shared = make_workspace(tree)
         self.frames: list[_Active] = []
         for f in frames:
             work = make_workspace(tree)._replace(A=shared.A, scratch=shared.scratch)
             pose = replace(f.init, beta=self.beta[: self.P]).pose(tree)
-            self.frames.append(_Active(f.terms, f.count, pose, make_pose(tree), make_blocks(tree), work))
+            self.frames.append(
+                _Active(f.terms, f.count, pose, make_pose(tree), make_blocks(tree), work)
+            )
 
     def optimize(self) -> None:
         """Optimize through the stages."""
@@ -247,16 +306,23 @@ class _Joint(SeveralFrames):
 
     def _conclude(self, s: int, cost: float, accepted: bool) -> None:
         if not accepted:
-            self._linearize(s, trial=False)  # one set of blocks a frame: memory, not time, is what a clip lacks
+            # one set of blocks a frame: memory, not time, is what a clip lacks
+            self._linearize(s, trial=False)
             return
         for frame in self.frames:
             frame.pose, frame.trial = frame.trial, frame.pose
         self.beta = self.frames[0].pose.beta.copy()
         self.log_focal = float(self.frames[0].pose.log_focal[0])
 
-    def _priors(self, s: int, pose: Pose | None = None) -> tuple[float, NDArray[np.float64], float, bool]:
-        """Return the arguments of `SharedPriors` in stage s, at another point than the current one if there is one."""
-        beta, log_focal = (self.beta, self.log_focal) if pose is None else (pose.beta, float(pose.log_focal[0]))
+    def _priors(
+        self, s: int, pose: Pose | None = None
+    ) -> tuple[float, NDArray[np.float64], float, bool]:
+        """Return the arguments of `SharedPriors` in stage s, at another point than the current one
+        if there is one.
+        """
+        beta, log_focal = (
+            (self.beta, self.log_focal) if pose is None else (pose.beta, float(pose.log_focal[0]))
+        )
         return float(self.shape_weights[s]), beta, log_focal, self.tree.globals > self.P
 
     def _linearize(self, s: int, trial: bool) -> float:
@@ -264,18 +330,32 @@ class _Joint(SeveralFrames):
         total: float = 0.0
         for f in self.frames:
             pose = f.trial if trial else f.pose
-            f.cost = linearize(self.tree, f.terms, self.stages[s], self.settings.triggs, pose, f.blocks, f.work.scratch)
+            f.cost = linearize(
+                self.tree,
+                f.terms,
+                self.stages[s],
+                self.settings.triggs,
+                pose,
+                f.blocks,
+                f.work.scratch,
+            )
             total += f.cost
         raise_failure()
         at = self.frames[0].trial if trial else self.frames[0].pose
         return total + sum(self.shared.costs(*self._priors(s, at)).values())
 
-    def _reduced(self, s: int, damping: float) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-        """Eliminate every frame's pose; return the summed system of the global columns and the sum of |q~|^2."""
+    def _reduced(
+        self, s: int, damping: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+        """Eliminate every frame's pose; return the summed system of the global columns and the sum
+        of |q~|^2.
+        """
         squares = 0.0
         C, c = np.zeros_like(self.frames[0].work.C), np.zeros_like(self.beta)
         for f in self.frames:
-            squares += eliminate(self.tree, f.pose, f.blocks, damping, self.settings.root_scale, f.work)
+            squares += eliminate(
+                self.tree, f.pose, f.blocks, damping, self.settings.root_scale, f.work
+            )
             C += f.work.C
             c += f.work.c
         self.shared.add(*self._priors(s), (C, c))
@@ -307,10 +387,20 @@ class _Joint(SeveralFrames):
         return out
 
     def _shares(self, f: _Active) -> dict[str, float]:
-        return cost_by_term(self.tree, f.terms, self.stages[-1], self.settings.triggs, f.pose, f.blocks, f.work.scratch)
+        return cost_by_term(
+            self.tree,
+            f.terms,
+            self.stages[-1],
+            self.settings.triggs,
+            f.pose,
+            f.blocks,
+            f.work.scratch,
+        )
 
     def cost_by_term(self) -> dict[str, float]:
-        """Return what the clip's cost is made of: the frames' sums, the shape prior once, the focal length's prior."""
+        """Return what the clip's cost is made of: the frames' sums, the shape prior once, the focal
+        length's prior.
+        """
         total: dict[str, float] = {}
         for f in self.frames:
             for name, cost in self._shares(f).items():
@@ -318,7 +408,9 @@ class _Joint(SeveralFrames):
         return total | self.shared.costs(*self._priors(-1))
 
     def information(self) -> NDArray[np.float64]:
-        """Return the information matrix of beta (P, P), prior included, poses and focal length eliminated."""
+        """Return the information matrix of beta (P, P), prior included, poses and focal length
+        eliminated.
+        """
         P = self.P
         if not self.frames:
             prior: NDArray[np.float64] = self.shape_weights[-1] * self.shared.shape_information
@@ -328,7 +420,9 @@ class _Joint(SeveralFrames):
 
 
 def shape_information(information: NDArray[np.float64], P: int) -> NDArray[np.float64]:
-    """Return the information (P, P) of the shape from that (G, G) of the global columns: the others are eliminated."""
+    """Return the information (P, P) of the shape from that (G, G) of the global columns: the others
+    are eliminated.
+    """
     out = information[:P, :P].copy()
     if len(information) > P and information[P, P] > 0.0:
         out -= np.outer(information[:P, P], information[P, :P]) / information[P, P]

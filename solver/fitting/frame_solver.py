@@ -36,10 +36,13 @@ def fit(
 ) -> Fit:
     """Fit pose and shape to one frame.
 
-    minimize 1/2 sum_i |r_i(T_i, Omega_i, beta)|^2 over T_0, Omega_1..K and beta (section 3 of the paper).
+    minimize 1/2 sum_i |r_i(T_i, Omega_i, beta)|^2 over T_0, Omega_1..K and beta (section 3 of the
+    paper).
 
-    :param init: where to start, camera frame, metres, in one stage; without it, from `initial_state`, in several.
-    :param priors: `default_priors(body)` unless given: the learned joint prior, joint limits, the population's shape.
+    :param init: where to start, camera frame, metres, in one stage; without it, from
+        `initial_state`, in several.
+    :param priors: `default_priors(body)` unless given: the learned joint prior, joint limits, the
+        population's shape.
     :return: the state and how it was reached; whatever values were measured, see `Status`.
     :raises ShapeError: when an array does not fit the body.
     :raises InvalidValueError: a value that no fit can use.
@@ -47,8 +50,12 @@ def fit(
     return FrameSolver(body, priors, options).fit(measurements, init)
 
 
-def fit_tree(tree: Tree, measurements: Measurements, init: State | None, priors: Priors, options: Options) -> Fit:
-    """`fit` on a tree that has been made already. Calls in a row with the same tree work in the same memory."""
+def fit_tree(
+    tree: Tree, measurements: Measurements, init: State | None, priors: Priors, options: Options
+) -> Fit:
+    """`fit` on a tree that has been made already. Calls in a row with the same tree work in the
+    same memory.
+    """
     solver = getattr(_last, "solver", None)
     if solver is None or solver.tree is not tree:
         solver = _last.solver = FrameSolver(tree, priors, options)
@@ -58,7 +65,8 @@ def fit_tree(tree: Tree, measurements: Measurements, init: State | None, priors:
 class FrameSolver:
     """Fits frames of one body, one after another; everything that they share is prepared once.
 
-    Not for several threads at a time. The arrays of `priors` must not be changed while it is in use.
+    Not for several threads at a time. The arrays of `priors` must not be changed while it is in
+    use.
     """
 
     def __init__(
@@ -93,7 +101,8 @@ class FrameSolver:
         priors: Priors | None = None,
         options: Options | None = None,
     ) -> Fit:
-        """Fit one frame, as `fit` does, with the priors and options of the constructor unless others are given.
+        """Fit one frame, as `fit` does, with the priors and options of the constructor unless
+        others are given.
 
         :raises ShapeError: when an array does not fit the body.
         :raises InvalidValueError: a value that no fit can use.
@@ -118,7 +127,9 @@ class FrameSolver:
         information = work.C[:P, :P] - last[0, SHAPE_PRIOR] * packed.shape_information[:P, :P]
         shares = {}
         if options.report:
-            shares = cost_by_term(tree, terms, last, options.triggs, found, memory.blocks[0], work.scratch)
+            shares = cost_by_term(
+                tree, terms, last, options.triggs, found, memory.blocks[0], work.scratch
+            )
         outcome = Outcome(Status(code), cost, iterations, rejected, shares)
         return make_fit(tree, found, outcome, information, count)
 
@@ -159,7 +170,9 @@ _last = threading.local()
 
 @kernel
 def _enter(R, t, Omega, beta, pose):  # type: ignore[no-untyped-def]
-    """Copy a state to `pose`; return whether its rotations are orthonormal now, which fails for singular ones."""
+    """Copy a state to `pose`; return whether its rotations are orthonormal now, which fails for
+    singular ones.
+    """
     for r in range(3):
         pose.t[0, r] = t[r]
         for c in range(3):

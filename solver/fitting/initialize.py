@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A first pose of the root from the measurements alone, every joint at the prior's mean.
 
-Rotation: the one that best turns the rest pose's points (3D keypoints) or bones (orientation field) onto the measured
-ones, the least-squares rotation of Kabsch. Without either, upright and facing the camera.
-Position: by 3D keypoints, the difference of centroids; by 2D keypoints, the linear least squares of
+Rotation: the one that best turns the rest pose's points (3D keypoints) or bones (orientation field)
+onto the measured ones, the least-squares rotation of Kabsch. Without either, upright and facing the
+camera. Position: by 3D keypoints, the difference of centroids; by 2D keypoints, the linear least
+squares of
     (R v + t)_x - u (R v + t)_z = 0,   (R v + t)_y - v (R v + t)_z = 0.
 """
 
@@ -23,9 +24,11 @@ DISTANCE = 3.0
 
 @kernel
 def _moments(tree, terms, pose, points, space, directed) -> None:  # type: ignore[no-untyped-def]
-    """Place the parts; write every slot's point (n, 3), and sums w, w s (3), w m (3), w m sᵀ (9) of two kinds.
+    """Place the parts; write every slot's point (n, 3), and sums w, w s (3), w m (3), w m sᵀ (9) of
+    two kinds.
 
-    space: s the points and m where they were measured; directed: s the levers and m the measured directions.
+    space: s the points and m where they were measured; directed: s the levers and m the measured
+    directions.
     """
     place_parts(tree, pose)
     for i in range(tree.parents.shape[0]):
@@ -58,7 +61,9 @@ def _moments(tree, terms, pose, points, space, directed) -> None:  # type: ignor
 
 @kernel
 def _image_system(terms, points, R, H, g, mean) -> None:  # type: ignore[no-untyped-def]
-    """Add the normal equations H t = g of the module's two rows for each 2D keypoint; mean: sums of w, w u, w v."""
+    """Add the normal equations H t = g of the module's two rows for each 2D keypoint; mean: sums of
+    w, w u, w v.
+    """
     for j in range(points.shape[0]):
         if not terms.flags[j] & HAS_2D:
             continue
@@ -83,7 +88,9 @@ def _image_system(terms, points, R, H, g, mean) -> None:  # type: ignore[no-unty
 
 
 def _rotation_onto(products: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """Return R maximizing tr(Rᵀ B) for B = sum w target sourceᵀ (3, 3), or None where B does not fix it."""
+    """Return R maximizing tr(Rᵀ B) for B = sum w target sourceᵀ (3, 3), or None where B does not
+    fix it.
+    """
     if not np.isfinite(products).all():
         return None
     u, s, vt = np.linalg.svd(products)
@@ -94,7 +101,9 @@ def _rotation_onto(products: NDArray[np.float64]) -> NDArray[np.float64] | None:
     return R
 
 
-def initial_state(tree: Tree, terms: Terms, joint_mean: NDArray[np.float64], beta: NDArray[np.float64]) -> State:
+def initial_state(
+    tree: Tree, terms: Terms, joint_mean: NDArray[np.float64], beta: NDArray[np.float64]
+) -> State:
     """Return a first state in the camera frame, metres; finite whatever the measurements are.
 
     :param joint_mean: (K, 3, 3) states of joints 1..K.
@@ -122,8 +131,12 @@ def initial_state(tree: Tree, terms: Terms, joint_mean: NDArray[np.float64], bet
     return State(R.copy(), t, joint_mean.copy(), beta.copy())
 
 
-def _position_in_image(terms: Terms, points: NDArray[np.float64], R: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """Return t (3,) by linear least squares; where it is not in front of the camera, at a distance on the mean ray."""
+def _position_in_image(
+    terms: Terms, points: NDArray[np.float64], R: NDArray[np.float64]
+) -> NDArray[np.float64] | None:
+    """Return t (3,) by linear least squares; where it is not in front of the camera, at a distance
+    on the mean ray.
+    """
     H, g, mean = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
     _image_system(terms, points, R, H, g, mean)
     if not mean[0] > 0.0 or not np.isfinite(H).all() or not np.isfinite(g).all():

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The results of a fit: its state, how it ended, and what its cost is made of.
 
-Every residual's cost is linear in its weight, so the share of one kind is the cost with all other weights at zero.
+Every residual's cost is linear in its weight, so the share of one kind is the cost with all other
+weights at zero.
 """
 
 from typing import NamedTuple
@@ -14,7 +15,14 @@ from ..compiled.tree import Tree
 from ..custom_residuals.external import external_residuals
 from ..gauss_newton.linearize import linearize
 from ..gauss_newton.terms import Terms
-from ..residuals.registry import KEYPOINT2D, KEYPOINT3D, ORIENTATION_FIELD, RESIDUALS, SHAPE_PRIOR, column_of
+from ..residuals.registry import (
+    KEYPOINT2D,
+    KEYPOINT3D,
+    ORIENTATION_FIELD,
+    RESIDUALS,
+    SHAPE_PRIOR,
+    column_of,
+)
 from ..state import Fit, State, Status
 
 # Columns of a stage's weights by name, in their order.
@@ -37,7 +45,13 @@ class Outcome(NamedTuple):
     cost_by_term: dict[str, float]
 
 
-def make_fit(tree: Tree, pose: Pose, outcome: Outcome, beta_information: NDArray[np.float64], measurements: int) -> Fit:
+def make_fit(
+    tree: Tree,
+    pose: Pose,
+    outcome: Outcome,
+    beta_information: NDArray[np.float64],
+    measurements: int,
+) -> Fit:
     """Return the result of one frame at `pose`, which is copied; beta_information (P, P)."""
     return Fit(
         state=State.from_pose(tree, pose),
@@ -62,16 +76,20 @@ def cost_by_term(
     blocks: Blocks,
     scratch: NDArray[np.float64],
 ) -> dict[str, float]:
-    """Return the cost of each kind of residual at `pose`; they add up to what `linearize` returns there.
+    """Return the cost of each kind of residual at `pose`; they add up to what `linearize` returns
+    there.
 
     Kinds whose weight is zero are left out.
 
     :param stage: (2, C) a row of weights and a row of 1/sigma, in the registry's order.
-    :param scratch: (2 QUEUE, W) of `make_scratch`. :param blocks: overwritten. Others as of `linearize`.
+    :param scratch: (2 QUEUE, W) of `make_scratch`. :param blocks: overwritten. Others as of
+        `linearize`.
     """
     found = {}
     measured = terms.external.calls[:, 4]  # columns of external residuals that have rows
-    external = {name: column_of(name) for name in external_residuals() if column_of(name) in measured}
+    external = {
+        name: column_of(name) for name in external_residuals() if column_of(name) in measured
+    }
     for name, column in {**COLUMNS, **external}.items():
         if stage[0, column] > 0.0:
             alone = stage.copy()

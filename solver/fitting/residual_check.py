@@ -23,22 +23,26 @@ _UNEXPLAINED = 1e-6  # of the gradient, outside the range of JᵀJ: more is no r
 _OTHERS_OFF = {"joint_prior": 0.0, "joint_limits": 0.0, "joint_flow": 0.0, "shape": 0.0}
 
 
-def check_residual(body: BodyArrays, name: str, ints: Any, floats: Any, *, seed: int = 0) -> dict[str, float]:
-    """Compare the derivatives that a registered residual returns with differences of its cost, at a random state.
+def check_residual(
+    body: BodyArrays, name: str, ints: Any, floats: Any, *, seed: int = 0
+) -> dict[str, float]:
+    """Compare the derivatives that a registered residual returns with differences of its cost, at a
+    random state.
 
-    A wrong Jacobian makes a fit slow, or stops it away from the minimum, without any error. The differences are
-    relative to the largest derivative: with the right Jacobian they are below 1e-5, unless the residual has a kink.
+    A wrong Jacobian makes a fit slow, or stops it away from the minimum, without any error. The
+    differences are relative to the largest derivative: with the right Jacobian they are below 1e-5,
+    unless the residual has a kink.
 
     :param ints, floats: rows for `name`, as in `Measurements.tables`.
-    :param seed: of the state: the root 3 m in front of the camera, joints rotated by about 50°, the shape as varied as
-        the population's.
-    :return: the largest difference for the root's six unknowns ("root"), the joints' rotations ("joints") and the shape
-        ("shape"), and by how much JᵀJ is too small for them: gᵀ (JᵀJ)⁺ g / 2 cost - 1, with g = Jᵀr ("curvature");
-        infinite where JᵀJ is missing.
+    :param seed: of the state: the root 3 m in front of the camera, joints rotated by about 50°, the
+        shape as varied as the population's.
+    :return: the largest difference for the root's six unknowns ("root"), the joints' rotations
+        ("joints") and the shape ("shape"), and by how much JᵀJ is too small for them: gᵀ (JᵀJ)⁺ g /
+        2 cost - 1, with g = Jᵀr ("curvature"); infinite where JᵀJ is missing.
     :raises ShapeError: the rows do not fit the residual or the body.
-    :raises InvalidValueError: there is no residual of that name, its kernel does not compile, or its cost is 0 or not
-        finite at that state, where derivatives say nothing; its Jᵀr or JᵀJ is not finite there; or the seed is not a
-        whole number of at least 0.
+    :raises InvalidValueError: there is no residual of that name, its kernel does not compile, or
+        its cost is 0 or not finite at that state, where derivatives say nothing; its Jᵀr or JᵀJ is
+        not finite there; or the seed is not a whole number of at least 0.
     """
     check_type(name, str, "name")
     check_count(seed, "seed", 0)
@@ -48,12 +52,14 @@ def check_residual(body: BodyArrays, name: str, ints: Any, floats: Any, *, seed:
     cost, g, H = problem.linearized(state)
     if not 0.0 < cost < np.inf:
         raise InvalidValueError(
-            f"The cost of {name!r} must be positive and finite to be differentiated, but is {cost:g} at the random "
+            f"The cost of {name!r} must be positive and finite to be differentiated, but is "
+            f"{cost:g} at the random "
             f"state of seed {seed}; use other rows or another seed."
         )
     if not (np.isfinite(g).all() and np.isfinite(H).all()):
         raise InvalidValueError(
-            f"The derivatives Jᵀr and JᵀJ of {name!r} must be finite, but hold NaN or infinity at the random state of "
+            f"The derivatives Jᵀr and JᵀJ of {name!r} must be finite, but hold NaN or infinity at "
+            "the random state of "
             f"seed {seed}."
         )
     for k in range(problem.size):
@@ -63,7 +69,8 @@ def check_residual(body: BodyArrays, name: str, ints: Any, floats: Any, *, seed:
     off = np.abs(g - found) / max(np.abs(found).max(), np.abs(g).max(), 1e-300)
     joints = 6 + 3 * (len(tree.parents) - 1)
     x = np.linalg.pinv(H, rcond=1e-10, hermitian=True) @ g
-    is_missing = np.linalg.norm(g - H @ x) > _UNEXPLAINED * np.linalg.norm(g)  # the pseudoinverse drops that part of g
+    # the pseudoinverse drops that part of g
+    is_missing = np.linalg.norm(g - H @ x) > _UNEXPLAINED * np.linalg.norm(g)
     explained = np.inf if is_missing else float(g @ x) / (2.0 * cost)
     return {
         "root": float(off[:6].max()),
@@ -86,10 +93,13 @@ class _Problem:
     def linearized(self, state: State) -> tuple[float, Array, Array]:
         """Return the cost, its gradient (n,) and JᵀJ (n, n), of the blocks of all parts."""
         tree, blocks, pose = self._tree, make_blocks(self._tree), state.pose(self._tree)
-        cost = linearize(tree, self._terms, self._weights, 0.0, pose, blocks, make_workspace(tree).scratch)
+        cost = linearize(
+            tree, self._terms, self._weights, 0.0, pose, blocks, make_workspace(tree).scratch
+        )
         raise_failure()
         n, P, end = self.size, tree.shape, SHAPE + tree.shape
-        g, H, x = np.zeros(n), np.zeros((n, n)), np.zeros((len(tree.parents), 6, n))  # x_i = x[i] @ unknowns
+        # x_i = x[i] @ unknowns
+        g, H, x = np.zeros(n), np.zeros((n, n)), np.zeros((len(tree.parents), 6, n))
         beta = np.eye(n)[n - P :]
         for i, parent in enumerate(tree.parents):
             if i == 0:

@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What Gauss-Newton leaves out of a joint's Hessian, estimated from the steps that are taken.
 
-The joint priors and limits together are functions f_i(Omega_i) of three numbers each. Gauss-Newton takes JᵀJ for the
-Hessian of f_i and leaves out sum_k r_k d^2 r_k, which for the learned prior is as large: steps along some joints are
-twice too long, along others half as long as they should be. A symmetric rank-one update a joint, in the parent's axes,
+The joint priors and limits together are functions f_i(Omega_i) of three numbers each. Gauss-Newton
+takes JᵀJ for the Hessian of f_i and leaves out sum_k r_k d^2 r_k, which for the learned prior is as
+large: steps along some joints are twice too long, along others half as long as they should be. A
+symmetric rank-one update a joint, in the parent's axes,
     S <- S + d dᵀ / (dᵀw),   d = g(trial) - g(current) - (H + S) w,   w = R_parᵀ u
-finds the missing part S from the gradients g that every trial computes anyway, within a few steps, as only 3 x 3
-numbers are unknown. H is JᵀJ at the trial if that was accepted, and at the current pose if it was rejected. The step
-is solved with H + t S, the largest t of 1, 1/2, 1/4, 1/8 and 0 that keeps H + t S above a fifth of H.
-Source: partitioned quasi-Newton updates (Griewank and Toint, Numerische Mathematik 39, 1982) on the part that
-Gauss-Newton omits (Dennis, Gay and Welsch, ACM TOMS 7, 1981).
+finds the missing part S from the gradients g that every trial computes anyway, within a few steps,
+as only 3 x 3 numbers are unknown. H is JᵀJ at the trial if that was accepted, and at the current
+pose if it was rejected. The step is solved with H + t S, the largest t of 1, 1/2, 1/4, 1/8 and 0
+that keeps H + t S above a fifth of H. Source: partitioned quasi-Newton updates (Griewank and Toint,
+Numerische Mathematik 39, 1982) on the part that Gauss-Newton omits (Dennis, Gay and Welsch, ACM
+TOMS 7, 1981).
 """
 
 from typing import NamedTuple
@@ -42,13 +44,35 @@ def make_curvature(tree: Tree) -> Curvature:
 @kernel
 def turned(R, H, transposed):  # type: ignore[no-untyped-def]
     """Return RᵀHR, or RHRᵀ if `transposed`, by rows of its upper triangle; H is symmetric."""
-    a, b, c, d, e, f, g, h, k = R[0, 0], R[1, 0], R[2, 0], R[0, 1], R[1, 1], R[2, 1], R[0, 2], R[1, 2], R[2, 2]
+    a, b, c, d, e, f, g, h, k = (
+        R[0, 0],
+        R[1, 0],
+        R[2, 0],
+        R[0, 1],
+        R[1, 1],
+        R[2, 1],
+        R[0, 2],
+        R[1, 2],
+        R[2, 2],
+    )
     if transposed:
         b, c, d, f, g, h = d, g, b, h, c, f
     h00, h01, h02, h11, h12, h22 = H
-    x0, x1, x2 = a * h00 + b * h01 + c * h02, a * h01 + b * h11 + c * h12, a * h02 + b * h12 + c * h22
-    y0, y1, y2 = d * h00 + e * h01 + f * h02, d * h01 + e * h11 + f * h12, d * h02 + e * h12 + f * h22
-    z0, z1, z2 = g * h00 + h * h01 + k * h02, g * h01 + h * h11 + k * h12, g * h02 + h * h12 + k * h22
+    x0, x1, x2 = (
+        a * h00 + b * h01 + c * h02,
+        a * h01 + b * h11 + c * h12,
+        a * h02 + b * h12 + c * h22,
+    )
+    y0, y1, y2 = (
+        d * h00 + e * h01 + f * h02,
+        d * h01 + e * h11 + f * h12,
+        d * h02 + e * h12 + f * h22,
+    )
+    z0, z1, z2 = (
+        g * h00 + h * h01 + k * h02,
+        g * h01 + h * h11 + k * h12,
+        g * h02 + h * h12 + k * h22,
+    )
     return (
         x0 * a + x1 * b + x2 * c, x0 * d + x1 * e + x2 * f, x0 * g + x1 * h + x2 * k,
         y0 * d + y1 * e + y2 * f, y0 * g + y1 * h + y2 * k, z0 * g + z1 * h + z2 * k,
@@ -113,12 +137,18 @@ def set_current(tree: Tree, pose: Pose, blocks: Blocks, curvature: Curvature) ->
 
 @kernel
 def update(
-    tree: Tree, pose: Pose, u: Array, trial: Pose, trial_blocks: Blocks, accepted: bool, curvature: Curvature
+    tree: Tree,
+    pose: Pose,
+    u: Array,
+    trial: Pose,
+    trial_blocks: Blocks,
+    accepted: bool,
+    curvature: Curvature,
 ) -> None:
     """Update S by the step u (K+1, 3), in camera axes, from the current `pose` to `trial`.
 
-    Residuals that couple a joint's state with its part's pose (blocks.cross) have gradients that depend on more than
-    the joint: S stays as it is.
+    Residuals that couple a joint's state with its part's pose (blocks.cross) have gradients that
+    depend on more than the joint: S stays as it is.
     """
     if trial_blocks.cross[0]:
         return
@@ -130,7 +160,11 @@ def update(
         length = w0 * w0 + w1 * w1 + w2 * w2
         if not length > SHORTEST_STEP * SHORTEST_STEP:
             continue
-        x, y, z = trial_blocks.H_u[i, 0, GRADIENT], trial_blocks.H_u[i, 1, GRADIENT], trial_blocks.H_u[i, 2, GRADIENT]
+        x, y, z = (
+            trial_blocks.H_u[i, 0, GRADIENT],
+            trial_blocks.H_u[i, 1, GRADIENT],
+            trial_blocks.H_u[i, 2, GRADIENT],
+        )
         h = turned(Q, upper(trial_blocks.H_uu[i]), False) if accepted else upper(curvature.H[i])
         S, g = curvature.S[i], curvature.g[i]
         m00, m01, m02 = h[0] + S[0, 0], h[1] + S[0, 1], h[2] + S[0, 2]
@@ -151,8 +185,12 @@ def update(
 
 
 @kernel
-def apply_correction(tree: Tree, pose: Pose, blocks: Blocks, curvature: Curvature, share: float) -> None:
-    """Write R_par (H + share t S) R_parᵀ to the blocks of the current pose; a share of 0 restores Gauss-Newton's."""
+def apply_correction(
+    tree: Tree, pose: Pose, blocks: Blocks, curvature: Curvature, share: float
+) -> None:
+    """Write R_par (H + share t S) R_parᵀ to the blocks of the current pose; a share of 0 restores
+    Gauss-Newton's.
+    """
     for i in range(1, tree.parents.shape[0]):
         H, S = curvature.H[i], curvature.S[i]
         h00, h01, h02, h11, h12, h22 = upper(H)
@@ -160,4 +198,6 @@ def apply_correction(tree: Tree, pose: Pose, blocks: Blocks, curvature: Curvatur
         if t > 0.0:  # False if S has overflowed
             h00, h01, h02 = h00 + t * S[0, 0], h01 + t * S[0, 1], h02 + t * S[0, 2]
             h11, h12, h22 = h11 + t * S[1, 1], h12 + t * S[1, 2], h22 + t * S[2, 2]
-        _store(blocks.H_uu[i], turned(pose.R[tree.parents[i]], (h00, h01, h02, h11, h12, h22), True))
+        _store(
+            blocks.H_uu[i], turned(pose.R[tree.parents[i]], (h00, h01, h02, h11, h12, h22), True)
+        )

@@ -19,11 +19,15 @@ _variable: Any = cgutils.alloca_once_value  # untyped
 
 
 def _tile(vectors: int, sign: int) -> Any:
-    """Return `tile(C, at, c_row, X, x, x_row, Z, z, z_row, count)`: four rows of C, `vectors` wide, += sign XᵀZ."""
+    """Return `tile(C, at, c_row, X, x, x_row, Z, z, z_row, count)`: four rows of C, `vectors` wide,
+    += sign XᵀZ.
+    """
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         C, at, c_row, X, x, x_row, Z, z, z_row, count = args
-        c_data, x_data, z_data = (context.make_array(sig.args[k])(context, builder, args[k]).data for k in (0, 3, 6))
+        c_data, x_data, z_data = (
+            context.make_array(sig.args[k])(context, builder, args[k]).data for k in (0, 3, 6)
+        )
 
         def vector_at(data: Any, place: Any, v: int) -> Any:
             place = builder.add(place, ir.Constant(place.type, v * WIDTH))
@@ -39,11 +43,15 @@ def _tile(vectors: int, sign: int) -> Any:
             right = builder.add(z, builder.mul(loop.index, z_row))
             values = [builder.load(vector_at(z_data, right, v), align=8) for v in range(vectors)]
             for r in range(4):
-                splat = splat_of(builder, builder.load(builder.gep(left, [ir.Constant(at.type, r)]), align=8))
+                splat = splat_of(
+                    builder, builder.load(builder.gep(left, [ir.Constant(at.type, r)]), align=8)
+                )
                 for v in range(vectors):
                     product = builder.fmul(splat, values[v], flags=["contract"])
                     add = builder.fadd if sign > 0 else builder.fsub
-                    builder.store(add(builder.load(sums[r][v]), product, flags=["contract"]), sums[r][v])
+                    builder.store(
+                        add(builder.load(sums[r][v]), product, flags=["contract"]), sums[r][v]
+                    )
         for row, pointers in zip(sums, targets, strict=True):
             for total, pointer in zip(row, pointers, strict=True):
                 builder.store(builder.load(total), pointer, align=8)
@@ -91,7 +99,8 @@ def subtract_gram(C, W, X, x, x_row, count) -> None:  # type: ignore[no-untyped-
 
 @kernel
 def subtract_gram_below(C, W, X, x, x_row, count, first) -> None:  # type: ignore[no-untyped-def]
-    """`subtract_gram` of an X whose column first + j is zero above row 3 (j // 3), for j below `count`.
+    """`subtract_gram` of an X whose column first + j is zero above row 3 (j // 3), for j below
+    `count`.
 
     `first` and `count` are multiples of four: tiles are skipped as a whole.
     """
@@ -116,7 +125,8 @@ def subtract_gram_below(C, W, X, x, x_row, count, first) -> None:  # type: ignor
 def subtract_gram_rows(C, at, c_row, X, x, x_row, Z, z, z_row, count, width) -> None:  # type: ignore[no-untyped-def]
     """C -= XᵀZ for four rows of C from the element `at` on, and a width that is a multiple of four.
 
-    X has four columns from x on, Z `width` from z on, and both `count` rows. C may follow them in one array.
+    X has four columns from x on, Z `width` from z on, and both `count` rows. C may follow them in
+    one array.
     """
     b = 0
     while b + 12 <= width:

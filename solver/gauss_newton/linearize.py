@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One pass over the body: poses of the parts, cost, and the Gauss-Newton blocks of every term.
 
-The 2D keypoint, 3D keypoint and orientation terms of one point are merged: with e = R_i v the lever of the point from
-its part's origin, W = GᵀG of the position terms, W_d of the direction, f and f_d the gradients,
-    M += [[ [e]x (W + W_d) [e]xᵀ, [e]x W ], [., W]],   N += [ e x (W + W_d) V' ; W V' ],   C += V'ᵀ (W + W_d) V'
-with V' = R_i V. The derivative D of the part's origin by shape is added once per part, and the part's sums, taken
-about its own origin, are then shifted to the pelvis, the origin of all twists. Products that go into C are gathered as
-pairs of rows and multiplied many at a time. The arithmetic of one point is in point_terms.py, of one part in
-part_sums.py; both are expanded here before LLVM sees them.
+The 2D keypoint, 3D keypoint and orientation terms of one point are merged: with e = R_i v the lever
+of the point from its part's origin, W = GᵀG of the position terms, W_d of the direction, f and f_d
+the gradients,
+    M += [[ [e]x (W + W_d) [e]xᵀ, [e]x W ], [., W]],   N += [ e x (W + W_d) V' ; W V' ],
+    C += V'ᵀ (W + W_d) V'
+with V' = R_i V. The derivative D of the part's origin by shape is added once per part, and the
+part's sums, taken about its own origin, are then shifted to the pelvis, the origin of all twists.
+Products that go into C are gathered as pairs of rows and multiplied many at a time. The arithmetic
+of one point is in point_terms.py, of one part in part_sums.py; both are expanded here before LLVM
+sees them.
 """
 
 from typing import Any
@@ -21,9 +24,25 @@ from ..compiled.rows import clear
 from ..compiled.tree import Tree
 from ..custom_residuals.external import accumulate_external
 from ..residuals import shape_prior
-from ..residuals.registry import KEYPOINT2D, KEYPOINT3D, ORIENTATION_FIELD, SHAPE_PRIOR, accumulate_tables
+from ..residuals.registry import (
+    KEYPOINT2D,
+    KEYPOINT3D,
+    ORIENTATION_FIELD,
+    SHAPE_PRIOR,
+    accumulate_tables,
+)
 from .gram import add_gram
-from .part_sums import add3, add6, add9, add_cross, cross_both, rotate, shift_angular, shift_corner, write_part
+from .part_sums import (
+    add3,
+    add6,
+    add9,
+    add_cross,
+    cross_both,
+    rotate,
+    shift_angular,
+    shift_corner,
+    write_part,
+)
 from .point_terms import point_at_rest, point_terms
 from .row_pass import row_pass
 from .terms import HAS_2D, HAS_SHAPE, Terms
@@ -32,7 +51,9 @@ QUEUE = 48  # pairs of rows (X, Z) of C += XᵀZ that are gathered before they a
 
 
 def make_scratch(tree: Tree) -> Array:
-    """Return the working memory of `linearize`: a queue of pairs of rows, each row X followed by its Z."""
+    """Return the working memory of `linearize`: a queue of pairs of rows, each row X followed by
+    its Z.
+    """
     return np.zeros((2 * QUEUE, tree.S.shape[2]))
 
 
@@ -46,9 +67,13 @@ def _place_formula(s, D_parent, S, D):  # type: ignore[no-untyped-def]
 
 
 def _point_formula(s, N, V, pairs):  # type: ignore[no-untyped-def]
-    """V' = R V;  N += [[e]x W_all; W] V';  pairs (V', W_all V'). s: R (9), [e]x W_all (9), W (6), W_all (6)."""
+    """V' = R V;  N += [[e]x W_all; W] V';  pairs (V', W_all V'). s: R (9), [e]x W_all (9), W (6),
+    W_all (6).
+    """
     moved = [_dot(s[3 * r : 3 * r + 3], V) for r in range(3)]
-    W, W_all = ([[a[0], a[1], a[2]], [a[1], a[3], a[4]], [a[2], a[4], a[5]]] for a in (s[18:24], s[24:30]))
+    W, W_all = (
+        [[a[0], a[1], a[2]], [a[1], a[3], a[4]], [a[2], a[4], a[5]]] for a in (s[18:24], s[24:30])
+    )
     angular = [N[r] + _dot(s[9 + 3 * r : 12 + 3 * r], moved) for r in range(3)]
     linear = [N[3 + r] + _dot(W[r], moved) for r in range(3)]
     weighted = [_dot(W_all[r], moved) for r in range(3)]
@@ -56,7 +81,8 @@ def _point_formula(s, N, V, pairs):  # type: ignore[no-untyped-def]
 
 
 def _part_formula(s, N, D, pairs):  # type: ignore[no-untyped-def]
-    """Add the origin's motion D to N and shift it to the pelvis. s: A (6), Z (9), the origin s (3), one half.
+    """Add the origin's motion D to N and shift it to the pelvis. s: A (6), Z (9), the origin s (3),
+    one half.
 
     With H = N_lin + A D / 2:  C += HᵀD + DᵀH,  N_ang += [s]x N_lin + Z D,  N_lin += A D.
     """
@@ -65,7 +91,9 @@ def _part_formula(s, N, D, pairs):  # type: ignore[no-untyped-def]
     H = [N[3 + r] + AD[r] * half for r in range(3)]
     turned = [y * N[5] - z * N[4], z * N[3] - x * N[5], x * N[4] - y * N[3]]
     angular = [N[r] + turned[r] + _dot(Z[3 * r : 3 * r + 3], D) for r in range(3)]
-    pairs = [row for r in range(3) for row in (H[r], D[r])] + [row for r in range(3) for row in (D[r], H[r])]
+    pairs = [row for r in range(3) for row in (H[r], D[r])] + [
+        row for r in range(3) for row in (D[r], H[r])
+    ]
     return angular + [N[3 + r] + AD[r] for r in range(3)], [], pairs
 
 
@@ -146,8 +174,9 @@ def _add_points(tree, terms, i, t, settings, pose, blocks, scratch, waiting, cos
     """Add the terms of part i's points to the cost, N, C and c.
 
     settings: weight and 1/sigma of each kind of term, focal scale, share of the second-order terms.
-    Return the cost, how many pairs are waiting, and sums over the points about the part's origin: W (6), [e]x W (9),
-    [e]x W_all [e]xᵀ (6), the force (3) and its moment (3), and those of the focal length's column.
+    Return the cost, how many pairs are waiting, and sums over the points about the part's origin: W
+    (6), [e]x W (9), [e]x W_all [e]xᵀ (6), the force (3) and its moment (3), and those of the focal
+    length's column.
     """
     A, C, c, V = blocks.A, blocks.C, blocks.c, terms.V
     W, P = C.shape[0], tree.shape
@@ -172,19 +201,35 @@ def _add_points(tree, terms, i, t, settings, pose, blocks, scratch, waiting, cos
             hx, hy, hz = add3((hx, hy, hz), h)
             nx, ny, nz = add_cross((nx, ny, nz), e, h)
         a00, a01, a02, a11, a12, a22 = add6((a00, a01, a02, a11, a12, a22), w)
-        x00, x01, x02, x10, x11, x12, x20, x21, x22 = add9((x00, x01, x02, x10, x11, x12, x20, x21, x22), b)
+        x00, x01, x02, x10, x11, x12, x20, x21, x22 = add9(
+            (x00, x01, x02, x10, x11, x12, x20, x21, x22), b
+        )
         fx, fy, fz = add3((fx, fy, fz), f)
         y00, y01, y02, y11, y12, y22 = add6((y00, y01, y02, y11, y12, y22), cross_both(e, b_all))
         mx, my, mz = add_cross((mx, my, mz), e, g)
         if flags & HAS_SHAPE:
             waiting = _make_room(C, W, scratch, waiting, 3)
             at = 2 * waiting * W
-            _point(r + b_all + w + w_all, W, A, 6 * i * row + SHAPE, row, V, 3 * j * W, W, scratch, at, W)
+            _point(
+                r + b_all + w + w_all,
+                W,
+                A,
+                6 * i * row + SHAPE,
+                row,
+                V,
+                3 * j * W,
+                W,
+                scratch,
+                at,
+                W,
+            )
             add_rows(c, 0, g[0], g[1], g[2], scratch, at, at + 2 * W, at + 4 * W, W)
             if fit_focal and flags & HAS_2D:
                 k = 2 * waiting
                 for n in range(P):
-                    C[n, P] += scratch[k, n] * h[0] + scratch[k + 2, n] * h[1] + scratch[k + 4, n] * h[2]
+                    C[n, P] += (
+                        scratch[k, n] * h[0] + scratch[k + 2, n] * h[1] + scratch[k + 4, n] * h[2]
+                    )
             waiting += 3
     a, x = (a00, a01, a02, a11, a12, a22), (x00, x01, x02, x10, x11, x12, x20, x21, x22)
     y, f, m = (y00, y01, y02, y11, y12, y22), (fx, fy, fz), (mx, my, mz)
@@ -193,7 +238,9 @@ def _add_points(tree, terms, i, t, settings, pose, blocks, scratch, waiting, cos
 
 @expanded_kernel
 def _add_part(tree, i, s, sums, pose, blocks, scratch, waiting):  # type: ignore[no-untyped-def]
-    """Shift part i's sums from its origin to the pelvis and write its block; return how many pairs are waiting."""
+    """Shift part i's sums from its origin to the pelvis and write its block; return how many pairs
+    are waiting.
+    """
     a, x, y, f, m, h, n = sums
     A, C, c, D = blocks.A, blocks.C, blocks.c, pose.D
     W, P = C.shape[0], tree.shape
@@ -204,7 +251,19 @@ def _add_part(tree, i, s, sums, pose, blocks, scratch, waiting):  # type: ignore
     z = shift_corner(s, x, a)
     if i > 0 and W > 0:
         waiting = _make_room(C, W, scratch, waiting, 6)
-        _part(a + z + s + (0.5,), W, A, 6 * i * row + SHAPE, row, D, at, W, scratch, 2 * waiting * W, W)
+        _part(
+            a + z + s + (0.5,),
+            W,
+            A,
+            6 * i * row + SHAPE,
+            row,
+            D,
+            at,
+            W,
+            scratch,
+            2 * waiting * W,
+            W,
+        )
         waiting += 6
         add_rows(c, 0, f[0], f[1], f[2], D, at, at + W, at + 2 * W, W)
     write_part(B, shift_angular(s, y, x, z), z, a, s, f, m)
@@ -213,11 +272,18 @@ def _add_part(tree, i, s, sums, pose, blocks, scratch, waiting):  # type: ignore
 
 @kernel
 def linearize(
-    tree: Tree, terms: Terms, stage: Array, triggs: float, pose: Pose, blocks: Blocks, scratch: Array
+    tree: Tree,
+    terms: Terms,
+    stage: Array,
+    triggs: float,
+    pose: Pose,
+    blocks: Blocks,
+    scratch: Array,
 ) -> float:
     """Place the parts, write the blocks at `pose`, and return the cost.
 
-    stage (2, weights) is a row of weights and a row of 1/sigma, in the registry's order; scratch of `make_scratch`.
+    stage (2, weights) is a row of weights and a row of 1/sigma, in the registry's order; scratch of
+    `make_scratch`.
     """
     place_parts(tree, pose)
     weights, inv_sigma = stage[0], stage[1]
@@ -235,10 +301,18 @@ def linearize(
         if terms.starts[i] == terms.starts[i + 1]:
             continue
         tx, ty, tz = pose.t[i, 0], pose.t[i, 1], pose.t[i, 2]
-        cost, waiting, sums = _add_points(tree, terms, i, (tx, ty, tz), settings, pose, blocks, scratch, waiting, cost)
-        waiting = _add_part(tree, i, (tx - ox, ty - oy, tz - oz), sums, pose, blocks, scratch, waiting)
+        cost, waiting, sums = _add_points(
+            tree, terms, i, (tx, ty, tz), settings, pose, blocks, scratch, waiting, cost
+        )
+        waiting = _add_part(
+            tree, i, (tx - ox, ty - oy, tz - oz), sums, pose, blocks, scratch, waiting
+        )
     add_gram(C, W, scratch, 0, 2 * W, scratch, W, 2 * W, waiting)
-    cost += accumulate_tables(tree, terms.ints, terms.floats, weights, inv_sigma, triggs, pose, blocks)
+    cost += accumulate_tables(
+        tree, terms.ints, terms.floats, weights, inv_sigma, triggs, pose, blocks
+    )
     cost += accumulate_external(tree, terms.external, weights, inv_sigma, triggs, pose, blocks)
-    cost += shape_prior.accumulate(terms.shape_mean, terms.shape_information, weights[SHAPE_PRIOR], pose, blocks)
+    cost += shape_prior.accumulate(
+        terms.shape_mean, terms.shape_information, weights[SHAPE_PRIOR], pose, blocks
+    )
     return cost

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Levenberg-Marquardt: the control that every fit shares, and the compiled optimizer of one frame.
 
-A trial point is accepted if it lowers the cost. The damping follows the gain ratio, the actual decrease over the
-predicted one (`judge_trial`), and a stage ends when the decrease, predicted or actual, becomes negligible.
-Of one frame, every trial point is linearized in the pass that evaluates it, so an accepted step costs one pass and one
-solve; a rejected one leaves the kept blocks to be solved again with a larger damping (two sets of blocks, swapped on
-acceptance). Rejected or not, a trial updates the estimate of what Gauss-Newton leaves out of the joints' Hessians
-(curvature.py).
-Source: damping by the gain ratio after Nielsen, Damping Parameter in Marquardt's Method, IMM-REP-1999-05.
+A trial point is accepted if it lowers the cost. The damping follows the gain ratio, the actual
+decrease over the predicted one (`judge_trial`), and a stage ends when the decrease, predicted or
+actual, becomes negligible. Of one frame, every trial point is linearized in the pass that evaluates
+it, so an accepted step costs one pass and one solve; a rejected one leaves the kept blocks to be
+solved again with a larger damping (two sets of blocks, swapped on acceptance). Rejected or not, a
+trial updates the estimate of what Gauss-Newton leaves out of the joints' Hessians (curvature.py).
+Source: damping by the gain ratio after Nielsen, Damping Parameter in Marquardt's Method,
+IMM-REP-1999-05.
 """
 
 from collections.abc import Sequence
@@ -24,7 +25,8 @@ from .linearize import linearize
 from .recursion import Workspace, eliminate, retract, step
 
 MIN_DAMPING, MAX_DAMPING = 1e-9, 1e12
-FIRST_GROWTH = 2.0  # of the damping after the first rejected step; it doubles with every further one in a row
+# of the damping after the first rejected step; it doubles with every further one in a row
+FIRST_GROWTH = 2.0
 MIN_DECREASE = 1e-13  # a predicted decrease below this share of the cost is rounding
 RUNNING = -1  # not a `Status`: the stage goes on
 CONVERGED, MAX_ITERATIONS, STALLED, NO_MEASUREMENTS, NON_FINITE = range(5)  # values of `Status`
@@ -48,7 +50,11 @@ def make_settings(options: Options, stages: Sequence[Stage]) -> Settings:
     :raises ShapeError: when a weight, a robust scale or a tolerance cannot be used.
     """
     table = options.stage_table(stages)
-    triggs, damping, root_scale = float(options.triggs), float(options.damping), 1.0 / options.root_length
+    triggs, damping, root_scale = (
+        float(options.triggs),
+        float(options.damping),
+        1.0 / options.root_length,
+    )
     return Settings(*table, triggs, damping, root_scale, bool(options.curvature))
 
 
@@ -62,13 +68,20 @@ class Memory(NamedTuple):
 
 
 def judge_trial(
-    cost: float, trial_cost: float, predicted: float, damping: float, growth: float, tolerance: float
+    cost: float,
+    trial_cost: float,
+    predicted: float,
+    damping: float,
+    growth: float,
+    tolerance: float,
 ) -> tuple[bool, float, float, int]:
-    """Return (whether to accept a trial point, the next damping, its next growth, CONVERGED, STALLED or RUNNING).
+    """Return (whether to accept a trial point, the next damping, its next growth, CONVERGED,
+    STALLED or RUNNING).
 
-    With the gain ratio g = (cost - trial_cost) / predicted, an accepted step multiplies the damping by
-    max(1/9, 1 - (2 g - 1)^3), a rejected one by `growth`, which then doubles. A trial cost that is not a number is
-    rejected. CONVERGED: the decrease is at most `tolerance` times the cost. STALLED: the damping exceeds its limit.
+    With the gain ratio g = (cost - trial_cost) / predicted, an accepted step multiplies the damping
+    by max(1/9, 1 - (2 g - 1)^3), a rejected one by `growth`, which then doubles. A trial cost that
+    is not a number is rejected. CONVERGED: the decrease is at most `tolerance` times the cost.
+    STALLED: the damping exceeds its limit.
     """
     if trial_cost < cost:  # False for NaN
         decrease = cost - trial_cost
@@ -79,12 +92,14 @@ def judge_trial(
     return False, damping, 2.0 * growth, STALLED if damping > MAX_DAMPING else RUNNING
 
 
-_judge_trial = kernel(judge_trial)  # for `optimize`; several_frames.py, whose loop is not compiled, calls it as it is
+# for `optimize`; several_frames.py, whose loop is not compiled, calls it as it is
+_judge_trial = kernel(judge_trial)
 
 
 @inlined_kernel
 def _run_stage(tree, terms, s, settings, memory, start):  # type: ignore[no-untyped-def]
-    """Run stage s from memory.poses[start]; return (cost, status, iterations, how many rejected, index of the result).
+    """Run stage s from memory.poses[start]; return (cost, status, iterations, how many rejected,
+    index of the result).
 
     The blocks of the result have the same index.
     """
@@ -111,8 +126,12 @@ def _run_stage(tree, terms, s, settings, memory, start):  # type: ignore[no-unty
         trial_cost = np.inf
         if np.isfinite(predicted):
             retract(tree, pose, work, trial)
-            trial_cost = linearize(tree, terms, stage, settings.triggs, trial, trial_blocks, work.scratch)
-        accepted, damping, growth, verdict = _judge_trial(cost, trial_cost, predicted, damping, growth, tolerance)
+            trial_cost = linearize(
+                tree, terms, stage, settings.triggs, trial, trial_blocks, work.scratch
+            )
+        accepted, damping, growth, verdict = _judge_trial(
+            cost, trial_cost, predicted, damping, growth, tolerance
+        )
         if settings.curvature and np.isfinite(trial_cost):
             update(tree, pose, work.u, trial, trial_blocks, accepted, curvature)
         if accepted:
@@ -133,10 +152,11 @@ def _run_stage(tree, terms, s, settings, memory, start):  # type: ignore[no-unty
 
 @kernel
 def optimize(tree, terms, measured, settings, memory):  # type: ignore[no-untyped-def]
-    """Run all stages from memory.poses[0]; return (cost, status, iterations, how many rejected, index of the result).
+    """Run all stages from memory.poses[0]; return (cost, status, iterations, how many rejected,
+    index of the result).
 
-    Without measurements, or for a cost that is not finite, the pose stays where it is. At the end memory.work.C is
-    the reduced Gauss-Newton system of the result: see `eliminate`.
+    Without measurements, or for a cost that is not finite, the pose stays where it is. At the end
+    memory.work.C is the reduced Gauss-Newton system of the result: see `eliminate`.
     """
     # Not the constant 0, for which `_run_stage` would be compiled once more.
     work, at, iterations, rejected = memory.work, np.int64(0), 0, 0
@@ -151,7 +171,13 @@ def optimize(tree, terms, measured, settings, memory):  # type: ignore[no-untype
     else:
         status = NO_MEASUREMENTS
         cost = linearize(
-            tree, terms, settings.stages[-1], settings.triggs, memory.poses[0], memory.blocks[0], work.scratch
+            tree,
+            terms,
+            settings.stages[-1],
+            settings.triggs,
+            memory.poses[0],
+            memory.blocks[0],
+            work.scratch,
         )
     eliminate(tree, memory.poses[at], memory.blocks[at], MIN_DAMPING, settings.root_scale, work)
     return cost, status, iterations, rejected, at

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sums of Gauss-Newton terms over the points of one part, in plain numbers, and their shift to the pelvis.
+"""Sums of Gauss-Newton terms over the points of one part, in plain numbers, and their shift to the
+pelvis.
 
-Vectors are tuples of 3 numbers, 3 x 3 matrices of 9 by rows, symmetric ones of the 6 of their upper triangle by rows.
+Vectors are tuples of 3 numbers, 3 x 3 matrices of 9 by rows, symmetric ones of the 6 of their upper
+triangle by rows.
 """
 
 from ..compiled.kernel import expanded_kernel
@@ -24,22 +26,37 @@ def add6(a, b):  # type: ignore[no-untyped-def]
 def add9(a, b):  # type: ignore[no-untyped-def]
     """Return a + b, nine numbers each."""
     return (
-        a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5], a[6] + b[6], a[7] + b[7],
+        a[0] + b[0],
+        a[1] + b[1],
+        a[2] + b[2],
+        a[3] + b[3],
+        a[4] + b[4],
+        a[5] + b[5],
+        a[6] + b[6],
+        a[7] + b[7],
         a[8] + b[8],
-    )  # fmt: skip
+    )
 
 
 @expanded_kernel
 def rotate(r, v):  # type: ignore[no-untyped-def]
     """Return R v; r: R by rows (9), v (3)."""
     x, y, z = v
-    return r[0] * x + r[1] * y + r[2] * z, r[3] * x + r[4] * y + r[5] * z, r[6] * x + r[7] * y + r[8] * z
+    return (
+        r[0] * x + r[1] * y + r[2] * z,
+        r[3] * x + r[4] * y + r[5] * z,
+        r[6] * x + r[7] * y + r[8] * z,
+    )
 
 
 @expanded_kernel
 def add_cross(m, a, b):  # type: ignore[no-untyped-def]
     """Return m + a x b."""
-    return m[0] + a[1] * b[2] - a[2] * b[1], m[1] + a[2] * b[0] - a[0] * b[2], m[2] + a[0] * b[1] - a[1] * b[0]
+    return (
+        m[0] + a[1] * b[2] - a[2] * b[1],
+        m[1] + a[2] * b[0] - a[0] * b[2],
+        m[2] + a[0] * b[1] - a[1] * b[0],
+    )
 
 
 @expanded_kernel
@@ -78,7 +95,9 @@ def shift_corner(s, x, a):  # type: ignore[no-untyped-def]
 
 @expanded_kernel
 def shift_angular(s, y, x, z):  # type: ignore[no-untyped-def]
-    """Return Y + X [s]xᵀ + [s]x Zᵀ, the angular block of M about the pelvis: its upper triangle by rows (6)."""
+    """Return Y + X [s]xᵀ + [s]x Zᵀ, the angular block of M about the pelvis: its upper triangle by
+    rows (6).
+    """
     sx, sy, sz = s
     y00, y01, y02, y11, y12, y22 = y
     y00 += sy * x[2] - sz * x[1] + sy * z[2] - sz * z[1]
@@ -92,7 +111,9 @@ def shift_angular(s, y, x, z):  # type: ignore[no-untyped-def]
 
 @expanded_kernel
 def write_part(B, y, z, a, s, f, m):  # type: ignore[no-untyped-def]
-    """Write M = [[Y, Z], [Zᵀ, A]], the force f and its moment m + s x f to a part's block B (6, 8+W)."""
+    """Write M = [[Y, Z], [Zᵀ, A]], the force f and its moment m + s x f to a part's block B (6,
+    8+W).
+    """
     B[0, 0], B[0, 1], B[0, 2], B[0, 3], B[0, 4], B[0, 5] = y[0], y[1], y[2], z[0], z[1], z[2]
     B[1, 0], B[1, 1], B[1, 2], B[1, 3], B[1, 4], B[1, 5] = y[1], y[3], y[4], z[3], z[4], z[5]
     B[2, 0], B[2, 1], B[2, 2], B[2, 3], B[2, 4], B[2, 5] = y[2], y[4], y[5], z[6], z[7], z[8]

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The terms of one measured point: 2D and 3D keypoint and direction, merged into W = GᵀG, its moments and a force.
+"""The terms of one measured point: 2D and 3D keypoint and direction, merged into W = GᵀG, its
+moments and a force.
 
 Tuples as in part_sums.py. Weights and 1/sigma come in as plain numbers.
 """
@@ -26,7 +27,9 @@ def point_at_rest(terms, beta, j, P):  # type: ignore[no-untyped-def]
 @expanded_kernel
 def _add_keypoint3d(q, p, weight, inv_sigma, triggs, cost, w, g):  # type: ignore[no-untyped-def]
     """Add the term of a point p (3) measured at q (4) to the cost, W = GᵀG (6) and Gᵀr (3)."""
-    more, w3d, k, x, y, z = keypoint3d.term(p[0], p[1], p[2], q[0], q[1], q[2], weight * q[3], inv_sigma, triggs)
+    more, w3d, k, x, y, z = keypoint3d.term(
+        p[0], p[1], p[2], q[0], q[1], q[2], weight * q[3], inv_sigma, triggs
+    )
     w = (
         w[0] + w3d - k * x * x, w[1] - k * x * y, w[2] - k * x * z,
         w[3] + w3d - k * y * y, w[4] - k * y * z, w[5] + w3d - k * z * z,
@@ -48,10 +51,12 @@ def point_terms(terms, j, e, t, settings, cost):  # type: ignore[no-untyped-def]
     """Evaluate what was measured of slot j, at e (3) from the origin t (3) of its part.
 
     settings: weight and 1/sigma of each kind of term, focal scale, share of the second-order terms.
-    Return the cost so far; W = GᵀG (6), [e]x W (9) and Gᵀr (3) of the position terms; with the direction, W, [e]x W and
-    Gᵀr of all; and Gᵀg (3), gᵀg and gᵀr of the focal length, g = dr/dlog f.
+    Return the cost so far; W = GᵀG (6), [e]x W (9) and Gᵀr (3) of the position terms; with the
+    direction, W, [e]x W and Gᵀr of all; and Gᵀg (3), gᵀg and gᵀr of the focal length, g = dr/dlog
+    f.
     """
-    # Scalars rather than tuples wherever a branch sets them: LLVM would sum in another order, with other roundings.
+    # Scalars rather than tuples wherever a branch sets them: LLVM would sum in another order, with
+    # other roundings.
     w2, k2, w3, k3, wd, kd, focal, triggs = settings
     flags = terms.flags[j]
     ex, ey, ez = e
@@ -74,7 +79,9 @@ def point_terms(terms, j, e, t, settings, cost):  # type: ignore[no-untyped-def]
     force = (gx, gy, gz)
     if flags & HAS_DIRECTION:
         w = (w00, w01, w02, w11, w12, w22)
-        cost, w, (gx, gy, gz) = _add_direction(terms.direction[j], e, wd, kd, triggs, cost, w, (gx, gy, gz))
+        cost, w, (gx, gy, gz) = _add_direction(
+            terms.direction[j], e, wd, kd, triggs, cost, w, (gx, gy, gz)
+        )
         w00, w01, w02, w11, w12, w22 = w
         b00, b01, b02, b10, b11, b12, b20, b21, b22 = cross_symmetric(e, w)
     w, b = (w00, w01, w02, w11, w12, w22), (b00, b01, b02, b10, b11, b12, b20, b21, b22)

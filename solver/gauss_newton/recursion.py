@@ -1,14 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Gauss-Newton step in O(K): eliminate the joints from the leaves to the root, solve 6 + P, substitute back.
+"""The Gauss-Newton step in O(K): eliminate the joints from the leaves to the root, solve 6 + P,
+substitute back.
 
-Twists x_i are in camera axes about the pelvis o = t_0, so a parent's twist passes to its child unchanged:
+Twists x_i are in camera axes about the pelvis o = t_0, so a parent's twist passes to its child
+unchanged:
     x_i = x_par + U_i u_i,  U_i = [I; [t_i - o]x]
-and with Y = UᵀM + H_ux, E = UᵀN + H_ubeta, q = Uᵀm + g_u for the joint's row of the normal equations,
+and with Y = UᵀM + H_ux, E = UᵀN + H_ubeta, q = Uᵀm + g_u for the joint's row of the normal
+equations,
     Q = UᵀMU + H_uu + H_ux U + Uᵀ H_uxᵀ + lambda I = L Lᵀ,   (Y~, E~, q~) = L^-1 (Y, E, q)
     M_par += M - Y~ᵀY~   N_par += N - Y~ᵀE~   m_par += m - Y~ᵀq~   C -= E~ᵀE~   c -= E~ᵀq~
     u_i = -L^-ᵀ (q~ + Y~ x_par + E~ dbeta)
-The root is damped by lambda (|w|^2 + s^2 |nu|^2), nu being the motion of the pelvis, beta not at all.
-Nothing larger than the number of global columns (P, or P + 1 with the focal length) or 6 is factorized.
+The root is damped by lambda (|w|^2 + s^2 |nu|^2), nu being the motion of the pelvis, beta not at
+all. Nothing larger than the number of global columns (P, or P + 1 with the focal length) or 6 is
+factorized.
 """
 
 import math
@@ -25,7 +29,8 @@ from .gram import subtract_gram
 from .linearize import make_scratch
 from .row_pass import row_pass
 
-TINY = 1e-13  # a pivot below this share of its diagonal is no information: that direction stays where it is
+# a pivot below this share of its diagonal is no information: that direction stays where it is
+TINY = 1e-13
 
 
 class Workspace(NamedTuple):
@@ -34,7 +39,9 @@ class Workspace(NamedTuple):
     A: Array  # (K+1, 6, 8+W), sums over subtrees
     Y: Array  # (K+1, 3, 8+W), [Y~ | q~ | 0 | E~]
     L: Array  # (K+1, 6), the inverse of L by rows of its lower triangle
-    root: Array  # (6, 8+W), L_0^-1 [M_0 + Lambda | m_0 | 0 | N_0]: L_0ᵀ in its upper triangle, 1/L_ii on the diagonal
+    # (6, 8+W), L_0^-1 [M_0 + Lambda | m_0 | 0 | N_0]: L_0ᵀ in its upper triangle, 1/L_ii on the
+    # diagonal
+    root: Array
     C: Array  # (W, W), full; after `eliminate` the reduced system of the frame, then its factor
     c: Array  # (W,)
     x: Array  # (K+1, 6), twists
@@ -47,7 +54,17 @@ def make_workspace(tree: Tree) -> Workspace:
     """Return a workspace of zeros for `tree`."""
     n, w = len(tree.parents), tree.S.shape[2]
     row = SHAPE + w
-    shapes: list[tuple[int, ...]] = [(n, 6, row), (n, 3, row), (n, 6), (6, row), (w, w), (w,), (n, 6), (n, 3), (w,)]
+    shapes: list[tuple[int, ...]] = [
+        (n, 6, row),
+        (n, 3, row),
+        (n, 6),
+        (6, row),
+        (w, w),
+        (w,),
+        (n, 6),
+        (n, 3),
+        (w,),
+    ]
     return Workspace(*[np.zeros(shape) for shape in shapes] + [make_scratch(tree)])
 
 
@@ -77,10 +94,12 @@ _to_parent = row_pass(_parent_formula, (6, 6, 3))
 
 @kernel
 def factorize(H, row: int, n: int, diagonal) -> None:  # type: ignore[no-untyped-def]
-    """Replace [H | rest], rows of length `row` whose first n columns are symmetric, by L^-1 [H | rest], H = L Lᵀ.
+    """Replace [H | rest], rows of length `row` whose first n columns are symmetric, by L^-1 [H |
+    rest], H = L Lᵀ.
 
-    Only the upper triangle is read, and L_ii^-1 is put on the diagonal. A pivot that is not positive to rounding gets
-    0 for its inverse, so that its unknown becomes 0. diagonal (n,) is overwritten.
+    Only the upper triangle is read, and L_ii^-1 is put on the diagonal. A pivot that is not
+    positive to rounding gets 0 for its inverse, so that its unknown becomes 0. diagonal (n,) is
+    overwritten.
     """
     for j in range(n):
         diagonal[j] = H[j, j]
@@ -97,11 +116,15 @@ def factorize(H, row: int, n: int, diagonal) -> None:  # type: ignore[no-untyped
 
 
 @kernel
-def eliminate(tree: Tree, pose: Pose, blocks: Blocks, damping: float, root_scale: float, work: Workspace) -> float:
-    """Eliminate all joints and the root's pose; leave the reduced system of the global columns in work.C, work.c.
+def eliminate(
+    tree: Tree, pose: Pose, blocks: Blocks, damping: float, root_scale: float, work: Workspace
+) -> float:
+    """Eliminate all joints and the root's pose; leave the reduced system of the global columns in
+    work.C, work.c.
 
-    Returns the sum of |q~|^2, the part of the predicted decrease that is due to what was eliminated.
-    `root_scale` is s, in radians per metre. The blocks are kept, to be eliminated again with another damping.
+    Returns the sum of |q~|^2, the part of the predicted decrease that is due to what was
+    eliminated. `root_scale` is s, in radians per metre. The blocks are kept, to be eliminated again
+    with another damping.
     """
     A, Y, L, C, c = work.A, work.Y, work.L, work.C, work.c
     W = c.shape[0]
@@ -182,7 +205,9 @@ def eliminate(tree: Tree, pose: Pose, blocks: Blocks, damping: float, root_scale
 
 @kernel
 def solve_globals(tree: Tree, C, c, dbeta) -> float:  # type: ignore[no-untyped-def]
-    """Solve C dbeta = -c for the global columns, overwriting C with its factor; return |L^-1 c|^2."""
+    """Solve C dbeta = -c for the global columns, overwriting C with its factor; return |L^-1
+    c|^2.
+    """
     P, W = tree.globals, C.shape[0]
     factorize(C, W, P, dbeta)
     for a in range(P):
@@ -204,7 +229,9 @@ def solve_globals(tree: Tree, C, c, dbeta) -> float:  # type: ignore[no-untyped-
 
 @kernel
 def substitute(tree: Tree, pose: Pose, damping: float, root_scale: float, work: Workspace) -> float:
-    """Fill work.x and work.u from work.dbeta, and return dᵀ Lambda d of the damping that was added."""
+    """Fill work.x and work.u from work.dbeta, and return dᵀ Lambda d of the damping that was
+    added.
+    """
     x, u, Y, root, dbeta = work.x, work.u, work.Y, work.root, work.dbeta
     P = tree.globals
     for r in range(5, -1, -1):
@@ -241,8 +268,11 @@ def substitute(tree: Tree, pose: Pose, damping: float, root_scale: float, work: 
 
 
 @kernel
-def step(tree: Tree, pose: Pose, blocks: Blocks, damping: float, root_scale: float, work: Workspace) -> float:
-    """Fill work.x, work.u, work.dbeta with the damped Gauss-Newton step and return the decrease it predicts.
+def step(
+    tree: Tree, pose: Pose, blocks: Blocks, damping: float, root_scale: float, work: Workspace
+) -> float:
+    """Fill work.x, work.u, work.dbeta with the damped Gauss-Newton step and return the decrease it
+    predicts.
 
     For (H + Lambda) d = -g the decrease of 1/2 dᵀHd + gᵀd is 1/2 |L^-1 g|^2 + 1/2 dᵀ Lambda d.
     """
@@ -260,10 +290,11 @@ def retract(tree: Tree, pose: Pose, work: Workspace, trial: Pose) -> None:
 
 @expanded_kernel
 def move(tree, pose, x, u, dg, trial):  # type: ignore[no-untyped-def]
-    """Write the moved pose to `trial`: R_0 <- exp(w) R_0, t_0 <- t_0 + nu, Omega <- exp(R_parᵀ u) Omega.
+    """Write the moved pose to `trial`: R_0 <- exp(w) R_0, t_0 <- t_0 + nu, Omega <- exp(R_parᵀ u)
+    Omega.
 
-    x (6,) is (w, nu), u (K+1, 3) without its row 0, dg (W,) the step of the global columns. R, t and D of the other
-    parts are left to `place_parts`.
+    x (6,) is (w, nu), u (K+1, 3) without its row 0, dg (W,) the step of the global columns. R, t
+    and D of the other parts are left to `place_parts`.
     """
     for i in range(tree.parents.shape[0]):
         if i == 0:

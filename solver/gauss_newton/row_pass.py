@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One pass over the rows of up to three arrays, made from a formula.
 
-Doing all that is to be done to some rows while they are in registers saves most loads and stores, which is what short
-rows cost. Rows are as in rows.py.
+Doing all that is to be done to some rows while they are in registers saves most loads and stores,
+which is what short rows cost. Rows are as in rows.py.
 """
 
 from collections.abc import Callable, Sequence
@@ -45,17 +45,22 @@ def _counted(scalars: int, rows: Sequence[int]) -> list[list[_Any]]:
 
 
 def row_pass(formula: Callable[..., Sequence[Sequence["_Row"]]], rows: Sequence[int]) -> Any:
-    """Return `apply(scalars, n, a, a0, a_row, b, b0, b_row, c, c0, c_row)` for kernels: one pass over three arrays.
+    """Return `apply(scalars, n, a, a0, a_row, b, b0, b_row, c, c0, c_row)` for kernels: one pass
+    over three arrays.
 
-    formula(s, a, b, c) gets the scalars (a tuple of float64 in kernels) and `rows[k]` rows of each array, and returns
-    the new rows of each array in turn; an empty list leaves them as they are. All rows have length n, row r of `a`
-    beginning at a0 + r a_row. Of each column everything is read before anything is written.
+    formula(s, a, b, c) gets the scalars (a tuple of float64 in kernels) and `rows[k]` rows of each
+    array, and returns the new rows of each array in turn; an empty list leaves them as they are.
+    All rows have length n, row r of `a` beginning at a0 + r a_row. Of each column everything is
+    read before anything is written.
     """
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         scalars, n = args[0], args[1]
         written = [len(list(group)) for group in formula(*_counted(sig.args[0].count, rows))]
-        splats = [_Row(builder, splat_of(builder, builder.extract_value(scalars, k))) for k in range(sig.args[0].count)]
+        splats = [
+            _Row(builder, splat_of(builder, builder.extract_value(scalars, k)))
+            for k in range(sig.args[0].count)
+        ]
         starts = []
         for k, count in enumerate(rows):
             array, offset, stride = args[2 + 3 * k : 5 + 3 * k]
@@ -67,8 +72,14 @@ def row_pass(formula: Callable[..., Sequence[Sequence["_Row"]]], rows: Sequence[
         width = ir.Constant(n.type, WIDTH)
         with cgutils.for_range(builder, builder.sdiv(n, width)) as loop:
             shift = builder.mul(loop.index, width)
-            at = [[builder.bitcast(builder.gep(p, [shift]), VECTOR.as_pointer()) for p in group] for group in starts]
-            loaded = [[_Row(builder, builder.load(p, align=8)) for p in at[k][:count]] for k, count in enumerate(rows)]
+            at = [
+                [builder.bitcast(builder.gep(p, [shift]), VECTOR.as_pointer()) for p in group]
+                for group in starts
+            ]
+            loaded = [
+                [_Row(builder, builder.load(p, align=8)) for p in at[k][:count]]
+                for k, count in enumerate(rows)
+            ]
             for pointers, values in zip(at, formula(splats, *loaded), strict=True):
                 for pointer, value in zip(pointers[: len(values)], values, strict=True):
                     builder.store(value.value, pointer, align=8)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the fits of several frames have in common: the loop of steps and trials, and the priors of shared unknowns."""
+"""What the fits of several frames have in common: the loop of steps and trials, and the priors of
+shared unknowns.
+"""
 
 from abc import ABC, abstractmethod
 from typing import NamedTuple
@@ -20,19 +22,25 @@ from .optimizer import (
 
 
 class SharedPriors(NamedTuple):
-    """Priors of the shape and of the logarithm of the focal length, which count once for all frames."""
+    """Priors of the shape and of the logarithm of the focal length, which count once for all
+    frames.
+    """
 
     shape_mean: Array  # (P,)
     shape_information: Array  # (P, P), over the shape's weight
     focal_weight: float
 
     def costs(self, weight: float, beta: Array, log_focal: float, focal: bool) -> dict[str, float]:
-        """Return the cost of each at beta (W,), with a weight of the shape's prior; `focal`: the length is unknown."""
+        """Return the cost of each at beta (W,), with a weight of the shape's prior; `focal`: the
+        length is unknown.
+        """
         offset = beta[: len(self.shape_mean)] - self.shape_mean
         shape = {"shape_prior": float(0.5 * weight * (offset @ self.shape_information @ offset))}
         return shape | {"focal_prior": 0.5 * self.focal_weight * log_focal**2} if focal else shape
 
-    def add(self, weight: float, beta: Array, log_focal: float, focal: bool, system: tuple[Array, Array]) -> None:
+    def add(
+        self, weight: float, beta: Array, log_focal: float, focal: bool, system: tuple[Array, Array]
+    ) -> None:
         """Add their Hessian and gradient to C (W, W) and c (W,) of `system`."""
         (C, c), P = system, len(self.shape_mean)
         C[:P, :P] += weight * self.shape_information
@@ -100,7 +108,9 @@ class SeveralFrames(ABC):
 
     @abstractmethod
     def _conclude(self, s: int, cost: float, accepted: bool) -> None:
-        """Make the trial point, whose cost this is, the current one if it was accepted, and else stay."""
+        """Make the trial point, whose cost this is, the current one if it was accepted, and else
+        stay.
+        """
 
     def _end(self) -> None:  # noqa: B027 - not all have something to do
         """Finish a stage that has begun."""

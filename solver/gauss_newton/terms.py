@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measurements of one frame as flat arrays: one slot a point, with all that was measured of it, by body part."""
+"""Measurements of one frame as flat arrays: one slot a point, with all that was measured of it, by
+body part.
+"""
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -19,8 +21,14 @@ if TYPE_CHECKING:
     from ..options import Priors
 
 HAS_SHAPE, HAS_2D, HAS_3D, HAS_DIRECTION = 1, 2, 4, 8
-# The least that a residual's whole numbers may be, by its INDEXES, and the array of `Tree` that has one row for each.
-_RANGES = {"points": (0, "point_part"), "parts": (0, "parents"), "joints": (1, "parents"), "indices": (0, None)}
+# The least that a residual's whole numbers may be, by its INDEXES, and the array of `Tree` that has
+# one row for each.
+_RANGES = {
+    "points": (0, "point_part"),
+    "parts": (0, "parents"),
+    "joints": (1, "parents"),
+    "indices": (0, None),
+}
 _UNLIMITED = np.iinfo(np.int64).max
 
 
@@ -45,7 +53,8 @@ class Terms(NamedTuple):
 def _common_part(tree: Tree, a: int, b: int) -> tuple[int, int, int]:
     """Return (part, start joint or -1, end joint or -1): a part that two points are both fixed to.
 
-    A joint belongs to its own part, as its origin, and to its parent, where it sits at S beta + l. -1 if none.
+    A joint belongs to its own part, as its origin, and to its parent, where it sits at S beta + l.
+    -1 if none.
     """
     M = tree.keypoints
     for p in range(2):
@@ -59,16 +68,18 @@ def _common_part(tree: Tree, a: int, b: int) -> tuple[int, int, int]:
 
 @allocating_kernel
 def _lay_out(tree: Tree, i2, i3, i_start, i_end) -> tuple[Any, ...]:  # type: ignore[no-untyped-def]
-    """Return (starts, shaped, rest, V, slots of 2D, of 3D, of directions, first direction without a common part or -1).
+    """Return (starts, shaped, rest, V, slots of 2D, of 3D, of directions, first direction without a
+    common part or -1).
 
-    Points with several kinds of measurement share one slot, unless one kind repeats. `shaped` is HAS_SHAPE where V is
-    not zero.
+    Points with several kinds of measurement share one slot, unless one kind repeats. `shaped` is
+    HAS_SHAPE where V is not zero.
     """
     n_points, W = tree.V.shape[0], tree.S.shape[2]
     n_parts = tree.parents.shape[0]
     counts = (i2.shape[0], i3.shape[0], i_end.shape[0])
     most = counts[0] + counts[1] + counts[2]
-    of_point = np.full(n_points + n_parts, -1, np.int64)  # after the points: joints as points of their parents
+    # after the points: joints as points of their parents
+    of_point = np.full(n_points + n_parts, -1, np.int64)
     part, listed = np.empty(most, np.int64), np.zeros(most, np.int64)
     point, minus = np.empty(most, np.int64), np.full(most, -1, np.int64)  # numbered as of_point
     slots = np.empty(most, np.int64)
@@ -84,7 +95,16 @@ def _lay_out(tree: Tree, i2, i3, i_start, i_end) -> tuple[Any, ...]:  # type: ig
                 i, first, last = _common_part(tree, i_start[k], end)
                 if i < 0:
                     empty = np.zeros(0, np.int64)
-                    return empty, empty, np.zeros((0, 3)), np.zeros((0, 3, W)), empty, empty, empty, k
+                    return (
+                        empty,
+                        empty,
+                        np.zeros((0, 3)),
+                        np.zeros((0, 3, W)),
+                        empty,
+                        empty,
+                        empty,
+                        k,
+                    )
             key = end if last < 0 else n_points + last
             from_origin = kind < 2 or (first < 0 and i_start[k] == tree.keypoints + i)
             slot = of_point[key] if from_origin else -1
@@ -115,9 +135,13 @@ def _lay_out(tree: Tree, i2, i3, i_start, i_end) -> tuple[Any, ...]:  # type: ig
             if key < 0:
                 continue
             for r in range(3):
-                rest[at, r] += sign * (tree.v_bar[key, r] if key < n_points else tree.l[key - n_points, r])
+                rest[at, r] += sign * (
+                    tree.v_bar[key, r] if key < n_points else tree.l[key - n_points, r]
+                )
                 for c in range(W):
-                    V[at, r, c] += sign * (tree.V[key, r, c] if key < n_points else tree.S[key - n_points, r, c])
+                    V[at, r, c] += sign * (
+                        tree.V[key, r, c] if key < n_points else tree.S[key - n_points, r, c]
+                    )
         for r in range(3):
             for c in range(W):
                 if V[at, r, c] != 0.0:
@@ -130,7 +154,9 @@ def _lay_out(tree: Tree, i2, i3, i_start, i_end) -> tuple[Any, ...]:  # type: ig
 
 @kernel
 def _usable(values, k: int) -> bool:  # type: ignore[no-untyped-def]
-    """Whether all of row k are numbers below `LARGEST` and its confidence, the last, is positive."""
+    """Whether all of row k are numbers below `LARGEST` and its confidence, the last, is
+    positive.
+    """
     last = values.shape[1] - 1
     for r in range(last + 1):
         if not abs(values[k, r]) < LARGEST:
@@ -184,12 +210,15 @@ def _same(a, b) -> bool:  # type: ignore[no-untyped-def]
 
 
 class Layout:
-    """Which slot every measurement goes to: the part of `Terms` that stays while the same points are measured."""
+    """Which slot every measurement goes to: the part of `Terms` that stays while the same points
+    are measured.
+    """
 
     def __init__(self, tree: Tree, indices: tuple[Array, ...]) -> None:
         """Lay out the slots.
 
-        :param indices: four arrays (n,): indices of 2D and of 3D keypoints, starts and ends of directions.
+        :param indices: four arrays (n,): indices of 2D and of 3D keypoints, starts and ends of
+            directions.
         :raises ShapeError: the two ends of a direction are not fixed to one part.
         """
         self.indices = tuple(index.copy() for index in indices)
@@ -197,7 +226,8 @@ class Layout:
         self.slots = tuple(slots)
         if bad >= 0:
             raise ShapeError(
-                f"Orientation {bad} goes from point {indices[2][bad]} to point {indices[3][bad]}, which no body part "
+                f"Orientation {bad} goes from point {indices[2][bad]} to point {indices[3][bad]}, "
+                "which no body part "
                 f"has in common; both ends must be fixed to one part."
             )
         n = len(self.rest)
@@ -236,7 +266,9 @@ def _padded(a: Array, shape: tuple[int, ...]) -> Array:
 
 
 def _checked_table(tree: Tree, name: str, table: tuple[Array, Array]) -> tuple[Array, Array]:
-    """Return the rows of a registered residual, or raise ShapeError where kernels would read beyond the arrays."""
+    """Return the rows of a registered residual, or raise ShapeError where kernels would read beyond
+    the arrays.
+    """
     module = registered(name)
     ints, floats = as_table(table, module.INTS, module.FLOATS, name)
     counted = getattr(module, "INDEXES", "indices")
@@ -244,7 +276,10 @@ def _checked_table(tree: Tree, name: str, table: tuple[Array, Array]) -> tuple[A
     limit = _UNLIMITED if of_what is None else len(getattr(tree, of_what))
     if not all_within(ints.ravel(), least, limit):
         wanted = "not be negative" if of_what is None else f"lie in {least}..{limit - 1}"
-        raise ShapeError(f"{counted.capitalize()} of {name!r} must {wanted}, but go from {ints.min()} to {ints.max()}.")
+        raise ShapeError(
+            f"{counted.capitalize()} of {name!r} must {wanted}, but go from "
+            f"{ints.min()} to {ints.max()}."
+        )
     return ints, floats
 
 
@@ -284,7 +319,10 @@ def fill_terms(
         for name, table in m.tables.items():
             more = _checked_table(tree, name, table)
             if name in RESIDUALS:
-                tables[name] = np.concatenate([tables[name][0], more[0]]), np.concatenate([tables[name][1], more[1]])
+                tables[name] = (
+                    np.concatenate([tables[name][0], more[0]]),
+                    np.concatenate([tables[name][1], more[1]]),
+                )
             else:
                 outside.append((registered(name), *more))
         external = pack_external(outside, FIRST_EXTERNAL) if outside else NONE

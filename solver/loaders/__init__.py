@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Body files that users bring themselves: SMPL (.npz, .pkl), SMPL+H, SMPL-X and STAR, all treated as hostile input.
+"""Body files that users bring themselves: SMPL (.npz, .pkl), SMPL+H, SMPL-X and STAR, all treated
+as hostile input.
 
 body_file.py          load_body(which) -> Body: the built-in ones, our own format, users' models
 arrays.py             what a body file's arrays must hold

@@ -25,7 +25,14 @@ from .regular_file import in_one_line
 LARGEST_ARRAY = 1 << 28  # bytes unpacked; SMPL-X's 400 shape directions in float64 have 100 million
 
 # What zipfile, zlib and numpy raise on damaged or hostile files.
-UNREADABLE: tuple[type[Exception], ...] = (OSError, EOFError, LookupError, ValueError, TypeError, ArithmeticError)
+UNREADABLE: tuple[type[Exception], ...] = (
+    OSError,
+    EOFError,
+    LookupError,
+    ValueError,
+    TypeError,
+    ArithmeticError,
+)
 UNREADABLE += (RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error, struct.error)
 UNREADABLE += (SyntaxError, tokenize.TokenError)  # a header that is no Python literal
 _HEADER_READERS: dict[tuple[int, int], Any] = {
@@ -45,7 +52,9 @@ def npz_keys(path: Path) -> set[str]:
         return set()
 
 
-def read_members(path: Path, wanted: Collection[str], shape_of: str) -> tuple[dict[str, NDArray[Any]], tuple[int, ...]]:
+def read_members(
+    path: Path, wanted: Collection[str], shape_of: str
+) -> tuple[dict[str, NDArray[Any]], tuple[int, ...]]:
     """Read the arrays of a .npz file that are wanted and present.
 
     :param shape_of: an array of which only the shape is returned, () when absent.
@@ -60,7 +69,9 @@ def read_members(path: Path, wanted: Collection[str], shape_of: str) -> tuple[di
                 if key not in wanted and key != shape_of:
                     continue
                 if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-                    raise ModelFileError(f"{key} is compressed in a way that numpy does not use; save it with numpy")
+                    raise ModelFileError(
+                        f"{key} is compressed in a way that numpy does not use; save it with numpy"
+                    )
                 if key in wanted:
                     with archive.open(entry) as file:
                         arrays[key] = _read_array(file, entry.file_size, key)
@@ -70,14 +81,18 @@ def read_members(path: Path, wanted: Collection[str], shape_of: str) -> tuple[di
     except ModelFileError as cause:
         raise ModelFileError(f"{path} cannot be used as a body: {cause}") from None
     except UNREADABLE as cause:
-        raise ModelFileError(f"{path} is not a readable body file ({in_one_line(cause)}); download it again") from cause
+        raise ModelFileError(
+            f"{path} is not a readable body file ({in_one_line(cause)}); download it again"
+        ) from cause
     return arrays, shape
 
 
 def _read_header(file: IO[bytes], key: str) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
     version = np.lib.format.read_magic(file)  # type: ignore[no-untyped-call]
     if version not in _HEADER_READERS:
-        raise ModelFileError(f"{key} is stored in version {version} of numpy's format; save it with a current numpy")
+        raise ModelFileError(
+            f"{key} is stored in version {version} of numpy's format; save it with a current numpy"
+        )
     header: tuple[tuple[int, ...], bool, np.dtype[Any]] = _HEADER_READERS[version](file)
     return header
 
@@ -85,11 +100,19 @@ def _read_header(file: IO[bytes], key: str) -> tuple[tuple[int, ...], bool, np.d
 def _read_array(file: IO[bytes], size: int, key: str) -> NDArray[Any]:
     shape, fortran, dtype = _read_header(file, key)
     if dtype.hasobject:
-        raise ModelFileError(f"{key} is stored as a Python object; use the publisher's own .npz or .pkl file")
+        raise ModelFileError(
+            f"{key} is stored as a Python object; use the publisher's own .npz or .pkl file"
+        )
     count = math.prod(shape) * dtype.itemsize
     if any(n < 0 for n in shape) or count > min(size, LARGEST_ARRAY):
-        raise ModelFileError(f"{key} claims shape {shape}, more than a body needs or the file holds; choose another")
+        raise ModelFileError(
+            f"{key} claims shape {shape}, more than a body needs or the file holds; choose another"
+        )
     raw = file.read(count)
     if len(raw) != count:
         raise ModelFileError(f"{key} ends too early; download it again")
-    return np.frombuffer(raw, dtype).reshape(shape, order="F" if fortran else "C") if count else np.zeros(shape, dtype)
+    return (
+        np.frombuffer(raw, dtype).reshape(shape, order="F" if fortran else "C")
+        if count
+        else np.zeros(shape, dtype)
+    )

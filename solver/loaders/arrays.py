@@ -45,7 +45,8 @@ OPTIONAL: dict[str, Form] = {
 
 
 def check_arrays(arrays: Mapping[str, NDArray[Any]], forms: Mapping[str, Form], path: Path) -> None:
-    """Check what the arrays of a file hold, and their shapes; arrays that are not in the file are not checked.
+    """Check what the arrays of a file hold, and their shapes; arrays that are not in the file are
+    not checked.
 
     :param arrays: by name, of the shapes in `forms`: (None, 3) is any number of rows of three.
     :raises ModelFileError: an array of another kind or shape.
@@ -57,7 +58,9 @@ def check_arrays(arrays: Mapping[str, NDArray[Any]], forms: Mapping[str, Form], 
         no_names = kind == "text" and array.size == 0  # which numpy writes as numbers
         if array.dtype.kind not in _KINDS[kind] and not no_names:
             raise ModelFileError(f"{path}: {key} must hold {kind}, but holds {array.dtype}")
-        if array.ndim != len(shape) or any(b not in (None, a) for a, b in zip(array.shape, shape, strict=True)):
+        if array.ndim != len(shape) or any(
+            b not in (None, a) for a, b in zip(array.shape, shape, strict=True)
+        ):
             wanted = ", ".join("any" if b is None else str(b) for b in shape)
             raise ModelFileError(f"{path}: {key} must have shape ({wanted}), but has {array.shape}")
 
@@ -70,7 +73,9 @@ def check_body(body: Body, path: Path) -> None:
     n, p, v, m = len(body.parents), body.P, len(body.v_template), len(body.keypoint_names)
     materials = max(1, len(body.material_names))
     if body.faces.shape[1] not in (3, 4):
-        raise ModelFileError(f"{path}: faces must be triangles or quads, but have {body.faces.shape[1]} corners")
+        raise ModelFileError(
+            f"{path}: faces must be triangles or quads, but have {body.faces.shape[1]} corners"
+        )
     expected = {
         "J_template": (n, 3),
         "J_shapedirs": (n, 3, p),
@@ -91,8 +96,15 @@ def check_body(body: Body, path: Path) -> None:
             raise ModelFileError(f"{path}: {key} must have shape {shape}, but has {array.shape}")
     if len(body.joint_names) != n:
         raise ModelFileError(f"{path}: {len(body.joint_names)} joint names for {n} joints")
-    if n == 0 or body.parents[0] != -1 or (body.parents[1:] < 0).any() or (body.parents[1:] >= np.arange(1, n)).any():
-        raise ModelFileError(f"{path}: kintree_table must list each joint after its parent, the root first")
+    if (
+        n == 0
+        or body.parents[0] != -1
+        or (body.parents[1:] < 0).any()
+        or (body.parents[1:] >= np.arange(1, n)).any()
+    ):
+        raise ModelFileError(
+            f"{path}: kintree_table must list each joint after its parent, the root first"
+        )
     _check_indices(body, path)
     for key in (key for key, (kind, _) in (REQUIRED | OPTIONAL).items() if kind == "numbers"):
         array = getattr(body, key)
@@ -121,15 +133,18 @@ def check_finite_array(key: str, array: NDArray[Any], path: Path) -> None:
 
 
 def check_extent(v_template: NDArray[np.float64], path: Path) -> None:
-    """Refuse a template (V, 3), metres, that is flat, or of another unit: no fit of it means anything.
+    """Refuse a template (V, 3), metres, that is flat, or of another unit: no fit of it means
+    anything.
 
-    :raises ModelFileError: it measures less or more along an axis than any body, or has no vertices.
+    :raises ModelFileError: it measures less or more along an axis than any body, or has no
+        vertices.
     """
     extent = np.ptp(v_template, axis=0) if len(v_template) else np.zeros(3)
     if not (extent.min() >= _MIN_EXTENT_M and extent.max() <= _MAX_EXTENT_M):
         size = " × ".join(f"{side:.3g}" for side in extent)
         raise ModelFileError(
-            f"{path}: v_template measures {size} m, which no body does; choose a file whose unit is the metre"
+            f"{path}: v_template measures {size} m, which no body does; choose a file whose unit "
+            "is the metre"
         )
 
 

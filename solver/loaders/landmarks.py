@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Nose, eyes, ears, heels, toes and fingertips of a skinned T-posed mesh.
 
-A *point* is an array (3, 1 + P): a rest position in the model frame and its derivative by each shape coefficient.
-Vertices and joints are points, and so is any fixed linear combination of them: exactly linear in the shape.
+A *point* is an array (3, 1 + P): a rest position in the model frame and its derivative by each
+shape coefficient. Vertices and joints are points, and so is any fixed linear combination of them:
+exactly linear in the shape.
 
-The vertex numbers are known for the published templates (``LANDMARK_VERTICES``). For any other mesh they are searched
-in the mean rest pose (y up, +x the person's left, facing +z), part by part, where a part's vertices are those whose
-largest skin weight is its own. The proportions below were taken from the default body.
+The vertex numbers are known for the published templates (``LANDMARK_VERTICES``). For any other mesh
+they are searched in the mean rest pose (y up, +x the person's left, facing +z), part by part, where
+a part's vertices are those whose largest skin weight is its own. The proportions below were taken
+from the default body.
 """
 
 from __future__ import annotations
@@ -18,7 +20,14 @@ from ..body import Body
 from .skeletons import LANDMARK_VERTICES, recognise_skeleton
 
 FINGERS = ("thumb", "index", "middle", "ring", "pinky")
-LANDMARKS = ("nose", *(f"{s}_{n}" for s in ("left", "right") for n in ("eye", "ear", "big_toe", "small_toe", "heel")))
+LANDMARKS = (
+    "nose",
+    *(
+        f"{s}_{n}"
+        for s in ("left", "right")
+        for n in ("eye", "ear", "big_toe", "small_toe", "heel")
+    ),
+)
 
 # Left fingertips from the wrist, in units of wrist to middle fingertip: along the arm, up, forward.
 _TIP_OFFSETS = {
@@ -38,12 +47,18 @@ class RestPoints:
         self.body = body
         self.joint_index = {name: i for i, name in enumerate(body.joint_names)}
         self._main_joint = body.skin_joints[:, 0]
-        known = LANDMARK_VERTICES.get(len(body.v_template)) if recognise_skeleton(body.parents) else None
+        known = (
+            LANDMARK_VERTICES.get(len(body.v_template))
+            if recognise_skeleton(body.parents)
+            else None
+        )
         self._vertices = dict(known) if known else self._search()
 
     def vertex(self, index: int) -> NDArray[np.float64]:
         """(3, 1 + P) one vertex."""
-        return np.concatenate([self.body.v_template[index][:, None], self.body.shapedirs[index]], axis=1)
+        return np.concatenate(
+            [self.body.v_template[index][:, None], self.body.shapedirs[index]], axis=1
+        )
 
     def joint(self, name: str) -> NDArray[np.float64]:
         """(3, 1 + P) one joint."""
@@ -55,7 +70,9 @@ class RestPoints:
         return self.vertex(self._vertices[name])
 
     def fingertip(self, side: str, finger: str) -> NDArray[np.float64]:
-        """(3, 1 + P) a fingertip: a known vertex, else beyond the last joint, else by the hand's proportions."""
+        """(3, 1 + P) a fingertip: a known vertex, else beyond the last joint, else by the hand's
+        proportions.
+        """
         known = self._vertices.get(f"{side}_{finger}_tip")
         if known is not None:
             return self.vertex(known)
@@ -67,13 +84,16 @@ class RestPoints:
         length = abs(reach[0, 0] - wrist[0, 0])
         along, up, forward = _TIP_OFFSETS[finger]
         point = wrist + along * (reach - wrist)
-        point[:, 0] = wrist[:, 0] + length * np.array([sign * along, up, forward])  # reach may be any finger's tip
+        # reach may be any finger's tip
+        point[:, 0] = wrist[:, 0] + length * np.array([sign * along, up, forward])
         return point
 
     # searching
 
     def _part(self, *joints: str) -> NDArray[np.intp]:
-        """Vertices of some parts; when they have none, of the nearest ancestor that has, at last the whole mesh."""
+        """Vertices of some parts; when they have none, of the nearest ancestor that has, at last
+        the whole mesh.
+        """
         wanted = {self.joint_index[name] for name in joints if name in self.joint_index}
         while wanted:
             found = np.flatnonzero(np.isin(self._main_joint, list(wanted)))
@@ -91,10 +111,14 @@ class RestPoints:
         return {**self._search_head(), **self._search_foot("left"), **self._search_foot("right")}
 
     def _nearest(self, vertices: NDArray[np.intp], target: NDArray[np.float64]) -> int:
-        return int(vertices[np.argmin(np.sum((self.body.v_template[vertices] - target) ** 2, axis=1))])
+        return int(
+            vertices[np.argmin(np.sum((self.body.v_template[vertices] - target) ** 2, axis=1))]
+        )
 
     def _search_head(self) -> dict[str, int]:
-        """Nose: foremost near the midline. Ears: the sides, level with the nose. Eyes: by proportion from these."""
+        """Nose: foremost near the midline. Ears: the sides, level with the nose. Eyes: by
+        proportion from these.
+        """
         head = self._part("head", "jaw", "left_eye_smplhf", "right_eye_smplhf")
         v = self.body.v_template[head]
         middle = self.body.J_template[self.joint_index["head"], 0]
@@ -103,12 +127,17 @@ class RestPoints:
         nose = int(head[midline][np.argmax(v[midline, 2])])
         nose_at = self.body.v_template[nose]
         level = np.abs(v[:, 1] - nose_at[1]) <= max(0.5 * half, np.abs(v[:, 1] - nose_at[1]).min())
-        sides = {"left": v[level][np.argmax(v[level, 0])], "right": v[level][np.argmin(v[level, 0])]}
+        sides = {
+            "left": v[level][np.argmax(v[level, 0])],
+            "right": v[level][np.argmin(v[level, 0])],
+        }
         found = {"nose": nose}
         for side, rim_at in sides.items():
             ear_at = rim_at + 0.15 * (nose_at - rim_at)  # from the rim of the ear to its opening
             width, depth = ear_at[0] - middle, nose_at[2] - ear_at[2]
-            eye_at = np.array([middle + 0.42 * width, nose_at[1] + 0.5 * abs(width), nose_at[2] - 0.25 * depth])
+            eye_at = np.array(
+                [middle + 0.42 * width, nose_at[1] + 0.5 * abs(width), nose_at[2] - 0.25 * depth]
+            )
             same_side = head[(v[:, 0] >= middle) if side == "left" else (v[:, 0] <= middle)]
             same_side = same_side if same_side.size else head
             found[f"{side}_ear"] = self._nearest(same_side, ear_at)
@@ -116,7 +145,9 @@ class RestPoints:
         return found
 
     def _search_foot(self, side: str) -> dict[str, int]:
-        """Heel: hindmost of the sole. Toes: foremost of the inner half and of the outer eighth of the forefoot."""
+        """Heel: hindmost of the sole. Toes: foremost of the inner half and of the outer eighth of
+        the forefoot.
+        """
         sign = 1.0 if side == "left" else -1.0
         foot = self._part(f"{side}_ankle", f"{side}_foot")
         v = self.body.v_template[foot]
@@ -125,7 +156,8 @@ class RestPoints:
         t = self.body.v_template[toes]
         outward = sign * t[:, 0]
         across = (outward - outward.min()) / max(np.ptp(outward), 1e-9)
-        inner, outer = across <= 0.5, across >= min(0.88, across.max())  # a flat part has no outer side
+        # a flat part has no outer side
+        inner, outer = across <= 0.5, across >= min(0.88, across.max())
         return {
             f"{side}_heel": int(foot[sole][np.argmin(v[sole, 2])]),
             f"{side}_big_toe": int(toes[inner][np.argmax(t[inner, 2])]),

@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A user's SMPL, SMPL+H, SMPL-X or STAR file as a ``Body``.
 
-    J̄ = J_regressor v_template,   J_s = J_regressor shapedirs        so that J(β) stays exactly linear
-    weights: the four largest of each vertex, scaled to sum to one    official files have four at most
+    J̄ = J_regressor v_template,   J_s = J_regressor shapedirs
+    weights: the four largest of each vertex, scaled to sum to one
 
-Only the linear-blend-skinning part is used. The pose correctives (``posedirs``: from rotation matrices in SMPL, from
-quaternions and the second shape coefficient in STAR) are left out: they move the surface near bent joints, never
-the joints, so that a fitted motion is a motion of the full model. ``Body.license`` states this.
+J(β) stays exactly linear, and official files have four weights at most.
+
+Only the linear-blend-skinning part is used. The pose correctives (``posedirs``: from rotation
+matrices in SMPL, from quaternions and the second shape coefficient in STAR) are left out: they move
+the surface near bent joints, never the joints, so that a fitted motion is a motion of the full
+model. ``Body.license`` states this.
 """
 
 from __future__ import annotations
@@ -30,7 +33,8 @@ from .restricted_pickle import read_pickle
 from .skeletons import recognise_skeleton
 
 MAX_BETAS = 16  # as AMASS; SMPL-X and STAR files carry 300, most of them below a millimetre
-SMPLX_SHAPE, SMPLX_EXPRESSION = 300, 100  # how a full SMPL-X file divides shapedirs; older ones have 10 and 10
+# how a full SMPL-X file divides shapedirs; older ones have 10 and 10
+SMPLX_SHAPE, SMPLX_EXPRESSION = 300, 100
 MAX_VERTICES, MAX_JOINTS, MAX_WEIGHTS = 200_000, 500, 20_000_000  # SMPL-X: 10475, 55, 576125
 STAR_CORRECTIVES = 93  # 23 quaternions and one shape coefficient; SMPL has 207
 
@@ -42,45 +46,61 @@ _GENDERS = {"m": "male", "f": "female", "male": "male", "female": "female", "neu
 
 @dataclass(frozen=True)
 class Tables:
-    """What a model file holds, as arrays; ``correctives`` is the last extent of posedirs, 0 when absent."""
+    """What a model file holds, as arrays; ``correctives`` is the last extent of posedirs, 0 when
+    absent.
+    """
 
     arrays: dict[str, NDArray[Any]]
     correctives: int
 
 
 def is_user_model(path: Path) -> bool:
-    """Whether a file is one for ``load_model``: a pickle, or a .npz with a joint regressor. Cheap; reads no array."""
+    """Whether a file is one for ``load_model``: a pickle, or a .npz with a joint regressor. Cheap;
+    reads no array.
+    """
     return path.suffix.lower() in (".pkl", ".pickle") or "J_regressor" in npz_keys(path)
 
 
 def is_motion(path: Path) -> bool:
-    """Whether a .npz holds poses and no body, as AMASS's files and our own motions do. Cheap; reads no array."""
+    """Whether a .npz holds poses and no body, as AMASS's files and our own motions do. Cheap; reads
+    no array.
+    """
     keys = npz_keys(path)
     return {"poses", "trans"} <= keys and "v_template" not in keys
 
 
 def load_model(path: str | Path, max_betas: int = MAX_BETAS) -> Body:
-    """Load a user's SMPL, SMPL+H, SMPL-X or STAR file, .npz or .pkl. The file may be hostile; nothing in it is run.
+    """Load a user's SMPL, SMPL+H, SMPL-X or STAR file, .npz or .pkl. The file may be hostile;
+    nothing in it is run.
 
-    Needs v_template (V, 3), weights (V, K+1), J_regressor (K+1, V), kintree_table (2, K+1) with par(i) < i and
-    f (F, 3); takes shapedirs (V, 3, P'), gender and joint_names when present. Metres, y up, facing +z.
+    Needs v_template (V, 3), weights (V, K+1), J_regressor (K+1, V), kintree_table (2, K+1) with
+    par(i) < i and f (F, 3); takes shapedirs (V, 3, P'), gender and joint_names when present.
+    Metres, y up, facing +z.
 
     :param max_betas: the most shape coefficients to keep, 0 to 300; the leading ones are kept.
-    :return: a ``Body`` named smpl, smplh, smplx, star, or after the file when the tree is none of these.
-    :raises ModelFileError: missing, unreadable, not a body, contradicts itself, or asks for more than arrays.
+    :return: a ``Body`` named smpl, smplh, smplx, star, or after the file when the tree is none of
+        these.
+    :raises ModelFileError: missing, unreadable, not a body, contradicts itself, or asks for more
+        than arrays.
     """
     path = Path(path)
     if not path.is_file():
-        raise ModelFileError(f"{path} does not exist; choose an SMPL, SMPL+H, SMPL-X or STAR file (.npz or .pkl)")
+        raise ModelFileError(
+            f"{path} does not exist; choose an SMPL, SMPL+H, SMPL-X or STAR file (.npz or .pkl)"
+        )
     if not 0 <= max_betas <= SMPLX_SHAPE:
         raise ModelFileError(f"max_betas must lie in 0..{SMPLX_SHAPE}, but is {max_betas}")
     tables = _read_tables(path)
     try:
         body = _make_body(tables, path, max_betas)
     except MemoryError as cause:
-        raise ModelFileError(f"{path} is too large for this computer's memory; choose a smaller body file") from cause
+        raise ModelFileError(
+            f"{path} is too large for this computer's memory; choose a smaller body file"
+        ) from cause
     check_body(body, path)
-    return replace(body, gender=read_gender(tables.arrays.get("gender"), path), file=str(path.resolve()))
+    return replace(
+        body, gender=read_gender(tables.arrays.get("gender"), path), file=str(path.resolve())
+    )
 
 
 def _read_tables(path: Path) -> Tables:
@@ -94,11 +114,14 @@ def _read_tables(path: Path) -> Tables:
             if isinstance(content.get("gender"), str | bytes):
                 arrays["gender"] = to_array(content["gender"])
         except (ModelFileError, ValueError, TypeError, IndexError, OverflowError) as cause:
-            raise ModelFileError(f"{path} cannot be used as a body: {cause}; get it from its publisher again") from None
+            raise ModelFileError(
+                f"{path} cannot be used as a body: {cause}; get it from its publisher again"
+            ) from None
     missing = [key for key in _REQUIRED if key not in arrays]
     if missing:
         raise ModelFileError(
-            f"{path} lacks {', '.join(missing)}: it is not an SMPL, SMPL+H, SMPL-X or STAR body; choose another file"
+            f"{path} lacks {', '.join(missing)}: it is not an SMPL, SMPL+H, SMPL-X or STAR body; "
+            "choose another file"
         )
     _check_tables(arrays, path)
     return Tables(arrays, posedirs[-1] if posedirs else 0)
@@ -106,14 +129,21 @@ def _read_tables(path: Path) -> Tables:
 
 def _check_tables(arrays: dict[str, NDArray[Any]], path: Path) -> None:
     """Check types and shapes."""
-    check_arrays(arrays, {"kintree_table": ("whole numbers", (2, None)), "v_template": ("numbers", (None, 3))}, path)
+    check_arrays(
+        arrays,
+        {"kintree_table": ("whole numbers", (2, None)), "v_template": ("numbers", (None, 3))},
+        path,
+    )
     vertices, n = len(arrays["v_template"]), arrays["kintree_table"].shape[1]
     if 0 in (vertices, n):
         raise ModelFileError(
-            f"{path}: {vertices} vertices and {n} joints do not match any supported body; choose another file"
+            f"{path}: {vertices} vertices and {n} joints do not match any supported body; choose "
+            "another file"
         )
     if vertices > MAX_VERTICES or n > MAX_JOINTS or vertices * n > MAX_WEIGHTS:
-        raise ModelFileError(f"{path}: {vertices} vertices and {n} joints are too many for a body; choose another")
+        raise ModelFileError(
+            f"{path}: {vertices} vertices and {n} joints are too many for a body; choose another"
+        )
     forms: dict[str, Form] = {
         "weights": ("numbers", (vertices, n)),
         "J_regressor": ("numbers", (n, vertices)),
@@ -134,13 +164,19 @@ def _make_body(tables: Tables, path: Path, max_betas: int) -> Body:
     shapedirs = _shapedirs(arrays.get("shapedirs"), len(v_template), name, max_betas)
     regressor = arrays["J_regressor"].astype(np.float64)
     skin_joints, skin_weights = reduce_weights(arrays["weights"], path)
-    for key, array in (("J_regressor", regressor), ("v_template", v_template), ("shapedirs", shapedirs)):
+    for key, array in (
+        ("J_regressor", regressor),
+        ("v_template", v_template),
+        ("shapedirs", shapedirs),
+    ):
         if not np.isfinite(array).all():
             raise ModelFileError(f"{path}: {key} contains NaN or infinity; download it again")
     check_extent(v_template, path)
     body = Body(
         name=name,
-        joint_names=skeleton.joint_names if skeleton else _joint_names(arrays.get("joint_names"), len(parents)),
+        joint_names=skeleton.joint_names
+        if skeleton
+        else _joint_names(arrays.get("joint_names"), len(parents)),
         parents=parents,
         J_template=regressor @ v_template,
         J_shapedirs=np.tensordot(regressor, shapedirs, axes=1),
@@ -155,18 +191,26 @@ def _make_body(tables: Tables, path: Path, max_betas: int) -> Body:
 
 
 def _parents(kintree: NDArray[np.integer[Any]], path: Path) -> NDArray[np.int32]:
-    """Return the parents (K+1,). Row 1 names the joints, row 0 the parents; the root's is 2³² − 1, −1 or itself."""
+    """Return the parents (K+1,). Row 1 names the joints, row 0 the parents; the root's is 2³² − 1,
+    −1 or itself.
+    """
     columns = {int(name): column for column, name in enumerate(kintree[1])}
     if len(columns) != kintree.shape[1]:
         raise ModelFileError(f"{path}: kintree_table names a joint twice; download it again")
     parents = np.array([-1, *(columns.get(int(name), -1) for name in kintree[0, 1:])], np.int32)
     if (parents[1:] < 0).any() or (parents[1:] >= np.arange(1, len(parents))).any():
-        raise ModelFileError(f"{path}: kintree_table must list each joint after its parent, the root first")
+        raise ModelFileError(
+            f"{path}: kintree_table must list each joint after its parent, the root first"
+        )
     return parents
 
 
-def _shapedirs(shapedirs: NDArray[Any] | None, vertices: int, name: str, max_betas: int) -> NDArray[np.float64]:
-    """Return the leading shape directions (V, 3, P), without the facial expressions that SMPL-X stores after them."""
+def _shapedirs(
+    shapedirs: NDArray[Any] | None, vertices: int, name: str, max_betas: int
+) -> NDArray[np.float64]:
+    """Return the leading shape directions (V, 3, P), without the facial expressions that SMPL-X
+    stores after them.
+    """
     if shapedirs is None:
         return np.zeros((vertices, 3, 0))
     count = shapedirs.shape[2]
@@ -175,11 +219,15 @@ def _shapedirs(shapedirs: NDArray[Any] | None, vertices: int, name: str, max_bet
     return shapedirs[:, :, : min(count, max_betas)].astype(np.float64)
 
 
-def reduce_weights(weights: NDArray[Any], path: Path) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """Return the four largest skin weights of each vertex, scaled to sum to one; weights below zero count as zero.
+def reduce_weights(
+    weights: NDArray[Any], path: Path
+) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Return the four largest skin weights of each vertex, scaled to sum to one; weights below zero
+    count as zero.
 
     :param weights: (V, K+1).
-    :return: skin_joints (V, 4) int and skin_weights (V, 4); with fewer than four joints, the rest is joint 0 at zero.
+    :return: skin_joints (V, 4) int and skin_weights (V, 4); with fewer than four joints, the rest
+        is joint 0 at zero.
     :raises ModelFileError: a weight is not finite, or a vertex has none that is positive.
     """
     if not np.isfinite(weights).all():
@@ -203,13 +251,19 @@ def _faces(faces: NDArray[np.integer[Any]], vertices: int, path: Path) -> NDArra
 
 
 def _joint_names(names: NDArray[Any] | None, count: int) -> tuple[str, ...]:
-    if names is not None and names.shape == (count,) and names.dtype.kind == "U" and len(set(names.tolist())) == count:
+    if (
+        names is not None
+        and names.shape == (count,)
+        and names.dtype.kind == "U"
+        and len(set(names.tolist())) == count
+    ):
         return tuple(names.tolist())
     return tuple(f"joint_{i:02d}" for i in range(count))
 
 
 def read_gender(stored: NDArray[Any] | None, path: Path) -> str:
-    """Return male, female or neutral: as the file says, else as its name or its folder's says, else neutral.
+    """Return male, female or neutral: as the file says, else as its name or its folder's says, else
+    neutral.
 
     :param stored: () text, what the file holds as gender.
     """
@@ -227,6 +281,7 @@ def read_gender(stored: NDArray[Any] | None, path: Path) -> str:
 
 def _license(name: str, path: Path) -> str:
     return (
-        f"Read from the user's own file {path.name} ({name}): its publisher's licence holds for mesh and shape. "
+        f"Read from the user's own file {path.name} ({name}): its publisher's licence holds for "
+        "mesh and shape. "
         "Pose correctives are not used."
     )

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reading .npz files that may come from anyone: plain arrays only, bounded size, one kind of error."""
+"""Reading .npz files that may come from anyone: plain arrays only, bounded size, one kind of
+error.
+"""
 
 from __future__ import annotations
 
@@ -30,9 +32,12 @@ def read_npz(
 
     :param error: class raised for a missing, broken, oversized or pickled file.
     :param what: what the file should have been, for the message, e.g. ``motion file``.
-    :param content: the file's bytes if they are not on disk; ``path`` then only names them in messages.
-    :param wanted: the arrays to read, if they are present; the others may hold anything. All if None.
-    :raises InputError: as `error`, when the file cannot be read, would be too large or holds pickled objects.
+    :param content: the file's bytes if they are not on disk; ``path`` then only names them in
+        messages.
+    :param wanted: the arrays to read, if they are present; the others may hold anything. All if
+        None.
+    :raises InputError: as `error`, when the file cannot be read, would be too large or holds
+        pickled objects.
     """
     if content is None:
         check_regular(path, error, what, LARGEST_BYTES)
@@ -47,4 +52,6 @@ def read_npz(
     except FileNotFoundError as cause:
         raise error(f"{path} does not exist; choose an existing {what}") from cause
     except UNREADABLE as cause:
-        raise error(f"{path} is not a readable {what} ({in_one_line(cause)}); choose another file") from cause
+        raise error(
+            f"{path} is not a readable {what} ({in_one_line(cause)}); choose another file"
+        ) from cause

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Inert stand-ins for what a body pickle names, and the arrays that they stand for.
 
-Each allowed global has one stand-in below; the classes and functions that a file names are never imported. Neither
-scipy nor chumpy is needed.
+Each allowed global has one stand-in below; the classes and functions that a file names are never
+imported. Neither scipy nor chumpy is needed.
 """
 
 from __future__ import annotations
@@ -17,14 +17,17 @@ from numpy.typing import NDArray
 
 from ..errors import ModelFileError
 
-LARGEST_DENSE = 5_000_000  # elements of one sparse matrix made dense; SMPL-X's joint regressor has 0.6 million
+# elements of one sparse matrix made dense; SMPL-X's joint regressor has 0.6 million
+LARGEST_DENSE = 5_000_000
 DEEPEST = 8  # matrices and chumpy expressions within each other; real files have two
 
 _DTYPE = re.compile(r"([<>|=]?)(\?|[biufSU][1-9][0-9]{0,3})")
 
 
 class Global:
-    """A function that a pickle may call, and what happens then; nothing a pickle does changes it."""
+    """A function that a pickle may call, and what happens then; nothing a pickle does changes
+    it.
+    """
 
     __slots__ = ("_make",)
 
@@ -49,7 +52,9 @@ class Discarded:
 
 
 class PickledDtype:
-    """``numpy.dtype(text)`` for plain numbers and text; structures and Python objects are refused."""
+    """``numpy.dtype(text)`` for plain numbers and text; structures and Python objects are
+    refused.
+    """
 
     def __init__(self, text: object, *_: object) -> None:
         """Parse a type as numpy writes it, for instance "<f8".
@@ -59,12 +64,18 @@ class PickledDtype:
         text = text.decode("latin1") if isinstance(text, bytes) else text
         if not isinstance(text, str) or _DTYPE.fullmatch(text) is None:
             shown = repr(text[:40]) if isinstance(text, str) else type(text).__name__
-            raise ModelFileError(f"it holds an array of type {shown}; only numbers and text are read")
+            raise ModelFileError(
+                f"it holds an array of type {shown}; only numbers and text are read"
+            )
         self.dtype = np.dtype(text)
 
     def __setstate__(self, state: object) -> None:
         """State as numpy writes it: version, byte order, sub-array, field names, fields, …"""
-        if not isinstance(state, tuple) or len(state) < 5 or any(part is not None for part in state[2:5]):
+        if (
+            not isinstance(state, tuple)
+            or len(state) < 5
+            or any(part is not None for part in state[2:5])
+        ):
             raise ModelFileError("it holds a structured array type; only numbers and text are read")
         order = state[1].decode("latin1") if isinstance(state[1], bytes) else state[1]
         if order not in ("<", ">", "|", "="):
@@ -73,7 +84,9 @@ class PickledDtype:
 
 
 class PickledArray:
-    """A numpy array whose bytes lie in the file itself, so that it can never be larger than the file."""
+    """A numpy array whose bytes lie in the file itself, so that it can never be larger than the
+    file.
+    """
 
     array: NDArray[Any] | None = None
 
@@ -150,7 +163,9 @@ _GLOBALS: dict[str, Any] = {
 
 def stand_in(dotted: str) -> Any:
     """Return the stand-in of an allowed global, given by module and name; None for any other."""
-    return next((found for pattern, found in _GLOBALS.items() if re.fullmatch(pattern, dotted)), None)
+    return next(
+        (found for pattern, found in _GLOBALS.items() if re.fullmatch(pattern, dotted)), None
+    )
 
 
 def _from_bytes(raw: object, dtype: object, shape: object, is_fortran: bool) -> NDArray[Any]:
@@ -163,14 +178,20 @@ def _from_bytes(raw: object, dtype: object, shape: object, is_fortran: bool) -> 
         raise ModelFileError("it holds a numpy array with an impossible shape")
     expected = math.prod(shape) * dtype.dtype.itemsize
     if expected != len(raw):
-        raise ModelFileError(f"it holds an array of {len(raw)} bytes whose shape {shape} needs {expected}")
+        raise ModelFileError(
+            f"it holds an array of {len(raw)} bytes whose shape {shape} needs {expected}"
+        )
     if not raw:
         return np.zeros(shape, dtype.dtype)
     return np.frombuffer(raw, dtype.dtype).reshape(shape, order="F" if is_fortran else "C")
 
 
 def _is_shape(shape: object) -> TypeGuard[tuple[int, ...]]:
-    return isinstance(shape, tuple) and len(shape) <= 32 and all(type(n) is int and 0 <= n < 1 << 63 for n in shape)
+    return (
+        isinstance(shape, tuple)
+        and len(shape) <= 32
+        and all(type(n) is int and 0 <= n < 1 << 63 for n in shape)
+    )
 
 
 def to_array(value: object, depth: int = 0) -> NDArray[Any]:
@@ -188,8 +209,14 @@ def to_array(value: object, depth: int = 0) -> NDArray[Any]:
         kind, deeper = type(value).__name__, depth + 1
         if kind in _SPARSE:
             return _dense(kind, value.state, deeper)
-        return _selected(value.state, deeper) if kind == "Select" else to_array(value.state.get("x"), deeper)
-    raise ModelFileError(f"an array was expected, but a {type(value).__name__} was found, or an unfinished array")
+        return (
+            _selected(value.state, deeper)
+            if kind == "Select"
+            else to_array(value.state.get("x"), deeper)
+        )
+    raise ModelFileError(
+        f"an array was expected, but a {type(value).__name__} was found, or an unfinished array"
+    )
 
 
 def _selected(state: dict[str, Any], depth: int) -> NDArray[Any]:
@@ -207,7 +234,11 @@ def _selected(state: dict[str, Any], depth: int) -> NDArray[Any]:
 def _dense(kind: str, state: dict[str, Any], depth: int) -> NDArray[np.float64]:
     """Return a CSC, CSR or COO matrix (row, column) as a dense one; repeated entries add up."""
     shape = state.get("_shape", state.get("shape"))
-    if not isinstance(shape, tuple) or len(shape) != 2 or not all(isinstance(n, int | np.integer) for n in shape):
+    if (
+        not isinstance(shape, tuple)
+        or len(shape) != 2
+        or not all(isinstance(n, int | np.integer) for n in shape)
+    ):
         raise ModelFileError("it holds a sparse matrix without a shape")
     rows, columns = shape = tuple(int(n) for n in shape)
     if not _is_shape(shape) or max(shape) > LARGEST_DENSE or rows * columns > LARGEST_DENSE:
@@ -241,6 +272,10 @@ def _dense(kind: str, state: dict[str, Any], depth: int) -> NDArray[np.float64]:
 
 
 def _indices(index: NDArray[Any], size: int) -> NDArray[np.intp]:
-    if index.dtype.kind not in "iu" or index.ndim != 1 or (index.size and (index.min() < 0 or index.max() >= size)):
+    if (
+        index.dtype.kind not in "iu"
+        or index.ndim != 1
+        or (index.size and (index.min() < 0 or index.max() >= size))
+    ):
         raise ModelFileError(f"it holds indices outside 0..{size - 1}")
     return index.astype(np.intp)

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-r"""Acceleration over three frames, of joints relative to their parents and of the root in the world.
+r"""Acceleration over three frames, of joints relative to their parents and of the root in the
+world.
 
-    phi_f = log(Omega_{f-1}ᵀ Omega_f),    v_f = phi_f / h_f,    a_f = (v_f - v_{f-1}) / h,   h = (h_f + h_{f-1}) / 2
+    phi_f = log(Omega_{f-1}ᵀ Omega_f),    v_f = phi_f / h_f,    a_f = (v_f - v_{f-1}) / h,
+    h = (h_f + h_{f-1}) / 2
     cost  1/2 w h rho(|a_f|^2),   h_f the time from frame f-1 to f in seconds
 With Omega <- exp(b) Omega in the parent's axes, b = R_parᵀ u, and J^-1 the inverse left Jacobian,
     d phi_f = J^-1(phi_f) Omega_{f-1}ᵀ (b_f - b_{f-1})
-The root's rotation enters in the same way, b = w, and its position with v_f = (t_f - t_{f-1}) / h_f, dt = nu. What the
-angular velocity of the root is measured in does not matter: its derivative is the same in body axes, turned.
-Robust, so that hits and landings stay sharp.
+The root's rotation enters in the same way, b = w, and its position with v_f = (t_f - t_{f-1}) /
+h_f, dt = nu. What the angular velocity of the root is measured in does not matter: its derivative
+is the same in body axes, turned. Robust, so that hits and landings stay sharp.
 docs/solver_mathematics.md, "A whole clip", has the objective.
 """
 
@@ -56,7 +58,9 @@ def _turn(J, R) -> None:  # type: ignore[no-untyped-def]
 
 @kernel
 def _add(system, f, at, slot, a, J, weight) -> None:  # type: ignore[no-untyped-def]
-    """Add a residual a (3,) of frames f-2, f-1, f with Jacobians J (3 frames, 3, 3) by the unknowns from `at` on."""
+    """Add a residual a (3,) of frames f-2, f-1, f with Jacobians J (3 frames, 3, 3) by the unknowns
+    from `at` on.
+    """
     for p in range(3):
         to = f - 2 + p
         for r in range(3):
@@ -85,12 +89,16 @@ class Memory(NamedTuple):
 def make_memory(tree: Tree) -> Memory:
     """Return the memory for the parts of `tree` and the root's position."""
     rows = len(tree.parents) + 1
-    return Memory(np.zeros((2, rows, 3)), np.zeros((2, rows, 3, 3)), np.zeros(3), np.zeros((3, 3, 3)))
+    return Memory(
+        np.zeros((2, rows, 3)), np.zeros((2, rows, 3, 3)), np.zeros(3), np.zeros((3, 3, 3))
+    )
 
 
 @kernel
 def _velocities(tree, poses, h, table, f, v, M) -> None:  # type: ignore[no-untyped-def]
-    """Write the velocities v (K+2, 3) from frame f-1 to f and their derivatives M (K+2, 3, 3) by frame f."""
+    """Write the velocities v (K+2, 3) from frame f-1 to f and their derivatives M (K+2, 3, 3) by
+    frame f.
+    """
     parts = tree.parents.shape[0]
     for k in range(parts):
         if table[k, 0] > 0.0:

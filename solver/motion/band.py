@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-r"""Block-banded Cholesky over time, with an arrowhead of global columns: the exact step of a clip in O(T).
+r"""Block-banded Cholesky over time, with an arrowhead of global columns: the exact step of a clip
+in O(T).
 
-Frame f is coupled to f+1 and f+2 and to the global columns. Its rows of the front, once the frames before it have been
-eliminated, are factorized in place,
+Frame f is coupled to f+1 and f+2 and to the global columns. Its rows of the front, once the frames
+before it have been eliminated, are factorized in place,
     [S | E_1 | E_2 | g N] -> L^-1 [S | E_1 | E_2 | g N] = Z,   S = L Lᵀ
-and Z without its first block takes ZᵀZ from what follows. The clip is eliminated from both of its ends, each in a
-thread of its own, and the ends meet at two frames in the middle; what is left are the global columns.
+and Z without its first block takes ZᵀZ from what follows. The clip is eliminated from both of its
+ends, each in a thread of its own, and the ends meet at two frames in the middle; what is left are
+the global columns.
     d_f = -L^-ᵀ (q + E_1 d_{f+1} + E_2 d_{f+2} + N dg)   in opposite order
 The factorization from both ends of a banded matrix is known as the twisted one.
 """
@@ -30,7 +32,9 @@ class Factor(NamedTuple):
 
     Z: Array  # (T, n, 3 n + 4 + W)
     trails: (
-        Array  # (2, 2 n + 4 + W, 2 n + 4 + W): what is left of the two frames that follow, and of the global columns
+        # (2, 2 n + 4 + W, 2 n + 4 + W): what is left of the two frames that follow, and of the
+        # global columns
+        Array
     )
     d: Array  # (T, n)
     C: Array  # (W, W), the reduced system of the global columns, then its factor
@@ -43,21 +47,30 @@ def make_factor(system: ClipSystem) -> Factor:
     frames, n, q = system.N.shape
     W = len(system.c)
     trails = np.zeros((2, 2 * n + q, 2 * n + q))
-    return Factor(np.zeros((frames, n, 3 * n + q)), trails, np.zeros((frames, n)), np.zeros((W, W)), *np.zeros((2, W)))
+    return Factor(
+        np.zeros((frames, n, 3 * n + q)),
+        trails,
+        np.zeros((frames, n)),
+        np.zeros((W, W)),
+        *np.zeros((2, W)),
+    )
 
 
 @kernel
 def far_width(first: int, n: int) -> int:
-    """Return how many columns of E_2, a multiple of four, are not zero in the rows first..first+3 of L^-1 E_2.
+    """Return how many columns of E_2, a multiple of four, are not zero in the rows first..first+3
+    of L^-1 E_2.
 
-    Only the same unknown of two frames that are not neighbours is coupled, by 3 x 3 blocks, and L^-1 is triangular.
+    Only the same unknown of two frames that are not neighbours is coupled, by 3 x 3 blocks, and
+    L^-1 is triangular.
     """
     return min(n, (3 * ((first + 3) // 3) + 3 + 3) & ~3)
 
 
 @kernel
 def factorize_rows(Z, n: int, row: int, diagonal) -> None:  # type: ignore[no-untyped-def]
-    """Replace [S | E_1 | E_2 | rest], n rows of length `row`, by L^-1 times it: see `recursion.factorize`.
+    """Replace [S | E_1 | E_2 | rest], n rows of length `row`, by L^-1 times it: see
+    `recursion.factorize`.
 
     n is a multiple of four: four rows at a time take what the rows above them leave, in registers.
     """
@@ -84,7 +97,9 @@ def factorize_rows(Z, n: int, row: int, diagonal) -> None:  # type: ignore[no-un
 
 @kernel
 def _load(system, f, step, damping, root_scale, trail, Z) -> None:  # type: ignore[no-untyped-def]
-    """Write frame f's rows of the front: what the frames before have left of it, and its own blocks, damped."""
+    """Write frame f's rows of the front: what the frames before have left of it, and its own
+    blocks, damped.
+    """
     n, q = system.N.shape[1], system.N.shape[2]
     D, N = system.D[f], system.N[f]
     last = system.D.shape[0] - 1
@@ -107,14 +122,18 @@ def _load(system, f, step, damping, root_scale, trail, Z) -> None:  # type: igno
                 at = 3 if k == blocks.shape[0] - 1 else (0 if k == 0 else 3 + 3 * k)
                 for r in range(3):
                     for s in range(3):
-                        Z[at + r, hop * n + at + s] += blocks[k, r, s] if step < 0 else blocks[k, s, r]
+                        Z[at + r, hop * n + at + s] += (
+                            blocks[k, r, s] if step < 0 else blocks[k, s, r]
+                        )
     if 0 <= f + step <= last:
         _load_contacts(system.contacts, f, f + step, n, Z)
 
 
 @kernel
 def _load_contacts(contacts, f, other, n: int, Z) -> None:  # type: ignore[no-untyped-def]
-    """Add to frame f's rows of the front what standing points couple it by to its neighbour `other`."""
+    """Add to frame f's rows of the front what standing points couple it by to its neighbour
+    `other`.
+    """
     for k in range(contacts.counts.shape[0]):
         w = contacts.w[max(f, other), k]
         if w <= 0.0:
@@ -128,7 +147,9 @@ def _load_contacts(contacts, f, other, n: int, Z) -> None:  # type: ignore[no-un
 
 @kernel
 def _advance(trail, n: int, q: int) -> None:  # type: ignore[no-untyped-def]
-    """Move what is left by one frame: the second of the two becomes the first, and the next is still untouched."""
+    """Move what is left by one frame: the second of the two becomes the first, and the next is
+    still untouched.
+    """
     size = 2 * n + q
     for a in range(n):
         for b in range(a, n):
@@ -143,8 +164,8 @@ def _advance(trail, n: int, q: int) -> None:  # type: ignore[no-untyped-def]
 def eliminate_frames(system, first, count, step, damping, root_scale, trail, Z) -> None:  # type: ignore[no-untyped-def]
     """Eliminate `count` frames from `first` on, upwards or downwards by step 1 or -1.
 
-    `trail` (2 n + q, 2 n + q) is what the frames before have left of these two and of the global columns, and becomes
-    what is left of the two that follow.
+    `trail` (2 n + q, 2 n + q) is what the frames before have left of these two and of the global
+    columns, and becomes what is left of the two that follow.
     """
     n, q = system.N.shape[1], system.N.shape[2]
     size, row = 2 * n + q, 3 * n + q
@@ -158,7 +179,9 @@ def eliminate_frames(system, first, count, step, damping, root_scale, trail, Z) 
 
 @kernel
 def substitute_frames(Z, first, count, step, dg, d) -> None:  # type: ignore[no-untyped-def]
-    """Fill d of `count` frames, whose elimination ended at `first` and went by `step`, from the next two and dg."""
+    """Fill d of `count` frames, whose elimination ended at `first` and went by `step`, from the
+    next two and dg.
+    """
     n, row = Z.shape[1], Z.shape[2]
     W = dg.shape[0]
     for k in range(count):
@@ -179,7 +202,9 @@ def substitute_frames(Z, first, count, step, dg, d) -> None:  # type: ignore[no-
 
 @kernel
 def _join(front, back, n: int, q: int) -> None:  # type: ignore[no-untyped-def]
-    """Add what the elimination from the back has left, whose frames come in opposite order, to that from the front."""
+    """Add what the elimination from the back has left, whose frames come in opposite order, to that
+    from the front.
+    """
     for a in range(n):
         for b in range(a, n):
             front[a, b] += back[n + a, n + b]
@@ -195,12 +220,18 @@ def _join(front, back, n: int, q: int) -> None:  # type: ignore[no-untyped-def]
 
 
 def eliminate_clip(
-    system: ClipSystem, damping: float, root_scale: float, factor: Factor, pool: ThreadPoolExecutor | None = None
+    system: ClipSystem,
+    damping: float,
+    root_scale: float,
+    factor: Factor,
+    pool: ThreadPoolExecutor | None = None,
 ) -> None:
-    """Factorize the damped system and leave the reduced one of the global columns in factor.C, factor.c.
+    """Factorize the damped system and leave the reduced one of the global columns in factor.C,
+    factor.c.
 
-    Damping lambda is added to all unknowns of the poses as in a single frame, lambda s^2 to the root's position;
-    `root_scale` is s, radians per metre. With `pool`, a thread of it eliminates the second half.
+    Damping lambda is added to all unknowns of the poses as in a single frame, lambda s^2 to the
+    root's position; `root_scale` is s, radians per metre. With `pool`, a thread of it eliminates
+    the second half.
     """
     frames, n, q = system.N.shape
     front, back = factor.trails
@@ -209,8 +240,19 @@ def eliminate_clip(
     front[2 * n + GLOBALS :, 2 * n + GLOBALS :] = system.C
     front[2 * n, 2 * n + GLOBALS :] = system.c
     middle = _middle(frames)
-    half = (system, frames - 1, max(frames - 2 - middle, 0), -1, damping, root_scale, back, factor.Z)
-    run_both(pool, eliminate_frames, (system, 0, middle, 1, damping, root_scale, front, factor.Z), half)
+    half = (
+        system,
+        frames - 1,
+        max(frames - 2 - middle, 0),
+        -1,
+        damping,
+        root_scale,
+        back,
+        factor.Z,
+    )
+    run_both(
+        pool, eliminate_frames, (system, 0, middle, 1, damping, root_scale, front, factor.Z), half
+    )
     _join(front, back, n, q)
     end = middle + min(frames, 2)
     without_back = system._replace(D=system.D[:end], N=system.N[:end])
@@ -227,10 +269,11 @@ def solve_clip(
     factor: Factor,
     pool: ThreadPoolExecutor | None = None,
 ) -> float:
-    """Fill factor.d and factor.dg with the damped Gauss-Newton step and return the decrease it predicts.
+    """Fill factor.d and factor.dg with the damped Gauss-Newton step and return the decrease it
+    predicts.
 
-    For (H + Lambda) d = -g the decrease of 1/2 dᵀHd + gᵀd is -1/2 gᵀd + 1/2 dᵀ Lambda d; the global columns are not
-    damped.
+    For (H + Lambda) d = -g the decrease of 1/2 dᵀHd + gᵀd is -1/2 gᵀd + 1/2 dᵀ Lambda d; the global
+    columns are not damped.
     """
     eliminate_clip(system, damping, root_scale, factor, pool)
     factor.dg[:] = 0.0
@@ -246,7 +289,9 @@ def solve_clip(
     return float(0.5 * (damping * damped - moved))
 
 
-def run_both(pool: ThreadPoolExecutor | None, kernel: Any, front: tuple[Any, ...], back: tuple[Any, ...]) -> None:
+def run_both(
+    pool: ThreadPoolExecutor | None, kernel: Any, front: tuple[Any, ...], back: tuple[Any, ...]
+) -> None:
     """Run a kernel on both halves of a clip, the second in a thread of the pool if there is one."""
     waiting = None if pool is None else pool.submit(kernel, *back)
     kernel(*front)
@@ -265,5 +310,10 @@ def _substitute_middle(factor: Factor, middle: int, both: int) -> None:
     """Fill d of the last frames eliminated, whose front reaches no others."""
     for f in range(middle + both - 1, middle - 1, -1):
         substitute_frames(
-            factor.Z[middle : middle + both], f - middle, 1, 1, factor.dg, factor.d[middle : middle + both]
+            factor.Z[middle : middle + both],
+            f - middle,
+            1,
+            1,
+            factor.dg,
+            factor.d[middle : middle + both],
         )

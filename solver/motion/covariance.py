@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-r"""Marginal covariances of a clip's joints and of its global columns, by selected inversion of the factor.
+r"""Marginal covariances of a clip's joints and of its global columns, by selected inversion of the
+factor.
 
-Row i of a frame's factor, divided by its pivot, says how unknown i follows from those that are eliminated after it:
-the later ones of the frame, the two frames after it and the global columns. With R_ij the row, S the covariance of all
-these, and u_i the pivot,
-    S_ij = -sum over k > i of R_ik S_kj / u_i,     S_ii = 1/u_i^2 - sum over k > i of R_ik S_ki / u_i
-so the diagonal blocks follow in one pass in opposite order, with nothing wider than 3 n + W. A joint's position is
-linear in these unknowns: t_i = t_0 + sum over its parents, dt_i = J_i d_f + D_i dbeta.
-The scale is that of the weights, which are inverse variances.
-Source: the recursion for the entries of a sparse inverse by Takahashi, Fagan and Chin (1973).
+Row i of a frame's factor, divided by its pivot, says how unknown i follows from those that are
+eliminated after it: the later ones of the frame, the two frames after it and the global columns.
+With R_ij the row, S the covariance of all these, and u_i the pivot,
+    S_ij = -sum over k > i of R_ik S_kj / u_i,
+    S_ii = 1/u_i^2 - sum over k > i of R_ik S_ki / u_i
+so the diagonal blocks follow in one pass in opposite order, with nothing wider than 3 n + W. A
+joint's position is linear in these unknowns: t_i = t_0 + sum over its parents, dt_i = J_i d_f + D_i
+dbeta. The scale is that of the weights, which are inverse variances. Source: the recursion for the
+entries of a sparse inverse by Takahashi, Fagan and Chin (1973).
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -70,21 +72,41 @@ def joint_covariances(
     # seen from the back, the first of the two frames is the later one
     order = np.r_[:n, 2 * n : 3 * n, n : 2 * n, 3 * n : 3 * n + W]
     back.S[:] = front.S[np.ix_(order, order)]
-    half = (tree, poses, factor.Z, middle + 2, max(T - 2 - middle, 0), 1, back, out.joints, out.from_root)
-    run_both(pool, _select, (tree, poses, factor.Z, middle - 1, middle, -1, front, out.joints, out.from_root), half)
+    half = (
+        tree,
+        poses,
+        factor.Z,
+        middle + 2,
+        max(T - 2 - middle, 0),
+        1,
+        back,
+        out.joints,
+        out.from_root,
+    )
+    run_both(
+        pool,
+        _select,
+        (tree, poses, factor.Z, middle - 1, middle, -1, front, out.joints, out.from_root),
+        half,
+    )
     return out
 
 
 def _make_memory(n: int, W: int, parts: int) -> _Memory:
     size, columns = 3 * n + W, 3 + 3 * parts + W
     return _Memory(
-        np.zeros((size, size)), np.zeros((size, 4)), np.zeros((2, 3, columns)), np.zeros(columns, dtype=np.int64)
+        np.zeros((size, size)),
+        np.zeros((size, 4)),
+        np.zeros((2, 3, columns)),
+        np.zeros(columns, dtype=np.int64),
     )
 
 
 @kernel
 def _select(tree, poses, Z, first, count, step, memory, joints, from_root) -> None:  # type: ignore[no-untyped-def]
-    """Write the covariances of `count` frames from `first` on, by step 1 or -1, each eliminated before the last one."""
+    """Write the covariances of `count` frames from `first` on, by step 1 or -1, each eliminated
+    before the last one.
+    """
     n = Z.shape[1]
     for k in range(count):
         f = first + step * k
@@ -95,11 +117,13 @@ def _select(tree, poses, Z, first, count, step, memory, joints, from_root) -> No
 
 @kernel
 def _invert_frame(Z, n: int, S, X) -> None:  # type: ignore[no-untyped-def]
-    """Fill the rows and columns of S (3 n + W, 3 n + W) of a frame, from those of what was eliminated after it.
+    """Fill the rows and columns of S (3 n + W, 3 n + W) of a frame, from those of what was
+    eliminated after it.
 
-    Four rows at a time: first their sums over the columns after these four, in registers. X (3 n + W, 4) is
-    overwritten. An unknown without a pivot, of which Z holds the inverse 0, does not move. Of the second frame after
-    it, only the columns that the rows reach (`far_width`) are read, here and before, and so only they are filled.
+    Four rows at a time: first their sums over the columns after these four, in registers. X (3 n +
+    W, 4) is overwritten. An unknown without a pivot, of which Z holds the inverse 0, does not move.
+    Of the second frame after it, only the columns that the rows reach (`far_width`) are read, here
+    and before, and so only they are filled.
     """
     size, shared = S.shape[0], 3 * n
     for first in range(n - 4, -1, -4):
@@ -113,7 +137,9 @@ def _invert_frame(Z, n: int, S, X) -> None:  # type: ignore[no-untyped-def]
                 X[k, r] = Z[first + r, k]
             for k in range(shared, size):
                 X[k, r] = Z[first + r, k + GLOBALS]
-        subtract_gram_rows(S, at, size, X, after * 4, 4, S, after * size + after, size, width, width)
+        subtract_gram_rows(
+            S, at, size, X, after * 4, 4, S, after * size + after, size, width, width
+        )
         subtract_gram_rows(S, at, size, X, shared * 4, 4, S, shared * size + after, size, W, width)
         subtract_gram_rows(S, to, size, X, after * 4, 4, S, after * size + shared, size, width, W)
         subtract_gram_rows(S, to, size, X, shared * 4, 4, S, shared * size + shared, size, W, W)
@@ -170,7 +196,9 @@ def _advance(n: int, S) -> None:  # type: ignore[no-untyped-def]
 
 @kernel
 def _write_joints(tree, poses, f, memory, joints, from_root) -> None:  # type: ignore[no-untyped-def]
-    """Write the covariances (K+1, 3, 3) of the joints' positions, and relative to part 0, of frame f."""
+    """Write the covariances (K+1, 3, 3) of the joints' positions, and relative to part 0, of frame
+    f.
+    """
     n = (memory.S.shape[0] - tree.S.shape[2]) // 3
     J, columns = memory.J, memory.columns
     t, D = poses.t[f], poses.D[f]
@@ -201,7 +229,9 @@ def _write_joints(tree, poses, f, memory, joints, from_root) -> None:  # type: i
 
 @kernel
 def _project(S, J, columns, count: int, out) -> None:  # type: ignore[no-untyped-def]
-    """Write J S Jᵀ (3, 3) to out: rows and columns columns[:count] of S, J[0] (3, count). J[1] is overwritten."""
+    """Write J S Jᵀ (3, 3) to out: rows and columns columns[:count] of S, J[0] (3, count). J[1] is
+    overwritten.
+    """
     for b in range(count):
         x = y = z = 0.0
         for a in range(count):

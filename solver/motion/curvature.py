@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Gauss-Newton leaves out of the joints' Hessians, learned over a clip as gauss_newton/curvature.py does."""
+"""What Gauss-Newton leaves out of the joints' Hessians, learned over a clip as
+gauss_newton/curvature.py does.
+"""
 
 import numpy as np
 from numba.extending import register_jitable
@@ -36,12 +38,22 @@ def _update(tree, poses, d, trial, joints, accepted, curvature) -> None:  # type
     for f in range(d.shape[0]):
         u = d[f, 3 : 3 + 3 * parts].reshape(parts, 3)  # row 0 is the root's position
         blocks = _blocks_of(joints, f)
-        update(tree, pose_of(poses, f), u, pose_of(trial, f), blocks, accepted, _curvature_of(curvature, f))
+        update(
+            tree,
+            pose_of(poses, f),
+            u,
+            pose_of(trial, f),
+            blocks,
+            accepted,
+            _curvature_of(curvature, f),
+        )
 
 
 @kernel
 def _apply(tree, poses, curvature, share, added, system) -> None:  # type: ignore[no-untyped-def]
-    """Add share times what may be added of S to the diagonal blocks, instead of `added` (T, K+1, 6), their triangle."""
+    """Add share times what may be added of S to the diagonal blocks, instead of `added` (T, K+1,
+    6), their triangle.
+    """
     for f in range(added.shape[0]):
         D = system.D[f]
         for i in range(1, added.shape[1]):
@@ -70,16 +82,22 @@ class ClipCurvature:
         self._added = np.zeros((frames, parts, 6))
 
     def set_current(self, poses: Pose, joints: Blocks) -> None:
-        """Take over the joints' own Hessians and gradients at `poses`: blocks with a leading dimension of frames."""
+        """Take over the joints' own Hessians and gradients at `poses`: blocks with a leading
+        dimension of frames.
+        """
         if self._on:
             _set_current(self._tree, poses, joints, self._curvature, self._added)
 
     def update(self, poses: Pose, d: Array, trial: Pose, joints: Blocks, accepted: bool) -> None:
-        """Update by the step d (T, n) from the current poses to `trial`, which `joints` belong to."""
+        """Update by the step d (T, n) from the current poses to `trial`, which `joints` belong
+        to.
+        """
         if self._on:
             _update(self._tree, poses, d, trial, joints, accepted, self._curvature)
 
     def apply(self, poses: Pose, system: ClipSystem, wanted: bool = True) -> None:
-        """Add what may be added of S to the system of the current poses, or take away what was added."""
+        """Add what may be added of S to the system of the current poses, or take away what was
+        added.
+        """
         if self._on:
             _apply(self._tree, poses, self._curvature, float(wanted), self._added, system)

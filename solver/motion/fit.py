@@ -45,22 +45,28 @@ _FRAMES_FOR_TWO_THREADS = 16
 
 @dataclass
 class MotionFit:
-    """Result of a clip of T frames, in the axes of the world: the camera's, where no view says otherwise."""
+    """Result of a clip of T frames, in the axes of the world: the camera's, where no view says
+    otherwise.
+    """
 
     states: list[State]
     R_world_part: Array  # (T, K+1, 3, 3)
     t_world_part: Array  # (T, K+1, 3), the joints, metres
     beta: Array  # (P,)
     beta_information: Array  # (P, P), shape prior included; zeros for a shape that was given
-    focal_scale: float  # estimated focal length over that of the intrinsics; 1 if it was not estimated
+    # estimated focal length over that of the intrinsics; 1 if it was not estimated
+    focal_scale: float
     measurements: Array  # (T,) usable points, directions and rows of pose priors of each frame
     status: Status
     cost: float  # with windows, their sum: frames in two of them count twice
     iterations: int
     rejected: int
-    joint_covariance: Array | None = None  # (T, K+1, 3, 3) of the joints' positions, metres^2; with `covariance` only
-    covariance_from_root: Array | None = None  # (T, K+1, 3, 3) of their positions relative to the root; likewise
-    cost_by_term: dict[str, float] = field(default_factory=dict)  # what couples the frames, and the shared priors
+    # (T, K+1, 3, 3) of the joints' positions, metres^2; with `covariance` only
+    joint_covariance: Array | None = None
+    # (T, K+1, 3, 3) of their positions relative to the root; likewise
+    covariance_from_root: Array | None = None
+    # what couples the frames, and the shared priors
+    cost_by_term: dict[str, float] = field(default_factory=dict)
 
 
 def fit_motion(
@@ -82,27 +88,30 @@ def fit_motion(
 ) -> MotionFit:
     """Fit all poses of a clip and one shape at once.
 
-    minimize, over the poses of all frames, beta and with `focal` one focal length, the sum of every frame's terms, as
-    `fit` has them, and of 1/2 integral of w rho(|acceleration|^2) dt over joints and root, and of w p |v|^2 dt over
-    standing points. Frames before and after thus help where one has little to say, and a frame without measurements
-    is filled in.
+    minimize, over the poses of all frames, beta and with `focal` one focal length, the sum of every
+    frame's terms, as `fit` has them, and of 1/2 integral of w rho(|acceleration|^2) dt over joints
+    and root, and of w p |v|^2 dt over standing points. Frames before and after thus help where one
+    has little to say, and a frame without measurements is filled in.
 
     :param frames: of each frame its measurements, or one `View` for each camera that saw something.
-    :param times: (T,) seconds, increasing; they need not be evenly spaced. Whole numbers are probably frame
-        numbers, and give a `UnitsWarning`.
-    :param init: each frame's state in the world's axes; without it, the frames are first fitted in order, several
-        cameras by points triangulated from their 2D keypoints, or by one of them where their rays are too parallel.
+    :param times: (T,) seconds, increasing; they need not be evenly spaced. Whole numbers are
+        probably frame numbers, and give a `UnitsWarning`.
+    :param init: each frame's state in the world's axes; without it, the frames are first fitted in
+        order, several cameras by points triangulated from their 2D keypoints, or by one of them
+        where their rays are too parallel.
     :param priors: `default_priors(body)` unless given.
     :param options: the stages are those of a fit that starts from a state; `report` has no effect.
     :param motion: weights of acceleration and of standing points.
     :param stands: points that may stand still, with the probability that they do.
     :param shape: (P,) where it is known; it is then kept.
-    :param focal: whether to estimate one focal length for all cameras, as a scale of that of their intrinsics;
-        `focal_weight` is a prior on the scale's squared logarithm.
-    :param covariance: whether to return the covariance of every joint's position; it is that of the weights, and
-        conditional on the other windows' frames and, with several windows, on the shape.
-    :param window, overlap: seconds. A longer clip is optimized in windows that overlap, each kept up to the middle of
-        its overlaps, with the shape that all of them together determine: memory does not grow with the clip.
+    :param focal: whether to estimate one focal length for all cameras, as a scale of that of their
+        intrinsics; `focal_weight` is a prior on the scale's squared logarithm.
+    :param covariance: whether to return the covariance of every joint's position; it is that of the
+        weights, and conditional on the other windows' frames and, with several windows, on the
+        shape.
+    :param window, overlap: seconds. A longer clip is optimized in windows that overlap, each kept
+        up to the middle of its overlaps, with the shape that all of them together determine: memory
+        does not grow with the clip.
     :return: the poses and how they were reached.
     :raises ShapeError: there is no frame, or an array does not fit the body or the clip.
     :raises InvalidValueError: a value that no fit can use.
@@ -112,13 +121,18 @@ def fit_motion(
     if init is not None:
         check_states(init, len(frames))
     if not as_number(window, "window") > 0.0:
-        raise InvalidValueError(f"window must be a positive number of seconds, or infinite for one, but is {window}.")
+        raise InvalidValueError(
+            f"window must be a positive number of seconds, or infinite for one, but is {window}."
+        )
     if not 0.0 <= as_number(overlap, "overlap") < window:
-        raise InvalidValueError(f"The overlap of windows must lie in 0..{window} s, but is {overlap} s.")
+        raise InvalidValueError(
+            f"The overlap of windows must lie in 0..{window} s, but is {overlap} s."
+        )
     for f, frame in enumerate(frames):
         views_of(frame, f"frames[{f}]")
     check_type(motion, MotionPrior, "motion")
-    if _weighs_by_default(motion):  # weights of their own are given by those who know how far apart their frames are
+    # weights of their own are given by those who know how far apart their frames are
+    if _weighs_by_default(motion):
         warn_of_frame_numbers(clock)
     check_type(stands, (StandingPoints, type(None)), "stands")
     check_weight(focal_weight, "focal_weight")
@@ -133,13 +147,24 @@ def fit_motion(
         init = _first_states(tree, frames, shape, priors, options)
     many = len(frames) >= _FRAMES_FOR_TWO_THREADS and (os.cpu_count() or 1) > 1
     with ThreadPoolExecutor(2) if many else nullcontext() as pool:
-        terms = MotionTerms.make(tree, clock, motion, StandingPoints() if stands is None else stands)
-        clip = _Clip(tree, frames, terms, init, _Settings(priors, options, focal, focal_weight, covariance), pool)
+        terms = MotionTerms.make(
+            tree, clock, motion, StandingPoints() if stands is None else stands
+        )
+        clip = _Clip(
+            tree,
+            frames,
+            terms,
+            init,
+            _Settings(priors, options, focal, focal_weight, covariance),
+            pool,
+        )
         return clip.solve(make_tree(body, focal), shape, overlapping(clock, window, overlap))
 
 
 def _weighs_by_default(motion: MotionPrior) -> bool:
-    """Return whether the weights of the root's acceleration are the default ones, those of 60 frames per second."""
+    """Return whether the weights of the root's acceleration are the default ones, those of 60
+    frames per second.
+    """
     default = MotionPrior.root_rotation, MotionPrior.root_position
     return (motion.root_rotation, motion.root_position) == default
 
@@ -149,7 +174,9 @@ def _checked_times(times: ArrayLike, frames: int) -> Array:
         raise ShapeError("A motion needs at least one frame of measurements, but got none.")
     clock = as_array(times, (frames,), "times")
     if not np.isfinite(clock).all() or (np.diff(clock) <= 0.0).any():
-        raise InvalidValueError("The times of a motion's frames must be finite and increase from frame to frame.")
+        raise InvalidValueError(
+            "The times of a motion's frames must be finite and increase from frame to frame."
+        )
     return clock
 
 
@@ -157,7 +184,9 @@ def _checked_shape(shape: ArrayLike | None, tree: Tree, focal: bool) -> Array | 
     if shape is None:
         return None
     if focal:
-        raise InvalidValueError("The focal length can only be estimated together with the shape; leave `shape` out.")
+        raise InvalidValueError(
+            "The focal length can only be estimated together with the shape; leave `shape` out."
+        )
     known = as_array(shape, (tree.shape,), "shape")
     check_finite(known, "shape")
     return known
@@ -204,9 +233,19 @@ class _Clip:
         settings: _Settings,
         pool: ThreadPoolExecutor | None,
     ) -> None:
-        self.tree, self.frames, self.motion, self.settings, self.pool = tree, frames, motion, settings, pool
+        self.tree, self.frames, self.motion, self.settings, self.pool = (
+            tree,
+            frames,
+            motion,
+            settings,
+            pool,
+        )
         T, K, P = len(frames), len(tree.parents) - 1, tree.shape
-        self.R, self.t, self.Omega = np.empty((T, K + 1, 3, 3)), np.empty((T, K + 1, 3)), np.empty((T, K, 3, 3))
+        self.R, self.t, self.Omega = (
+            np.empty((T, K + 1, 3, 3)),
+            np.empty((T, K + 1, 3)),
+            np.empty((T, K, 3, 3)),
+        )
         for f, state in enumerate(init):
             self.R[f, 0] = as_array(state.R_camera_root, (3, 3), "R_camera_root")
             self.t[f, 0] = as_array(state.t_camera_root, (3,), "t_camera_root")
@@ -242,7 +281,9 @@ class _Clip:
         settings, P = self.settings, tree.shape
         priors = settings.priors if P else _without_shape(settings.priors)
         first, frames = window.frames.start, self.frames[window.frames]
-        views, self.counts[window.frames] = pack_frames(tree, frames, pack_priors(tree, priors), first)
+        views, self.counts[window.frames] = pack_frames(
+            tree, frames, pack_priors(tree, priors), first
+        )
         poses = make_poses(tree, len(frames))
         poses.R[:, 0], poses.t[:, 0] = self.R[window.frames, 0], self.t[window.frames, 0]
         poses.Omega[:, 1:] = self.Omega[window.frames]
@@ -257,7 +298,10 @@ class _Clip:
         if self.counts[window.frames].any():
             status = Status(optimizer.run())
             # the worst of the windows'
-            if self.status in (Status.NO_MEASUREMENTS, Status.CONVERGED) or status is Status.NON_FINITE:
+            if (
+                self.status in (Status.NO_MEASUREMENTS, Status.CONVERGED)
+                or status is Status.NON_FINITE
+            ):
                 self.status = status
         else:
             optimizer.cost = problem.linearize(-1, optimizer.poses, optimizer.system)
@@ -266,7 +310,9 @@ class _Clip:
         return optimizer
 
     def _find_shared(self, tree: Tree, parts: list[Window]) -> None:
-        """Set the shape, and the focal length, to what parts of the clip say together; keep the parts' poses."""
+        """Set the shape, and the focal length, to what parts of the clip say together; keep the
+        parts' poses.
+        """
         estimates, informations = [], []
         P, G = tree.shape, tree.globals
         for part in parts:
@@ -285,7 +331,9 @@ class _Clip:
         self.information = shape_information(self.information, P)
 
     def _keep_poses(self, poses: Pose, window: Window) -> None:
-        inner = slice(window.kept.start - window.frames.start, window.kept.stop - window.frames.start)
+        inner = slice(
+            window.kept.start - window.frames.start, window.kept.stop - window.frames.start
+        )
         self.R[window.kept], self.t[window.kept] = poses.R[inner], poses.t[inner]
         self.Omega[window.kept] = poses.Omega[inner, 1:]
 
@@ -301,14 +349,33 @@ class _Clip:
             self.information = shape_information(optimizer.information(), tree.shape)
         if self.covariances is not None:
             root_scale = optimizer.problem.settings.root_scale
-            found = joint_covariances(tree, optimizer.system, poses, root_scale, optimizer.factor, self.pool)
-            inner = slice(window.kept.start - window.frames.start, window.kept.stop - window.frames.start)
+            found = joint_covariances(
+                tree, optimizer.system, poses, root_scale, optimizer.factor, self.pool
+            )
+            inner = slice(
+                window.kept.start - window.frames.start, window.kept.stop - window.frames.start
+            )
             self.covariances[:, window.kept] = found.joints[inner], found.from_root[inner]
 
     def _result(self) -> MotionFit:
-        states = [State(self.R[f, 0], self.t[f, 0], self.Omega[f], self.beta) for f in range(len(self.frames))]
+        states = [
+            State(self.R[f, 0], self.t[f, 0], self.Omega[f], self.beta)
+            for f in range(len(self.frames))
+        ]
         joints, from_root = (None, None) if self.covariances is None else self.covariances
         return MotionFit(
-            states, self.R, self.t, self.beta, self.information, float(np.exp(self.log_focal)), self.counts,
-            self.status, float(self.cost), self.iterations, self.rejected, joints, from_root, self.costs,
-        )  # fmt: skip
+            states,
+            self.R,
+            self.t,
+            self.beta,
+            self.information,
+            float(np.exp(self.log_focal)),
+            self.counts,
+            self.status,
+            float(self.cost),
+            self.iterations,
+            self.rejected,
+            joints,
+            from_root,
+            self.costs,
+        )

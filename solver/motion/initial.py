@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a clip's optimization starts: frames fitted in order, what several cameras see triangulated first."""
+"""Where a clip's optimization starts: frames fitted in order, what several cameras see triangulated
+first.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,7 +16,8 @@ from ..options import Options, Priors
 from ..state import State
 from .views import View
 
-_MIN_CONDITION = 1e-4  # of a point's rays: smallest over largest eigenvalue, below which they are too nearly parallel
+# of a point's rays: smallest over largest eigenvalue, below which they are too nearly parallel
+_MIN_CONDITION = 1e-4
 _LEAST_SHARE = 1 / 3  # of one camera's points that must be triangulated, or that camera says more
 
 
@@ -25,17 +28,23 @@ def initial_states(
     views = [[View(frame)] if isinstance(frame, Measurements) else list(frame) for frame in frames]
     chosen = [_first_view(v, len(tree.point_part)) for v in views]
     cameras = [_camera_of(view) for view in chosen]
-    states = fit_in_order(tree, [view.measurements for view in chosen], priors, options, None, cameras)
+    states = fit_in_order(
+        tree, [view.measurements for view in chosen], priors, options, None, cameras
+    )
     return [replace(state, beta=states[-1].beta) for state in states]
 
 
 def _first_view(views: Sequence[View], points: int) -> View:
-    """Return what a frame is first fitted to: its triangulated points, or one camera's view where that says more."""
+    """Return what a frame is first fitted to: its triangulated points, or one camera's view where
+    that says more.
+    """
     if len(views) < 2:
         return views[0] if views else View(Measurements())
     fullest = max(views, key=lambda view: _points_of(view, points))  # of equal ones the first
     found = View(triangulated(views, points))
-    return found if _points_of(found, points) > _LEAST_SHARE * _points_of(fullest, points) else fullest
+    return (
+        found if _points_of(found, points) > _LEAST_SHARE * _points_of(fullest, points) else fullest
+    )
 
 
 def _points_of(view: View, points: int) -> int:
@@ -45,21 +54,27 @@ def _points_of(view: View, points: int) -> int:
 
 
 def _camera_of(view: View) -> Camera:
-    return np.asarray(view.R_camera_world, dtype=float), np.asarray(view.t_camera_world, dtype=float)
+    return np.asarray(view.R_camera_world, dtype=float), np.asarray(
+        view.t_camera_world, dtype=float
+    )
 
 
 def triangulated(views: Sequence[View], points: int) -> Measurements:
-    """Return the points of the world that rays of several cameras or 3D keypoints fix, numbered as in measurements.
+    """Return the points of the world that rays of several cameras or 3D keypoints fix, numbered as
+    in measurements.
 
-    A ray (u, v, 1) of a camera with R, t as in `View` says (R_0 - u R_2) p = u t_2 - t_0 and likewise for v; rows are
-    divided by the depth of a first solution, so that the second minimizes errors in the image. A 3D keypoint weighs as
-    much as one ray from a metre away.
+    A ray (u, v, 1) of a camera with R, t as in `View` says (R_0 - u R_2) p = u t_2 - t_0 and
+    likewise for v; rows are divided by the depth of a first solution, so that the second minimizes
+    errors in the image. A 3D keypoint weighs as much as one ray from a metre away.
     """
     p = np.full((points, 3), np.nan)
     for _ in range(2):
         A, b = np.zeros((points, 3, 3)), np.zeros((points, 3))
         for view in views:
-            R, t = np.asarray(view.R_camera_world, dtype=float), np.asarray(view.t_camera_world, dtype=float)
+            R, t = (
+                np.asarray(view.R_camera_world, dtype=float),
+                np.asarray(view.t_camera_world, dtype=float),
+            )
             indices, m = view.measurements.packed2d(points)
             usable = np.isfinite(m).all(axis=1) & (m[:, 2] > 0.0)
             indices, m = indices[usable], m[usable]
@@ -82,6 +97,8 @@ def triangulated(views: Sequence[View], points: int) -> Measurements:
 
 
 def _add_rows(A: Array, b: Array, indices: Array, row: Array, value: Array, weight: Array) -> None:
-    """Add the normal equations of row (n, 3) times p = value (n,) to those of the points with these indices."""
+    """Add the normal equations of row (n, 3) times p = value (n,) to those of the points with these
+    indices.
+    """
     np.add.at(A, indices, weight[:, None, None] * row[:, :, None] * row[:, None, :])
     np.add.at(b, indices, (weight * value)[:, None] * row)

@@ -29,7 +29,9 @@ class Optimizer(SeveralFrames):
     """Optimizes one clip; `poses`, `system` and `costs` are those of the best point so far."""
 
     def __init__(self, problem: ClipProblem, poses: Pose, pool: ThreadPoolExecutor | None) -> None:
-        """Allocate two systems, of which the trial point's becomes the current one when it is accepted."""
+        """Allocate two systems, of which the trial point's becomes the current one when it is
+        accepted.
+        """
         super().__init__()
         self.problem, self.settings, self.pool = problem, problem.settings, pool
         self.poses, self._trial = poses, make_poses(problem.tree, problem.frames)
@@ -40,14 +42,18 @@ class Optimizer(SeveralFrames):
     def _begin(self, s: int) -> float:
         cost = self.problem.linearize(s, self.poses, self.system)
         self.costs = self.problem.costs
-        self._learned = ClipCurvature(self.problem.tree, self.problem.frames, self.settings.curvature)
+        self._learned = ClipCurvature(
+            self.problem.tree, self.problem.frames, self.settings.curvature
+        )
         self._learned.set_current(self.poses, self.problem.joints)
         return cost
 
     def _step(self, s: int, damping: float) -> float:
         self._learned.apply(self.poses, self.system)
         root_scale = self.settings.root_scale
-        return solve_clip(self.problem.tree, self.system, damping, root_scale, self.factor, self.pool)
+        return solve_clip(
+            self.problem.tree, self.system, damping, root_scale, self.factor, self.pool
+        )
 
     def _try(self, s: int) -> float:
         retract_clip(self.problem.tree, self.poses, self.factor.d, self.factor.dg, self._trial)
@@ -67,7 +73,9 @@ class Optimizer(SeveralFrames):
         self._learned.apply(self.poses, self.system, wanted=False)
 
     def information(self) -> Array:
-        """Return the information (G, G) of the global columns with all poses eliminated, priors included."""
+        """Return the information (G, G) of the global columns with all poses eliminated, priors
+        included.
+        """
         G, root_scale = self.problem.tree.globals, self.settings.root_scale
         eliminate_clip(self.system, MIN_DAMPING, root_scale, self.factor, self.pool)
         C = np.triu(self.factor.C[:G, :G])

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is expected of any motion: little acceleration, and points that stand still while they stand."""
+"""What is expected of any motion: little acceleration, and points that stand still while they
+stand.
+"""
 
 import math
 from dataclasses import dataclass, field
@@ -9,26 +11,33 @@ from numpy.typing import ArrayLike
 
 from ..arrays import as_array
 from ..compiled.part import Array
-from ..validation import as_indices, as_number, check_finite, check_not_negative, check_robust, check_weight
+from ..validation import (
+    as_indices,
+    as_number,
+    check_finite,
+    check_not_negative,
+    check_robust,
+    check_weight,
+)
 
 
 @dataclass(frozen=True)
 class MotionPrior:
     """Weights of acceleration and of a standing point's velocity, per second of the clip.
 
-    The cost is 1/2 integral of w rho(|a|^2) dt, and for standing points of w p |v|^2 dt with p their probability, so
-    that a weight means the same at any frame rate.
+    The cost is 1/2 integral of w rho(|a|^2) dt, and for standing points of w p |v|^2 dt with p
+    their probability, so that a weight means the same at any frame rate.
 
-    joints: weight of each joint's angular acceleration relative to its parent, (K,) or one for all, s^3/rad^2;
-    root_rotation: of the root's in the world, s^3/rad^2; root_position: of its origin, s^3/m^2.
-    robust_joints, robust_root_rotation: Geman-McClure sigma of squared accelerations, (rad/s^2)^2, of joints (K,) or
-    one for all;
-    robust_root_position: (m/s^2)^2. Infinity turns the kernel off.
-    contact: weight of standing points, s/m^2.
+    joints: weight of each joint's angular acceleration relative to its parent, (K,) or one for all,
+    s^3/rad^2; root_rotation: of the root's in the world, s^3/rad^2; root_position: of its origin,
+    s^3/m^2. robust_joints, robust_root_rotation: Geman-McClure sigma of squared accelerations,
+    (rad/s^2)^2, of joints (K,) or one for all; robust_root_position: (m/s^2)^2. Infinity turns the
+    kernel off. contact: weight of standing points, s/m^2.
 
-    The defaults suit keypoints of a network at 60 frames per second. Errors of a network in neighbouring frames are
-    alike, so that more frames say less than their number: at other rates, weights of acceleration times (rate / 60)^2
-    were found better. Markers, whose errors are independent, need less.
+    The defaults suit keypoints of a network at 60 frames per second. Errors of a network in
+    neighbouring frames are alike, so that more frames say less than their number: at other rates,
+    weights of acceleration times (rate / 60)^2 were found better. Markers, whose errors are
+    independent, need less.
     """
 
     joints: ArrayLike = 1.0
@@ -50,10 +59,12 @@ class MotionPrior:
             check_robust(getattr(self, name), f"MotionPrior.{name}")
 
     def packed(self, K: int) -> Array:
-        """Return (K+2, 2) weights and 1/sigma: the root's rotation, joints 1..K, the root's position.
+        """Return (K+2, 2) weights and 1/sigma: the root's rotation, joints 1..K, the root's
+        position.
 
         :raises ShapeError: `joints` or `robust_joints` is neither one number nor (K,).
-        :raises InvalidValueError: a weight of `joints` is negative or not finite, or a sigma is not positive.
+        :raises InvalidValueError: a weight of `joints` is negative or not finite, or a sigma is not
+            positive.
         """
         joints = _each(self.joints, K, "MotionPrior.joints")
         check_finite(joints, "MotionPrior.joints")
@@ -81,15 +92,17 @@ def _inverse(sigma: float) -> float:
 
 @dataclass
 class StandingPoints:
-    """Points that may stand still: indices (C,), numbered as in the measurements, and the probability (T, C) that each
-    does in each frame. Between two frames a point stands with the smaller of their probabilities.
+    """Points that may stand still: indices (C,), numbered as in the measurements, and the
+    probability (T, C) that each does in each frame. Between two frames a point stands with the
+    smaller of their probabilities.
     """
 
     indices: ArrayLike = field(default_factory=lambda: np.zeros(0, np.int64))
     probability: ArrayLike = field(default_factory=lambda: np.zeros((0, 0)))
 
     def packed(self, points: int, frames: int) -> tuple[Array, Array]:
-        """Return indices (C,) and (T, C) probability of standing since the frame before, 0 for the first.
+        """Return indices (C,) and (T, C) probability of standing since the frame before, 0 for the
+        first.
 
         :raises ShapeError: an array has another shape, or an index lies outside.
         :raises InvalidValueError: a probability is negative or not finite.

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A clip's objective: the terms of every frame, the acceleration between frames, and the shape's prior once."""
+"""A clip's objective: the terms of every frame, the acceleration between frames, and the shape's
+prior once.
+"""
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -11,7 +13,14 @@ from ..compiled.kernel import inlined_kernel, kernel
 from ..compiled.part import GRADIENT, Array, Blocks, Pose
 from ..compiled.tree import Tree
 from ..custom_residuals.external import raise_failure
-from ..gauss_newton.linearize import clear_blocks, linearize, make_blocks, make_pose, make_scratch, place_parts
+from ..gauss_newton.linearize import (
+    clear_blocks,
+    linearize,
+    make_blocks,
+    make_pose,
+    make_scratch,
+    place_parts,
+)
 from ..gauss_newton.optimizer import Settings
 from ..gauss_newton.several_frames import SharedPriors
 from ..residuals.registry import SHAPE_PRIOR
@@ -32,7 +41,9 @@ class MotionTerms(NamedTuple):
     contact: float
 
     @classmethod
-    def make(cls, tree: Tree, times: Array, prior: MotionPrior, stands: StandingPoints) -> "MotionTerms":
+    def make(
+        cls, tree: Tree, times: Array, prior: MotionPrior, stands: StandingPoints
+    ) -> "MotionTerms":
         """Lay out the terms of frames at `times` (T,), seconds.
 
         :raises ShapeError: an array does not fit the body or the clip.
@@ -40,14 +51,24 @@ class MotionTerms(NamedTuple):
         """
         indices, probability = stands.packed(len(tree.point_part), len(times))
         table = prior.packed(len(tree.parents) - 1)
-        return cls(np.diff(times, prepend=times[0] - 1.0), table, indices, probability, float(prior.contact))
+        return cls(
+            np.diff(times, prepend=times[0] - 1.0),
+            table,
+            indices,
+            probability,
+            float(prior.contact),
+        )
 
     def part(self, frames: slice) -> "MotionTerms":
         """Return the terms of consecutive frames alone."""
-        return self._replace(h=self.h[frames], probability=np.ascontiguousarray(self.probability[frames]))
+        return self._replace(
+            h=self.h[frames], probability=np.ascontiguousarray(self.probability[frames])
+        )
 
 
-_CHUNK = 8  # frames that are linearized and coupled before the next ones, while they are in the processor's cache
+# frames that are linearized and coupled before the next ones, while they are in the processor's
+# cache
+_CHUNK = 8
 
 
 class _Memory(NamedTuple):
@@ -68,14 +89,25 @@ def _make_memory(tree: Tree) -> _Memory:
     blocks, total = make_blocks(tree), make_blocks(tree)
     sums, W = np.zeros_like(blocks.A), len(blocks.c)
     return _Memory(
-        make_pose(tree), blocks, total, make_scratch(tree), sums, acceleration.make_memory(tree), np.zeros((3, 1 + W)),
-        np.zeros((W, W)), np.zeros(W),
-    )  # fmt: skip
+        make_pose(tree),
+        blocks,
+        total,
+        make_scratch(tree),
+        sums,
+        acceleration.make_memory(tree),
+        np.zeros((3, 1 + W)),
+        np.zeros((W, W)),
+        np.zeros(W),
+    )
 
 
 @inlined_kernel
-def linearize_frames(tree, views, first, last, stage, triggs, poses, memory, joints, system) -> float:  # type: ignore[no-untyped-def]
-    """Write the blocks of frames first..last-1 and what `joints` has, add to C and c of `memory`; return the cost."""
+def linearize_frames(
+    tree, views, first, last, stage, triggs, poses, memory, joints, system
+) -> float:  # type: ignore[no-untyped-def]
+    """Write the blocks of frames first..last-1 and what `joints` has, add to C and c of `memory`;
+    return the cost.
+    """
     cost: float = 0.0
     blocks, total = memory.blocks, memory.total
     for f in range(first, last):
@@ -114,8 +146,12 @@ def linearize_frames(tree, views, first, last, stage, triggs, poses, memory, joi
 
 @kernel
 def couple_frames(tree, poses, motion, first, last, memory, system, costs) -> None:  # type: ignore[no-untyped-def]
-    """Add what couples each of the frames first..last-1 to the two before it; add to costs[1] and costs[2]."""
-    costs[1] += acceleration.accumulate(tree, poses, motion, first, last, memory.accelerations, system)
+    """Add what couples each of the frames first..last-1 to the two before it; add to costs[1] and
+    costs[2].
+    """
+    costs[1] += acceleration.accumulate(
+        tree, poses, motion, first, last, memory.accelerations, system
+    )
     costs[2] += standing.accumulate(tree, first, last, memory.work, system, memory.C, memory.c)
 
 
@@ -123,14 +159,18 @@ def couple_frames(tree, poses, motion, first, last, memory, system, costs) -> No
 def linearize_half(  # type: ignore[no-untyped-def]
     tree, views, motion, first, last, coupled, stage, triggs, poses, memory, joints, system, costs
 ) -> None:
-    """Write the equations of frames first..last-1, those from `coupled` on with what couples them; costs (3,)."""
+    """Write the equations of frames first..last-1, those from `coupled` on with what couples them;
+    costs (3,).
+    """
     for a in range(memory.c.shape[0]):
         memory.c[a] = 0.0
         for b in range(memory.c.shape[0]):
             memory.C[a, b] = 0.0
     for a in range(first, last, _CHUNK):
         b = min(a + _CHUNK, last)
-        costs[0] += linearize_frames(tree, views, a, b, stage, triggs, poses, memory, joints, system)
+        costs[0] += linearize_frames(
+            tree, views, a, b, stage, triggs, poses, memory, joints, system
+        )
         standing.place_points(tree, poses, motion, a, b, system)
         couple_frames(tree, poses, motion, max(a, coupled), b, memory, system, costs)
 
@@ -139,7 +179,8 @@ def linearize_half(  # type: ignore[no-untyped-def]
 class ClipProblem:
     """All terms of a clip, and how to linearize them.
 
-    The clip is linearized in halves, whether two threads share them or one takes both, so that all sums are the same.
+    The clip is linearized in halves, whether two threads share them or one takes both, so that all
+    sums are the same.
     """
 
     tree: Tree
@@ -148,7 +189,8 @@ class ClipProblem:
     shared: SharedPriors
     settings: Settings  # without the shape's prior in the frames: it enters once
     pool: ThreadPoolExecutor | None = None
-    costs: dict[str, float] = field(default_factory=dict)  # of what couples the frames, and of the shared unknowns
+    # of what couples the frames, and of the shared unknowns
+    costs: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Make the working memory."""
@@ -159,7 +201,9 @@ class ClipProblem:
         parts, T = len(self.tree.parents), self.frames
         # of the joints alone, as last linearized, with a leading dimension of frames
         self.joints = self._memories[0].total._replace(
-            H_u=np.zeros((T, parts, 3, GRADIENT + 1)), H_uu=np.zeros((T, parts, 3, 3)), cross=np.zeros(1, np.int64)
+            H_u=np.zeros((T, parts, 3, GRADIENT + 1)),
+            H_uu=np.zeros((T, parts, 3, 3)),
+            cross=np.zeros(1, np.int64),
         )
 
     @property
@@ -172,21 +216,32 @@ class ClipProblem:
         return make_system(self.tree, self.frames, self.motion.indices)
 
     def linearize(self, s: int, poses: Pose, system: ClipSystem) -> float:
-        """Write the normal equations at `poses` with the weights of stage s, and return the cost."""
-        T, costs = self.frames, np.zeros((3, 3))  # by half, then of the frames that reach from one to the other
+        """Write the normal equations at `poses` with the weights of stage s, and return the
+        cost.
+        """
+        # by half, then of the frames that reach from one to the other
+        T, costs = self.frames, np.zeros((3, 3))
         system.C[:] = 0.0
         system.c[:] = 0.0
         self.joints.cross[0] = 0
         middle = T // 2
-        after = min(middle + 2, T)  # the first frame whose acceleration is that of the second half alone
+        # the first frame whose acceleration is that of the second half alone
+        after = min(middle + 2, T)
         front = s, poses, system, (0, middle, 0), self._memories[0], costs[0]
         back = s, poses, system, (middle, T, after), self._memories[1], costs[1]
         run_both(self.pool, self._linearize_half, front, back)
-        couple_frames(self.tree, poses, self.motion, middle, after, self._memories[0], system, costs[2])
+        couple_frames(
+            self.tree, poses, self.motion, middle, after, self._memories[0], system, costs[2]
+        )
         for memory in self._memories:
             system.C[:] += memory.C
             system.c[:] += memory.c
-        shared = self.shape_weights[s], poses.beta, float(poses.log_focal[0]), self.tree.globals > self.tree.shape
+        shared = (
+            self.shape_weights[s],
+            poses.beta,
+            float(poses.log_focal[0]),
+            self.tree.globals > self.tree.shape,
+        )
         self.shared.add(*shared, (system.C, system.c))
         self.costs = {
             "acceleration": float(costs[:, 1].sum()),
@@ -196,10 +251,25 @@ class ClipProblem:
         return float(costs[:, 0].sum()) + sum(self.costs.values())
 
     def _linearize_half(
-        self, s: int, poses: Pose, system: ClipSystem, frames: tuple[int, int, int], memory: _Memory, costs: Array
+        self,
+        s: int,
+        poses: Pose,
+        system: ClipSystem,
+        frames: tuple[int, int, int],
+        memory: _Memory,
+        costs: Array,
     ) -> None:
         linearize_half(
-            self.tree, self.views, self.motion, *frames, self.settings.stages[s], self.settings.triggs, poses, memory,
-            self.joints, system, costs,
-        )  # fmt: skip
+            self.tree,
+            self.views,
+            self.motion,
+            *frames,
+            self.settings.stages[s],
+            self.settings.triggs,
+            poses,
+            memory,
+            self.joints,
+            system,
+            costs,
+        )
         raise_failure()  # in the thread in which the residual failed

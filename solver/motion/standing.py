@@ -2,9 +2,10 @@
 r"""The velocity of points that stand still: a sole in contact is where it was one frame before.
 
     r = sqrt(w p / h) (p_f - p_{f-1}),   p = R_i (V_j beta + v_bar_j) + t_i in the world, metres
-    dp = w x (p - t_0) + nu + sum of u_k x (p - t_k) over the joints k from the root to part i + (R_i V_j + D_i) dbeta
-h is the time between the two frames, so that the cost is 1/2 integral of w p |v|^2 dt. Both frames move, unlike in
-residuals/foot_contact.py, where the earlier position is a constant.
+    dp = w x (p - t_0) + nu + sum of u_k x (p - t_k) over the joints k from the root to part i
+         + (R_i V_j + D_i) dbeta
+h is the time between the two frames, so that the cost is 1/2 integral of w p |v|^2 dt. Both frames
+move, unlike in residuals/foot_contact.py, where the earlier position is a constant.
 docs/solver_mathematics.md, "A whole clip", has the objective.
 """
 
@@ -15,7 +16,9 @@ from .system import GLOBALS, pose_of
 
 @kernel
 def _jacobian(tree, poses, f, j, count, p, J) -> None:  # type: ignore[no-untyped-def]
-    """Write point j (3,) and its derivatives J (3, count + W) by the unknowns that move it, and by the shape."""
+    """Write point j (3,) and its derivatives J (3, count + W) by the unknowns that move it, and by
+    the shape.
+    """
     pose = pose_of(poses, f)
     i = tree.point_part[j]
     x, y, z = lever(tree, pose, j)
@@ -37,13 +40,16 @@ def _jacobian(tree, poses, f, j, count, p, J) -> None:  # type: ignore[no-untype
     R = pose.R[i]
     for a in range(tree.shape):
         for r in range(3):
-            turned = R[r, 0] * tree.V[j, 0, a] + R[r, 1] * tree.V[j, 1, a] + R[r, 2] * tree.V[j, 2, a]
+            turned = (
+                R[r, 0] * tree.V[j, 0, a] + R[r, 1] * tree.V[j, 1, a] + R[r, 2] * tree.V[j, 2, a]
+            )
             J[r, count + a] = turned + pose.D[i, r, a]
 
 
 @kernel
 def place_points(tree, poses, motion, first, last, system) -> None:  # type: ignore[no-untyped-def]
-    """Fill `system.contacts` at frames first..last-1, and add what the points say of each frame alone to its block.
+    """Fill `system.contacts` at frames first..last-1, and add what the points say of each frame
+    alone to its block.
 
     :param poses: of `make_poses`; motion `MotionTerms`.
     """
@@ -59,14 +65,21 @@ def place_points(tree, poses, motion, first, last, system) -> None:  # type: ign
             own, count = J[f, k], counts[k]
             _jacobian(tree, poses, f, motion.indices[k], count, p[f, k], own)
             for a in range(count):
-                g0, g1, g2, row = both * own[0, a], both * own[1, a], both * own[2, a], columns[k, a]
+                g0, g1, g2, row = (
+                    both * own[0, a],
+                    both * own[1, a],
+                    both * own[2, a],
+                    columns[k, a],
+                )
                 for b in range(a, count):
                     D[row, columns[k, b]] += g0 * own[0, b] + g1 * own[1, b] + g2 * own[2, b]
 
 
 @kernel
 def _add_gradient(N, J, columns, count, force, moved, P) -> None:  # type: ignore[no-untyped-def]
-    """Add Jᵀ force and the global columns Jᵀ moved to N (n, 4+W); J (3, count+W), force (3,), moved (3, W)."""
+    """Add Jᵀ force and the global columns Jᵀ moved to N (n, 4+W); J (3, count+W), force (3,), moved
+    (3, W).
+    """
     for a in range(count):
         x, y, z = J[0, a], J[1, a], J[2, a]
         N[columns[a], 0] += x * force[0] + y * force[1] + z * force[2]
@@ -76,10 +89,11 @@ def _add_gradient(N, J, columns, count, force, moved, P) -> None:  # type: ignor
 
 @kernel
 def accumulate(tree, first, last, work, system, C, c) -> float:  # type: ignore[no-untyped-def]
-    """Add the rest of what standing points say at frames first..last-1 to `system`, C and c; return their cost.
+    """Add the rest of what standing points say at frames first..last-1 to `system`, C and c; return
+    their cost.
 
-    `place_points` comes first, at the frame before them as well. C (W, W) upper triangle, c (W,); work (3, 1+W) is
-    overwritten.
+    `place_points` comes first, at the frame before them as well. C (W, W) upper triangle, c (W,);
+    work (3, 1+W) is overwritten.
     """
     cost: float = 0.0
     P = tree.shape

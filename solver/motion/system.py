@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-r"""The normal equations of a clip: dense blocks of width 6 + 3K a frame, what couples them, and global columns.
+r"""The normal equations of a clip: dense blocks of width 6 + 3K a frame, what couples them, and
+global columns.
 
-The unknowns of frame f are d_f = (w, nu, u_1..u_K), those of `recursion.py`: the root's twist about the pelvis, then
-the joints' rotations, all in the axes that the poses are given in. Part i moves by x_i = x_0 + sum of U_j u_j over the
-joints j on its way from the root, so that with M, N, m summed over the parts that hang on joint i,
+The unknowns of frame f are d_f = (w, nu, u_1..u_K), those of `recursion.py`: the root's twist about
+the pelvis, then the joints' rotations, all in the axes that the poses are given in. Part i moves by
+x_i = x_0 + sum of U_j u_j over the joints j on its way from the root, so that with M, N, m summed
+over the parts that hang on joint i,
     Y_i = U_iᵀ M_i + H_ux,      H(u_i, x_0) = Y_i,      H(u_i, u_j) = Y_i U_j  for j above i
     H(u_i, u_i) = Y_i U_i + H_uu + (H_ux U_i)ᵀ
-which is what the recursion factorizes without ever forming it. A clip needs it, because two frames are coupled in all
-of their unknowns once one of them has been eliminated.
-Source: section 3 of the paper; composite rigid bodies in Featherstone, Rigid Body Dynamics Algorithms, chapter 6.
+which is what the recursion factorizes without ever forming it. A clip needs it, because two frames
+are coupled in all of their unknowns once one of them has been eliminated. Source: section 3 of the
+paper; composite rigid bodies in Featherstone, Rigid Body Dynamics Algorithms, chapter 6.
 """
 
 from collections.abc import Sequence
@@ -26,7 +28,9 @@ GLOBALS = 4  # first global column of `ClipSystem.N`; its column 0 is the gradie
 
 
 class Contacts(NamedTuple):
-    """How C standing points couple each frame f to the one before: block (f, f-1) -= w_f J_fᵀ J_{f-1} for each."""
+    """How C standing points couple each frame f to the one before: block (f, f-1) -= w_f J_fᵀ
+    J_{f-1} for each.
+    """
 
     w: Array  # (T, C)
     p: Array  # (T, C, 3) the points
@@ -39,7 +43,9 @@ class ClipSystem(NamedTuple):
     """JᵀJ and Jᵀr of a clip of T frames. n is 6 + 3K padded to whole vectors, W as in `Tree`."""
 
     D: Array  # (T, n, n): block (f, f), its upper triangle
-    B1: Array  # (T, K+2, 3, 3): blocks of (f, f-1) between rotations of part 0..K, and between the root's positions
+    # (T, K+2, 3, 3): blocks of (f, f-1) between rotations of part 0..K, and between the root's
+    # positions
+    B1: Array
     B2: Array  # (T, K+2, 3, 3): the same of (f, f-2)
     N: Array  # (T, n, 4+W): gradient, three unused, global columns
     C: Array  # (W, W): upper triangle
@@ -48,7 +54,9 @@ class ClipSystem(NamedTuple):
 
 
 def make_system(tree: Tree, frames: int, points: Sequence[int] | Array = ()) -> ClipSystem:
-    """Return a system of zeros for that many frames, in which the points of these numbers (C,) may stand."""
+    """Return a system of zeros for that many frames, in which the points of these numbers (C,) may
+    stand.
+    """
     K, W = len(tree.parents) - 1, tree.S.shape[2]
     n = padded(6 + 3 * K)
     shapes: list[tuple[int, ...]] = [(n, n), (K + 2, 3, 3), (K + 2, 3, 3), (n, GLOBALS + W)]
@@ -56,7 +64,9 @@ def make_system(tree: Tree, frames: int, points: Sequence[int] | Array = ()) -> 
     columns = [_columns(tree, int(tree.point_part[j])) for j in points]
     counts = np.array([len(some) for some in columns], np.int64)
     m, C = max(counts, default=0), len(points)
-    padded_columns = np.array([some + [0] * (m - len(some)) for some in columns], np.int64).reshape(C, m)
+    padded_columns = np.array([some + [0] * (m - len(some)) for some in columns], np.int64).reshape(
+        C, m
+    )
     J = np.zeros((frames, C, 3, m + W))
     contacts = Contacts(np.zeros((frames, C)), np.zeros((frames, C, 3)), J, padded_columns, counts)
     return ClipSystem(D, B1, B2, N, np.zeros((W, W)), np.zeros(W), contacts)
@@ -72,7 +82,9 @@ def _columns(tree: Tree, part: int) -> list[int]:
 
 
 def make_poses(tree: Tree, frames: int) -> Pose:
-    """Return the poses of a clip in arrays with a leading dimension of frames; beta and log_focal as of one frame."""
+    """Return the poses of a clip in arrays with a leading dimension of frames; beta and log_focal
+    as of one frame.
+    """
     K, W = len(tree.parents) - 1, tree.S.shape[2]
     eye = np.tile(np.eye(3), (frames, K + 1, 1, 1))
     t, D = np.zeros((frames, K + 1, 3)), np.zeros((frames, K + 1, 3, W))
@@ -87,7 +99,9 @@ def pose_of(poses: Pose, f: int) -> Pose:
 
 @kernel
 def add_turned(turn, source: Blocks, sums: Blocks) -> None:  # type: ignore[no-untyped-def]
-    """Add blocks of a camera whose axes are turn (3, 3) times those of `sums`: x' = (R w, R nu), u' = R u."""
+    """Add blocks of a camera whose axes are turn (3, 3) times those of `sums`: x' = (R w, R nu), u'
+    = R u.
+    """
     n, row = source.A.shape[0], source.A.shape[2]
     W = source.c.shape[0]
     for i in range(n):
@@ -123,7 +137,8 @@ def add_turned(turn, source: Blocks, sums: Blocks) -> None:  # type: ignore[no-u
 
 @kernel
 def write_frame(tree: Tree, pose: Pose, blocks: Blocks, sums, D, N, C, c) -> None:  # type: ignore[no-untyped-def]
-    """Write a frame's block (n, n), upper triangle, and its gradient and global columns (n, 4+W); add to C and c.
+    """Write a frame's block (n, n), upper triangle, and its gradient and global columns (n, 4+W);
+    add to C and c.
 
     sums (K+1, 6, 8+W) is overwritten.
     """

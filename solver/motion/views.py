@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What cameras see of one frame. Each camera is linearized in its own axes, and its blocks are turned to the world's.
+"""What cameras see of one frame. Each camera is linearized in its own axes, and its blocks are
+turned to the world's.
 
-With R, t the world in camera axes, part i is at (R R_i, R t_i + t) there. A twist about the pelvis has the components
-R w, R nu in camera axes and a joint's rotation R u, so that M = Rᵀ M' R by 3 x 3 blocks and likewise the rest. Nothing
-else in the solver knows of several cameras.
+With R, t the world in camera axes, part i is at (R R_i, R t_i + t) there. A twist about the pelvis
+has the components R w, R nu in camera axes and a joint's rotation R u, so that M = Rᵀ M' R by 3 x 3
+blocks and likewise the rest. Nothing else in the solver knows of several cameras.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,10 +30,11 @@ from ..validation import check_finite, check_rotations, check_type
 
 @dataclass
 class View:
-    """What one camera measured of one frame, and where it was: a point p of the world is at R p + t in its axes.
+    """What one camera measured of one frame, and where it was: a point p of the world is at R p + t
+    in its axes.
 
-    All measurements are in the camera's axes, and pixels with its intrinsics, as everywhere. R_camera_world (3, 3),
-    t_camera_world (3,) in metres.
+    All measurements are in the camera's axes, and pixels with its intrinsics, as everywhere.
+    R_camera_world (3, 3), t_camera_world (3,) in metres.
     """
 
     measurements: Measurements
@@ -41,11 +43,14 @@ class View:
 
 
 class PackedViews(NamedTuple):
-    """The terms of all views of T frames, laid out for the kernels: those of one view are `terms_of`. V views."""
+    """The terms of all views of T frames, laid out for the kernels: those of one view are
+    `terms_of`. V views.
+    """
 
     of_frame: Array  # (T+1,): the views of frame f are of_frame[f]:of_frame[f+1]
     starts: Array  # (V, K+2), as in `Terms`
-    slots: Array  # (V, 2): a view's first slot in the next four, and in `rest` and `V`, which views share
+    # (V, 2): a view's first slot in the next four, and in `rest` and `V`, which views share
+    slots: Array
     flags: Array  # (N,)
     image: Array  # (N, 3)
     point: Array  # (N, 4)
@@ -90,25 +95,44 @@ def terms_of(views: PackedViews, v: int) -> Terms:
     n = views.starts[v, -1]
     a, b = views.slots[v, 0], views.slots[v, 1]
     external = External(
-        views.external.calls[views.calls[v] : views.calls[v + 1]], views.external.ints, views.external.floats
+        views.external.calls[views.calls[v] : views.calls[v + 1]],
+        views.external.ints,
+        views.external.floats,
     )
     return Terms(
-        views.starts[v], views.flags[a : a + n], views.rest[b : b + n], views.V[b : b + n], views.image[a : a + n],
-        views.point[a : a + n], views.direction[a : a + n], _rows_of(views.ints, views.rows, v),
-        _rows_of(views.floats, views.rows, v), views.shape_mean, views.shape_information, external,
-    )  # fmt: skip
+        views.starts[v],
+        views.flags[a : a + n],
+        views.rest[b : b + n],
+        views.V[b : b + n],
+        views.image[a : a + n],
+        views.point[a : a + n],
+        views.direction[a : a + n],
+        _rows_of(views.ints, views.rows, v),
+        _rows_of(views.floats, views.rows, v),
+        views.shape_mean,
+        views.shape_information,
+        external,
+    )
 
 
 def pack_frames(
-    tree: Tree, frames: Sequence[Measurements | Sequence[View]], priors: PackedPriors, first: int = 0
+    tree: Tree,
+    frames: Sequence[Measurements | Sequence[View]],
+    priors: PackedPriors,
+    first: int = 0,
 ) -> tuple[PackedViews, Array]:
-    """Return the terms of frames, and how many measurements of each are usable. Each frame's first view has the priors.
+    """Return the terms of frames, and how many measurements of each are usable. Each frame's first
+    view has the priors.
 
     :param first: number of the first frame, for messages.
     :raises ShapeError: an array does not fit the body.
-    :raises InvalidValueError: a value that no fit can use, or a frame that is neither measurements nor views.
+    :raises InvalidValueError: a value that no fit can use, or a frame that is neither measurements
+        nor views.
     """
-    packer, without = _Packer(tree), PackedPriors(empty_tables(), priors.shape_mean, priors.shape_information)
+    packer, without = (
+        _Packer(tree),
+        PackedPriors(empty_tables(), priors.shape_mean, priors.shape_information),
+    )
     of_frame, counts = [0], np.zeros(len(frames), np.int64)
     for f, frame in enumerate(frames):
         name = f"frames[{first + f}]"
@@ -119,22 +143,31 @@ def pack_frames(
 
 
 def views_of(frame: Measurements | Sequence[View], name: str) -> Sequence[View]:
-    """Return what cameras measured of a frame, checked: measurements alone are the view of a camera at the origin.
+    """Return what cameras measured of a frame, checked: measurements alone are the view of a camera
+    at the origin.
 
     :param name: of the frame, for messages.
     :raises ShapeError: a camera's rotation or position has another shape.
-    :raises InvalidValueError: the frame is neither measurements nor views, or a camera's rotation is none.
+    :raises InvalidValueError: the frame is neither measurements nor views, or a camera's rotation
+        is none.
     """
     if isinstance(frame, Measurements):
         return [View(frame)]
     if not isinstance(frame, Sequence) or isinstance(frame, str):
-        raise InvalidValueError(f"{name} must be Measurements or a list of View, but is {described(frame)}.")
+        raise InvalidValueError(
+            f"{name} must be Measurements or a list of View, but is {described(frame)}."
+        )
     for k, view in enumerate(frame):
         check_type(view, View, f"{name}[{k}]")
         check_type(view.measurements, Measurements, f"measurements of {name}[{k}]")
-        R, t = as_array(view.R_camera_world, (3, 3), f"R_camera_world of {name}[{k}]"), view.t_camera_world
+        R, t = (
+            as_array(view.R_camera_world, (3, 3), f"R_camera_world of {name}[{k}]"),
+            view.t_camera_world,
+        )
         check_rotations(R[None], f"R_camera_world of {name}[{k}]")
-        check_finite(as_array(t, (3,), f"t_camera_world of {name}[{k}]"), f"t_camera_world of {name}[{k}]")
+        check_finite(
+            as_array(t, (3,), f"t_camera_world of {name}[{k}]"), f"t_camera_world of {name}[{k}]"
+        )
     return frame
 
 
@@ -162,7 +195,9 @@ class _Packer:
         self.starts.append(terms.starts)
         self._slots.append((self._size, self._shared))
         # the next view with this layout overwrites them
-        self._values.append(tuple(a.copy() for a in (terms.flags, terms.image, terms.point, terms.direction)))
+        self._values.append(
+            tuple(a.copy() for a in (terms.flags, terms.image, terms.point, terms.direction))
+        )
         for table, ints, floats in zip(self._tables, terms.ints, terms.floats, strict=True):
             table.add(ints, floats)
         self._external.append(terms.external)
@@ -172,21 +207,38 @@ class _Packer:
 
     def packed(self, of_frame: list[int], priors: PackedPriors) -> PackedViews:
         """Return what has been added."""
-        flags, image, point, direction = (np.concatenate(some) for some in zip(*self._values, strict=True))
+        flags, image, point, direction = (
+            np.concatenate(some) for some in zip(*self._values, strict=True)
+        )
         R, t, own_axes = (np.array(some) for some in zip(*self._cameras, strict=True))
         calls, external = _joined(self._external)
         return PackedViews(
-            np.array(of_frame), np.array(self.starts), np.array(self._slots), flags, image, point, direction,
+            np.array(of_frame),
+            np.array(self.starts),
+            np.array(self._slots),
+            flags,
+            image,
+            point,
+            direction,
             np.concatenate([layout.rest for layout in self._layouts]),
             np.concatenate([layout.V for layout in self._layouts]),
-            np.array([table.rows for table in self._tables]), tuple(table.ints() for table in self._tables),
-            tuple(table.floats() for table in self._tables), calls, external, priors.shape_mean,
-            priors.shape_information, R, t, own_axes,
-        )  # fmt: skip
+            np.array([table.rows for table in self._tables]),
+            tuple(table.ints() for table in self._tables),
+            tuple(table.floats() for table in self._tables),
+            calls,
+            external,
+            priors.shape_mean,
+            priors.shape_information,
+            R,
+            t,
+            own_axes,
+        )
 
 
 class _Tables:
-    """The rows of one residual; views with the same arrays, as those of priors, share their rows."""
+    """The rows of one residual; views with the same arrays, as those of priors, share their
+    rows.
+    """
 
     def __init__(self) -> None:
         self.rows: list[tuple[int, int]] = []
@@ -213,8 +265,13 @@ class _Tables:
 
 
 def _camera_of(view: View) -> tuple[Array, Array, bool]:
-    """Return R_camera_world, made orthonormal, t_camera_world, and whether the camera's axes are the world's."""
-    R, t = np.asarray(view.R_camera_world, dtype=float), np.asarray(view.t_camera_world, dtype=float)
+    """Return R_camera_world, made orthonormal, t_camera_world, and whether the camera's axes are
+    the world's.
+    """
+    R, t = (
+        np.asarray(view.R_camera_world, dtype=float),
+        np.asarray(view.t_camera_world, dtype=float),
+    )
     if np.array_equal(R, _EYE) and not t.any():
         return _EYE, _NULL, True
     return nearest_rotation(R), t, False
@@ -229,20 +286,27 @@ def _joined(views: Sequence[External]) -> tuple[Array, External]:
     for external in views:
         calls.append(external.calls + np.array([0, 0, i, f, 0]))
         i, f = i + len(external.ints), f + len(external.floats)
-    ints, floats = (np.concatenate([getattr(each, name) for each in views]) for name in ("ints", "floats"))
+    ints, floats = (
+        np.concatenate([getattr(each, name) for each in views]) for name in ("ints", "floats")
+    )
     return np.cumsum([0, *map(len, calls)]), External(np.concatenate(calls), ints, floats)
 
 
 @kernel
 def place_in_camera(R, t, pose, seen) -> None:  # type: ignore[no-untyped-def]
-    """Write the root of `pose` in a camera's axes, and its joints, to `seen`; the other parts are left to linearize.
+    """Write the root of `pose` in a camera's axes, and its joints, to `seen`; the other parts are
+    left to linearize.
 
     R (3, 3), t (3,): the world in the camera's axes.
     """
     for r in range(3):
         for c in range(3):
-            seen.R[0, r, c] = R[r, 0] * pose.R[0, 0, c] + R[r, 1] * pose.R[0, 1, c] + R[r, 2] * pose.R[0, 2, c]
-        seen.t[0, r] = R[r, 0] * pose.t[0, 0] + R[r, 1] * pose.t[0, 1] + R[r, 2] * pose.t[0, 2] + t[r]
+            seen.R[0, r, c] = (
+                R[r, 0] * pose.R[0, 0, c] + R[r, 1] * pose.R[0, 1, c] + R[r, 2] * pose.R[0, 2, c]
+            )
+        seen.t[0, r] = (
+            R[r, 0] * pose.t[0, 0] + R[r, 1] * pose.t[0, 1] + R[r, 2] * pose.t[0, 2] + t[r]
+        )
     for i in range(1, pose.Omega.shape[0]):
         for r in range(3):
             for c in range(3):

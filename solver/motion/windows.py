@@ -17,7 +17,8 @@ class Window(NamedTuple):
 
 
 def overlapping(times: Array, length: float, overlap: float) -> list[Window]:
-    """Return windows of `length` seconds that overlap, each kept up to the middle of its overlaps; one if that does.
+    """Return windows of `length` seconds that overlap, each kept up to the middle of its overlaps;
+    one if that does.
 
     :param times: (T,) seconds, increasing.
     """
@@ -29,7 +30,8 @@ def overlapping(times: Array, length: float, overlap: float) -> list[Window]:
     first = np.searchsorted(times, starts)
     last = np.searchsorted(times, starts + length, side="right")
     last[-1] = T
-    first[1:] = np.minimum(first[1:], last[:-1])  # without overlap, rounding may leave a frame between two windows
+    # without overlap, rounding may leave a frame between two windows
+    first[1:] = np.minimum(first[1:], last[:-1])
     middle = [0, *((a + b) // 2 for a, b in zip(first[1:], last[:-1], strict=True)), T]
     return [
         Window(slice(int(first[k]), int(last[k])), slice(int(middle[k]), int(middle[k + 1])))
@@ -43,13 +45,19 @@ def tiles(windows: Sequence[Window]) -> list[Window]:
     return [Window(w.kept, w.kept) for w in windows]
 
 
-def combined(estimates: Sequence[Array], informations: Sequence[Array], mean: Array, prior: Array) -> Array:
-    """Return the minimum (G,) of the sum of quadratics, each with the same prior, which shall count once.
+def combined(
+    estimates: Sequence[Array], informations: Sequence[Array], mean: Array, prior: Array
+) -> Array:
+    """Return the minimum (G,) of the sum of quadratics, each with the same prior, which shall count
+    once.
 
-    :param estimates: (G,) the minimum of each. :param informations: (G, G) its curvature, prior included.
+    :param estimates: (G,) the minimum of each. :param informations: (G, G) its curvature, prior
+        included.
     :param mean: (G,) and prior (G, G): the prior's mean and information.
     """
     total = prior + sum(I - prior for I in informations)
-    right = prior @ mean + sum(I @ x - prior @ mean for I, x in zip(informations, estimates, strict=True))
+    right = prior @ mean + sum(
+        I @ x - prior @ mean for I, x in zip(informations, estimates, strict=True)
+    )
     out: Array = np.linalg.solve(total, right)
     return out

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What residuals of a point or of a joint have in common: from their weight and gradient to the Gauss-Newton blocks.
+"""What residuals of a point or of a joint have in common: from their weight and gradient to the
+Gauss-Newton blocks.
 
-A residual of a point p fixed to part i, with W = GᵀG and f = Gᵀr for G = dr/dp, adds, with e = p - origin and
-B = R_i V + D_i,
-    M += [[ [e]x W [e]xᵀ, [e]x W ], [., W]],   N += [[e]x W B ; W B],   m += [e x f ; f],   C += BᵀWB,   c += Bᵀf
-and one of a joint's state adds its Hessian and gradient, turned from the parent's axes to the camera's.
-Source: section 3 of the paper.
+A residual of a point p fixed to part i, with W = GᵀG and f = Gᵀr for G = dr/dp, adds, with e = p -
+origin and B = R_i V + D_i,
+    M += [[ [e]x W [e]xᵀ, [e]x W ], [., W]],   N += [[e]x W B ; W B],   m += [e x f ; f],
+    C += BᵀWB,   c += Bᵀf
+and one of a joint's state adds its Hessian and gradient, turned from the parent's axes to the
+camera's. Source: section 3 of the paper.
 """
 
 from ..compiled.kernel import kernel
@@ -31,11 +33,17 @@ def relative_log(h, R):  # type: ignore[no-untyped-def]
 
 @kernel
 def add_to_joint(tree, pose, blocks, i, h00, h01, h02, h11, h12, h22, g0, g1, g2):  # type: ignore[no-untyped-def]
-    """Add a Hessian and a gradient in the parent's axes to joint i: H_uu += R_par H R_parᵀ, g_u += R_par g."""
+    """Add a Hessian and a gradient in the parent's axes to joint i: H_uu += R_par H R_parᵀ, g_u +=
+    R_par g.
+    """
     R = pose.R[tree.parents[i]]
     for r in range(3):
         x, y, z = R[r, 0], R[r, 1], R[r, 2]
-        a, b, c = x * h00 + y * h01 + z * h02, x * h01 + y * h11 + z * h12, x * h02 + y * h12 + z * h22
+        a, b, c = (
+            x * h00 + y * h01 + z * h02,
+            x * h01 + y * h11 + z * h12,
+            x * h02 + y * h12 + z * h22,
+        )
         for s in range(3):
             blocks.H_uu[i, r, s] += a * R[s, 0] + b * R[s, 1] + c * R[s, 2]
         blocks.H_u[i, r, GRADIENT] += x * g0 + y * g1 + z * g2
@@ -72,8 +80,8 @@ def _shape_derivative(tree, pose, k, i, a):  # type: ignore[no-untyped-def]
 
 @kernel
 def add_to_point(tree, pose, blocks, k, lx, ly, lz, w00, w01, w02, w11, w12, w22, f0, f1, f2):  # type: ignore[no-untyped-def]
-    """Add W (its upper triangle) and f of point k, whose `lever` is (lx, ly, lz). One point at a time, for the few that
-    touch something; the many that are measured go through linearize.py.
+    """Add W (its upper triangle) and f of point k, whose `lever` is (lx, ly, lz). One point at a
+    time, for the few that touch something; the many that are measured go through linearize.py.
     """
     i = tree.point_part[k]
     A, C, c = blocks.A[i], blocks.C, blocks.c
@@ -106,7 +114,11 @@ def add_to_point(tree, pose, blocks, k, lx, ly, lz, w00, w01, w02, w11, w12, w22
     for a in range(tree.shape):
         B0, B1, B2 = _shape_derivative(tree, pose, k, i, a)
         c[a] += B0 * f0 + B1 * f1 + B2 * f2
-        g0, g1, g2 = w00 * B0 + w01 * B1 + w02 * B2, w01 * B0 + w11 * B1 + w12 * B2, w02 * B0 + w12 * B1 + w22 * B2
+        g0, g1, g2 = (
+            w00 * B0 + w01 * B1 + w02 * B2,
+            w01 * B0 + w11 * B1 + w12 * B2,
+            w02 * B0 + w12 * B1 + w22 * B2,
+        )
         A[0, SHAPE + a] += y * g2 - z * g1
         A[1, SHAPE + a] += z * g0 - x * g2
         A[2, SHAPE + a] += x * g1 - y * g0

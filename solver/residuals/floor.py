@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The floor: no point may be below it, and one in contact may not be above it either.
 
-    h = n^T p - d,   p = R_i (V_j beta + v_bar_j) + t_i,   metres above the plane n^T p = d in the camera frame
+    h = n^T p - d,   p = R_i (V_j beta + v_bar_j) + t_i,
+    metres above the plane n^T p = d in the camera frame
     r = sqrt(w) h,   w = w_below where h < 0, else w_above
     dr/dx = sqrt(w) n^T [-[p - origin]x, I],   dr/dbeta = sqrt(w) n^T (R_i V_j + D_i)
-With w_above = 0 it is one-sided; with the probability of contact there it holds standing feet down. r and, where both
-weights are equal, dr/dp are continuous at h = 0; the cost and its gradient always are.
-Source: a one-sided height keeps the form r_i(T_i, beta) of section 3 of the paper.
+With w_above = 0 it is one-sided; with the probability of contact there it holds standing feet down.
+r and, where both weights are equal, dr/dp are continuous at h = 0; the cost and its gradient always
+are. Source: a one-sided height keeps the form r_i(T_i, beta) of section 3 of the paper.
 """
 
 import numpy as np
@@ -22,7 +23,9 @@ INDEXES = "points"
 
 @kernel
 def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # type: ignore[no-untyped-def]
-    """Add every row's M, N, m, C, c to the blocks and return the cost. ints (n, 1), floats (n, 6)."""
+    """Add every row's M, N, m, C, c to the blocks and return the cost. ints (n, 1), floats (n,
+    6).
+    """
     cost = 0.0
     for k in range(ints.shape[0]):
         f = floats[k]
@@ -36,19 +39,36 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
             continue
         cost += 0.5 * w * h * h
         add_to_point(
-            tree, pose, blocks, j, x, y, z,
-            w * a * a, w * a * b, w * a * c, w * b * b, w * b * c, w * c * c, w * h * a, w * h * b, w * h * c,
-        )  # fmt: skip
+            tree,
+            pose,
+            blocks,
+            j,
+            x,
+            y,
+            z,
+            w * a * a,
+            w * a * b,
+            w * a * c,
+            w * b * b,
+            w * b * c,
+            w * c * c,
+            w * h * a,
+            w * h * b,
+            w * h * c,
+        )
     return cost
 
 
-def pack(points: Array, normal: Array, offset: Array, w_below: Array, w_above: Array) -> tuple[Array, Array]:
+def pack(
+    points: Array, normal: Array, offset: Array, w_below: Array, w_above: Array
+) -> tuple[Array, Array]:
     """Return the tables of `accumulate`: int64 (n, 1) and float64 (n, 6).
 
     :param points: (n,) which points, as in the measurements.
-    :param normal, offset: of the plane normal^T p = offset in camera axes; (3,), a unit vector pointing up, and ()
-        metres; or (n, 3) and (n,), of each point's own plane.
-    :param w_below: (n,) weights of points that are below the plane. :param w_above: (n,) of those above.
+    :param normal, offset: of the plane normal^T p = offset in camera axes; (3,), a unit vector
+        pointing up, and () metres; or (n, 3) and (n,), of each point's own plane.
+    :param w_below: (n,) weights of points that are below the plane. :param w_above: (n,) of those
+        above.
     """
     n = len(points)
     floats = np.empty((n, 6))
@@ -70,10 +90,13 @@ def evaluate(
     """Return the residual (1 row) times sqrt(weight) and its derivatives.
 
     :param v_bar, V: (3,), (3, P) of the point relative to its part's origin, metres.
-    :param normal, offset: of the plane normal^T p = offset in camera axes; (3,), a unit vector pointing up, and metres.
+    :param normal, offset: of the plane normal^T p = offset in camera axes; (3,), a unit vector
+        pointing up, and metres.
     """
     p = part.R @ (V @ part.beta + v_bar) + part.t
     J_x, J_beta = point_jacobian(part, p, V)
     h = float(normal @ p) - offset
     g = np.sqrt(weight * (w_below if h < 0.0 else w_above))
-    return Linearization(np.array([g * h]), g * (normal @ J_x)[None], np.zeros((1, 3)), g * (normal @ J_beta)[None])
+    return Linearization(
+        np.array([g * h]), g * (normal @ J_x)[None], np.zeros((1, 3)), g * (normal @ J_beta)[None]
+    )

@@ -3,9 +3,10 @@
 
     r = sqrt(w) (p - p_stand),   p = R_i (V_j beta + v_bar_j) + t_i,   metres
     dr/dx = sqrt(w) [-[p - origin]x, I],   dr/dbeta = sqrt(w) (R_i V_j + D_i)
-p_stand is a constant, last frame's position or the mean over the contact, in the camera frame of this frame; w is the
-probability of contact. Without a robust kernel: contact is uncertain through w, not through outliers.
-Source: velocity terms whose last frame is a constant keep the form r_i(T_i, beta) of section 3 of the paper.
+p_stand is a constant, last frame's position or the mean over the contact, in the camera frame of
+this frame; w is the probability of contact. Without a robust kernel: contact is uncertain through
+w, not through outliers. Source: velocity terms whose last frame is a constant keep the form
+r_i(T_i, beta) of section 3 of the paper.
 """
 
 import numpy as np
@@ -21,7 +22,9 @@ INDEXES = "points"
 
 @kernel
 def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # type: ignore[no-untyped-def]
-    """Add every row's M, N, m, C, c to the blocks and return the cost. ints (n, 1), floats (n, 4)."""
+    """Add every row's M, N, m, C, c to the blocks and return the cost. ints (n, 1), floats (n,
+    4).
+    """
     cost = 0.0
     for k in range(ints.shape[0]):
         f = floats[k]
@@ -45,7 +48,9 @@ def pack(points: Array, p_stand: Array, weights: Array) -> tuple[Array, Array]:
     return np.reshape(points, (n, 1)).astype(np.int64), floats
 
 
-def evaluate(part: Part, v_bar: Array, V: Array, p_stand: Array, weight: float = 1.0) -> Linearization:
+def evaluate(
+    part: Part, v_bar: Array, V: Array, p_stand: Array, weight: float = 1.0
+) -> Linearization:
     """Return the residual (3 rows) times sqrt(weight) and its derivatives.
 
     :param v_bar, V: (3,), (3, P) of the point relative to its part's origin, metres.

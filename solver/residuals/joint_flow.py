@@ -1,21 +1,26 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A joint's state by a normalizing flow z(Omega) on SO(3), learned from motion: the paper's joint state prior.
+"""A joint's state by a normalizing flow z(Omega) on SO(3), learned from motion: the paper's joint
+state prior.
 
-    r = sqrt(w) (z, sqrt(h) l),   1/2 |z|^2 + l^2/2 = -log p(Omega) + const,   l = 0 for h = 0 (the paper's residual)
+    r = sqrt(w) (z, sqrt(h) l),   1/2 |z|^2 + l^2/2 = -log p(Omega) + const,
+    l = 0 for h = 0 (the paper's residual)
     dr/du = sqrt(w) (dz/dw; ...) R_parᵀ,   for Omega <- exp(R_parᵀ u) Omega
-p is the density against the Haar measure; l^2/2 = floor(B - log |det dz/dmu|) with floor(a) = (a + sqrt(a^2 + 1))/2 and
-a bound B of the log-determinant near the data.
+p is the density against the Haar measure; l^2/2 = floor(B - log |det dz/dmu|) with floor(a) = (a +
+sqrt(a^2 + 1))/2 and a bound B of the log-determinant near the data.
 
 Chart: with M a mean rotation and (w, v) the unit quaternion of MᵀOmega, w >= 0,
-    y = v / sqrt(w),   dmu/dy = 2/pi^2 w^(5/2) / (1 + w^2),   dy/de = sqrt(w)/2 I - [y]x/2 + y yᵀ/(4 sqrt(w))
-for Omega <- M exp(e) MᵀOmega: a diffeomorphism onto R^3 of all rotations but the half turns from M. There |y| and the
-residual tend to infinity, as (pi - angle)^-1/2, so the prior never prefers to turn on beyond; in the last 1e-4
-radians the residual is that at pi - 1e-4 about the same axis, whose sign is arbitrary at pi itself.
-Then LAYERS times, with tau(u) = u / (1 + u^2), S(a) = a + sqrt(1 + a^2), and s, t linear in HIDDEN values of tau,
-    x <- A x + b,   x_2 <- S(s_2(x_1)) x_2 + t_2(x_1),   x_3 <- S(s_3(x_1, x_2)) x_3 + t_3(x_1, x_2),
+    y = v / sqrt(w),   dmu/dy = 2/pi^2 w^(5/2) / (1 + w^2),
+    dy/de = sqrt(w)/2 I - [y]x/2 + y yᵀ/(4 sqrt(w))
+for Omega <- M exp(e) MᵀOmega: a diffeomorphism onto R^3 of all rotations but the half turns from M.
+There |y| and the residual tend to infinity, as (pi - angle)^-1/2, so the prior never prefers to
+turn on beyond; in the last 1e-4 radians the residual is that at pi - 1e-4 about the same axis,
+whose sign is arbitrary at pi itself. Then LAYERS times, with tau(u) = u / (1 + u^2), S(a) = a +
+sqrt(1 + a^2), and s, t linear in HIDDEN values of tau,
+    x <- A x + b,   x_2 <- S(s_2(x_1)) x_2 + t_2(x_1),
+    x_3 <- S(s_3(x_1, x_2)) x_3 + t_3(x_1, x_2),
     x_k <- x_k + beta_k sqrt(1 + x_k^2)
-and z = A x + b. Everything is smooth and has an inverse in closed form, `invert`.
-Source: section 3 of the paper, which leaves the kind of flow open; this one is ours. Training: tools/train_prior.
+and z = A x + b. Everything is smooth and has an inverse in closed form, `invert`. Source: section 3
+of the paper, which leaves the kind of flow open; this one is ours. Training: tools/train_prior.
 """
 
 import math
@@ -52,7 +57,8 @@ NEAREST = 1e-4  # radians to pi
 _MIN_TRACE = 4.0 * math.sin(0.5 * NEAREST) ** 2  # of 1 + tr MᵀOmega = 4 cos^2(angle / 2)
 _FARTHEST = math.sin(0.5 * NEAREST) ** -2.5  # of (1 + w^2) / w^(5/2)
 
-# A state of the formulas: x (3), dx/de (9) by rows, |det dx/dmu| without constants, gradient of its logarithm by e (3).
+# A state of the formulas: x (3), dx/de (9) by rows, |det dx/dmu| without constants, gradient of its
+# logarithm by e (3).
 STATE = 16
 
 
@@ -67,7 +73,11 @@ def chart(q: Callable[[int], Any], s: list[Any]) -> list[Any]:
     w = 0.5 * sqrt(four_ww)
     root = sqrt(w)
     k = root / four_ww
-    y = [k * (entry(2, 1) - entry(1, 2)), k * (entry(0, 2) - entry(2, 0)), k * (entry(1, 0) - entry(0, 1))]
+    y = [
+        k * (entry(2, 1) - entry(1, 2)),
+        k * (entry(0, 2) - entry(2, 0)),
+        k * (entry(1, 0) - entry(0, 1)),
+    ]
     f = 0.5 * root
     n = 0.25 / root
     a, b, c = n * y[0], n * y[1], n * y[2]
@@ -80,16 +90,25 @@ def chart(q: Callable[[int], Any], s: list[Any]) -> list[Any]:
     return [*y, *J, ww1 / (w * w * root), g * y[0], g * y[1], g * y[2]]
 
 
-def _linear(q: Callable[[int], Any], at: int, x: list[Any], J: list[Any]) -> tuple[list[Any], list[Any]]:
+def _linear(
+    q: Callable[[int], Any], at: int, x: list[Any], J: list[Any]
+) -> tuple[list[Any], list[Any]]:
     """Return A x + b and A J, with A and b from parameter `at` on."""
     A = [q(at + k) for k in range(9)]
-    out = [q(at + 9 + r) + A[3 * r] * x[0] + A[3 * r + 1] * x[1] + A[3 * r + 2] * x[2] for r in range(3)]
+    out = [
+        q(at + 9 + r) + A[3 * r] * x[0] + A[3 * r + 1] * x[1] + A[3 * r + 2] * x[2]
+        for r in range(3)
+    ]
     entries = [(r, c) for r in range(3) for c in range(3)]
-    return out, [A[3 * r] * J[c] + A[3 * r + 1] * J[3 + c] + A[3 * r + 2] * J[6 + c] for r, c in entries]
+    return out, [
+        A[3 * r] * J[c] + A[3 * r + 1] * J[3 + c] + A[3 * r + 2] * J[6 + c] for r, c in entries
+    ]
 
 
 def _hidden(q: Callable[[int], Any], at: int, x: list[Any]) -> list[Any]:
-    """Return (s, ds/dx.., t, dt/dx..) of the small network whose parameters start at `at`, of one or two inputs x."""
+    """Return (s, ds/dx.., t, dt/dx..) of the small network whose parameters start at `at`, of one
+    or two inputs x.
+    """
     n, H = len(x), HIDDEN
     out, bias = at + (n + 1) * H, at + (n + 3) * H
     sums = [[q(bias + r)] + [None] * n for r in range(2)]
@@ -153,7 +172,9 @@ def finish(q: Callable[[int], Any], s: list[Any]) -> list[Any]:
 
 
 def normal(q: Callable[[int], Any], s: list[Any]) -> list[Any]:
-    """Return JᵀJ (6, upper), Jᵀz (3), |z|^2, then what `finish` left from entry 10 on: state[12:16] stays."""
+    """Return JᵀJ (6, upper), Jᵀz (3), |z|^2, then what `finish` left from entry 10 on: state[12:16]
+    stays.
+    """
     J = [s[3:6], s[6:9], s[9:12]]
 
     def dot(a: int, b: int) -> Any:
@@ -165,7 +186,8 @@ def normal(q: Callable[[int], Any], s: list[Any]) -> list[Any]:
 
 
 _chart, _layer, _finish, _normal = (
-    vectorized(formula, reads) for formula, reads in ((chart, 9), (layer, STATE), (finish, STATE), (normal, 12))
+    vectorized(formula, reads)
+    for formula, reads in ((chart, 9), (layer, STATE), (finish, STATE), (normal, 12))
 )
 
 
@@ -182,7 +204,9 @@ def _gather(pose, ints, k, state):  # type: ignore[no-untyped-def]
 
 @allocating_kernel
 def _keep_off_half_turns(floats, k, state):  # type: ignore[no-untyped-def]
-    """Take the joints of row k in `state` that are nearly a half turn from their M back to pi - `NEAREST`."""
+    """Take the joints of row k in `state` that are nearly a half turn from their M back to pi -
+    `NEAREST`.
+    """
     M, R = np.empty((3, 3)), np.empty((3, 3))
     for lane in range(WIDTH):
         for e in range(9):
@@ -196,17 +220,23 @@ def _keep_off_half_turns(floats, k, state):  # type: ignore[no-untyped-def]
             trace += R[r, r]
         if 1.0 + trace > _MIN_TRACE:
             continue
-        x, y, z = log3(R[0, 0], R[0, 1], R[0, 2], R[1, 0], R[1, 1], R[1, 2], R[2, 0], R[2, 1], R[2, 2])
+        x, y, z = log3(
+            R[0, 0], R[0, 1], R[0, 2], R[1, 0], R[1, 1], R[1, 2], R[2, 0], R[2, 1], R[2, 2]
+        )
         scale = (math.pi - NEAREST) / math.sqrt(x * x + y * y + z * z)
         E = exp3(scale * x, scale * y, scale * z)
         for r in range(3):
             for c in range(3):
-                state[(3 * r + c) * WIDTH + lane] = M[r, 0] * E[c] + M[r, 1] * E[3 + c] + M[r, 2] * E[6 + c]
+                state[(3 * r + c) * WIDTH + lane] = (
+                    M[r, 0] * E[c] + M[r, 1] * E[3 + c] + M[r, 2] * E[6 + c]
+                )
 
 
 @allocating_kernel
 def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # type: ignore[no-untyped-def]
-    """Add every joint's H_uu and g_u to the blocks and return the cost. ints (n, WIDTH), floats (n, FLOATS)."""
+    """Add every joint's H_uu and g_u to the blocks and return the cost. ints (n, WIDTH), floats (n,
+    FLOATS).
+    """
     cost = 0.0
     if ints.shape[0] == 0 or weight <= 0.0:
         return cost
@@ -233,10 +263,21 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
                 continue
             e = state[lane::WIDTH]
             cost += 0.5 * w * e[9]
-            h00, h01, h02, h11, h12, h22 = w * e[0], w * e[1], w * e[2], w * e[3], w * e[4], w * e[5]
+            h00, h01, h02, h11, h12, h22 = (
+                w * e[0],
+                w * e[1],
+                w * e[2],
+                w * e[3],
+                w * e[4],
+                w * e[5],
+            )
             g0, g1, g2 = w * e[6], w * e[7], w * e[8]
             if h > 0.0:
-                a = floats[k, BOUND * WIDTH + lane] - floats[k, CONSTANT * WIDTH + lane] - math.log(e[12])
+                a = (
+                    floats[k, BOUND * WIDTH + lane]
+                    - floats[k, CONSTANT * WIDTH + lane]
+                    - math.log(e[12])
+                )
                 root = math.sqrt(a * a + 1.0)
                 half = 0.5 * (a + root)  # l^2 / 2
                 slope = half / root
@@ -249,14 +290,20 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
     return cost
 
 
-def pack(joints: Array, parameters: Array, weights: Array, log_det: float = 0.0) -> tuple[Array, Array]:
-    """Return the tables of `accumulate` from joints (n,) in 1..K, parameters (n, SIZE), weights w (n,), and h."""
+def pack(
+    joints: Array, parameters: Array, weights: Array, log_det: float = 0.0
+) -> tuple[Array, Array]:
+    """Return the tables of `accumulate` from joints (n,) in 1..K, parameters (n, SIZE), weights w
+    (n,), and h.
+    """
     n = len(joints)
     rows = -(-n // WIDTH)
     ints, floats = np.zeros((rows * WIDTH, 1), np.int64), np.zeros((rows * WIDTH, SIZE + 2))
     floats[:, MEAN : MEAN + 9] = np.eye(3).ravel()
     ints[:n, 0] = joints
-    floats[:n] = np.hstack([np.reshape(parameters, (n, SIZE)), np.c_[weights], np.full((n, 1), log_det)])
+    floats[:n] = np.hstack(
+        [np.reshape(parameters, (n, SIZE)), np.c_[weights], np.full((n, 1), log_det)]
+    )
     width_last = floats.reshape(rows, WIDTH, SIZE + 2).transpose(0, 2, 1)
     return ints.reshape(rows, WIDTH), np.ascontiguousarray(width_last).reshape(rows, FLOATS)
 
@@ -264,7 +311,8 @@ def pack(joints: Array, parameters: Array, weights: Array, log_det: float = 0.0)
 def transform(parameters: Array, Omega: Array) -> tuple[Array, Array, Array, Array]:
     """Return z (..., 3), dz/dw (..., 3, 3), log |det dz/dmu| (...) and its gradient by w (..., 3).
 
-    For parameters (SIZE,) and states Omega (..., 3, 3), with Omega <- exp(w) Omega and mu the normalized Haar measure.
+    For parameters (SIZE,) and states Omega (..., 3, 3), with Omega <- exp(w) Omega and mu the
+    normalized Haar measure.
     """
     p = np.asarray(parameters, float)
     M = p[MEAN : MEAN + 9].reshape(3, 3)
@@ -272,7 +320,9 @@ def transform(parameters: Array, Omega: Array) -> tuple[Array, Array, Array, Arr
     near = 1.0 + np.trace(local, axis1=-2, axis2=-1) < _MIN_TRACE
     if near.any():
         phi = log(local)
-        kept = exp(phi * ((np.pi - NEAREST) / np.maximum(np.linalg.norm(phi, axis=-1, keepdims=True), 1.0)))
+        kept = exp(
+            phi * ((np.pi - NEAREST) / np.maximum(np.linalg.norm(phi, axis=-1, keepdims=True), 1.0))
+        )
         local = np.where(near[..., None, None], kept, local)
     s = list(np.moveaxis((M @ local).reshape(*local.shape[:-2], 9), -1, 0))
     s = chart(p.__getitem__, s)
@@ -284,7 +334,8 @@ def transform(parameters: Array, Omega: Array) -> tuple[Array, Array, Array, Arr
 
 
 def log_density(parameters: Array, Omega: Array) -> Array:
-    """Return log p (...) in nats against the normalized Haar measure, so that the uniform distribution has 0.
+    """Return log p (...) in nats against the normalized Haar measure, so that the uniform
+    distribution has 0.
 
     :param parameters: (SIZE,) of one joint.
     :param Omega: (..., 3, 3) states of the joint.
@@ -295,7 +346,9 @@ def log_density(parameters: Array, Omega: Array) -> Array:
 
 
 def invert(parameters: Array, z: Array) -> Array:
-    """Return Omega (..., 3, 3) with transform(parameters, Omega)[0] = z (..., 3); a normal z gives a sample."""
+    """Return Omega (..., 3, 3) with transform(parameters, Omega)[0] = z (..., 3); a normal z gives
+    a sample.
+    """
     p = np.asarray(parameters, float)
 
     def unmap(at: int, x: Array) -> Array:
@@ -320,8 +373,11 @@ def invert(parameters: Array, z: Array) -> Array:
     return p[MEAN : MEAN + 9].reshape(3, 3) @ matrix_from_quaternion(quaternion)
 
 
-def evaluate(part: Part, parameters: Array, weight: float = 1.0, log_det: float = 0.0) -> Linearization:
-    """Return the residual (4 rows) times sqrt(weight) and its derivatives; the last row is sqrt(h) l, h = log_det.
+def evaluate(
+    part: Part, parameters: Array, weight: float = 1.0, log_det: float = 0.0
+) -> Linearization:
+    """Return the residual (4 rows) times sqrt(weight) and its derivatives; the last row is sqrt(h)
+    l, h = log_det.
 
     :param parameters: (SIZE,) of the joint.
     """
@@ -332,4 +388,6 @@ def evaluate(part: Part, parameters: Array, weight: float = 1.0, log_det: float 
     slope = -np.sqrt(0.5 * log_det * half / (a * a + 1.0))
     scale = np.sqrt(weight)
     J_u = scale * np.vstack([J, slope * gradient]) @ part.R_parent.T
-    return Linearization(scale * np.append(z, last), np.zeros((4, 6)), J_u, np.zeros((4, len(part.beta))))
+    return Linearization(
+        scale * np.append(z, last), np.zeros((4, 6)), J_u, np.zeros((4, len(part.beta)))
+    )

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One-sided limits on a joint's state: its angle about an axis, and how far it swings off that axis.
+"""One-sided limits on a joint's state: its angle about an axis, and how far it swings off that
+axis.
 
-    phi = log(Omega), a unit axis in the parent's axes at rest, angle = aᵀ phi, swing s = (I - a aᵀ) phi
+    phi = log(Omega), a unit axis in the parent's axes at rest, angle = aᵀ phi,
+    swing s = (I - a aᵀ) phi
     r_1   = sqrt(w) (max(0, angle - upper) - max(0, lower - angle))
     r_2-4 = sqrt(w_swing) s max(0, 1 - swing_limit / |s|)
     dr_1/du = sqrt(w) aᵀ J^-1(phi) R_parᵀ
     dr_2-4/du = sqrt(w_swing) (k I + (1 - k) s^ s^ᵀ) (I - a aᵀ) J^-1(phi) R_parᵀ
-with k = 1 - swing_limit / |s|, both zero inside the limits. Radians.
-Source: one-sided penalties on knees and upper arms as the paper's code has them; the ranges are ours.
+with k = 1 - swing_limit / |s|, both zero inside the limits. Radians. Source: one-sided penalties on
+knees and upper arms as the paper's code has them; the ranges are ours.
 """
 
 import math
@@ -24,8 +26,9 @@ INTS = 1  # joint
 FLOATS = 8  # axis (3), lower, upper, swing_limit, w, w_swing
 INDEXES = "joints"
 
-# Axis in the parent's rest axes of SMPL's T-pose (x to the person's left, y up, z forward), lower, upper, swing limit.
-# A knee bends the shin backwards; an elbow brings the forearm forwards, and carries some of the forearm's twist.
+# Axis in the parent's rest axes of SMPL's T-pose (x to the person's left, y up, z forward), lower,
+# upper, swing limit. A knee bends the shin backwards; an elbow brings the forearm forwards, and
+# carries some of the forearm's twist.
 HINGES = {
     "left_knee": ((1.0, 0.0, 0.0), -0.05, 2.6, 0.3),
     "right_knee": ((1.0, 0.0, 0.0), -0.05, 2.6, 0.3),
@@ -36,7 +39,9 @@ HINGES = {
 
 @kernel
 def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # type: ignore[no-untyped-def]
-    """Add every row's H_uu and g_u to the blocks and return the cost. ints (n, 1), floats (n, 8)."""
+    """Add every row's H_uu and g_u to the blocks and return the cost. ints (n, 1), floats (n,
+    8).
+    """
     cost = 0.0
     for k in range(ints.shape[0]):
         i = ints[k, 0]
@@ -61,7 +66,14 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
         a2 = f[0] * J[2] + f[1] * J[5] + f[2] * J[8]
         if hinged:
             cost += 0.5 * w * r * r
-            h00, h01, h02, h11, h12, h22 = w * a0 * a0, w * a0 * a1, w * a0 * a2, w * a1 * a1, w * a1 * a2, w * a2 * a2
+            h00, h01, h02, h11, h12, h22 = (
+                w * a0 * a0,
+                w * a0 * a1,
+                w * a0 * a2,
+                w * a1 * a1,
+                w * a1 * a2,
+                w * a2 * a2,
+            )
             g0, g1, g2 = w * r * a0, w * r * a1, w * r * a2
         if swung:
             share = 1.0 - f[5] / swing
@@ -84,7 +96,13 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
 
 
 def pack(
-    joints: Array, axes: Array, lower: Array, upper: Array, swing_limit: Array, w: Array, w_swing: Array
+    joints: Array,
+    axes: Array,
+    lower: Array,
+    upper: Array,
+    swing_limit: Array,
+    w: Array,
+    w_swing: Array,
 ) -> tuple[Array, Array]:
     """Return the tables of `accumulate`: int64 (n, 1) and float64 (n, 8).
 
@@ -96,14 +114,27 @@ def pack(
     """
     n = len(joints)
     floats = np.hstack(
-        [np.reshape(axes, (n, 3)), np.c_[lower], np.c_[upper], np.c_[swing_limit], np.c_[w], np.c_[w_swing]]
+        [
+            np.reshape(axes, (n, 3)),
+            np.c_[lower],
+            np.c_[upper],
+            np.c_[swing_limit],
+            np.c_[w],
+            np.c_[w_swing],
+        ]
     )
-    return np.reshape(joints, (n, 1)).astype(np.int64), np.ascontiguousarray(floats, dtype=np.float64)
+    return np.reshape(joints, (n, 1)).astype(np.int64), np.ascontiguousarray(
+        floats, dtype=np.float64
+    )
 
 
 def hinges_of(joint_names: Sequence[str]) -> tuple[Array, Array]:
-    """Return the tables of `accumulate` for the knees and elbows among a body's joint names; empty if it has none."""
-    found = [(joint_names.index(name), *hinge) for name, hinge in HINGES.items() if name in joint_names]
+    """Return the tables of `accumulate` for the knees and elbows among a body's joint names; empty
+    if it has none.
+    """
+    found = [
+        (joint_names.index(name), *hinge) for name, hinge in HINGES.items() if name in joint_names
+    ]
     if not found:
         return np.zeros((0, INTS), np.int64), np.zeros((0, FLOATS))
     joints, axes, lower, upper, swing = (np.array(column) for column in zip(*found, strict=True))
@@ -138,6 +169,12 @@ def evaluate(
     if swing > swing_limit:
         share, unit = 1.0 - swing_limit / swing, s / swing
         r[1:] = share * s
-        J_u[1:] = (share * np.eye(3) + (1.0 - share) * np.outer(unit, unit)) @ (np.eye(3) - np.outer(axis, axis)) @ J
+        J_u[1:] = (
+            (share * np.eye(3) + (1.0 - share) * np.outer(unit, unit))
+            @ (np.eye(3) - np.outer(axis, axis))
+            @ J
+        )
     scale = np.sqrt(weight * np.array([w, w_swing, w_swing, w_swing]))
-    return Linearization(scale * r, np.zeros((4, 6)), scale[:, None] * J_u, np.zeros((4, len(part.beta))))
+    return Linearization(
+        scale * r, np.zeros((4, 6)), scale[:, None] * J_u, np.zeros((4, len(part.beta)))
+    )

@@ -2,9 +2,10 @@
 """A joint's state pulled towards a mean: the rest pose, a learned mean, or last frame's state.
 
     r = sqrt(w_i) log(Omega_mean_iᵀ Omega_i),   radians
-    dr/du = sqrt(w_i) J^-1(phi) Omega_meanᵀ R_parᵀ,  phi = log(Omega_meanᵀ Omega),  for Omega <- exp(R_parᵀ u) Omega
-The gradient is w Omega_mean phi in the parent's axes, because J^-T(phi) phi = phi.
-Source: section 3 of the paper (joint state prior), with a Gaussian on SO(3) in place of the normalizing flow.
+    dr/du = sqrt(w_i) J^-1(phi) Omega_meanᵀ R_parᵀ,  phi = log(Omega_meanᵀ Omega),
+    for Omega <- exp(R_parᵀ u) Omega
+The gradient is w Omega_mean phi in the parent's axes, because J^-T(phi) phi = phi. Source: section
+3 of the paper (joint state prior), with a Gaussian on SO(3) in place of the normalizing flow.
 """
 
 import numpy as np
@@ -21,7 +22,9 @@ INDEXES = "joints"
 
 @kernel
 def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # type: ignore[no-untyped-def]
-    """Add every row's H_uu and g_u to the blocks and return the cost. ints (n, 1), floats (n, 10)."""
+    """Add every row's H_uu and g_u to the blocks and return the cost. ints (n, 1), floats (n,
+    10).
+    """
     cost = 0.0
     for k in range(ints.shape[0]):
         i = ints[k, 0]
@@ -31,7 +34,8 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
             continue
         x, y, z = relative_log(m, pose.Omega[i])
         J = left_jacobian_inverse3(x, y, z)
-        # J^-T J^-1 = q I + (1 - q) a aᵀ with a the axis and q = |phi/2|^2 / sin^2(|phi|/2): read q off the trace
+        # J^-T J^-1 = q I + (1 - q) a aᵀ with a the axis and q = |phi/2|^2 / sin^2(|phi|/2): read q
+        # off the trace
         s = x * x + y * y + z * z
         trace = 0.0
         for e in range(9):
@@ -53,7 +57,9 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
 
 
 def pack(joints: Array, Omega_mean: Array, weights: Array) -> tuple[Array, Array]:
-    """Return the tables of `accumulate` from joints (n,) in 1..K, means (n, 3, 3) and weights (n,)."""
+    """Return the tables of `accumulate` from joints (n,) in 1..K, means (n, 3, 3) and weights
+    (n,).
+    """
     n = len(joints)
     floats = np.empty((n, 10))
     floats[:, :9], floats[:, 9] = np.reshape(Omega_mean, (n, 9)), weights
@@ -61,7 +67,9 @@ def pack(joints: Array, Omega_mean: Array, weights: Array) -> tuple[Array, Array
 
 
 def evaluate(part: Part, Omega_mean: Array, weight: float = 1.0) -> Linearization:
-    """Return the residual (3 rows) times sqrt(weight) and its derivatives; `Omega_mean` (3, 3) is a joint state."""
+    """Return the residual (3 rows) times sqrt(weight) and its derivatives; `Omega_mean` (3, 3) is a
+    joint state.
+    """
     phi = log(Omega_mean.T @ part.Omega)
     g = np.sqrt(weight)
     J_u = g * left_jacobian_inverse(phi) @ Omega_mean.T @ part.R_parent.T

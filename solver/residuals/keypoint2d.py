@@ -2,16 +2,17 @@
 r"""A keypoint seen in the image.
 
     r = (f x/z - u, f y/z - v),   p = (x, y, z) = R_i (V_j beta + v_bar_j) + t_i
-with (u, v) the pixel in normalized image coordinates of the given intrinsics, u = (px - cx - skew v) / fx, and f = 1,
-or the unknown focal length over the given one. Weights are therefore per square of a normalized coordinate: one pixel
-squared times focal squared.
+with (u, v) the pixel in normalized image coordinates of the given intrinsics, u = (px - cx - skew
+v) / fx, and f = 1, or the unknown focal length over the given one. Weights are therefore per square
+of a normalized coordinate: one pixel squared times focal squared.
 
-    dr/dp = G = (f/z) [[1, 0, -x/z], [0, 1, -y/z]],  dr/dx = G [-[p - origin]x, I],  dr/dbeta = G (R V_j + D),
+    dr/dp = G = (f/z) [[1, 0, -x/z], [0, 1, -y/z]],  dr/dx = G [-[p - origin]x, I],
+    dr/dbeta = G (R V_j + D),
     dr/dlog f = f (x/z, y/z)
 
-Nearer than z_min, or behind the camera, z is replaced by z_min in the projection and a third residual,
-(z_min - z) / z_min, which no robust kernel flattens, pushes the point to the front; all is finite and continuous.
-Source: section 3 of the paper, pinhole projection.
+Nearer than z_min, or behind the camera, z is replaced by z_min in the projection and a third
+residual, (z_min - z) / z_min, which no robust kernel flattens, pushes the point to the front; all
+is finite and continuous. Source: section 3 of the paper, pinhole projection.
 """
 
 import numpy as np
@@ -25,7 +26,9 @@ Z_MIN = 0.1  # metres
 
 @kernel
 def term(x, y, z, u, v, focal, weight, inv_sigma, triggs):  # type: ignore[no-untyped-def]
-    """Return (cost, 6 of w GᵀG by rows of its upper triangle, 3 of w Gᵀr, 3 of w Gᵀg, w gᵀg, w gᵀr), g = dr/dlog f."""
+    """Return (cost, 6 of w GᵀG by rows of its upper triangle, 3 of w Gᵀr, 3 of w Gᵀg, w gᵀg, w
+    gᵀr), g = dr/dlog f.
+    """
     front = z > Z_MIN
     iz = 1.0 / (z if front else Z_MIN)
     gx, gy = focal * x * iz, focal * y * iz
@@ -51,11 +54,30 @@ def term(x, y, z, u, v, focal, weight, inv_sigma, triggs):  # type: ignore[no-un
         cost += 0.5 * weight * depth * depth
         w22 += weight / (Z_MIN * Z_MIN)
         fz -= weight * depth / Z_MIN
-    return cost, w00, w01, w02, w11, w12, w22, fx, fy, fz, hx, hy, hz, w * (gx * gx + gy * gy), w * (gx * rx + gy * ry)
+    return (
+        cost,
+        w00,
+        w01,
+        w02,
+        w11,
+        w12,
+        w22,
+        fx,
+        fy,
+        fz,
+        hx,
+        hy,
+        hz,
+        w * (gx * gx + gy * gy),
+        w * (gx * rx + gy * ry),
+    )
 
 
-def evaluate(part: Part, v_bar: Array, V: Array, uv: Array, weight: float = 1.0, focal: float = 1.0) -> Linearization:
-    """Return r sqrt(weight) (2 rows, or 3 behind z_min), without robust kernel, and its derivatives.
+def evaluate(
+    part: Part, v_bar: Array, V: Array, uv: Array, weight: float = 1.0, focal: float = 1.0
+) -> Linearization:
+    """Return r sqrt(weight) (2 rows, or 3 behind z_min), without robust kernel, and its
+    derivatives.
 
     v_bar (3,), V (3, P) of the keypoint in metres; uv (2,) normalized image coordinates.
     """

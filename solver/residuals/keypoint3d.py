@@ -27,7 +27,9 @@ def term(x, y, z, mx, my, mz, weight, inv_sigma, triggs):  # type: ignore[no-unt
     return 0.5 * weight * rho, w, kappa, w * rx, w * ry, w * rz
 
 
-def evaluate(part: Part, v_bar: Array, V: Array, point: Array, weight: float = 1.0) -> Linearization:
+def evaluate(
+    part: Part, v_bar: Array, V: Array, point: Array, weight: float = 1.0
+) -> Linearization:
     """Return r sqrt(weight) (3 rows), without robust kernel, and its derivatives.
 
     :param v_bar, V: (3,), (3, P) of the point relative to its part's origin, metres.

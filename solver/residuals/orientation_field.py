@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The part orientation field: the unit direction between two points of one part against a measured unit vector.
+"""The part orientation field: the unit direction between two points of one part against a measured
+unit vector.
 
-    r = d/|d| - n,   d = R_i (V beta + v_bar),   (V, v_bar) the difference of the two points' (part origin: zero)
+    r = d/|d| - n,   d = R_i (V beta + v_bar),
+    (V, v_bar) the difference of the two points' (part origin: zero)
     dr/dd = G = (I - n^ n^ᵀ) / |d|, n^ = d/|d|;   dr/dx = G [-[d]x, 0],  dr/dbeta = G R V
 Neither the position of the part nor D enters. |r|^2 = 2 - 2 cos(angle); n is in the camera frame.
 A lever shorter than a tenth of a millimetre has no direction and counts for nothing.
@@ -44,7 +46,9 @@ def term(dx, dy, dz, nx, ny, nz, weight, inv_sigma, triggs):  # type: ignore[no-
     return 0.5 * weight * rho, w00, w01, w02, w11, w12, w22, fx, fy, fz
 
 
-def evaluate(part: Part, v_bar: Array, V: Array, direction: Array, weight: float = 1.0) -> Linearization:
+def evaluate(
+    part: Part, v_bar: Array, V: Array, direction: Array, weight: float = 1.0
+) -> Linearization:
     """Return r sqrt(weight) (3 rows), without robust kernel, and its derivatives.
 
     :param v_bar, V: (3,), (3, P) of the second point relative to the first, metres.
@@ -58,5 +62,8 @@ def evaluate(part: Part, v_bar: Array, V: Array, direction: Array, weight: float
     unit = d / length
     G = np.sqrt(weight) * (np.eye(3) - np.outer(unit, unit)) / length
     return Linearization(
-        np.sqrt(weight) * (unit - direction), G @ np.hstack([hat_identity(d)[:, :3], zeros]), zeros, G @ part.R @ V
+        np.sqrt(weight) * (unit - direction),
+        G @ np.hstack([hat_identity(d)[:, :3], zeros]),
+        zeros,
+        G @ part.R @ V,
     )

@@ -4,8 +4,8 @@
     r = (sqrt(w_R) log(R^ᵀ R), sqrt(w_t) (t - t^)),   radians and metres
     dr_R/dx = sqrt(w_R) J^-1(phi) R^ᵀ [I, 0],  phi = log(R^ᵀ R)
     dr_t/dx = sqrt(w_t) [-[t - origin]x, I],   dr_t/dbeta = sqrt(w_t) D
-Comparing positions rather than log(T T^-1) keeps the residual independent of the distance from the camera.
-Source: section 3 of the paper (pose prior on T_i).
+Comparing positions rather than log(T T^-1) keeps the residual independent of the distance from the
+camera. Source: section 3 of the paper (pose prior on T_i).
 """
 
 import numpy as np
@@ -22,7 +22,9 @@ INDEXES = "parts"
 
 @kernel
 def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # type: ignore[no-untyped-def]
-    """Add every row's M, N, m, C, c to the blocks and return the cost. ints (n, 1), floats (n, 14)."""
+    """Add every row's M, N, m, C, c to the blocks and return the cost. ints (n, 1), floats (n,
+    14).
+    """
     A = blocks.A
     cost = 0.0
     for k in range(ints.shape[0]):
@@ -56,7 +58,9 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
     return cost
 
 
-def pack(parts: Array, R_camera_part: Array, t_camera_part: Array, w_R: Array, w_t: Array) -> tuple[Array, Array]:
+def pack(
+    parts: Array, R_camera_part: Array, t_camera_part: Array, w_R: Array, w_t: Array
+) -> tuple[Array, Array]:
     """Return the tables of `accumulate`: int64 (n, 1) and float64 (n, 14).
 
     :param parts: (n,) in 0..K.
@@ -70,7 +74,9 @@ def pack(parts: Array, R_camera_part: Array, t_camera_part: Array, w_R: Array, w
     return np.reshape(parts, (n, 1)).astype(np.int64), floats
 
 
-def evaluate(part: Part, R_hat: Array, t_hat: Array, w_R: float, w_t: float, weight: float = 1.0) -> Linearization:
+def evaluate(
+    part: Part, R_hat: Array, t_hat: Array, w_R: float, w_t: float, weight: float = 1.0
+) -> Linearization:
     """Return the residual (6 rows) times sqrt(weight) and its derivatives.
 
     :param R_hat, t_hat: (3, 3), (3,) the expected pose of the part, metres, camera frame.
@@ -81,4 +87,6 @@ def evaluate(part: Part, R_hat: Array, t_hat: Array, w_R: float, w_t: float, wei
     J_x[:3, :3] = a * left_jacobian_inverse(phi) @ R_hat.T
     J_x[3:] = b * hat_identity(part.t - part.origin)
     J_beta = np.vstack([np.zeros_like(part.D), b * part.D])
-    return Linearization(np.concatenate([a * phi, b * (part.t - t_hat)]), J_x, np.zeros((6, 3)), J_beta)
+    return Linearization(
+        np.concatenate([a * phi, b * (part.t - t_hat)]), J_x, np.zeros((6, 3)), J_beta
+    )

@@ -1,19 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every residual the optimizer knows. This is the one place to add another; `register_residual` adds one from outside.
+"""Every residual the optimizer knows. This is the one place to add another; `register_residual`
+adds one from outside.
 
 A residual r_i(T_i, Omega_i, beta) in addition to the measurements is a module with
-    INTS, FLOATS                             columns of its two tables, one row for each term
-    INDEXES                                  what all its whole numbers count: "points" as in the measurements, "parts"
-                                             0..K or "joints" 1..K. Rows outside are refused; without it, negative ones
-    accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks) -> cost
-                                             compiled with @kernel; adds JᵀJ and Jᵀr to `Blocks` (see part.py)
-    evaluate(part, ...) -> Linearization     the same in plain numpy, for the derivative test
-To add it here: its import, and one line, its module in RESIDUALS. Its tables come in through
-`Measurements.tables[name]`, or through a field of `Measurements` or `Priors` of its own; its weight through
-`Weights.tables[name]`. A residual with no rows costs one call.
 
-The three measurements (keypoint2d, keypoint3d, orientation_field) are not here: the hot path in linearize.py merges
-those of one point into one term.
+    INTS, FLOATS
+        columns of its two tables, one row for each term
+    INDEXES
+        what all its whole numbers count: "points" as in the measurements, "parts" 0..K or "joints"
+        1..K. Rows outside are refused; without it, negative ones
+    accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks) -> cost
+        compiled with @kernel; adds JᵀJ and Jᵀr to `Blocks` (see part.py)
+    evaluate(part, ...) -> Linearization
+        the same in plain numpy, for the derivative test
+
+To add it here: its import, and one line, its module in RESIDUALS. Its tables come in through
+`Measurements.tables[name]`, or through a field of `Measurements` or `Priors` of its own; its weight
+through `Weights.tables[name]`. A residual with no rows costs one call.
+
+The three measurements (keypoint2d, keypoint3d, orientation_field) are not here: the hot path in
+linearize.py merges those of one point into one term.
 """
 
 from collections.abc import Callable
@@ -40,7 +46,8 @@ RESIDUALS = {
     "outline": outline,
 }
 
-# Columns of a stage's weights: the measurements, the shape prior, then RESIDUALS in order, then external ones.
+# Columns of a stage's weights: the measurements, the shape prior, then RESIDUALS in order, then
+# external ones.
 KEYPOINT2D, KEYPOINT3D, ORIENTATION_FIELD, SHAPE_PRIOR, FIRST_TABLE = range(5)
 FIRST_EXTERNAL = FIRST_TABLE + len(RESIDUALS)
 COLUMNS = FIRST_EXTERNAL + MAX_EXTERNAL
@@ -61,13 +68,15 @@ def _followed_by(before: Any, index: int, name: str, accumulate: Any) -> Any:
         w, s = weights[column], inv_sigma[column]
         return cost + accumulate(tree, ints[index], floats[index], w, s, triggs, pose, blocks)
 
-    # Numba names machine code by this and a number that counts up within a process. Code that several processes have
-    # put on disk is linked by name: under one name for all, a kernel of one file could run in place of another's.
+    # Numba names machine code by this and a number that counts up within a process. Code that
+    # several processes have put on disk is linked by name: under one name for all, a kernel of one
+    # file could run in place of another's.
     run.__qualname__ = run.__name__ = f"run_to_{name}"
     return inlined_kernel(run)
 
 
-# Adds the residuals of all tables to the blocks and returns their cost; ints, floats and weights in RESIDUALS' order.
+# Adds the residuals of all tables to the blocks and returns their cost; ints, floats and weights in
+# RESIDUALS' order.
 accumulate_tables = _nothing
 for _index, (_name, _module) in enumerate(RESIDUALS.items()):
     accumulate_tables = _followed_by(accumulate_tables, _index, _name, _module.accumulate)
@@ -83,7 +92,9 @@ def registered(name: str) -> Any:
         return external[name]
     if name not in RESIDUALS:
         names = ", ".join([*RESIDUALS, *external])
-        raise InvalidValueError(f"There is no residual named {name!r}; the registered ones are {names}.")
+        raise InvalidValueError(
+            f"There is no residual named {name!r}; the registered ones are {names}."
+        )
     return RESIDUALS[name]
 
 
@@ -103,42 +114,64 @@ def register_residual(
     kernel: Callable[..., Any] | None = None,
     function: Callable[..., Any] | None = None,
 ) -> None:
-    """Add a residual of the form r(T_i, Omega_i, beta) to the solver, for this process. No file of Scope changes.
+    """Add a residual of the form r(T_i, Omega_i, beta) to the solver, for this process. No file of
+    Scope changes.
 
-    Rows come in through `Measurements.tables[name]`, int64 (n, ints) and float64 (n, floats); `Weights.tables[name]`
-    is its weight, 1 if left out; `Fit.cost_by_term[name]` its cost. The same name again replaces the residual.
+    Rows come in through `Measurements.tables[name]`, int64 (n, ints) and float64 (n, floats);
+    `Weights.tables[name]` is its weight, 1 if left out; `Fit.cost_by_term[name]` its cost. The same
+    name again replaces the residual.
 
     :param ints: columns of whole numbers; the first is what the row is about.
     :param floats: columns of other numbers.
-    :param indexes: what all whole numbers count: "points" as in the measurements, "parts" 0..K or "joints" 1..K.
-    :param kernel: ``accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks) -> cost``, as this module
-        describes it: a plain function, which is compiled here, or one that `numba.njit` has compiled. Its speed is that
-        of Scope's own.
-    :param function: ``function(part, ints, floats) -> r (n,)`` of one row (ints,), (floats,) in plain Python, with
-        R (3, 3), t (3,) of `compiled.part.Part` the pose of part i in the camera frame, metres, Omega (3, 3) the state
-        of its joint and beta (P,). Derivatives are central differences: slow, to try an idea.
-    :raises InvalidValueError: the name is one of Scope's own, not exactly one of `kernel` and `function` is given, a
-        count is not a whole number of at least 1 (`floats`: 0), `indexes` is unknown or "points" with a `function`, or
-        too many are registered.
+    :param indexes: what all whole numbers count: "points" as in the measurements, "parts" 0..K or
+        "joints" 1..K.
+    :param kernel: ``accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks) ->
+        cost``, as this module describes it: a plain function, which is compiled here, or one that
+        `numba.njit` has compiled. Its speed is that of Scope's own.
+    :param function: ``function(part, ints, floats) -> r (n,)`` of one row (ints,), (floats,) in
+        plain Python, with R (3, 3), t (3,) of `compiled.part.Part` the pose of part i in the camera
+        frame, metres, Omega (3, 3) the state of its joint and beta (P,). Derivatives are central
+        differences: slow, to try an idea.
+    :raises InvalidValueError: the name is one of Scope's own, not exactly one of `kernel` and
+        `function` is given, a count is not a whole number of at least 1 (`floats`: 0), `indexes` is
+        unknown or "points" with a `function`, or too many are registered.
     """
     external = external_residuals()
-    own = [*RESIDUALS, "keypoints2d", "keypoints3d", "orientation_field", "shape_prior", "focal_prior"]
+    own = [
+        *RESIDUALS,
+        "keypoints2d",
+        "keypoints3d",
+        "orientation_field",
+        "shape_prior",
+        "focal_prior",
+    ]
     if not isinstance(name, str) or not name or name in own:
-        raise InvalidValueError(f"A residual of your own needs a name other than {', '.join(own)}, but got {name!r}.")
+        raise InvalidValueError(
+            f"A residual of your own needs a name other than {', '.join(own)}, but got {name!r}."
+        )
     if (kernel is None) == (function is None) or not callable(kernel or function):
-        raise InvalidValueError(f"Residual {name!r} needs exactly one callable, kernel or function.")
+        raise InvalidValueError(
+            f"Residual {name!r} needs exactly one callable, kernel or function."
+        )
     for what, count, least in (("ints", ints, 1), ("floats", floats, 0)):
         check_count(count, f"{what} of {name!r}", least)
     allowed = INDEXES if function is None else INDEXES[1:]
     if not isinstance(indexes, str) or indexes not in allowed:
         found = repr(indexes) if isinstance(indexes, str) else described(indexes)
-        raise InvalidValueError(f"indexes of {name!r} must be one of {', '.join(allowed)}, but is {found}.")
+        raise InvalidValueError(
+            f"indexes of {name!r} must be one of {', '.join(allowed)}, but is {found}."
+        )
     if name not in external and len(external) == MAX_EXTERNAL:
-        raise InvalidValueError(f"There is room for {MAX_EXTERNAL} residuals from outside: {', '.join(external)}.")
+        raise InvalidValueError(
+            f"There is room for {MAX_EXTERNAL} residuals from outside: {', '.join(external)}."
+        )
     slot = external[name].slot if name in external else len(external)
     external[name] = Registered(name, slot, int(ints), int(floats), indexes, kernel, function)
 
 
 def empty_tables() -> dict[str, tuple[Array, Array]]:
     """Return tables without rows for every residual."""
-    return {name: (np.zeros((0, m.INTS), np.int64), np.zeros((0, m.FLOATS))) for name, m in RESIDUALS.items()}
+    return {
+        name: (np.zeros((0, m.INTS), np.int64), np.zeros((0, m.FLOATS)))
+        for name, m in RESIDUALS.items()
+    }

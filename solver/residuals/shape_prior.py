@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The shape pulled towards a mean: 1/2 w (beta - mean)ᵀ Lambda (beta - mean).
 
-Lambda (P, P) is the identity for the population prior, or an information matrix carried from earlier frames. As a
-residual, r = sqrt(w) Lᵀ (beta - mean) with Lambda = L Lᵀ, dr/dbeta = sqrt(w) Lᵀ.
-Source: section 3 of the paper (shape prior).
+Lambda (P, P) is the identity for the population prior, or an information matrix carried from
+earlier frames. As a residual, r = sqrt(w) Lᵀ (beta - mean) with Lambda = L Lᵀ, dr/dbeta = sqrt(w)
+Lᵀ. Source: section 3 of the paper (shape prior).
 """
 
 import numpy as np
@@ -29,7 +29,9 @@ def accumulate(mean, information, weight, pose, blocks):  # type: ignore[no-unty
 
 
 def evaluate(part: Part, mean: Array, information: Array, weight: float = 1.0) -> Linearization:
-    """Return the residual (P rows) and its derivatives for `mean` (P,) and `information` (P, P), positive definite."""
+    """Return the residual (P rows) and its derivatives for `mean` (P,) and `information` (P, P),
+    positive definite.
+    """
     root = np.sqrt(weight) * np.linalg.cholesky(information).T
     n = len(part.beta)
     return Linearization(root @ (part.beta - mean), np.zeros((n, 6)), np.zeros((n, 3)), root)

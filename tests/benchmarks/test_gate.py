@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The gate lets noise pass and stops what is worse, on made figures; and its record names what it measures."""
+"""The gate lets noise pass and stops what is worse, on made figures; and its record names what it
+measures.
+"""
 
 import math
 
@@ -46,7 +48,12 @@ def test_the_status_is_that_of_the_figures(monkeypatch, capsys):
 
 @pytest.mark.parametrize(
     ("variables", "status"),
-    [({}, 0), ({"CI": "1"}, 1), ({"CI": "1", "SCOPE_WITHOUT_SHARED": "1"}, 0), ({"SCOPE_WITHOUT_SHARED": "1"}, 0)],
+    [
+        ({}, 0),
+        ({"CI": "1"}, 1),
+        ({"CI": "1", "SCOPE_WITHOUT_SHARED": "1"}, 0),
+        ({"SCOPE_WITHOUT_SHARED": "1"}, 0),
+    ],
 )
 def test_a_recorded_figure_that_is_not_measured_fails_in_ci(monkeypatch, capsys, variables, status):
     for name in ("CI", "SCOPE_WITHOUT_SHARED"):

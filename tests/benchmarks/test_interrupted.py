@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The clip that is captured, and the run that is killed, by what they do to a few frames and a small program."""
+"""The clip that is captured, and the run that is killed, by what they do to a few frames and a
+small program.
+"""
 
 from __future__ import annotations
 
@@ -48,7 +50,9 @@ def test_a_clip_goes_there_and_back_again_at_an_even_rate(tmp_path: Path) -> Non
     with open_video(clip) as video:
         assert (video.width, video.height, video.frame_count) == (1920, 1080, 15)
         frames = list(video)
-    np.testing.assert_allclose([frame.timestamp_s for frame in frames], np.arange(15) / 30, atol=1e-6)
+    np.testing.assert_allclose(
+        [frame.timestamp_s for frame in frames], np.arange(15) / 30, atol=1e-6
+    )
     expected = [greys[k] for k in (0, 1, 2, 3, 2, 1, 0, 1, 2, 3, 2, 1, 0, 1, 2)]
     np.testing.assert_allclose([frame.image_rgb.mean() for frame in frames], expected, atol=4)
     with open_video(clip) as video:

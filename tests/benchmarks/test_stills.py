@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Single frames as images: the right frames, their errors against the truth of these frames, and the table."""
+"""Single frames as images: the right frames, their errors against the truth of these frames, and
+the table.
+"""
 
 from __future__ import annotations
 
@@ -34,13 +36,17 @@ def test_images_are_the_frames_asked_for(tmp_path: Path) -> None:
 
 
 def test_the_truth_of_a_frame_has_no_error(monkeypatch: pytest.MonkeyPatch, body: Body) -> None:
-    """A capture that returns the truth of one frame is wrong by the motion since then in the others."""
+    """A capture that returns the truth of one frame is wrong by the motion since then in the
+    others.
+    """
     with np.load(SAMPLE.truth) as file:
         joints, names = file["joints_cam"], file["joint_names"].tolist()
     assert tuple(names) == body.joint_names
     true = made_motion(body, np.zeros((1, body.K + 1, 3)), np.zeros((1, 3)))
     asked = [37, 74, 111]  # a quarter, half and three quarters of 150 frames
-    monkeypatch.setattr(stills, "frames_as_images", lambda _, frames: [(k, Path(f"{k}.png")) for k in frames])
+    monkeypatch.setattr(
+        stills, "frames_as_images", lambda _, frames: [(k, Path(f"{k}.png")) for k in frames]
+    )
 
     def captured(image: Path, *_: object) -> SimpleNamespace:
         if image.stem == "111":
@@ -49,7 +55,11 @@ def test_the_truth_of_a_frame_has_no_error(monkeypatch: pytest.MonkeyPatch, body
 
     monkeypatch.setattr(stills, "capture", captured)
     first, second, third = stills.errors_of_clip(body, SAMPLE, len(asked), "best")
-    limbs = [names.index(f"{side}_{at}") for at in ("knee", "ankle", "elbow", "wrist") for side in ("left", "right")]
+    limbs = [
+        names.index(f"{side}_{at}")
+        for at in ("knee", "ankle", "elbow", "wrist")
+        for side in ("left", "right")
+    ]
     moved = [joints[k, limbs] - joints[k, [1, 2]].mean(axis=0) for k in (37, 74)]
     assert first == pytest.approx((0.0, 0.0), abs=1e-3)
     assert second[0] > 300 * np.linalg.norm(moved[1] - moved[0], axis=1).mean()
@@ -57,10 +67,22 @@ def test_the_truth_of_a_frame_has_no_error(monkeypatch: pytest.MonkeyPatch, body
 
 
 def test_table() -> None:
-    """Means are of clips, medians of people; who was not found is counted, and counts in neither."""
+    """Means are of clips, medians of people; who was not found is counted, and counts in
+    neither.
+    """
     missed = (np.nan, np.nan)
     clips = {"a": [(10.0, 1.0), (20.0, 2.0), missed], "b": [(45.0, 4.0)], "c": [missed]}
-    shown = stills.errors_table({"best": {"cameras": clips, "nobody": {"c": [missed]}}}).splitlines()
+    shown = stills.errors_table(
+        {"best": {"cameras": clips, "nobody": {"c": [missed]}}}
+    ).splitlines()
     cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in shown[2:]]
-    assert cells[0] == ["best, cameras", "5", "30.0 (15.0 to 45.0)", "20.0", "2.8 (1.5 to 4.0)", "2.0", "2"]
+    assert cells[0] == [
+        "best, cameras",
+        "5",
+        "30.0 (15.0 to 45.0)",
+        "20.0",
+        "2.8 (1.5 to 4.0)",
+        "2.0",
+        "2",
+    ]
     assert cells[1] == ["best, nobody", "1", "", "", "", "", "1"]

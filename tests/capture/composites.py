@@ -15,7 +15,9 @@ FRAMES = range(0, 100, 2)  # of the clips, which have 60 per second
 
 @cache
 def panels(shared: Path, camera: str) -> tuple[list[np.ndarray], np.ndarray]:
-    """The middle of `FRAMES` of a clip, 500 pixels high, and the true centre of the trunk in each, (50, 2) pixels."""
+    """The middle of `FRAMES` of a clip, 500 pixels high, and the true centre of the trunk in each,
+    (50, 2) pixels.
+    """
     truth = np.load(shared / f"data/pose2sim/truth_{camera}.npz")
     names = [str(n) for n in truth["names"]]
     trunk = [names.index(n) for n in ("LShoulder", "RShoulder", "LHip", "RHip")]
@@ -27,13 +29,20 @@ def panels(shared: Path, camera: str) -> tuple[list[np.ndarray], np.ndarray]:
     for t in range(FRAMES.stop):
         video.grab()
         if t in FRAMES:
-            image = cv2.resize(video.retrieve()[1][top:bottom, left:right], (400, 500), interpolation=cv2.INTER_AREA)
+            image = cv2.resize(
+                video.retrieve()[1][top:bottom, left:right],
+                (400, 500),
+                interpolation=cv2.INTER_AREA,
+            )
             images.append(cv2.cvtColor(image, cv2.COLOR_BGR2RGB))
     return images, (at[FRAMES] - [left, top]) / 2
 
 
-def composite(shared: Path, cameras: tuple[str, str], crossing: bool) -> Iterator[tuple[np.ndarray, np.ndarray, bool]]:
-    """Frames, true positions (2, 2), and whether the first person is occluded; the second one passes in front.
+def composite(
+    shared: Path, cameras: tuple[str, str], crossing: bool
+) -> Iterator[tuple[np.ndarray, np.ndarray, bool]]:
+    """Frames, true positions (2, 2), and whether the first person is occluded; the second one
+    passes in front.
 
     30 per second, as of `visit`.
     """
@@ -48,7 +57,8 @@ def composite(shared: Path, cameras: tuple[str, str], crossing: bool) -> Iterato
 
 
 def visit(shared: Path) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Frames and true positions (2, 2): the first person stays, the second enters and leaves at the right edge.
+    """Frames and true positions (2, 2): the first person stays, the second enters and leaves at the
+    right edge.
 
     The background has enough texture to show that the camera is static.
     """
@@ -65,14 +75,18 @@ def visit(shared: Path) -> Iterator[tuple[np.ndarray, np.ndarray]]:
 
 
 def distant_view(image: np.ndarray) -> np.ndarray:
-    """The image at an eighth of its size, with its top left corner at (400, 200) of 1280 × 720 pixels."""
+    """The image at an eighth of its size, with its top left corner at (400, 200) of 1280 × 720
+    pixels.
+    """
     small = cv2.resize(image, None, fx=1 / 8, fy=1 / 8, interpolation=cv2.INTER_AREA)
     height, width = small.shape[:2]
     return cv2.copyMakeBorder(small, 200, 520 - height, 400, 880 - width, cv2.BORDER_REPLICATE)
 
 
 def beside(large: np.ndarray, small: np.ndarray) -> np.ndarray:
-    """The large image of 576 × 576 pixels, and right of it, at (800, 200), the small one with a height of 180."""
+    """The large image of 576 × 576 pixels, and right of it, at (800, 200), the small one with a
+    height of 180.
+    """
     height, width = small.shape[:2]
     there = cv2.resize(small, (round(180 * width / height), 180), interpolation=cv2.INTER_AREA)
     image = cv2.copyMakeBorder(large, 0, 0, 0, 600, cv2.BORDER_REPLICATE)

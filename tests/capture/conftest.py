@@ -15,16 +15,21 @@ Frames = Callable[..., Iterator[np.ndarray]]
 
 @pytest.fixture(scope="session")
 def frames(shared: Path) -> Frames:
-    """``frames("clips/NAME", stop=None, every=1, start=0)``: RGB frames in order, one of ``every`` from ``start``."""
+    """``frames("clips/NAME", stop=None, every=1, start=0)``: RGB frames in order, one of ``every``
+    from ``start``.
+    """
 
-    def read(name: str, stop: int | None = None, every: int = 1, start: int = 0) -> Iterator[np.ndarray]:
+    def read(
+        name: str, stop: int | None = None, every: int = 1, start: int = 0
+    ) -> Iterator[np.ndarray]:
         video = cv2.VideoCapture(str(shared / "data" / f"{name}.mp4"))
         index = 0
         while stop is None or index < stop:
             if not video.grab():
                 assert index, f"{name} cannot be read"
                 return
-            if index >= start and (index - start) % every == 0:  # the others are decoded, but not converted
+            # the others are decoded, but not converted
+            if index >= start and (index - start) % every == 0:
                 ok, image = video.retrieve()
                 assert ok
                 yield cv2.cvtColor(image, cv2.COLOR_BGR2RGB)

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Synthetic people for tests of tracking: images of coloured boxes, and networks that see people in them.
+"""Synthetic people for tests of tracking: images of coloured boxes, and networks that see people in
+them.
 
-The fake networks know where everybody is, and fail as the real ones do: an occluded person is not detected, and the
-landmarks in a region are those of the visible person nearest to its centre, whoever that is.
+The fake networks know where everybody is, and fail as the real ones do: an occluded person is not
+detected, and the landmarks in a region are those of the visible person nearest to its centre,
+whoever that is.
 """
 
 from __future__ import annotations
@@ -18,13 +20,25 @@ from scope.scope_addon.capture.perception.person_detector import Detection
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.left_right import MIRROR_PARTNER
 
-_HEIGHTS = {"shoulder": -0.5, "elbow": -0.3, "wrist": -0.1, "hip": 0.0, "knee": 0.45, "ankle": 0.85, "heel": 0.9}
+_HEIGHTS = {
+    "shoulder": -0.5,
+    "elbow": -0.3,
+    "wrist": -0.1,
+    "hip": 0.0,
+    "knee": 0.45,
+    "ankle": 0.85,
+    "heel": 0.9,
+}
 _HEIGHTS |= {"foot": 0.9, "pinky": -0.05, "index": -0.05, "thumb": -0.05}
 
 
 def _joint(name: str) -> tuple[float, float, float]:
     side = 0.15 if "left" in name else -0.15 if "right" in name else 0.0
-    return (2 * side if "wrist" in name else side), next((h for key, h in _HEIGHTS.items() if key in name), -0.7), 0.0
+    return (
+        (2 * side if "wrist" in name else side),
+        next((h for key, h in _HEIGHTS.items() if key in name), -0.7),
+        0.0,
+    )
 
 
 _BODY = np.array([_joint(name) for name in KEYPOINT_NAMES])
@@ -32,10 +46,12 @@ _BODY = np.array([_joint(name) for name in KEYPOINT_NAMES])
 
 @dataclass
 class Person:
-    """``center_px(t)`` of the hips, None outside the image; ``size_px``, pixels per metre; ``hidden`` frames.
+    """``center_px(t)`` of the hips, None outside the image; ``size_px``, pixels per metre;
+    ``hidden`` frames.
 
-    In the frames ``swapped`` the small network confuses left and right, in the frames ``lost`` it sees nobody, and in
-    the frames ``turned`` it sees the person turned about the vertical axis by as many degrees.
+    In the frames ``swapped`` the small network confuses left and right, in the frames ``lost`` it
+    sees nobody, and in the frames ``turned`` it sees the person turned about the vertical axis by
+    as many degrees.
     """
 
     center_px: Callable[[int], tuple[float, float] | None]
@@ -56,14 +72,18 @@ class Person:
         return _BODY + np.stack([swing, np.zeros(33), swing], axis=1)
 
 
-def pictures(people: list[Person], count: int, size: tuple[int, int] = (1200, 400)) -> Iterator[np.ndarray]:
+def pictures(
+    people: list[Person], count: int, size: tuple[int, int] = (1200, 400)
+) -> Iterator[np.ndarray]:
     for t in range(count):
         image = np.full((size[1], size[0], 3), 128, np.uint8)
         for person in people:
             place = person.place(t)
             if place is not None:
                 half = np.array([0.3, 0.9]) * person.size_px
-                low, high = (tuple(int(v) for v in corner) for corner in (place - half, place + half))
+                low, high = (
+                    tuple(int(v) for v in corner) for corner in (place - half, place + half)
+                )
                 cv2.rectangle(image, low, high, person.color, -1)
         image[0, 0] = t % 256, t // 256, 0
         yield image
@@ -77,7 +97,9 @@ class FakeDetector:
     def __init__(self, people: list[Person]) -> None:
         self.people, self.calls, self.close_calls = people, 0, 0
 
-    def detect(self, image: np.ndarray, threshold: float = 0.5, closely: bool = False) -> list[Detection]:
+    def detect(
+        self, image: np.ndarray, threshold: float = 0.5, closely: bool = False
+    ) -> list[Detection]:
         self.calls += 1
         self.close_calls += closely
         found = []
@@ -105,7 +127,9 @@ class FakeLandmarks:
         self.batches.append(len(regions))
         return [self._one(_time(image), region) for region in regions]
 
-    def begin(self, image: np.ndarray, region: Region, with_mask: bool = False) -> Future[PoseEstimate]:
+    def begin(
+        self, image: np.ndarray, region: Region, with_mask: bool = False
+    ) -> Future[PoseEstimate]:
         call: Future[PoseEstimate] = Future()
         call.set_result(self._one(_time(image), region))
         self.begun += 1
@@ -114,7 +138,11 @@ class FakeLandmarks:
     def _one(self, t: int, region: Region) -> PoseEstimate:
         def distance(person: Person) -> float:
             place = person.place(t)
-            return np.inf if place is None else float(np.linalg.norm(place - region.center_px)) / region.side_px
+            return (
+                np.inf
+                if place is None
+                else float(np.linalg.norm(place - region.center_px)) / region.side_px
+            )
 
         person = min(self.people, key=distance)
         seen = distance(person) < 0.4 and (self.is_reliable or t not in person.lost)

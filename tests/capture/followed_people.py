@@ -23,4 +23,6 @@ class FollowedPeople:
         self._times.append(time_s)
 
     def tracks(self, most: int) -> list[Track]:
-        return build_tracks(range(len(self._times)), self._times, list(self._tracklets.values()), most)
+        return build_tracks(
+            range(len(self._times)), self._times, list(self._tracklets.values()), most
+        )

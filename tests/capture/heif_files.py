@@ -24,20 +24,36 @@ def full_box(name: bytes, content: bytes, version: int = 0, flags: int = 0) -> b
 
 
 def coded(picture_rgb: np.ndarray) -> tuple[bytes, bytes]:
-    """Return the decoder's configuration (hvcC box, ISO 14496-15) and the coded picture, by x265."""
+    """Return the decoder's configuration (hvcC box, ISO 14496-15) and the coded picture, by
+    x265.
+    """
     av = package("av")
     need_encoder("libx265")
     encoder = av.CodecContext.create("libx265", "w")
-    encoder.width, encoder.height, encoder.pix_fmt = picture_rgb.shape[1], picture_rgb.shape[0], "yuv444p"
-    encoder.time_base, encoder.options = Fraction(1), {"crf": "8", "x265-params": "log-level=none:repeat-headers=1"}
+    encoder.width, encoder.height, encoder.pix_fmt = (
+        picture_rgb.shape[1],
+        picture_rgb.shape[0],
+        "yuv444p",
+    )
+    encoder.time_base, encoder.options = (
+        Fraction(1),
+        {"crf": "8", "x265-params": "log-level=none:repeat-headers=1"},
+    )
     frame = av.VideoFrame.from_ndarray(picture_rgb, "rgb24")
     stream = b"".join(bytes(packet) for packet in [*encoder.encode(frame), *encoder.encode()])
     units = [unit for unit in re.split(b"\0?\0\0\x01", stream) if unit]
     kinds = [unit[0] >> 1 & 63 for unit in units]
     headers = [(kind, unit) for kind, unit in zip(kinds, units, strict=True) if kind in _PARAMETERS]
     profile = next(unit for kind, unit in headers if kind == _SEQUENCE_PARAMETERS)[3:15]
-    arrays = b"".join(struct.pack(">BHH", 0x80 | kind, 1, len(unit)) + unit for kind, unit in headers)
-    said = b"\x01" + profile + struct.pack(">HBBBBHBB", 0xF000, 0xFC, 0xFF, 0xF8, 0xF8, 0, 0x0F, len(headers)) + arrays
+    arrays = b"".join(
+        struct.pack(">BHH", 0x80 | kind, 1, len(unit)) + unit for kind, unit in headers
+    )
+    said = (
+        b"\x01"
+        + profile
+        + struct.pack(">HBBBBHBB", 0xF000, 0xFC, 0xFF, 0xF8, 0xF8, 0, 0x0F, len(headers))
+        + arrays
+    )
     slices = [unit for kind, unit in zip(kinds, units, strict=True) if kind < 32]
     return box(b"hvcC", said), b"".join(struct.pack(">I", len(unit)) + unit for unit in slices)
 
@@ -60,9 +76,15 @@ def heic(
         rows, columns, pieces = 1, 1, [picture_rgb]
     else:
         rows, columns = -(-height // tile), -(-width // tile)
-        whole = np.pad(picture_rgb, ((0, rows * tile - height), (0, columns * tile - width), (0, 0)), mode="edge")
+        whole = np.pad(
+            picture_rgb,
+            ((0, rows * tile - height), (0, columns * tile - width), (0, 0)),
+            mode="edge",
+        )
         pieces = [
-            whole[r * tile : (r + 1) * tile, c * tile : (c + 1) * tile] for r in range(rows) for c in range(columns)
+            whole[r * tile : (r + 1) * tile, c * tile : (c + 1) * tile]
+            for r in range(rows)
+            for c in range(columns)
         ]
     small = np.full((64, 64, 3), 128, np.uint8)
     data = [coded(np.ascontiguousarray(piece)) for piece in (small, *pieces)]
@@ -81,9 +103,13 @@ def heic(
         number = numbers[-1] + 1
         numbers, kinds = [*numbers, number], [*kinds, b"Exif"]
         references += box(b"cdsc", struct.pack(">HHH", number, 1, primary))
-        directory = struct.pack(">HHHIHHI", 1, 0x8769, 4, 1, 0, 0, 0)[:10] + struct.pack(">II", 26, 0)
+        directory = struct.pack(">HHHIHHI", 1, 0x8769, 4, 1, 0, 0, 0)[:10] + struct.pack(
+            ">II", 26, 0
+        )
         inner = struct.pack(">HHHIHHI", 1, 0xA405, 3, 1, focal_mm, 0, 0)
-        contents.append(struct.pack(">I", 6) + b"Exif\0\0" + b"MM\0*" + struct.pack(">I", 8) + directory + inner)
+        contents.append(
+            struct.pack(">I", 6) + b"Exif\0\0" + b"MM\0*" + struct.pack(">I", 8) + directory + inner
+        )
     properties: list[bytes] = []
     associations: dict[int, list[int]] = {number: [] for number in numbers}
 
@@ -98,7 +124,9 @@ def heic(
         tell(primary, full_box(b"ispe", struct.pack(">II", width, height)))
     for kind, value in turns:
         tell(primary, box(kind.encode(), bytes([value])))
-    said = b"".join(struct.pack(f">HB{len(w)}B", number, len(w), *w) for number, w in associations.items())
+    said = b"".join(
+        struct.pack(f">HB{len(w)}B", number, len(w), *w) for number, w in associations.items()
+    )
     kinds_box = struct.pack(">H", len(numbers)) + b"".join(
         full_box(b"infe", struct.pack(">HH4s", number, 0, kind) + b"\0", version=2)
         for number, kind in zip(numbers, kinds, strict=True)
@@ -121,7 +149,8 @@ def heic(
             + full_box(b"iref", references)
             + box(
                 b"iprp",
-                box(b"ipco", b"".join(properties)) + full_box(b"ipma", struct.pack(">I", len(associations)) + said),
+                box(b"ipco", b"".join(properties))
+                + full_box(b"ipma", struct.pack(">I", len(associations)) + said),
             )
             + box(b"idat", idat),
         )
@@ -134,5 +163,10 @@ def heic(
     return (
         begin
         + meta(places)
-        + box(b"mdat", b"".join(content for content, within in zip(contents, inside, strict=True) if not within))
+        + box(
+            b"mdat",
+            b"".join(
+                content for content, within in zip(contents, inside, strict=True) if not within
+            ),
+        )
     )

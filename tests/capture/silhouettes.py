@@ -27,37 +27,50 @@ def standing(body: Body) -> list[State]:
     for heading in np.linspace(0, np.pi, 6, endpoint=False):
         rotations = np.tile(np.eye(3), (body.K + 1, 1, 1))
         for side, sign in (("left", 1.0), ("right", -1.0)):
-            rotations[body.joint_names.index(f"{side}_shoulder")] = exp(np.array([0, 0, -0.7 * sign]))
+            rotations[body.joint_names.index(f"{side}_shoulder")] = exp(
+                np.array([0, 0, -0.7 * sign])
+            )
             rotations[body.joint_names.index(f"{side}_hip")] = exp(np.array([0, 0, 0.15 * sign]))
         R_root = np.diag([1.0, -1.0, -1.0]) @ exp(np.array([0, heading, 0]))
         found.append(State(R_root, np.array([0.0, 0.0, 3.6]), rotations[1:], np.zeros(body.P)))
     return found
 
 
-def posed(body: Body, state: State, betas: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def posed(
+    body: Body, state: State, betas: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Part poses with the pelvis at the state's position, whatever the shape."""
     rotations = np.concatenate([state.R_camera_root[None], state.Omega])
-    return body.forward_kinematics(rotations, state.t_camera_root - body.rest_joints(betas)[0], betas)
+    return body.forward_kinematics(
+        rotations, state.t_camera_root - body.rest_joints(betas)[0], betas
+    )
 
 
 def mask_of(
     body: Body, state: State, betas: NDArray[np.float64], garment: Garment | None = None
 ) -> NDArray[np.float32]:
-    """The true silhouette in the region, by filled triangles of OpenCV's projection, with soft edges."""
+    """The true silhouette in the region, by filled triangles of OpenCV's projection, with soft
+    edges.
+    """
     R, t = posed(body, state, betas)
     points, triangles = body.skin(R, t, betas), body.triangles()
     a, b, c = points[triangles].transpose(1, 0, 2)
-    triangles = triangles[np.einsum("ij,ij->i", np.cross(b - a, c - a), a) < 0.0]  # the back lies behind the front
+    # the back lies behind the front
+    triangles = triangles[np.einsum("ij,ij->i", np.cross(b - a, c - a), a) < 0.0]
     if garment is not None:
         triangles = np.concatenate([triangles, garment.triangles + len(points)])
         points = np.concatenate([points, garment.placed(body, betas, R[0], t[0])])
-    pixels = cv2.projectPoints(points, np.zeros(3), np.zeros(3), K, np.zeros(5))[0][:, 0].astype(float)
+    pixels = cv2.projectPoints(points, np.zeros(3), np.zeros(3), K, np.zeros(5))[0][:, 0].astype(
+        float
+    )
     at = (REGION.crop_from_image(pixels) * 256 * FINER - 0.5) * 16
     image = np.zeros((256 * FINER, 256 * FINER), np.uint8)
     for triangle in np.rint(at).astype(np.int32)[triangles]:
         cv2.fillConvexPoly(image, np.ascontiguousarray(triangle), (255,), cv2.LINE_8, 4)
     small = cv2.resize(image, (256, 256), interpolation=cv2.INTER_AREA)
-    soft: NDArray[np.float32] = cv2.GaussianBlur(small, (0, 0), 1.0).astype(np.float32) / np.float32(255)
+    soft: NDArray[np.float32] = cv2.GaussianBlur(small, (0, 0), 1.0).astype(
+        np.float32
+    ) / np.float32(255)
     return soft
 
 
@@ -65,7 +78,9 @@ def seen_in(body: Body, betas: NDArray[np.float64], garment: Garment | None) -> 
     """Exact keypoints and masks of a person who wears a garment."""
     at, states = body.keypoint_set("blazepose"), standing(body)
     order, count = [at[name] for name in KEYPOINT_NAMES], len(states)
-    points = np.array([body.keypoints(*posed(body, state, betas), betas)[order] for state in states])
+    points = np.array(
+        [body.keypoints(*posed(body, state, betas), betas)[order] for state in states]
+    )
     pixels = points @ K.T
     masks = [PersonMask(REGION, mask_of(body, state, betas, garment), SIZE) for state in states]
     return Track(
@@ -82,5 +97,7 @@ def seen_in(body: Body, betas: NDArray[np.float64], garment: Garment | None) -> 
 
 def surface_error(body: Body, a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
     """Root mean square distance of the two shapes' vertices, pelvis on pelvis, metres."""
-    apart = (body.rest_vertices(a) - body.rest_joints(a)[0]) - (body.rest_vertices(b) - body.rest_joints(b)[0])
+    apart = (body.rest_vertices(a) - body.rest_joints(a)[0]) - (
+        body.rest_vertices(b) - body.rest_joints(b)[0]
+    )
     return float(np.sqrt((apart**2).sum(axis=1).mean()))

@@ -2,7 +2,8 @@
 """Small ONNX graphs with the inputs and outputs of real networks, and known results.
 
 Detectors return constants. Keypoint networks detect colours: keypoint k is the brightest place of
-the picture's colour k mod 3 (red, green, blue), so that the picture and the way back from it are tested with them.
+the picture's colour k mod 3 (red, green, blue), so that the picture and the way back from it are
+tested with them.
 """
 
 from __future__ import annotations
@@ -16,7 +17,13 @@ from onnx import TensorProto, helper, numpy_helper
 OPSET = 17
 
 
-def save(path: Path, nodes: list, inputs: list, outputs: list, constants: dict[str, np.ndarray] | None = None) -> Path:
+def save(
+    path: Path,
+    nodes: list,
+    inputs: list,
+    outputs: list,
+    constants: dict[str, np.ndarray] | None = None,
+) -> Path:
     weights = [numpy_helper.from_array(value, name) for name, value in (constants or {}).items()]
     graph = helper.make_graph(nodes, "ours", inputs, outputs, weights)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=8)
@@ -25,7 +32,9 @@ def save(path: Path, nodes: list, inputs: list, outputs: list, constants: dict[s
     return path
 
 
-def picture_input(width: int | str, height: int | str, kind: int = TensorProto.FLOAT) -> onnx.ValueInfoProto:
+def picture_input(
+    width: int | str, height: int | str, kind: int = TensorProto.FLOAT
+) -> onnx.ValueInfoProto:
     return helper.make_tensor_value_info("images", kind, [1, 3, height, width])
 
 
@@ -36,7 +45,9 @@ def fixed(path: Path, width: int | str, height: int | str, outputs: dict[str, np
         constants[f"{name}_value"] = value
         nodes.append(helper.make_node("Identity", [f"{name}_value"], [name]))
     infos = [
-        helper.make_tensor_value_info(name, helper.np_dtype_to_tensor_dtype(value.dtype), value.shape)
+        helper.make_tensor_value_info(
+            name, helper.np_dtype_to_tensor_dtype(value.dtype), value.shape
+        )
         for name, value in outputs.items()
     ]
     return save(path, nodes, [picture_input(width, height)], infos, constants)
@@ -49,7 +60,9 @@ def _colours(count: int) -> tuple[list, dict[str, np.ndarray]]:
 
 
 def simcc(path: Path, count: int, width: int, height: int, ratio: float = 2.0) -> Path:
-    """Write an RTMPose graph: bin b of an axis is the maximum of column or row b / ratio, linearly interpolated."""
+    """Write an RTMPose graph: bin b of an axis is the maximum of column or row b / ratio, linearly
+    interpolated.
+    """
     nodes, constants = _colours(count)
     constants["scales"] = np.array([1.0, 1.0, ratio], np.float32)
     for name, axis in (("simcc_x", 2), ("simcc_y", 3)):

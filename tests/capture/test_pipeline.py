@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The main job on real footage with ground truth in 3D, and on our own clip with exact ground truth."""
+"""The main job on real footage with ground truth in 3D, and on our own clip with exact ground
+truth.
+"""
 
 import json
 import os
@@ -28,7 +30,9 @@ def sample(body):
 
 
 def smpl_by_hand(body, pose, trans, betas):
-    """SMPL's own formula with 4x4 matrices and cv2's Rodrigues: rest joints, chain, blend. Joints and vertices."""
+    """SMPL's own formula with 4x4 matrices and cv2's Rodrigues: rest joints, chain, blend. Joints
+    and vertices.
+    """
     J = body.J_template + body.J_shapedirs @ betas
     v = body.v_template + body.shapedirs @ betas
     G = []
@@ -53,7 +57,9 @@ def test_an_independent_smpl_formula_meets_joints_cam_through_world_from_camera(
     m = sample.motions[0]
     for k in (0, len(m) // 2, len(m) - 1):
         joints, verts = smpl_by_hand(body, m.poses[k], m.trans[k], m.betas.astype(float))
-        in_world = m.joints_cam[k] @ m.world_from_camera[k, :3, :3].T + m.world_from_camera[k, :3, 3]
+        in_world = (
+            m.joints_cam[k] @ m.world_from_camera[k, :3, :3].T + m.world_from_camera[k, :3, 3]
+        )
         assert np.abs(joints - in_world).max() < 1e-4
         assert abs(verts[:, 2].min()) < 0.35  # on the floor, give or take a step or a jump
 
@@ -77,7 +83,16 @@ def test_the_motion_is_complete_and_its_values_are_sane(sample):
     m = sample.motions[0]
     assert np.array_equal(m.frames, np.arange(len(m)))
     assert np.all(np.diff(m.timestamps) > 0)
-    for name in ("poses", "trans", "poses_raw", "trans_raw", "betas", "joints_cam", "keypoints2d", "world_from_camera"):
+    for name in (
+        "poses",
+        "trans",
+        "poses_raw",
+        "trans_raw",
+        "betas",
+        "joints_cam",
+        "keypoints2d",
+        "world_from_camera",
+    ):
         assert np.isfinite(getattr(m, name)).all(), name
     assert (m.joints_cam[..., 2] > 0.3).all()
     for name in ("joint_confidence", "foot_contact"):
@@ -123,19 +138,29 @@ def evaluated(shared, body, camera, folder, **options):
     result.motions[0].save(folder / "result.npz")
     truth = shared / f"data/pose2sim/truth_{camera}.npz"
     argv = [sys.executable, shared / "tools/evaluate.py", truth, folder / "result.npz"]
-    return json.loads(subprocess.run(list(map(str, argv)), capture_output=True, text=True, check=True).stdout)
+    return json.loads(
+        subprocess.run(list(map(str, argv)), capture_output=True, text=True, check=True).stdout
+    )
 
 
 @pytest.mark.parametrize("quality", ["fast", "balanced"])
-def test_the_smaller_networks_do_not_flip_a_person_with_a_blurred_face(shared, body, tmp_path, quality):
-    """BlazePose-full confuses front and back, or left and right, in 29 % of this camera's frames."""
-    figures = evaluated(shared, body, "cam2", tmp_path, quality=quality, wanted=VideoRange(end_s=0.6))
+def test_the_smaller_networks_do_not_flip_a_person_with_a_blurred_face(
+    shared, body, tmp_path, quality
+):
+    """BlazePose-full confuses front and back, or left and right, in 29 % of this camera's
+    frames.
+    """
+    figures = evaluated(
+        shared, body, "cam2", tmp_path, quality=quality, wanted=VideoRange(end_s=0.6)
+    )
     assert figures["coverage"] >= 0.36  # of the whole clip
     assert figures["lr_swap"] + figures["mirror"] + figures["mirror_swap"] <= 0.01
 
 
 def test_real_footage_with_truth_beats_the_raw_landmarks(shared, body, tmp_path):
-    """Raw BlazePose-heavy has 129.7 mm MPJPE-root and 89 mm PA-MPJPE here, and we 73.7, 54.7 and a jitter of 14.9."""
+    """Raw BlazePose-heavy has 129.7 mm MPJPE-root and 89 mm PA-MPJPE here, and we 73.7, 54.7 and a
+    jitter of 14.9.
+    """
     figures = evaluated(shared, body, "cam3", tmp_path, quality="best")
     assert "warnings" not in figures
     assert figures["coverage"] == 1.0
@@ -163,7 +188,9 @@ def test_frames_without_the_person_are_filled_and_marked(body, tmp_path):
     assert np.isfinite(m.poses).all()
     steps = np.linalg.norm(np.diff(m.joints_cam.mean(1), axis=0), axis=-1)
     assert steps.max() < 0.15  # metres a frame: no jump into or out of the gap
-    assert any("8 of 30" in w or "9 of 30" in w or "10 of 30" in w for w in result.report["warnings"])
+    assert any(
+        "8 of 30" in w or "9 of 30" in w or "10 of 30" in w for w in result.report["warnings"]
+    )
 
 
 def test_footage_without_people_is_an_error(body, tmp_path):
@@ -176,10 +203,16 @@ def test_there_are_no_more_threads_than_cores(body, tmp_path):
     ok, frame = cv2.VideoCapture(str(SAMPLE)).read()
     assert ok
     cv2.imwrite(str(tmp_path / "person.png"), frame)
-    report = capture(tmp_path / "person.png", body, CaptureOptions(quality="fast", threads=1000)).report
+    report = capture(
+        tmp_path / "person.png", body, CaptureOptions(quality="fast", threads=1000)
+    ).report
     cores = os.cpu_count()
     assert report["execution"].startswith(f"CPU, {cores} thread")
-    assert [w for w in report["warnings"] if f"1000 threads were requested, but there are only {cores} cores" in w]
+    assert [
+        w
+        for w in report["warnings"]
+        if f"1000 threads were requested, but there are only {cores} cores" in w
+    ]
 
 
 def test_a_cancel_is_raised_and_leaves_no_thread(body):
@@ -203,15 +236,24 @@ def test_no_foot_is_under_the_floor(shared, body):
     options = CaptureOptions(quality="fast", wanted=VideoRange(7.0, 9.4))
     found = capture(shared / "data" / "clips" / "sit_stand_close.mp4", body, options)
     m = found.motions[0]
-    parts = [body.joint_names.index(f"{side}_{part}") for side in ("left", "right") for part in ("ankle", "foot")]
+    parts = [
+        body.joint_names.index(f"{side}_{part}")
+        for side in ("left", "right")
+        for part in ("ankle", "foot")
+    ]
     of_feet = np.isin(body.strongest_joints, parts)
-    vertices = [smpl_by_hand(body, *row, m.betas.astype(float))[1] for row in zip(m.poses, m.trans, strict=True)]
+    vertices = [
+        smpl_by_hand(body, *row, m.betas.astype(float))[1]
+        for row in zip(m.poses, m.trans, strict=True)
+    ]
     assert np.min(np.array(vertices)[:, of_feet, 2]) > -0.01
     assert not any("floor" in warning for warning in found.report["warnings"])
 
 
 def test_feet_outside_the_image_are_not_locked(shared, body, tmp_path):
-    """Squats, cut off at the hips: the visible part of the body moves up and down, as in the image."""
+    """Squats, cut off at the hips: the visible part of the body moves up and down, as in the
+    image.
+    """
     clip = tmp_path / "hips.mp4"
     video = cv2.VideoCapture(str(shared / "data" / "clips" / "squats_5fps.mp4"))
     writer = cv2.VideoWriter(str(clip), cv2.VideoWriter.fourcc(*"mp4v"), 5, (720, 600))
@@ -219,7 +261,10 @@ def test_feet_outside_the_image_are_not_locked(shared, body, tmp_path):
         writer.write(video.read()[1][:600])
     writer.release()
     found = capture(clip, body, CaptureOptions(quality="fast"))
-    assert "hips.mp4: the legs of the person were not seen, so their motion is a guess" in found.report["warnings"]
+    assert (
+        "hips.mp4: the legs of the person were not seen, so their motion is a guess"
+        in found.report["warnings"]
+    )
     motion = found.motions[0]
     feet = [k for k, name in enumerate(body.joint_names) if "foot" in name or "ankle" in name]
     assert motion.joint_confidence[:, feet].max() < 0.05
@@ -229,7 +274,9 @@ def test_feet_outside_the_image_are_not_locked(shared, body, tmp_path):
 
 def test_a_warning_names_the_person_without_hands(shared):
     clip, body = shared / "data" / "clips" / "two_people_portrait.mp4", load_body("scope_h")
-    options = CaptureOptions(quality="fast", people=2, hands="on", wanted=VideoRange(0.0, 0.5, None))
+    options = CaptureOptions(
+        quality="fast", people=2, hands="on", wanted=VideoRange(0.0, 0.5, None)
+    )
     report = capture(clip, body, options).report
     without = [n for n, person in enumerate(report["per_person"], 1)
                if not person["left_hand_frames"] + person["right_hand_frames"]]  # fmt: skip

@@ -37,7 +37,9 @@ def own_networks(networks: Path, tmp_path_factory: pytest.TempPathFactory) -> tu
 
 @pytest.fixture(scope="module", autouse=True)
 def processes_are_started_once() -> Iterator[None]:
-    """Keep the processes of the networks, which have no state: each takes half a second to start."""
+    """Keep the processes of the networks, which have no state: each takes half a second to
+    start.
+    """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(graph, "NetworkProcess", cache(NetworkProcess))
         yield
@@ -45,7 +47,11 @@ def processes_are_started_once() -> Iterator[None]:
 
 def captured(detector: Path | None = None, keypoints: Path | None = None) -> Capture:
     options = CaptureOptions(
-        quality="fast", wanted=VideoRange(0.0, 1.0), threads=1, detector=detector, keypoints=keypoints
+        quality="fast",
+        wanted=VideoRange(0.0, 1.0),
+        threads=1,
+        detector=detector,
+        keypoints=keypoints,
     )
     return capture(SAMPLE, load_body("scope"), options)
 
@@ -62,12 +68,19 @@ def test_a_capture_with_both_is_as_good_as_ours(own_networks: tuple[Path, Path])
         a, b = (j - j[:, :1] for j in (found[:, :22], truth[:, :22]))
         errors.append(np.linalg.norm(a - b, axis=-1).mean())
     assert errors[1] < 1.25 * errors[0] + 0.01
-    assert not motion.keypoints2d[:, [1, 9, 17, 31], 2].any()  # what COCO lacks: eye corner, mouth, finger, toe
+    # what COCO lacks: eye corner, mouth, finger, toe
+    assert not motion.keypoints2d[:, [1, 9, 17, 31], 2].any()
 
 
 def test_a_network_that_finds_nobody_is_named(tmp_path: Path) -> None:
-    blind = fixed(tmp_path / "blind.onnx", 640, 640, {"output0": np.zeros((1, 84, 8400), np.float32)})
-    with pytest.raises(NoPersonError, match=r"crop footage of .*; if .* without blind\.onnx, state in blind\.json"):
+    blind = fixed(
+        tmp_path / "blind.onnx", 640, 640, {"output0": np.zeros((1, 84, 8400), np.float32)}
+    )
+    with pytest.raises(
+        NoPersonError,
+        match=r"crop footage of .*; if .* without blind\.onnx, state "
+        r"in blind\.json",
+    ):
         captured(detector=blind)
 
 
@@ -84,7 +97,9 @@ def test_a_lost_person_is_found_again(own_networks: tuple[Path, Path]) -> None:
 
 
 def test_left_right_swaps_of_a_users_network_are_repaired(shared: Path, tmp_path: Path) -> None:
-    """BlazePose-full swaps them in 29 of 100 frames of this clip, in which the man's face is hardly visible."""
+    """BlazePose-full swaps them in 29 of 100 frames of this clip, in which the man's face is hardly
+    visible.
+    """
     spec = importlib.util.spec_from_file_location("evaluate", shared / "tools/evaluate.py")
     assert spec is not None
     assert spec.loader is not None
@@ -96,31 +111,46 @@ def test_left_right_swaps_of_a_users_network_are_repaired(shared: Path, tmp_path
     found.motions[0].save(tmp_path / "cam2.npz")
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
-        figures = tool.evaluate(str(shared / "data/pose2sim/truth_cam2.npz"), str(tmp_path / "cam2.npz"))
+        figures = tool.evaluate(
+            str(shared / "data/pose2sim/truth_cam2.npz"), str(tmp_path / "cam2.npz")
+        )
     assert max(figures[key] for key in ("lr_swap", "mirror", "mirror_swap")) <= 0.01
     assert figures["mpjpe_root"] < 90
 
 
 def test_two_people_keep_their_identities(own_networks: tuple[Path, Path], frames: Frames) -> None:
-    tracker = PeopleTracker("fast", 1, people=4, detector=own_networks[0], keypoints=own_networks[1])
+    tracker = PeopleTracker(
+        "fast", 1, people=4, detector=own_networks[0], keypoints=own_networks[1]
+    )
     for image in frames("clips/two_people_portrait", stop=24):
         seen = dict(tracker.step(image))
         assert sorted(seen) == [0, 1]
     assert abs(seen[0].region.center_px[0] - seen[1].region.center_px[0]) > 200
 
 
-def test_a_runner_is_tracked_at_a_low_frame_rate(own_networks: tuple[Path, Path], frames: Frames) -> None:
-    """Without auxiliary points, at 7.5 frames per second, every limb stays in the predicted region."""
-    tracker, numbers = PeopleTracker("fast", 1, detector=own_networks[0], keypoints=own_networks[1]), set()
+def test_a_runner_is_tracked_at_a_low_frame_rate(
+    own_networks: tuple[Path, Path], frames: Frames
+) -> None:
+    """Without auxiliary points, at 7.5 frames per second, every limb stays in the predicted
+    region.
+    """
+    tracker, numbers = (
+        PeopleTracker("fast", 1, detector=own_networks[0], keypoints=own_networks[1]),
+        set(),
+    )
     for image in frames("clips/run_moving_camera", every=4):
         ((number, seen),) = tracker.step(image)
         numbers.add(number)
-        in_region = seen.region.crop_from_image(seen.keypoints_px[[0, *range(11, 17), *range(23, 29)]])
+        in_region = seen.region.crop_from_image(
+            seen.keypoints_px[[0, *range(11, 17), *range(23, 29)]]
+        )
         assert ((in_region > 0.03) & (in_region < 0.97)).all()
     assert numbers == {0}
 
 
-def test_the_track_of_a_person_who_leaves_the_image_ends(own_networks: tuple[Path, Path], frames: Frames) -> None:
+def test_the_track_of_a_person_who_leaves_the_image_ends(
+    own_networks: tuple[Path, Path], frames: Frames
+) -> None:
     """The woman on the grass leaves at the left edge between frames 195 and 207."""
     tracker, woman = PeopleTracker("fast", 1, people=2, keypoints=own_networks[1]), []
     for index, image in enumerate(frames("clips/walk_side_static", start=185, stop=215), 185):

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A capture that was stopped continues with what its networks had found, to the same result, bit for bit."""
+"""A capture that was stopped continues with what its networks had found, to the same result, bit
+for bit.
+"""
 
 from __future__ import annotations
 
@@ -59,12 +61,15 @@ def test_a_stopped_capture_continues_to_the_same_result(tmp_path, body, networks
     resumed = capture(SAMPLE, body, options, unfinished=folder).motions[0]
     after = len(runs) - before
     whole = capture(SAMPLE, body, options).motions[0]
-    assert len(runs) - before - after > before > 2 * after > 0  # what was under way at the stop is run again
+    # what was under way at the stop is run again
+    assert len(runs) - before - after > before > 2 * after > 0
     assert_same(resumed, whole)
 
 
 def test_a_stopped_capture_of_a_long_clip_goes_on_in_its_middle(tmp_path, body, networks, runs):
-    """Three windows of 0.2 s, of which two are finished, without the estimates that would give the same."""
+    """Three windows of 0.2 s, of which two are finished, without the estimates that would give the
+    same.
+    """
     options = CaptureOptions(quality="fast", threads=1, window_s=0.2, wanted=VideoRange(0.0, 0.6))
     folder = tmp_path / "unfinished"
     with pytest.raises(CancelledError):

@@ -24,7 +24,9 @@ def footage(shared: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Pat
     """A video, and the true positions of the two, (T, 2, 2) pixels."""
     path, places, writer = tmp_path_factory.mktemp("visit") / "visit.avi", [], None
     for image, at in visit(shared):
-        writer = writer or cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 30, image.shape[1::-1])
+        writer = writer or cv2.VideoWriter(
+            str(path), cv2.VideoWriter.fourcc(*"MJPG"), 30, image.shape[1::-1]
+        )
         writer.write(np.ascontiguousarray(image[:, :, ::-1]))
         places.append(at)
     assert writer is not None
@@ -62,7 +64,9 @@ def test_nobody_jumps_when_entering_or_leaving(everybody: Capture) -> None:
         assert (motion.joints_cam[:, 0, 2] > 1.0).all()
 
 
-def test_the_visitor_is_the_same_at_six_frames_a_second(footage: tuple[Path, np.ndarray], body: Body) -> None:
+def test_the_visitor_is_the_same_at_six_frames_a_second(
+    footage: tuple[Path, np.ndarray], body: Body
+) -> None:
     options = CaptureOptions(quality="fast", people="all", wanted=VideoRange(fps=Fraction(6)))
     result = capture(footage[0], body, options)
     stays, visitor = result.motions

@@ -10,8 +10,12 @@ from scope.solver.loaders.body_file import load_body
 from scope.solver.rotations import exp
 
 
-def someone_walking(frames: int, rate: float, heading: float, turn: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """(T, 33, 2) pixels and (T, 33, 3) world landmarks of the walking body, one step of each foot per second."""
+def someone_walking(
+    frames: int, rate: float, heading: float, turn: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """(T, 33, 2) pixels and (T, 33, 3) world landmarks of the walking body, one step of each foot
+    per second.
+    """
     body = load_body("scope")
     seen, at = with_keypoint_offsets(body), list(body.keypoint_set("blazepose").values())
     pixels, world = [], []
@@ -36,7 +40,9 @@ def someone_walking(frames: int, rate: float, heading: float, turn: float = 0.0)
     return np.array(pixels), np.array(world)
 
 
-def track_without_depth(pixels: np.ndarray, rate: float, references: dict[int, np.ndarray]) -> Track:
+def track_without_depth(
+    pixels: np.ndarray, rate: float, references: dict[int, np.ndarray]
+) -> Track:
     count = len(pixels)
     return Track(
         frames=np.arange(count),

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Our own networks with the outputs of other types, such as a user's RTMPose and YOLO.
 
-Appended nodes convert BlazePose's landmarks to SimCC rows of COCO-17, and its detections to rows of boxes.
+Appended nodes convert BlazePose's landmarks to SimCC rows of COCO-17, and its detections to rows of
+boxes.
 """
 
 from __future__ import annotations
@@ -20,10 +21,14 @@ from scope.scope_addon.capture.perception.sessions import network_path
 _SIDE, _RATIO = 256, 2
 
 
-def _extend(source: str, path: Path, nodes: list, constants: dict[str, np.ndarray], outputs: list) -> Path:
+def _extend(
+    source: str, path: Path, nodes: list, constants: dict[str, np.ndarray], outputs: list
+) -> Path:
     model = onnx.load(str(network_path(source)))
     model.graph.node.extend(nodes)
-    model.graph.initializer.extend(numpy_helper.from_array(value, name) for name, value in constants.items())
+    model.graph.initializer.extend(
+        numpy_helper.from_array(value, name) for name, value in constants.items()
+    )
     del model.graph.output[:]
     model.graph.output.extend(outputs)
     onnx.save(model, str(path))
@@ -31,7 +36,9 @@ def _extend(source: str, path: Path, nodes: list, constants: dict[str, np.ndarra
 
 
 def coco_simcc(path: Path, source: str = "pose_landmark_lite") -> Path:
-    """Write a SimCC network: the score is visibility times presence, and falls by a quarter per bin."""
+    """Write a SimCC network: the score is visibility times presence, and falls by a quarter per
+    bin.
+    """
     constants: dict[str, np.ndarray] = {
         "table": np.array([39, 5], np.int64),
         "coco": np.array([KEYPOINT_NAMES.index(name) for name in COCO_17], np.int64),
@@ -65,7 +72,8 @@ def coco_simcc(path: Path, source: str = "pose_landmark_lite") -> Path:
             make("Unsqueeze", [f"scored_{axis}", "batch"], [f"simcc_{axis}"]),
         ]
     outputs = [
-        helper.make_tensor_value_info(f"simcc_{axis}", TensorProto.FLOAT, [1, 17, _SIDE * _RATIO]) for axis in "xy"
+        helper.make_tensor_value_info(f"simcc_{axis}", TensorProto.FLOAT, [1, 17, _SIDE * _RATIO])
+        for axis in "xy"
     ]
     path.with_suffix(".json").write_text(json.dumps({"mean": 0, "std": 255}))
     return _extend(source, path, nodes, constants, outputs)
@@ -94,5 +102,7 @@ def box_rows(path: Path) -> Path:
         make("Concat", ["low", "high", "score", "class"], ["rows"], axis=2),
     ]
     output = helper.make_tensor_value_info("rows", TensorProto.FLOAT, [1, 2254, 6])
-    path.with_suffix(".json").write_text(json.dumps({"mean": 127.5, "std": 127.5, "score_threshold": 0.5}))
+    path.with_suffix(".json").write_text(
+        json.dumps({"mean": 127.5, "std": 127.5, "score_threshold": 0.5})
+    )
     return _extend("pose_detection", path, nodes, constants, [output])

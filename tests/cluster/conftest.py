@@ -3,5 +3,6 @@
 
 import os
 
-# Otherwise every process looks at its own stacks a hundred times a second, in a fifth of these tests' processor time.
+# Otherwise every process looks at its own stacks a hundred times a second, in a fifth of these
+# tests' processor time.
 os.environ.setdefault("DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED", "False")

@@ -13,14 +13,18 @@ from ..required import package
 
 @pytest.fixture(scope="module")
 def connection():
-    """The module, without whose import, which takes a while, every process of a run collects this file."""
+    """The module, without whose import, which takes a while, every process of a run collects this
+    file.
+    """
     package("distributed")
     from scope.scope_addon.cluster import connection
 
     return connection
 
 
-@pytest.mark.parametrize("text", ["", "localhost:8786", "http://host:8786", "inproc://host", "tcp://", "nowhere.json"])
+@pytest.mark.parametrize(
+    "text", ["", "localhost:8786", "http://host:8786", "inproc://host", "tcp://", "nowhere.json"]
+)
 def test_what_is_no_address_and_no_file_is_refused(connection, text):
     with pytest.raises(UsageError, match="--scheduler must be an address"):
         connection.connect(text)

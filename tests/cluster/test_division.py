@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Long clips that several workers observe: every window once in the result, whatever becomes of workers."""
+"""Long clips that several workers observe: every window once in the result, whatever becomes of
+workers.
+"""
 
 from __future__ import annotations
 
@@ -21,14 +23,15 @@ from .test_runner import calls, files, run, started
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="sends signals to worker processes")
 
-# Replaces the capture. A clip has as many windows as its text says, each of three frames. The first process of the
-# window in the file beside it runs until its standard input ends.
+# Replaces the capture. A clip has as many windows as its text says, each of three frames. The first
+# process of the window in the file beside it runs until its standard input ends.
 CLIP = """
 import json, os, pathlib, sys
 clip = pathlib.Path(sys.argv[2])
 given = dict(each.split("=", 1) for each in sys.argv if each.startswith("--windows"))
 with open(clip.with_suffix(".calls"), "a") as log:
-    log.write(json.dumps({"pid": os.getpid(), "parent": os.getppid(), "windows": given.get("--windows", "")}) + "\\n")
+    row = {"pid": os.getpid(), "parent": os.getppid(), "windows": given.get("--windows", "")}
+    log.write(json.dumps(row) + "\\n")
 windows, count = given.get("--windows", ""), int(clip.read_text("utf-8"))
 if windows == "count" and count > 1:
     print(json.dumps({"windows": count})); sys.exit()
@@ -40,12 +43,16 @@ if ":" in windows:
         sys.stdin.read(); sys.exit(130)
     if failing.exists() and first <= int(failing.read_text("utf-8")) < end:
         print("scope: it cannot be decoded", file=sys.stderr); sys.exit(1)
-    outputs = [pathlib.Path(given["--windows-folder"], f"window{k:05d}.npz") for k in range(first, end)]
+    into = pathlib.Path(given["--windows-folder"])
+    outputs = [into / f"window{k:05d}.npz" for k in range(first, end)]
     for k, path in enumerate(outputs):
         path.write_text(f"{first + k} ")
-    print(json.dumps({"frames": 3 * len(outputs), "outputs": [str(p) for p in outputs], "warnings": []})); sys.exit()
+    names = [str(p) for p in outputs]
+    print(json.dumps({"frames": 3 * len(outputs), "outputs": names, "warnings": []}))
+    sys.exit()
 folder = given.get("--windows-folder")
-found = "".join(p.read_text("utf-8") for p in sorted(pathlib.Path(folder).iterdir())) if folder else "whole"
+paths = sorted(pathlib.Path(folder).iterdir()) if folder else []
+found = "".join(p.read_text("utf-8") for p in paths) if folder else "whole"
 outputs = [sys.argv[i + 1] for i, a in enumerate(sys.argv) if a == "-o"]
 for path in outputs:
     pathlib.Path(path).write_text(found)
@@ -73,8 +80,19 @@ def result(folder: Path, name: str) -> str:
 
 def test_windows_become_tasks_of_at_most_some_windows() -> None:
     assert window_ranges(3, 1) == ["0:2", "2:3"]
-    assert window_ranges(30, 4) == ["0:4", "4:8", "8:12", "12:16", "16:20", "20:24", "24:28", "28:30"]
-    assert all(int(e) - int(b) <= MAX_WINDOWS for b, e in (r.split(":") for r in window_ranges(1000, 2)))
+    assert window_ranges(30, 4) == [
+        "0:4",
+        "4:8",
+        "8:12",
+        "12:16",
+        "16:20",
+        "20:24",
+        "24:28",
+        "28:30",
+    ]
+    assert all(
+        int(e) - int(b) <= MAX_WINDOWS for b, e in (r.split(":") for r in window_ranges(1000, 2))
+    )
 
 
 def test_the_last_part_of_a_clip_is_followed_by_its_capture(tmp_path: Path) -> None:
@@ -87,7 +105,10 @@ def test_the_last_part_of_a_clip_is_followed_by_its_capture(tmp_path: Path) -> N
     assert divisions.ended(parts[0], "tcp://b", None) == []
     (last,) = divisions.ended(parts[2], "tcp://a", entry)
     assert (last.windows, last.windows_folder, last.key) == ("", str(tmp_path / "windows0"), "abc")
-    assert divisions.close(last) == (200, {"windows": 3, "window_seconds": 4.0, "window_workers": ["tcp://a"]})
+    assert divisions.close(last) == (
+        200,
+        {"windows": 3, "window_seconds": 4.0, "window_workers": ["tcp://a"]},
+    )
     assert not (tmp_path / "windows0").exists()
     assert divisions.close(last) == (0, {})
 
@@ -99,7 +120,8 @@ def test_a_long_clip_is_captured_in_windows_and_counted_once(cluster: Any, folde
     assert status == 0
     assert result(folder, "a") == "0 1 2 3 4 5 6 "
     assert result(folder, "b") == "whole"
-    assert files(folder) == ["a.glb", "a.npz", "b.glb", "b.npz", "scope-batch.json"]  # and no window
+    # and no window
+    assert files(folder) == ["a.glb", "a.npz", "b.glb", "b.npz", "scope-batch.json"]
     long, short = report["files"]
     assert (long["windows"], "windows" in short) == (7, False)
     rows = report["workers"]
@@ -117,7 +139,11 @@ def test_the_windows_of_a_killed_worker_are_observed_by_another(folder: Path) ->
 
     def kill() -> None:
         wait_for(lambda: calls(clip) and not clip.with_suffix(".hangs").exists())
-        (hung,) = [c for c in calls(clip) if ":" in c["windows"] and 4 in range(*map(int, c["windows"].split(":")))]
+        (hung,) = [
+            c
+            for c in calls(clip)
+            if ":" in c["windows"] and 4 in range(*map(int, c["windows"].split(":")))
+        ]
         os.kill(hung["parent"], signal.SIGKILL)
         wait_for(lambda: not runs(hung["pid"]))
 
@@ -145,7 +171,9 @@ def test_a_part_that_fails_is_left_to_the_capture_of_the_clip(cluster: Any, fold
     assert sum(row["frames"] for row in report["workers"]) == 12
 
 
-def test_real_windows_of_two_workers_give_the_result_in_one_piece(cluster: Any, folder: Path, networks: Path) -> None:
+def test_real_windows_of_two_workers_give_the_result_in_one_piece(
+    cluster: Any, folder: Path, networks: Path
+) -> None:
     (folder / "clip.mp4").write_bytes(SAMPLE.read_bytes())
     options = ["--quality", "fast", "--end", "1.1", "--window-seconds", "0.5", "--formats", "npz"]
     whole = folder.parent / "whole.npz"

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Footage and results in a store: listing, and what is published; `file://` and `memory://` stand for other stores."""
+"""Footage and results in a store: listing, and what is published; `file://` and `memory://` stand
+for other stores.
+"""
 
 import pytest
 from scope.scope_addon.cluster import remote
@@ -30,7 +32,9 @@ def files(folder):
 
 
 def test_footage_and_results_are_mirrored_by_their_names(store, tmp_path):
-    folder = mirror_footage("memory://bucket/clips", "memory://bucket/clips/out", tmp_path / "clips")
+    folder = mirror_footage(
+        "memory://bucket/clips", "memory://bucket/clips/out", tmp_path / "clips"
+    )
     assert files(folder) == ["below/a.mp4"]
     assert (folder / "below" / "a.mp4").read_bytes() == b""
     folder = mirror_results("memory://bucket/clips/out", tmp_path / "out")
@@ -50,10 +54,15 @@ def test_results_replace_earlier_ones_and_nothing_else_stays(store, tmp_path):
         staging = RemoteStaging(out)
         file.write_text(text)
         upload(file, f"{staging.attempt(0)}/below/a.npz")
-        assert staging.publish(staging.attempt(0), ["below/a.npz"], {"below/a.npz": {"bytes": len(text)}})
+        assert staging.publish(
+            staging.attempt(0), ["below/a.npz"], {"below/a.npz": {"bytes": len(text)}}
+        )
         staging.write_report(file)
         staging.close()
-        assert store.find("/bucket/out") == ["/bucket/out/below/a.npz", f"/bucket/out/{REPORT_NAME}"]
+        assert store.find("/bucket/out") == [
+            "/bucket/out/below/a.npz",
+            f"/bucket/out/{REPORT_NAME}",
+        ]
         assert store.cat_file("/bucket/out/below/a.npz").decode() == text
 
 
@@ -64,14 +73,18 @@ def test_a_damaged_or_late_result_is_not_published(store, tmp_path, damage):
     upload(tmp_path / "a.npz", f"{staging.attempt(0)}/a.npz")
     if damage == "given up":
         staging.remove(staging.attempt(0))
-    assert not staging.publish(staging.attempt(0), ["a.npz"], {"a.npz": {"bytes": 7 if damage == "cut" else 6}})
+    assert not staging.publish(
+        staging.attempt(0), ["a.npz"], {"a.npz": {"bytes": 7 if damage == "cut" else 6}}
+    )
     staging.close()
     assert not store.exists("/bucket/out/a.npz")
 
 
 def test_an_upload_that_is_cut_is_an_error(store, tmp_path, monkeypatch):
     (tmp_path / "a.npz").write_text("result")
-    monkeypatch.setattr(type(store), "put_file", lambda self, file, path: self.pipe_file(path, b"res"))
+    monkeypatch.setattr(
+        type(store), "put_file", lambda self, file, path: self.pipe_file(path, b"res")
+    )
     with pytest.raises(OSError, match="not as large"):
         upload(tmp_path / "a.npz", "memory://bucket/out/a.npz")
 
@@ -81,7 +94,9 @@ def test_what_a_store_raises_is_a_sentence(store, tmp_path, monkeypatch):
         raise RuntimeError("no\nsuch bucket")
 
     monkeypatch.setattr(type(store), "find", fails)
-    with pytest.raises(InputError, match="memory://bucket cannot be used .no such bucket.; check the address"):
+    with pytest.raises(
+        InputError, match="memory://bucket cannot be used .no such bucket.; check the address"
+    ):
         mirror_footage("memory://bucket", "", tmp_path / "clips")
     with pytest.raises(OutputError):
         mirror_results("memory://bucket", tmp_path / "out")

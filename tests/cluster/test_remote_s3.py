@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A batch whose footage and results are on S3, as moto's server imitates it, with a worker killed on the way."""
+"""A batch whose footage and results are on S3, as moto's server imitates it, with a worker killed
+on the way.
+"""
 
 import json
 import os
@@ -25,8 +27,16 @@ def store(monkeypatch):
     serving = server.ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
     serving.start()
     host, port = serving.get_host_and_port()
-    values = {"ENDPOINT_URL": f"http://{host}:{port}", "ACCESS_KEY_ID": "key", "SECRET_ACCESS_KEY": "secret"}
-    for name, value in {**values, "DEFAULT_REGION": "us-east-1", "EC2_METADATA_DISABLED": "true"}.items():
+    values = {
+        "ENDPOINT_URL": f"http://{host}:{port}",
+        "ACCESS_KEY_ID": "key",
+        "SECRET_ACCESS_KEY": "secret",
+    }
+    for name, value in {
+        **values,
+        "DEFAULT_REGION": "us-east-1",
+        "EC2_METADATA_DISABLED": "true",
+    }.items():
         monkeypatch.setenv(f"AWS_{name}", value)
     s3fs.S3FileSystem.clear_instance_cache()
     file_system = s3fs.S3FileSystem()
@@ -47,10 +57,22 @@ def test_clips_on_s3_are_captured_once_although_a_worker_is_killed(store, tmp_pa
 
     def calls(name):
         log = tmp_path / f"{name}.calls"
-        return [json.loads(line) for line in log.read_text("utf-8").splitlines()] if log.exists() else []
+        return (
+            [json.loads(line) for line in log.read_text("utf-8").splitlines()]
+            if log.exists()
+            else []
+        )
 
     with started(n_workers=2, processes=True) as cluster:
-        argv = ["batch", "s3://studio/clips", "--out", "s3://studio/out", "--formats", "npz", "--recursive"]
+        argv = [
+            "batch",
+            "s3://studio/clips",
+            "--out",
+            "s3://studio/out",
+            "--formats",
+            "npz",
+            "--recursive",
+        ]
         argv += ["--scheduler", cluster.scheduler_address]
         pids = set(workers(cluster).values())
 
@@ -69,7 +91,9 @@ def test_clips_on_s3_are_captured_once_although_a_worker_is_killed(store, tmp_pa
             report = json.loads(store.cat_file(f"studio/out/{REPORT_NAME}"))
             assert report["counts"] == {**counts, "no_person": 0, "failed": 1}
             results = {"a.npz": "a", "below/d.npz": "d", "c.npz": "hangs"}
-            assert store.find("studio/out") == sorted(f"studio/out/{name}" for name in [*results, REPORT_NAME])
+            assert store.find("studio/out") == sorted(
+                f"studio/out/{name}" for name in [*results, REPORT_NAME]
+            )
             for name, text in results.items():
                 assert store.cat_file(f"studio/out/{name}").decode() == f"result of {text}"
     assert {name: len(calls(name)) for name in "abcd"} == {"a": 1, "b": 2, "c": 2, "d": 1}

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A batch on a cluster of two worker processes: one good output per clip, whatever becomes of workers and scheduler."""
+"""A batch on a cluster of two worker processes: one good output per clip, whatever becomes of
+workers and scheduler.
+"""
 
 import json
 import os
@@ -18,14 +20,16 @@ from ..required import package
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="sends signals to worker processes")
 
-# Replaces the capture. The clip's text decides the outcome; every call is logged beside the clip. The first process of
-# a clip "hangs" runs until its standard input ends, as it does when the worker dies or stops the process.
+# Replaces the capture. The clip's text decides the outcome; every call is logged beside the clip.
+# The first process of a clip "hangs" runs until its standard input ends, as it does when the worker
+# dies or stops the process.
 PROGRAM = """
 import json, os, pathlib, sys
 clip = pathlib.Path(sys.argv[2])
 text = clip.read_text("utf-8")
 with open(clip.with_suffix(".calls"), "a") as log:
-    log.write(json.dumps({"pid": os.getpid(), "parent": os.getppid(), "arguments": sys.argv[1:]}) + "\\n")
+    row = {"pid": os.getpid(), "parent": os.getppid(), "arguments": sys.argv[1:]}
+    log.write(json.dumps(row) + "\\n")
 if text == "nobody":
     print("scope: no person found", file=sys.stderr); sys.exit(3)
 if text == "broken":
@@ -63,23 +67,38 @@ def folder(tmp_path):
 
 def calls(clip):
     log = clip.with_suffix(".calls")
-    return [json.loads(line) for line in log.read_text("utf-8").splitlines()] if log.exists() else []
+    return (
+        [json.loads(line) for line in log.read_text("utf-8").splitlines()] if log.exists() else []
+    )
 
 
 def run(cluster, folder, *options, program=PROGRAM):
     """Run the command with a cluster or a scheduler file, and return its status and its report."""
     out = folder.parent / "out"
-    argv = ["batch", str(folder), "--out", str(out), "--formats", "npz,glb", "--recursive", *options]
+    argv = [
+        "batch",
+        str(folder),
+        "--out",
+        str(out),
+        "--formats",
+        "npz,glb",
+        "--recursive",
+        *options,
+    ]
     status = main(
         [*argv, "--scheduler", str(getattr(cluster, "scheduler_address", cluster))],
         program=[sys.executable, "-c", program],
     )
-    report = json.loads((out / REPORT_NAME).read_text("utf-8")) if (out / REPORT_NAME).exists() else None
+    report = (
+        json.loads((out / REPORT_NAME).read_text("utf-8")) if (out / REPORT_NAME).exists() else None
+    )
     return status, report
 
 
 def files(folder):
-    return sorted(p.relative_to(folder.parent / "out").as_posix() for p in (folder.parent / "out").rglob("*"))
+    return sorted(
+        p.relative_to(folder.parent / "out").as_posix() for p in (folder.parent / "out").rglob("*")
+    )
 
 
 def is_json(file):
@@ -95,8 +114,15 @@ def workers(cluster):
         return client.run(os.getpid)
 
 
-def test_every_clip_has_its_outcome_and_a_second_run_captures_what_has_changed(cluster, folder, capsys):
-    for name, text in {"a.mp4": "a", "b.mp4": "broken", "c.png": "nobody", "below/d.mp4": "d"}.items():
+def test_every_clip_has_its_outcome_and_a_second_run_captures_what_has_changed(
+    cluster, folder, capsys
+):
+    for name, text in {
+        "a.mp4": "a",
+        "b.mp4": "broken",
+        "c.png": "nobody",
+        "below/d.mp4": "d",
+    }.items():
         (folder / name).write_text(text)
     status, report = run(cluster, folder)
     assert status == 1
@@ -125,7 +151,12 @@ def test_every_clip_has_its_outcome_and_a_second_run_captures_what_has_changed(c
     (folder.parent / "out" / "below" / "d.glb").unlink()
     status, report = run(cluster, folder)
     assert report["counts"] == {"done": 2, "skipped": 0, "no_person": 1, "failed": 1}
-    assert [len(calls(folder / name)) for name in ("a.mp4", "b.mp4", "c.png", "below/d.mp4")] == [2, 2, 1, 2]
+    assert [len(calls(folder / name)) for name in ("a.mp4", "b.mp4", "c.png", "below/d.mp4")] == [
+        2,
+        2,
+        1,
+        2,
+    ]
     assert (folder.parent / "out" / "a.npz").read_text("utf-8") == "result of changed"
 
 
@@ -146,7 +177,9 @@ def test_a_clip_of_a_killed_worker_is_captured_by_another_and_its_process_ends(c
     thread.join()
     assert status == 0
     assert [e["status"] for e in report["files"]] == ["done"] * 3
-    assert files(folder) == sorted([*(f"{n}.{s}" for n in "abc" for s in ("npz", "glb")), REPORT_NAME])
+    assert files(folder) == sorted(
+        [*(f"{n}.{s}" for n in "abc" for s in ("npz", "glb")), REPORT_NAME]
+    )
     first, second = calls(folder / "b.mp4")
     assert first["arguments"][6] != second["arguments"][6]  # a folder of its own for each attempt
     wait_for(lambda: not runs(first["pid"]))
@@ -155,7 +188,9 @@ def test_a_clip_of_a_killed_worker_is_captured_by_another_and_its_process_ends(c
     assert any("b.mp4 is captured again" in event["event"] for event in report["log"])
 
 
-def test_a_clip_that_ends_its_workers_fails_and_the_others_are_captured(cluster, folder, monkeypatch):
+def test_a_clip_that_ends_its_workers_fails_and_the_others_are_captured(
+    cluster, folder, monkeypatch
+):
     monkeypatch.setattr("scope.scope_addon.cluster.runner.ATTEMPTS", 1)
     for name in ("a", "b", "c"):
         (folder / f"{name}.mp4").write_text("kills" if name == "a" else name)
@@ -163,7 +198,9 @@ def test_a_clip_that_ends_its_workers_fails_and_the_others_are_captured(cluster,
     assert status == 1
     assert [e["status"] for e in report["files"]] == ["failed", "done", "done"]
     assert "lost while they captured it" in report["files"][0]["message"]
-    assert files(folder) == sorted([*(f"{n}.{s}" for n in "bc" for s in ("npz", "glb")), REPORT_NAME])
+    assert files(folder) == sorted(
+        [*(f"{n}.{s}" for n in "bc" for s in ("npz", "glb")), REPORT_NAME]
+    )
 
 
 def test_an_interrupt_ends_the_captures_on_the_workers(cluster, folder, monkeypatch):
@@ -185,16 +222,23 @@ def test_workers_of_another_version_get_no_clips(cluster, folder, monkeypatch, c
     monkeypatch.setattr("scope.scope_addon.cluster.runner.program_version", lambda root: "0" * 64)
     assert run(cluster, folder) == (1, None)
     said = capsys.readouterr().err.splitlines()
-    assert said[-1].startswith("scope: no worker of the cluster can capture: it runs another version of Scope (")
+    assert said[-1].startswith(
+        "scope: no worker of the cluster can capture: it runs another version of Scope ("
+    )
     assert calls(folder / "a.mp4") == []
     assert files(folder) == []
 
 
 @pytest.mark.parametrize(
     ("attribute", "value", "says"),
-    [("_folder", "/no/such/clips", "it has no folder /no/such/clips"), ("_out", None, "it does not see the output")],
+    [
+        ("_folder", "/no/such/clips", "it has no folder /no/such/clips"),
+        ("_out", None, "it does not see the output"),
+    ],
 )
-def test_workers_that_see_other_folders_get_no_clips(cluster, folder, monkeypatch, capsys, attribute, value, says):
+def test_workers_that_see_other_folders_get_no_clips(
+    cluster, folder, monkeypatch, capsys, attribute, value, says
+):
     (folder / "a.mp4").write_text("a")
     from scope.scope_addon.cluster.runner import DaskRunner
 
@@ -215,7 +259,11 @@ def test_footage_and_results_may_be_at_urls(cluster, folder, capsys):
     out = folder.parent / "out"
     argv = ["batch", folder.as_uri(), "--out", out.as_uri(), "--formats", "npz", "--recursive"]
     argv += ["--scheduler", cluster.scheduler_address]
-    program = [sys.executable, "-c", PROGRAM.replace('clip.with_suffix(".calls")', 'pathlib.Path("/dev/null")')]
+    program = [
+        sys.executable,
+        "-c",
+        PROGRAM.replace('clip.with_suffix(".calls")', 'pathlib.Path("/dev/null")'),
+    ]
     for counts in ({"done": 2, "skipped": 0}, {"done": 0, "skipped": 2}):
         assert main(argv, program=program) == 1
         report = json.loads((out / REPORT_NAME).read_text("utf-8"))
@@ -223,10 +271,14 @@ def test_footage_and_results_may_be_at_urls(cluster, folder, capsys):
         assert report["folder"] == folder.as_uri()
         assert files(folder) == ["a.npz", "below", "below/d.npz", REPORT_NAME]
         assert (out / "below" / "d.npz").read_text("utf-8") == "result of d"
-    assert capsys.readouterr().err.splitlines()[-1].endswith(f"report in {out.as_uri()}/{REPORT_NAME}")
+    assert (
+        capsys.readouterr().err.splitlines()[-1].endswith(f"report in {out.as_uri()}/{REPORT_NAME}")
+    )
 
 
-def test_a_lost_scheduler_is_a_sentence_and_finished_clips_are_kept(folder, tmp_path, monkeypatch, capsys):
+def test_a_lost_scheduler_is_a_sentence_and_finished_clips_are_kept(
+    folder, tmp_path, monkeypatch, capsys
+):
     class Impatient(package("distributed").Client):
         """Gives up a scheduler that is lost after two seconds; connecting to it may take longer."""
 
@@ -242,10 +294,14 @@ def test_a_lost_scheduler_is_a_sentence_and_finished_clips_are_kept(folder, tmp_
     options = ["--scheduler-file", str(file), "--no-dashboard"]
     silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     with ExitStack() as stack:
-        scheduler = subprocess.Popen([*dask, "scheduler", "--port", "0", "--host", "127.0.0.1", *options], **silent)
+        scheduler = subprocess.Popen(
+            [*dask, "scheduler", "--port", "0", "--host", "127.0.0.1", *options], **silent
+        )
         stack.callback(scheduler.wait)
         stack.callback(scheduler.kill)
-        worker = subprocess.Popen([*dask, "worker", "--no-nanny", "--nthreads", "1", *options], **silent)
+        worker = subprocess.Popen(
+            [*dask, "worker", "--no-nanny", "--nthreads", "1", *options], **silent
+        )
         stack.callback(worker.wait)
         stack.callback(worker.kill)
         wait_for(lambda: file.exists() and is_json(file))  # Dask does not write it at once

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Folders of attempts: complete and checked results get their final names, and nothing else does."""
+"""Folders of attempts: complete and checked results get their final names, and nothing else
+does.
+"""
 
 import hashlib
 import os
@@ -23,7 +25,9 @@ def attempt(staging, name, text):
     folder = staging.folder / name
     (folder / "below").mkdir(parents=True)
     (folder / "below" / "a.npz").write_text(text)
-    return folder, {"below/a.npz": {"sha256": hashlib.sha256(text.encode()).hexdigest(), "bytes": len(text)}}
+    return folder, {
+        "below/a.npz": {"sha256": hashlib.sha256(text.encode()).hexdigest(), "bytes": len(text)}
+    }
 
 
 def names(folder):

@@ -29,7 +29,9 @@ def test_an_invalid_number_of_people_is_an_error(said):
         options(f"--people={said}")
 
 
-@pytest.mark.parametrize(("said", "meant"), [("175", (1.75,)), ("175,162.5", (1.75, 1.625)), ("180, 170", (1.8, 1.7))])
+@pytest.mark.parametrize(
+    ("said", "meant"), [("175", (1.75,)), ("175,162.5", (1.75, 1.625)), ("180, 170", (1.8, 1.7))]
+)
 def test_heights_are_centimetres(said, meant):
     assert options("--height", said).heights_m == pytest.approx(meant)
 
@@ -45,13 +47,19 @@ def test_heights_are_centimetres(said, meant):
     ],
 )
 def test_the_height_of_a_child_needs_the_body_of_all_ages(said, body):
-    assert body_and_options(build_parser().parse_args(["capture", "clip.mp4", *said]))[0].name == body
+    assert (
+        body_and_options(build_parser().parse_args(["capture", "clip.mp4", *said]))[0].name == body
+    )
 
 
 def test_ones_own_body_is_not_exchanged(tmp_path):
     own = shutil.copy(BUILT_IN["scope"], tmp_path / "own.npz")
     with pytest.raises(UsageError, match="can be 127 to 213 cm tall, not 110: omit the height"):
-        body_and_options(build_parser().parse_args(["capture", "clip.mp4", "--height", "110", "--body", str(own)]))
+        body_and_options(
+            build_parser().parse_args(
+                ["capture", "clip.mp4", "--height", "110", "--body", str(own)]
+            )
+        )
 
 
 @pytest.mark.parametrize("said", ["", "175,", "1,75", "tall", "nan", "inf", "175;162"])
@@ -62,9 +70,13 @@ def test_an_invalid_height_is_an_error(said):
 
 def test_a_batch_passes_the_rig_on(tmp_path):
     rig = tmp_path / "rig.glb"
-    args = build_parser().parse_args(["batch", ".", "--out", ".", "--retarget", str(rig), "--rig-object", "Rig"])
+    args = build_parser().parse_args(
+        ["batch", ".", "--out", ".", "--retarget", str(rig), "--rig-object", "Rig"]
+    )
     assert non_default_arguments(args) == {"--retarget": str(rig), "--rig-object": "Rig"}
-    args = build_parser().parse_args(["batch", ".", "--out", ".", "--retarget", str(rig), "--retarget-root", "object"])
+    args = build_parser().parse_args(
+        ["batch", ".", "--out", ".", "--retarget", str(rig), "--retarget-root", "object"]
+    )
     assert non_default_arguments(args) == {"--retarget": str(rig), "--retarget-root": "object"}
 
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A rig that takes the importer too long, or too much memory, ends the command with one sentence."""
+"""A rig that takes the importer too long, or too much memory, ends the command with one
+sentence.
+"""
 
 import subprocess
 import sys
@@ -21,8 +23,16 @@ print("whole", flush=True)
 @pytest.mark.parametrize(
     ("seconds", "work", "says"),
     [
-        (0.6, "while True: pass", "Blender did not finish importing this file within 1 s; export it again"),
-        (300, "block = bytearray(b'1') * 300_000_000; time.sleep(300)", "takes more than 0.1 GB of memory; export"),
+        (
+            0.6,
+            "while True: pass",
+            "Blender did not finish importing this file within 1 s; export it again",
+        ),
+        (
+            300,
+            "block = bytearray(b'1') * 300_000_000; time.sleep(300)",
+            "takes more than 0.1 GB of memory; export",
+        ),
         (300, "block = bytearray(b'1') * 30_000_000", None),
     ],
 )

@@ -14,13 +14,21 @@ def batch(tmp_path, scheduler):
 @pytest.mark.parametrize(
     ("hidden", "says"),
     [
-        ("distributed", "distributed must be installed for this: pip install 'scope-mocap[cluster]'"),
-        (".cluster", "Blender's extension cannot use a cluster; use ./scripts/batch in the repository\n"),
+        (
+            "distributed",
+            "distributed must be installed for this: pip install 'scope-mocap[cluster]'",
+        ),
+        (
+            ".cluster",
+            "Blender's extension cannot use a cluster; use ./scripts/batch in the repository\n",
+        ),
     ],
 )
 def test_a_cluster_needs_the_package_and_the_room(tmp_path, capsys, monkeypatch, hidden, says):
     find = installed.find_spec
-    monkeypatch.setattr(installed, "find_spec", lambda name: None if name.endswith(hidden) else find(name))
+    monkeypatch.setattr(
+        installed, "find_spec", lambda name: None if name.endswith(hidden) else find(name)
+    )
     monkeypatch.delitem(installed.sys.modules, "distributed", raising=False)
     assert batch(tmp_path, "tcp://127.0.0.1:1") == 1
     assert says in capsys.readouterr().err

@@ -23,7 +23,17 @@ def amass(tmp_path):
 @pytest.mark.usefixtures("blender_module")
 def test_the_outputs_and_the_report(amass, capfd):
     outputs = [amass.with_name(name) for name in ("out.glb", "out.bvh", "out.blend", "out.npz")]
-    assert main(["import", str(amass), *(word for path in outputs for word in ("-o", str(path))), "--json"]) == 0
+    assert (
+        main(
+            [
+                "import",
+                str(amass),
+                *(word for path in outputs for word in ("-o", str(path))),
+                "--json",
+            ]
+        )
+        == 0
+    )
     out, err = capfd.readouterr()
     report = json.loads(out)
     assert set(report["outputs"]) == {str(path) for path in outputs}
@@ -59,7 +69,9 @@ def test_without_an_output_a_glb_lies_beside_the_motion(amass):
         (["."], 1, "not a readable motion file"),
     ],
 )
-def test_errors_are_one_sentence_and_write_nothing(amass, monkeypatch, capfd, arguments, status, says):
+def test_errors_are_one_sentence_and_write_nothing(
+    amass, monkeypatch, capfd, arguments, status, says
+):
     monkeypatch.chdir(amass.parent)
     (amass.parent / "text.npz").write_text("no motion")
     np.savez(amass.parent / "other.npz", x=np.zeros(3))

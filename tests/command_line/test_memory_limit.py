@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A shell's limit on addresses: too low a one is refused before anything is loaded, with what to do."""
+"""A shell's limit on addresses: too low a one is refused before anything is loaded, with what to
+do.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,11 @@ from scope.scope_addon.errors import SetupError
         (None, True, ""),
         (4_000_000_000, True, ""),
         (2_600_000_000, False, ""),
-        (2_600_000_000, True, "2.60 GB of address space, but a capture needs 3.20 GB: run ulimit -v unlimited first"),
+        (
+            2_600_000_000,
+            True,
+            "2.60 GB of address space, but a capture needs 3.20 GB: run ulimit -v unlimited first",
+        ),
         (1_000_000_000, False, "1.00 GB of address space, but a capture needs 2.50 GB"),
     ],
 )

@@ -26,7 +26,10 @@ def test_results_of_the_shipped_sample_lie_in_the_current_folder(tmp_path, monke
         "through a link": tmp_path / "link" / SAMPLE.name,
         "with a detour": SAMPLE.parent / ".." / "sample" / SAMPLE.name,
     }[way]
-    assert [p.resolve() for p in default_outputs(sample)] == [tmp_path / "sample.npz", tmp_path / "sample.glb"]
+    assert [p.resolve() for p in default_outputs(sample)] == [
+        tmp_path / "sample.npz",
+        tmp_path / "sample.glb",
+    ]
 
 
 def test_a_current_folder_within_scopes_own_is_refused(monkeypatch):
@@ -39,7 +42,10 @@ def test_results_of_images_in_the_current_folder_are_named_after_it(tmp_path, mo
     (tmp_path / "walk").mkdir()
     monkeypatch.chdir(tmp_path / "walk")
     for here in (Path(), Path("../walk/."), Path("below/..")):
-        assert [p.resolve() for p in default_outputs(here)] == [tmp_path / "walk.npz", tmp_path / "walk.glb"]
+        assert [p.resolve() for p in default_outputs(here)] == [
+            tmp_path / "walk.npz",
+            tmp_path / "walk.glb",
+        ]
 
 
 def test_folders_of_images_whose_names_have_dots_have_different_results(tmp_path):

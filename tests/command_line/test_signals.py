@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Signals that end a command: what is raised, what is restored afterwards, and what is left alone."""
+"""Signals that end a command: what is raised, what is restored afterwards, and what is left
+alone.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,9 @@ def as_in_a_terminal() -> Iterator[None]:
     signals.received.clear()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGINT)])
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGINT)]
+)
 def test_a_signal_interrupts_and_is_remembered(number: signal.Signals) -> None:
     with pytest.raises(KeyboardInterrupt), signals.stopped_by_signals():
         signal.raise_signal(number)

@@ -93,5 +93,7 @@ def test_output_of_c_libraries_is_not_part_of_the_report():
         "    print('{}', file=stdout)\n"
     )
     buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=buffered)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=buffered
+    )
     assert (done.stdout, done.stderr) == ("{}\n", "Blender 9.9\nexporting\n")

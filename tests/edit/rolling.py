@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A synthetic walk whose feet roll from heel to ball; each is at rest on the floor while it is in contact."""
+"""A synthetic walk whose feet roll from heel to ball; each is at rest on the floor while it is in
+contact.
+"""
 
 from functools import cache
 
@@ -14,7 +16,8 @@ J = BODY.rest_joints(ZERO) @ R_WORLD_MODEL.T
 V = BODY.rest_vertices(ZERO) @ R_WORLD_MODEL.T
 FLOOR = V[:, 2].min()
 PERIOD, STANCE, STRIDE = 1.2, 0.62, 1.0
-FLAT, RISE = 0.2, 0.55  # shares of the stance at which the sole is flat, and at which the heel lifts
+# shares of the stance at which the sole is flat, and at which the heel lifts
+FLAT, RISE = 0.2, 0.55
 
 
 def joint(part):
@@ -43,10 +46,15 @@ def pitch(degrees):
 
 
 def foot(side, step):
-    """Return ankle, rotations of foot and toes, contact of heel and of ball, at a time in steps of this foot."""
+    """Return ankle, rotations of foot and toes, contact of heel and of ball, at a time in steps of
+    this foot.
+    """
     number, phase = np.floor(step), step % 1 / STANCE
     place = joint(f"{side}_ankle") + [0, -STRIDE * number, -FLOOR]
-    heel, ball = heel_of(side) - joint(f"{side}_ankle"), joint(f"{side}_foot") - joint(f"{side}_ankle")
+    heel, ball = (
+        heel_of(side) - joint(f"{side}_ankle"),
+        joint(f"{side}_foot") - joint(f"{side}_ankle"),
+    )
     if phase < FLAT:
         turn = pitch(-22 * (1 - phase / FLAT) ** 2)
         return place + heel - turn @ heel, turn, turn, True, False
@@ -81,14 +89,18 @@ def rolling_walk(seconds=2.6, stiff_toes=False):
     stands = {"left": np.zeros((len(times), 2), bool), "right": np.zeros((len(times), 2), bool)}
     for t, time in enumerate(times):
         D = {name: np.eye(3) for name in NAMES}
-        D["left_shoulder"], D["right_shoulder"] = (turn_by(np.array([0, sign * 1.2, 0])) for sign in (1, -1))
+        D["left_shoulder"], D["right_shoulder"] = (
+            turn_by(np.array([0, sign * 1.2, 0])) for sign in (1, -1)
+        )
         for side in ("left", "right"):
             for part in ("elbow", "wrist", "hand"):
                 D[f"{side}_{part}"] = D[f"{side}_shoulder"]
         height = -FLOOR - 0.07 + 0.015 * np.cos(4 * np.pi * time / PERIOD)
         root[t] = J[0] + [0, -STRIDE * (time / PERIOD - 0.5 * STANCE + 0.04), height]
         for side, begin in (("left", 0.0), ("right", 0.5)):
-            ankle, D[f"{side}_ankle"], D[f"{side}_foot"], *stands[side][t] = foot(side, time / PERIOD + begin)
+            ankle, D[f"{side}_ankle"], D[f"{side}_foot"], *stands[side][t] = foot(
+                side, time / PERIOD + begin
+            )
             if stiff_toes:
                 D[f"{side}_foot"] = D[f"{side}_ankle"]
             ankle = ankle + [0, STRIDE * begin, 0]
@@ -106,5 +118,7 @@ def rolling_walk(seconds=2.6, stiff_toes=False):
         for i, name in enumerate(NAMES):
             parent = BODY.parents[i]
             R = D[name] if parent < 0 else D[NAMES[parent]].T @ D[name]
-            rotations[t, i] = R @ R_WORLD_MODEL if parent < 0 else R_WORLD_MODEL.T @ R @ R_WORLD_MODEL
+            rotations[t, i] = (
+                R @ R_WORLD_MODEL if parent < 0 else R_WORLD_MODEL.T @ R @ R_WORLD_MODEL
+            )
     return Clip(times, rotations, root), stands

@@ -27,7 +27,9 @@ def test_baking_to_another_rate_keeps_the_motion_and_drops_what_the_rate_cannot_
     truth = walk(4.0, rate=24.0)
     assert angle(baked.rotations, truth.rotations[: len(baked)]).max() < np.radians(1.5)
     shaking = walk(4.0, rate=60.0)
-    shaking.rotations[:, 3] = exp(0.3 * np.cos(2 * np.pi * 29.0 * shaking.times)[:, None] * [1.0, 0, 0])
+    shaking.rotations[:, 3] = exp(
+        0.3 * np.cos(2 * np.pi * 29.0 * shaking.times)[:, None] * [1.0, 0, 0]
+    )
     assert angle(resample(shaking, 24.0).rotations[2:-2, 3], np.eye(3)).max() < 0.06  # of 0.3
     with pytest.raises(UsageError, match="above zero"):
         resample(clip, 0.0)

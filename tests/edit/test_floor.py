@@ -34,4 +34,6 @@ def test_a_sloping_world_is_levelled():
     up = level.rotations[:, 0] @ np.swapaxes(clip.rotations[:, 0], 1, 2)
     assert np.degrees(np.arccos(np.clip(up[:, 2, 2], -1, 1))).max() < 1.5
     spot = walk(2.0, speed=0.0)  # standing on one spot says nothing of the floor's slope: no turn
-    np.testing.assert_array_equal(floor.refloor(spot, BODY, BETAS, level=True).rotations, spot.rotations)
+    np.testing.assert_array_equal(
+        floor.refloor(spot, BODY, BETAS, level=True).rotations, spot.rotations
+    )

@@ -14,7 +14,11 @@ from .walking import BETAS, BODY, NAMES, walk
 def test_the_cycle_of_a_walk_is_found_and_closed():
     clip = walk(5.0, period=1.1)
     rng = np.random.default_rng(2)
-    noisy = Clip(clip.times, clip.rotations @ exp(0.02 * rng.standard_normal((len(clip), len(NAMES), 3))), clip.root)
+    noisy = Clip(
+        clip.times,
+        clip.rotations @ exp(0.02 * rng.standard_normal((len(clip), len(NAMES), 3))),
+        clip.root,
+    )
     found = loop.best_cycle(noisy, BODY, BETAS, 0.3, 4.7)
     length = clip.times[found.last] - clip.times[found.first]
     assert abs(length / 1.1 - round(length / 1.1)) < 0.05
@@ -66,7 +70,11 @@ def test_a_cycle_after_a_pause_is_found():
     """The still part, whose poses differ least, is not chosen."""
     still, moving = sitting(2.0), walk(3.0, period=1.0, speed=0.0)
     times = np.concatenate([still.times, still.times[-1] + 1 / 30 + moving.times])
-    clip = Clip(times, np.concatenate([still.rotations, moving.rotations]), np.concatenate([still.root, moving.root]))
+    clip = Clip(
+        times,
+        np.concatenate([still.rotations, moving.rotations]),
+        np.concatenate([still.root, moving.root]),
+    )
     found = loop.best_cycle(clip, BODY, BETAS, 0.0, times[-1])
     assert times[found.last] > 2.9
     length = times[found.last] - times[found.first]

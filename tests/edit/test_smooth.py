@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Amounts of smoothing: the raw and the finished motion exactly, a filter in between, and one beyond, but for feet."""
+"""Amounts of smoothing: the raw and the finished motion exactly, a filter in between, and one
+beyond, but for feet.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,9 @@ ELBOW = NAMES.index("left_elbow")
 
 
 def shaking(hz: float, seconds: float = 6.0) -> Motion:
-    """Return a motion whose left elbow moves by a sinusoid of 0.1 radians, raw and finished alike."""
+    """Return a motion whose left elbow moves by a sinusoid of 0.1 radians, raw and finished
+    alike.
+    """
     still = walk(seconds, speed=0.0)
     rotations = np.tile(np.eye(3), still.rotations.shape[:2] + (1, 1))
     rotations[:, ELBOW] = exp(np.outer(0.1 * np.sin(2 * np.pi * hz * still.times), [0.0, 0.0, 1.0]))
@@ -43,7 +47,9 @@ def test_strength_zero_is_the_raw_motion_and_one_the_finished() -> None:
 
 
 def test_more_strength_leaves_less_of_a_quick_movement_and_all_of_a_slow_one() -> None:
-    """The finished motion has all of what it has; from there, at strength 3, the filter's gain is 1/√2 at 1.6 Hz."""
+    """The finished motion has all of what it has; from there, at strength 3, the filter's gain is
+    1/√2 at 1.6 Hz.
+    """
     quick = [amplitude(smoothed(BODY, shaking(6.0), s)) for s in (0.0, 1.0, 2.0, 3.0)]
     assert quick[0] == pytest.approx(0.1, rel=0.02)
     assert quick[1] == pytest.approx(0.1, rel=0.02)  # the finished motion has it
@@ -54,12 +60,15 @@ def test_more_strength_leaves_less_of_a_quick_movement_and_all_of_a_slow_one() -
 
 
 @pytest.mark.parametrize(("strength", "share"), [(0.5, 0.5), (2.0, 1.0), (3.0, 1.0)])
-def test_what_the_finished_motion_adds_stays_and_fades_out_below_strength_one(strength: float, share: float) -> None:
+def test_what_the_finished_motion_adds_stays_and_fades_out_below_strength_one(
+    strength: float, share: float
+) -> None:
     """Here a place that differs from the raw motion's, as that of a foot that is held does."""
     motion, shift = motion_of(walk(2.0), noise=0.02), np.array([0.03, -0.02, 0.05])
     moved = replace(motion, trans=motion.trans + shift)
     added = smoothed(BODY, moved, strength).root - smoothed(BODY, motion, strength).root
-    tolerance = 1e-6 if strength < 1 else 3e-3  # beyond, the distance from the camera is smoothed by itself
+    # beyond, the distance from the camera is smoothed by itself
+    tolerance = 1e-6 if strength < 1 else 3e-3
     np.testing.assert_allclose(added, np.broadcast_to(share * shift, added.shape), atol=tolerance)
 
 
@@ -73,7 +82,9 @@ def test_beyond_the_finished_motion_it_is_calmer_however_noisy_the_raw_one_is() 
 @pytest.mark.parametrize("strength", [2.5, 8.0])
 @pytest.mark.parametrize("end_m", [1.6, 0.8])
 def test_a_walk_begins_and_ends_where_it_was(strength: float, end_m: float) -> None:
-    """A filter that sees one side alone would move both ends inwards, by 12 cm, and more near the camera."""
+    """A filter that sees one side alone would move both ends inwards, by 12 cm, and more near the
+    camera.
+    """
     motion = motion_of(walk(2.0))
     camera = motion.world_from_camera[:, :3, 3]
     away = clip_from_motion(BODY, motion, raw=False).root - camera
@@ -97,11 +108,17 @@ def test_feet_that_rest_stay_in_place_when_the_rest_is_smoothed() -> None:
     rotations[:, 0] = R_WORLD_MODEL
     still = Clip(clip.times, rotations, clip.root)
     ankles = [NAMES.index(f"{side}_ankle") for side in ("left", "right")]
-    root = clip.root - still.joints(BODY, BETAS)[:, ankles].mean(axis=1) + still.joints(BODY, BETAS)[0, ankles].mean(0)
+    root = (
+        clip.root
+        - still.joints(BODY, BETAS)[:, ankles].mean(axis=1)
+        + still.joints(BODY, BETAS)[0, ankles].mean(0)
+    )
     motion = motion_of(Clip(clip.times, rotations, root))
     rests = np.ones((len(clip.times), 4))
     rests[70:, 2:] = 0.0  # the right foot does not rest any more
-    held, free = (replace(motion, foot_contact=contact) for contact in (rests, np.zeros_like(rests)))
+    held, free = (
+        replace(motion, foot_contact=contact) for contact in (rests, np.zeros_like(rests))
+    )
     moved = []
     for each in (held, free):
         joints = smoothed(BODY, each, 2.5).joints(BODY, BETAS)[:, ankles]
@@ -128,7 +145,10 @@ def test_smoothing_has_no_delay() -> None:
 def test_noise_falls_with_the_strength() -> None:
     true = walk()
     motion = motion_of(true, noise=0.05)
-    errors = [float(angle(smoothed(BODY, motion, s).rotations, true.rotations).mean()) for s in (0.0, 0.5, 1.0)]
+    errors = [
+        float(angle(smoothed(BODY, motion, s).rotations, true.rotations).mean())
+        for s in (0.0, 0.5, 1.0)
+    ]
     assert errors[0] > errors[1] > errors[2]
 
 
@@ -142,4 +162,6 @@ def test_what_is_no_strength_is_refused(strength: float) -> None:
 def test_a_clip_too_short_to_smooth_stays(frames: int) -> None:
     clip = walk(1.0)
     short = motion_of(Clip(clip.times[:frames], clip.rotations[:frames], clip.root[:frames]))
-    np.testing.assert_array_equal(smoothed(BODY, short, 2.0).root, clip_from_motion(BODY, short, raw=True).root)
+    np.testing.assert_array_equal(
+        smoothed(BODY, short, 2.0).root, clip_from_motion(BODY, short, raw=True).root
+    )

@@ -18,7 +18,8 @@ def test_a_broken_span_is_gone_over_as_the_neighbours_move():
     broken.rotations[bad] = exp(np.random.default_rng(0).standard_normal((6, len(NAMES), 3)))
     broken.root[bad] += 1.0
     mended = spans.interpolate(broken, 20 / RATE, 25 / RATE)
-    assert angle(mended.rotations, clip.rotations).max() < np.radians(6.0)  # of a swing of 23 degrees
+    # of a swing of 23 degrees
+    assert angle(mended.rotations, clip.rotations).max() < np.radians(6.0)
     assert np.abs(mended.root - clip.root).max() < 0.03
     outside = np.r_[0:20, 26 : len(clip)]
     np.testing.assert_array_equal(mended.rotations[outside], broken.rotations[outside])
@@ -32,16 +33,24 @@ def test_a_broken_span_is_gone_over_as_the_neighbours_move():
 def test_swapping_puts_each_limb_where_the_other_one_was(limbs):
     clip = walk(1.0)
     rng = np.random.default_rng(1)
-    clip.rotations[:, 1:] = clip.rotations[:, 1:] @ exp(0.2 * rng.standard_normal((len(NAMES) - 1, 3)))
+    clip.rotations[:, 1:] = clip.rotations[:, 1:] @ exp(
+        0.2 * rng.standard_normal((len(NAMES) - 1, 3))
+    )
     out = spans.swap_sides(clip, BODY, 0.2, 0.5, limbs)
     span = (clip.times > 0.199) & (clip.times < 0.501)
     before, after = clip.joints(BODY, BETAS), out.joints(BODY, BETAS)
-    for kind, chain in (("legs", ("hip", "knee", "ankle", "foot")), ("arms", ("shoulder", "elbow", "wrist"))):
+    for kind, chain in (
+        ("legs", ("hip", "knee", "ankle", "foot")),
+        ("arms", ("shoulder", "elbow", "wrist")),
+    ):
         for a, b in zip(chain, chain[1:], strict=False):
             for side, other in (("left", "right"), ("right", "left")):
 
                 def bone(joints, which, a=a, b=b):
-                    d = joints[:, NAMES.index(f"{which}_{b}")] - joints[:, NAMES.index(f"{which}_{a}")]
+                    d = (
+                        joints[:, NAMES.index(f"{which}_{b}")]
+                        - joints[:, NAMES.index(f"{which}_{a}")]
+                    )
                     return d / np.linalg.norm(d, axis=1, keepdims=True)
 
                 source = other if limbs in (kind, "both") else side
@@ -54,6 +63,7 @@ def test_swapping_puts_each_limb_where_the_other_one_was(limbs):
 
 def test_a_swapped_elbow_still_bends_forwards():
     clip = walk(0.5)
-    clip.rotations[:, NAMES.index("right_elbow")] = exp([0.0, 1.0, 0.0])  # bends forward: see joint_limits.HINGES
+    # bends forward: see joint_limits.HINGES
+    clip.rotations[:, NAMES.index("right_elbow")] = exp([0.0, 1.0, 0.0])
     out = spans.swap_sides(clip, BODY, 0.0, 0.5, "arms")
     assert log(out.rotations[0, NAMES.index("left_elbow")])[1] == pytest.approx(-1.0)

@@ -41,7 +41,9 @@ def walk(seconds=4.0, period=1.0, speed=1.2, rate=RATE, bent=0.0):
 
 
 def motion_of(clip, noise=0.0, seed=0, body=BODY):
-    """Return a capture of the clip by a level camera 4 m away; its raw motion has ``noise`` in radians."""
+    """Return a capture of the clip by a level camera 4 m away; its raw motion has ``noise`` in
+    radians.
+    """
     rng = np.random.default_rng(seed)
     T, K1 = clip.rotations.shape[:2]
     shaken = clip.rotations @ exp(noise * rng.standard_normal((T, K1, 3)))

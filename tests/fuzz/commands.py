@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The commands that `kills` kills and refuses system calls, what they need, and how to tell that a result is whole."""
+"""The commands that `kills` kills and refuses system calls, what they need, and how to tell that a
+result is whole.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +46,8 @@ class Command(NamedTuple):
     :param outputs: patterns of what it writes.
     :param needs: names in `INPUTS`.
     :param is_whole: whether a file is as complete as the one that was written without a fault.
-    :param replaces: whether it replaces earlier results; otherwise there are none, and it would not run with them.
+    :param replaces: whether it replaces earlier results; otherwise there are none, and it would not
+        run with them.
     :param continues: whether it uses what a killed one has left, so that it is run after each kill.
     :param tells: whether a failure is one sentence and status 1.
     """
@@ -77,7 +80,10 @@ def _is_same_or_as_large(path: Path, whole: bytes) -> bool:
 def _is_same_or_report(path: Path, whole: bytes) -> bool:
     if path.suffix != ".json":
         return _is_same(path, whole)
-    return all(entry["status"] in ("done", "skipped", "failed") for entry in json.loads(path.read_bytes())["files"])
+    return all(
+        entry["status"] in ("done", "skipped", "failed")
+        for entry in json.loads(path.read_bytes())["files"]
+    )
 
 
 def _can_be_read(path: Path, _: bytes) -> bool:
@@ -101,7 +107,8 @@ def _is_same_or_can_be_read(path: Path, whole: bytes) -> bool:
 def _import(suffix: str) -> Command:
     arguments: tuple[str, ...] = ("import", "in/walk.npz", "-o", f"out/walk{suffix}")
     if suffix == ".fbx":
-        arguments += ("--shape-keys", "baked")  # a quarter of the bytes, which are written 4 kB at a time
+        # a quarter of the bytes, which are written 4 kB at a time
+        arguments += ("--shape-keys", "baked")
     is_whole = _is_as_large if suffix in (".fbx", ".blend", ".usdc") else _is_same
     return Command(suffix[1:], SCOPE, arguments, (f"out/walk{suffix}",), ("walk",), is_whole)
 
@@ -111,7 +118,16 @@ COMMANDS = (
     Command(
         "capture",
         SCOPE,
-        ("capture", "in/still.png", "-o", "out/still.npz", "--overlay", "out/still.png", "--report", "out/still.html"),
+        (
+            "capture",
+            "in/still.png",
+            "-o",
+            "out/still.npz",
+            "--overlay",
+            "out/still.png",
+            "--report",
+            "out/still.html",
+        ),
         ("out/still.npz", "out/still.png", "out/still.html"),
         ("still",),
         _is_same_or_as_large,
@@ -128,7 +144,16 @@ COMMANDS = (
     Command(
         "overlay",
         SCOPE,
-        ("capture", "in/short.mp4", "-o", "out/short.npz", "--overlay", "out/short.mp4", "--quality", "fast"),
+        (
+            "capture",
+            "in/short.mp4",
+            "-o",
+            "out/short.npz",
+            "--overlay",
+            "out/short.mp4",
+            "--quality",
+            "fast",
+        ),
         ("out/short.npz", "out/short.mp4"),
         ("short",),
         _is_same,
@@ -136,7 +161,17 @@ COMMANDS = (
     Command(
         "continued",  # a capture that keeps what its networks find at once, rather than every 20 s
         PROGRAM,
-        ("continued", "capture", "in/short.mp4", "--end", "0.1", "-o", "out/short.npz", "--quality", "fast"),
+        (
+            "continued",
+            "capture",
+            "in/short.mp4",
+            "--end",
+            "0.1",
+            "-o",
+            "out/short.npz",
+            "--quality",
+            "fast",
+        ),
         ("out/short.npz",),
         ("short",),
         _is_same,
@@ -145,7 +180,16 @@ COMMANDS = (
     Command(
         "windows",  # one of a long clip, which keeps its finished windows
         SCOPE,
-        ("capture", "in/short.mp4", "--window-seconds", "0.2", "-o", "out/short.npz", "--quality", "fast"),
+        (
+            "capture",
+            "in/short.mp4",
+            "--window-seconds",
+            "0.2",
+            "-o",
+            "out/short.npz",
+            "--quality",
+            "fast",
+        ),
         ("out/short.npz",),
         ("short",),
         _is_same,
@@ -177,7 +221,8 @@ COMMANDS = (
         _can_be_read,
     ),
     Command(
-        "cache",  # two captures are kept, the older one is removed, since there is no space for both
+        # two captures are kept, the older one is removed, since there is no space for both
+        "cache",
         PROGRAM,
         ("cache", "in/walk.npz", CACHE),
         (f"{CACHE}/captures/new/*",),
@@ -200,7 +245,9 @@ COMMANDS = (
 
 def _walk(folder: Path) -> None:
     body = load_body("scope")
-    made_motion(body, np.zeros((2, 3 * (body.K + 1))), np.zeros((2, 3))).save(folder / "in" / "walk.npz")
+    made_motion(body, np.zeros((2, 3 * (body.K + 1))), np.zeros((2, 3))).save(
+        folder / "in" / "walk.npz"
+    )
 
 
 def _still(folder: Path) -> None:
@@ -217,7 +264,9 @@ def _short(folder: Path) -> None:
     source = cv2.VideoCapture(str(SAMPLE))
     size = int(source.get(cv2.CAP_PROP_FRAME_WIDTH)), int(source.get(cv2.CAP_PROP_FRAME_HEIGHT))
     codec = cv2.VideoWriter.fourcc(*"mp4v")
-    writer = cv2.VideoWriter(str(folder / "in" / "short.mp4"), codec, source.get(cv2.CAP_PROP_FPS), size)
+    writer = cv2.VideoWriter(
+        str(folder / "in" / "short.mp4"), codec, source.get(cv2.CAP_PROP_FPS), size
+    )
     for _ in range(SHORT):
         writer.write(source.read()[1])
     writer.release()

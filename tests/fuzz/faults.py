@@ -58,7 +58,8 @@ def failing(n: int, without: tuple[str, ...] = ()) -> Iterator[list[int]]:
 
     def faulty(call: Callable[..., Any], name: str) -> Callable[..., Any]:
         def wrapped(*arguments: Any, **named: Any) -> Any:
-            if name == "close":  # closes, and reports that the disk is full, as file systems on a network do
+            # closes, and reports that the disk is full, as file systems on a network do
+            if name == "close":
                 call(*arguments)
                 count()
                 return None
@@ -76,11 +77,15 @@ def failing(n: int, without: tuple[str, ...] = ()) -> Iterator[list[int]]:
 
 
 def later(n: int) -> int:
-    """Return the next call to fail where there may be thousands: all of the first 20, then ever fewer."""
+    """Return the next call to fail where there may be thousands: all of the first 20, then ever
+    fewer.
+    """
     return n + 1 if n < 20 else n * 8 // 5
 
 
-def all_faults(write: Callable[[], None], state: Callable[[], object], old: object, new: object) -> int:
+def all_faults(
+    write: Callable[[], None], state: Callable[[], object], old: object, new: object
+) -> int:
     """Write with a fault at every call in turn; return how many there were.
 
     :param state: everything in the folder, to be ``old`` or ``new`` after each.
@@ -105,4 +110,8 @@ def all_faults(write: Callable[[], None], state: Callable[[], object], old: obje
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }

@@ -3,7 +3,8 @@
 
 What fails is kept in build/fuzz/.
 
-Each target runs in a process of its own, because a library may crash; the input is on disk before it is read.
+Each target runs in a process of its own, because a library may crash; the input is on disk before
+it is read.
 """
 
 from __future__ import annotations
@@ -36,7 +37,10 @@ _LARGEST_NOISE = 16.0  # of a file of random bytes, in powers of two
 def inputs(name: str, folder: Path, seed: int) -> Iterator[Path]:
     """Yield a target's past findings, then damaged inputs without end, each as a file."""
     target, chance = TARGETS[name], random.Random(f"{name} {seed}")
-    pool = [*target.seeds(folder), *(path.read_bytes() for path in sorted(CORPUS.glob(f"{name}-*")))]
+    pool = [
+        *target.seeds(folder),
+        *(path.read_bytes() for path in sorted(CORPUS.glob(f"{name}-*"))),
+    ]
     for data in pool:
         for suffix in target.suffixes:
             yield _written(folder, suffix, data)
@@ -48,7 +52,9 @@ def inputs(name: str, folder: Path, seed: int) -> Iterator[Path]:
 
 
 def random_inputs(name: str, folder: Path, seed: int, count: int) -> Iterator[Path]:
-    """Yield files of random bytes, and valid inputs of which a part is replaced by random bytes, ``count`` in all."""
+    """Yield files of random bytes, and valid inputs of which a part is replaced by random bytes,
+    ``count`` in all.
+    """
     target, chance = TARGETS[name], random.Random(f"{name} {seed}")
     pool = target.seeds(folder)
     while count > 0:
@@ -102,13 +108,18 @@ def run_target(name: str, seconds: float, seed: int, count: int = 0) -> None:
         if not count and time.monotonic() > end:
             break
     random_bytes = f" with {count} random bytes" if count else ""
-    print(f"{name}: {done} inputs{random_bytes}, at most {_peak_megabytes():.0f} MB of memory", flush=True)
+    print(
+        f"{name}: {done} inputs{random_bytes}, at most {_peak_megabytes():.0f} MB of memory",
+        flush=True,
+    )
 
 
 def _peak_megabytes() -> float:
     import resource
 
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (
+        1e6 if sys.platform == "darwin" else 1e3
+    )
 
 
 def main(seconds: float) -> int:
@@ -130,7 +141,8 @@ def read_random_bytes(count: int) -> int:
 
 def _is_good(name: str, *limits: str) -> bool:
     """Run a target in a process of its own; keep the input that it failed on."""
-    # In CI the inputs are the same every time, so that what fails is the change and not the luck of the day.
+    # In CI the inputs are the same every time, so that what fails is the change and not the luck of
+    # the day.
     seed = "2" if os.environ.get("CI") else str(int.from_bytes(os.urandom(4), "little"))
     command = [sys.executable, "-m", __spec__.name, name, limits[0], seed, *limits[1:]]
     done = subprocess.run(command, stderr=subprocess.PIPE, text=True, errors="replace", check=False)

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Kill commands at every write, let every write or allocation fail, and run them again: ``./scripts/fuzz --faults``.
+"""Kill commands at every write, let every write or allocation fail, and run them again:
+``./scripts/fuzz --faults``.
 
-Old files or complete new ones, one sentence, leftovers only of a killed process, and none after the next run.
+Old files or complete new ones, one sentence, leftovers only of a killed process, and none after the
+next run.
 """
 
 from __future__ import annotations
@@ -22,9 +24,11 @@ ROOT = Path(__file__).resolve().parents[2]
 OLD = b"an earlier result"
 REMOVALS = ("unlink", "rmdir")  # what could not be removed, the next run removes
 FOLDERS = ("in", "out", "tmp", "clips", "home")
-UNFINISHED = "home/scope-mocap/unfinished/"  # what a command that failed continues with, and then removes
+# what a command that failed continues with, and then removes
+UNFINISHED = "home/scope-mocap/unfinished/"
 SEEN = ("out", "tmp", "home")  # folders in which nothing may be left
-KEPT_FOLDERS = ("scope-mocap", "cache", "captures", "jobs", "kernels", "new", "unfinished")  # may be empty
+# may be empty
+KEPT_FOLDERS = ("scope-mocap", "cache", "captures", "jobs", "kernels", "new", "unfinished")
 
 
 class Workplace:
@@ -44,13 +48,17 @@ class Workplace:
         assert ended.status == 0, ended.stderr
         paths = [path for pattern in self._command.outputs for path in self._folder.glob(pattern)]
         self._whole = {str(path.relative_to(self._folder)): path.read_bytes() for path in paths}
-        assert len(self._whole) >= len(self._command.outputs), f"of {self._command.outputs}, {paths} were written"
+        assert len(self._whole) >= len(self._command.outputs), (
+            f"of {self._command.outputs}, {paths} were written"
+        )
         assert not self.leftovers(), f"{self.leftovers()} were left without any fault"
         return len(ended.calls)
 
     def _run(self, n: int, action: str) -> Traced:
         command = [sys.executable, "-m", self._command.module, *self._command.arguments]
-        environment = dict(os.environ, TMPDIR=str(self._folder / "tmp"), XDG_CACHE_HOME=str(self._folder / "home"))
+        environment = dict(
+            os.environ, TMPDIR=str(self._folder / "tmp"), XDG_CACHE_HOME=str(self._folder / "home")
+        )
         here = os.getcwd()
         os.chdir(self._folder)
         try:
@@ -59,7 +67,8 @@ class Workplace:
             os.chdir(here)
 
     def fault(self, n: int, action: str) -> bool:
-        """Run the command on old files with a fault at its n-th call; return whether there were that many calls.
+        """Run the command on old files with a fault at its n-th call; return whether there were
+        that many calls.
 
         :raises AssertionError: something is not as it should be.
         """
@@ -71,18 +80,26 @@ class Workplace:
         self._check_files(at)
         if action != KILL:
             self._check_end(ended, at)
-            left = [name for name in self.leftovers() if not (self._command.continues and name.startswith(UNFINISHED))]
+            left = [
+                name
+                for name in self.leftovers()
+                if not (self._command.continues and name.startswith(UNFINISHED))
+            ]
             if not ended.calls[n - 1].startswith(REMOVALS):
                 assert not left, f"{at}: {left} were left"
         return True
 
     def state(self) -> object:
         """Return what the next run finds, apart from random names and the contents of leftovers."""
-        left = {re.sub(r"[-.][^/.]*-[^/.]*|(?<=blender_)\w+", "-*", name) for name in self.leftovers()}
+        left = {
+            re.sub(r"[-.][^/.]*-[^/.]*|(?<=blender_)\w+", "-*", name) for name in self.leftovers()
+        }
         return frozenset(left), frozenset(name for name in self._whole if self._is_old(name))
 
     def problems_of_next_run(self, after: str) -> list[str]:
-        """Run the command without a fault, and return in sentences what is wrong with what it leaves."""
+        """Run the command without a fault, and return in sentences what is wrong with what it
+        leaves.
+        """
         try:
             self._run_again()
         except AssertionError as error:
@@ -95,7 +112,9 @@ class Workplace:
         assert ended.status == 0, f"the next run: {ended.stderr}"
         for name in self._whole:
             assert self._is_whole(name), f"{name} after the next run"
-        assert not self.leftovers(), f"{self.leftovers()} were left by the next run, {before} before it"
+        assert not self.leftovers(), (
+            f"{self.leftovers()} were left by the next run, {before} before it"
+        )
 
     def _put_old_files(self) -> None:
         for name in self._whole:
@@ -109,7 +128,9 @@ class Workplace:
             if not (self._folder / name).is_file():
                 assert not self._command.replaces, f"{at}: {name} is lost"
                 continue
-            assert self._is_old(name) or self._is_whole(name), f"{at}: {name} is neither old nor whole"
+            assert self._is_old(name) or self._is_whole(name), (
+                f"{at}: {name} is neither old nor whole"
+            )
 
     def _is_old(self, name: str) -> bool:
         path = self._folder / name
@@ -130,21 +151,33 @@ class Workplace:
             assert said[0].startswith("scope: "), f"{at}: {ended.stderr}"
 
     def leftovers(self) -> list[str]:
-        """Return what lies in the folders for results, caches and temporary files, besides results and captures."""
+        """Return what lies in the folders for results, caches and temporary files, besides results
+        and captures.
+        """
         found = [path for name in SEEN for path in (self._folder / name).rglob("*")]
         found = [path for path in found if self._folder / CACHE / "captures" not in path.parents]
-        files = [path for path in found if path.is_file() or (not any(path.iterdir()) and not _may_be_empty(path))]
+        files = [
+            path
+            for path in found
+            if path.is_file() or (not any(path.iterdir()) and not _may_be_empty(path))
+        ]
         return sorted({str(path.relative_to(self._folder)) for path in files} - set(self._whole))
 
 
 def _may_be_empty(path: Path) -> bool:
-    """Whether this is a folder of ours that stays, or one of a killed Blender, in whose panel a capture was started."""
-    of_blender = path.name.startswith("blender_") and path.parent.name == "tmp"  # a shell's are in a folder of ours
+    """Whether this is a folder of ours that stays, or one of a killed Blender, in whose panel a
+    capture was started.
+    """
+    # a shell's are in a folder of ours
+    of_blender = path.name.startswith("blender_") and path.parent.name == "tmp"
     return path.name in KEPT_FOLDERS or of_blender or "thumbnails" in path.parts
 
 
-def check_command(command: Command, action: str, calls: Iterable[int] | None = None) -> tuple[int, list[str]]:
-    """Run a command with a fault at each of its calls, again after each kill that leaves something else.
+def check_command(
+    command: Command, action: str, calls: Iterable[int] | None = None
+) -> tuple[int, list[str]]:
+    """Run a command with a fault at each of its calls, again after each kill that leaves something
+    else.
 
     At the end, it runs once more without a fault, unless that was the last thing it did.
 
@@ -154,7 +187,9 @@ def check_command(command: Command, action: str, calls: Iterable[int] | None = N
     with tempfile.TemporaryDirectory(prefix="scope-faults-") as folder:
         place = Workplace(Path(folder), command)
         count = place.prepare()
-        numbers = itertools.count(1) if calls is None else (n if n > 0 else count + 1 + n for n in calls)
+        numbers = (
+            itertools.count(1) if calls is None else (n if n > 0 else count + 1 + n for n in calls)
+        )
         done, problems, seen, ran_again = 0, [], set[object](), False
         for n in numbers:
             ran_again = False
@@ -164,7 +199,9 @@ def check_command(command: Command, action: str, calls: Iterable[int] | None = N
             except AssertionError as error:
                 problems.append(str(error))
             done += 1
-            if (action == KILL or place.leftovers()) and (command.continues or place.state() not in seen):
+            if (action == KILL or place.leftovers()) and (
+                command.continues or place.state() not in seen
+            ):
                 seen.add(place.state())
                 problems += place.problems_of_next_run(f"after {action} at call {n}")
                 ran_again = True
@@ -174,7 +211,8 @@ def check_command(command: Command, action: str, calls: Iterable[int] | None = N
 
 
 def chosen(names: list[str]) -> list[tuple[Command, str]]:
-    """Return the commands and faults that are named; all commands if none is, and all faults if none is.
+    """Return the commands and faults that are named; all commands if none is, and all faults if
+    none is.
 
     :raises SystemExit: there is no command and no fault of a name.
     """
@@ -182,8 +220,12 @@ def chosen(names: list[str]) -> list[tuple[Command, str]]:
     actions = [action for action in ACTIONS if action in names] or list(ACTIONS)
     known = {*(command.name for command in COMMANDS), *ACTIONS}
     if unknown := sorted(set(names) - known):
-        sys.exit(f"fuzz: no command or fault {', '.join(unknown)}; there are {', '.join(sorted(known))}")
-    return [(command, action) for command in commands for action in actions if action in command.actions]
+        sys.exit(
+            f"fuzz: no command or fault {', '.join(unknown)}; there are {', '.join(sorted(known))}"
+        )
+    return [
+        (command, action) for command in commands for action in actions if action in command.actions
+    ]
 
 
 def main(names: list[str]) -> int:
@@ -192,7 +234,10 @@ def main(names: list[str]) -> int:
     for command, action in chosen(names):
         start = time.monotonic()
         count, problems = check_command(command, action)
-        print(f"{command.name}, {action}: {count} faults in {time.monotonic() - start:.0f} s", flush=True)
+        print(
+            f"{command.name}, {action}: {count} faults in {time.monotonic() - start:.0f} s",
+            flush=True,
+        )
         for problem in problems:
             print(f"    {problem}", flush=True)
         failed = failed or bool(problems)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Damage inputs: bytes anywhere, and values where the format is known, behind checksums and brackets."""
+"""Damage inputs: bytes anywhere, and values where the format is known, behind checksums and
+brackets.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,19 @@ _VALUES: tuple[Any, ...] = (
     *("", "x" * 300, "\ud800", "\0", "../../etc/passwd", [], [[]], {}, {"": None}, [1, "2", None]),
 )
 _TYPES = ("f4", "f8", "i4", "u1", "i8", "?", "U3", "S2", "c8", "M8[s]", "f2")
-_SHAPES = ((), (0,), (1,), (3,), (0, 3), (3, 0), (10, 3), (3, 3, 3), (2, 72), (1, 1, 1, 1), (100, 24))
+_SHAPES = (
+    (),
+    (0,),
+    (1,),
+    (3,),
+    (0, 3),
+    (3, 0),
+    (10, 3),
+    (3, 3, 3),
+    (2, 72),
+    (1, 1, 1, 1),
+    (100, 24),
+)
 
 
 def mutate(data: bytes, chance: random.Random) -> bytes:
@@ -98,7 +112,9 @@ def _arrays(data: bytes, chance: random.Random) -> bytes:
         if way == 0:
             value = np.zeros(chance.choice(_SHAPES), chance.choice(_TYPES))
         elif way == 1 and value.dtype.kind == "f" and value.size:
-            value.reshape(-1)[chance.randrange(value.size)] = chance.choice((np.nan, np.inf, 1e30, -1e30, 0.0))
+            value.reshape(-1)[chance.randrange(value.size)] = chance.choice(
+                (np.nan, np.inf, 1e30, -1e30, 0.0)
+            )
         elif way == 2 and value.ndim:
             value = value[: chance.randrange(len(value) + 1)]
         elif way == 3 and value.dtype.kind in "iu" and value.size:

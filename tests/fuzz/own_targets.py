@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What reads messages of Scope's own processes, and what Scope itself has written: damaged disks, hostile processes."""
+"""What reads messages of Scope's own processes, and what Scope itself has written: damaged disks,
+hostile processes.
+"""
 
 from __future__ import annotations
 
@@ -59,17 +61,25 @@ def read_answer(path: Path) -> None:
     from scope.scope_addon.capture.perception.adapters.network_server import receive
 
     with path.open("rb") as stream, suppress(EOFError, ValueError):  # which its caller expects
-        assert sum(array.nbytes for array in receive(stream, LARGEST_ARRAYS)["arrays"]) <= LARGEST_ARRAYS
+        assert (
+            sum(array.nbytes for array in receive(stream, LARGEST_ARRAYS)["arrays"])
+            <= LARGEST_ARRAYS
+        )
 
 
 def run_network(path: Path) -> None:
-    """Open a user's network in its process, and run it on white; it may take 15 s to open and 2 s to run."""
+    """Open a user's network in its process, and run it on white; it may take 15 s to open and 2 s
+    to run.
+    """
     from scope.scope_addon.capture.perception.adapters import graph, network_process
     from scope.scope_addon.capture.perception.adapters.description import Description
 
     with patch.multiple(network_process, DEFAULT_OPENING_S=15.0, RUN_S=2.0):
         opened = graph.Graph(path, Description(), threads=1)
-        opened.run(np.full((opened.height, opened.width, 3), 255, np.uint8), graph.Normalization(std=(0.01,)))
+        opened.run(
+            np.full((opened.height, opened.width, 3), 255, np.uint8),
+            graph.Normalization(std=(0.01,)),
+        )
 
 
 def read_expression_map(path: Path) -> None:
@@ -117,11 +127,14 @@ def find_capture(path: Path) -> None:
     shutil.copy(path, folder / REPORT)
     found = Cache(path.parent).find(KEY)
     assert found is None or all(motion.parent == folder for motion in found.motions)
-    assert found is None or 0 <= float(found.report.get("fps", {}).get("total", 0.0))  # which the panel shows
+    # which the panel shows
+    assert found is None or 0 <= float(found.report.get("fps", {}).get("total", 0.0))
 
 
 def load_times(path: Path) -> None:
-    """Load the times of earlier captures, show a capture's remaining time by them, and keep those of this one."""
+    """Load the times of earlier captures, show a capture's remaining time by them, and keep those
+    of this one.
+    """
     from scope.scope_addon.job.progress.job_progress import STAGES, JobProgress
     from scope.scope_addon.job.progress.stage_times import load_stage_times, save_stage_times
 
@@ -156,7 +169,10 @@ def requests(_: Path) -> list[bytes]:
     from scope.scope_addon.options import Place, options_at
 
     values = {option.name: option.default for option in options_at(Place.WORKER)}
-    return [json.dumps({"footage": "walk.mp4", **values}, default=str).encode(), LiveRequest("0").to_json().encode()]
+    return [
+        json.dumps({"footage": "walk.mp4", **values}, default=str).encode(),
+        LiveRequest("0").to_json().encode(),
+    ]
 
 
 def _lines(messages: list[dict[str, Any]]) -> list[bytes]:
@@ -168,7 +184,11 @@ def replies(_: Path) -> list[bytes]:
         [
             {"event": "progress", "stage": "solving", "done": 3, "total": 10},
             {"event": "preview", "file": "preview.rgba", "width": 320, "height": 180, "frame": 7},
-            {"event": "result", "motions": ["person1.npz"], "report": {"fps": {"total": 9.5}, "warnings": ["dark"]}},
+            {
+                "event": "result",
+                "motions": ["person1.npz"],
+                "report": {"fps": {"total": 9.5}, "warnings": ["dark"]},
+            },
             {"event": "error", "message": "the footage is too short"},
         ]
     )
@@ -183,7 +203,12 @@ def live_replies(_: Path) -> list[bytes]:
         "positions": [[0.0, 0.0, 1.0]],
     }
     pose |= {"rotations": [[1.0, 0.0, 0.0, 0.0]] * JOINTS, "betas": [0.1] * COEFFICIENTS}
-    status: dict[str, Any] = {"event": "status", "presence": "seen", "rate": 29.5, "latency_ms": 60.0}
+    status: dict[str, Any] = {
+        "event": "status",
+        "presence": "seen",
+        "rate": 29.5,
+        "latency_ms": 60.0,
+    }
     status |= {"dropped": 3, "received": 90, "recorded_s": 2.5}
     return _lines([pose, status, {"event": "notice", "text": "interrupted"}, {"event": "ended"}])
 
@@ -211,7 +236,11 @@ def built_in_maps() -> Path:
 
 
 def descriptions(_: Path) -> list[bytes]:
-    return [json.dumps({"type": "simcc", "input_size": [192, 256], "mean": [1, 2, 3], "keypoints": "coco17"}).encode()]
+    return [
+        json.dumps(
+            {"type": "simcc", "input_size": [192, 256], "mean": [1, 2, 3], "keypoints": "coco17"}
+        ).encode()
+    ]
 
 
 def windows(folder: Path) -> list[bytes]:
@@ -228,7 +257,9 @@ def windows(folder: Path) -> list[bytes]:
     people = {0: Tracklet(list(range(6)), values, centers, [9.0] * 6)}
     regions = {0: Region((1.0, 2.0), 9.0, 0.0)}
     sums, indices = np.ones(6, np.uint32), np.arange(6)
-    record = WindowRecord(Window(1, 1.0, 2.0, 4.0), indices, times, sums, 2, 5, people, regions, [], background)
+    record = WindowRecord(
+        Window(1, 1.0, 2.0, 4.0), indices, times, sums, 2, 5, people, regions, [], background
+    )
     return [save_window(folder, record, (64, 48)).read_bytes()]
 
 
@@ -248,10 +279,18 @@ def times(folder: Path) -> list[bytes]:
     from scope.scope_addon.job.progress.stage_times import save_stage_times
 
     for kind in ("other", KEY):
-        save_stage_times(folder, kind, {"finding the person": 9.0, "solving": 0.5, "writing": 0.25}, 100)
+        save_stage_times(
+            folder, kind, {"finding the person": 9.0, "solving": 0.5, "writing": 0.25}, 100
+        )
     return [(folder / "times.json").read_bytes()]
 
 
 def batch_reports(_: Path) -> list[bytes]:
-    entry = {"name": BATCH_NAME, "status": "done", "outputs": ["walk.npz"], "hash": "0a", "warnings": []}
+    entry = {
+        "name": BATCH_NAME,
+        "status": "done",
+        "outputs": ["walk.npz"],
+        "hash": "0a",
+        "warnings": [],
+    }
     return [json.dumps({"folder": "clips", "files": [entry], "exit_status": 0}).encode()]

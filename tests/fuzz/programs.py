@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What `commands` runs that is no command of Scope's: ``python -m scope.tests.fuzz.programs NAME ARGUMENT…``.
+"""What `commands` runs that is no command of Scope's: ``python -m scope.tests.fuzz.programs NAME
+ARGUMENT…``.
 
 Errors are printed as the command line prints them, so that all commands are checked alike.
 """
@@ -89,7 +90,9 @@ def compile_kernels(package: str, folder: str) -> int:
 
 
 def _register() -> None:
-    """Register the extension in a fresh Blender; its workers use the solver that is compiled already."""
+    """Register the extension in a fresh Blender; its workers use the solver that is compiled
+    already.
+    """
     import bpy
     import scope
     from scope.scope_addon.job.live.process import LiveProcess

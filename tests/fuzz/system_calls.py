@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run a command, and at its n-th system call of a kind kill it or let the call fail. Linux on x86-64 only.
+"""Run a command, and at its n-th system call of a kind kill it or let the call fail. Linux on
+x86-64 only.
 
-``python system_calls.py PLAN COMMAND…`` prints what happened as JSON on its last line. It imports nothing of Scope and
-is a process of its own, because whoever traces has to wait for every child. The kernel stops the command only at the
-calls that are named here (a seccomp filter), also in libraries, in threads and in the processes that it starts.
+``python system_calls.py PLAN COMMAND…`` prints what happened as JSON on its last line. It imports
+nothing of Scope and is a process of its own, because whoever traces has to wait for every child.
+The kernel stops the command only at the calls that are named here (a seccomp filter), also in
+libraries, in threads and in the processes that it starts.
 """
 
 from __future__ import annotations
@@ -22,7 +24,8 @@ from typing import Any, NamedTuple
 AVAILABLE = sys.platform == "linux" and platform.machine() == "x86_64"
 KILL, FULL, NO_MEMORY = "kill", "full", "no memory"
 _DISK_FULL, _LACK_OF_MEMORY = 28, 12  # ENOSPC, ENOMEM
-_AT_FD, _AT_PATH, _AT_FOLDER = range(3)  # the first argument is a file, a path, or a folder to which a path belongs
+# the first argument is a file, a path, or a folder to which a path belongs
+_AT_FD, _AT_PATH, _AT_FOLDER = range(3)
 _WRITES = {
     1: ("write", _AT_FD),
     18: ("pwrite", _AT_FD),
@@ -53,7 +56,8 @@ _LARGE = 1 << 20  # bytes of an allocation that counts
 # Of struct user_regs_struct, in words of 8 bytes.
 _RAX, _ORIG_RAX, _ARGUMENTS, _WORDS = 10, 15, (14, 13, 12, 7, 9, 8), 27
 _TRACEME, _CONT, _GETREGS, _SETREGS, _SETOPTIONS = 0, 7, 12, 13, 0x4200
-_OPTIONS = 0x2 | 0x4 | 0x8 | 0x10 | 0x80 | 0x100000  # fork, vfork, clone, exec, seccomp; kill all if the tracer ends
+# fork, vfork, clone, exec, seccomp; kill all if the tracer ends
+_OPTIONS = 0x2 | 0x4 | 0x8 | 0x10 | 0x80 | 0x100000
 _SECCOMP_EVENT = 7
 _ALL = 0x40000000  # of waitpid: threads too
 
@@ -71,12 +75,14 @@ class Traced(NamedTuple):
     stderr: str
 
 
-def traced(command: list[str], folder: Path, n: int, action: str, environment: dict[str, str] | None = None) -> Traced:
+def traced(
+    command: list[str], folder: Path, n: int, action: str, environment: dict[str, str] | None = None
+) -> Traced:
     """Run a command and do something at its n-th call.
 
     :param folder: only writes to files below it count.
-    :param action: ``KILL`` or ``FULL`` (the n-th write fails: no space left), or ``NO_MEMORY`` (the n-th allocation of
-        at least 1 MiB fails).
+    :param action: ``KILL`` or ``FULL`` (the n-th write fails: no space left), or ``NO_MEMORY`` (the
+        n-th allocation of at least 1 MiB fails).
     """
     plan = json.dumps({"folder": os.path.realpath(folder), "n": n, "action": action})
     done = subprocess.run(
@@ -100,7 +106,12 @@ class _Tracer:
     def __init__(self, plan: dict[str, Any]) -> None:
         self._folder, self._n, self._action = plan["folder"], plan["n"], plan["action"]
         self._libc = ctypes.CDLL(None, use_errno=True)
-        self._libc.ptrace.argtypes = [ctypes.c_long, ctypes.c_long, ctypes.c_void_p, ctypes.c_void_p]
+        self._libc.ptrace.argtypes = [
+            ctypes.c_long,
+            ctypes.c_long,
+            ctypes.c_void_p,
+            ctypes.c_void_p,
+        ]
         self.calls: list[str] = []
 
     def run(self, command: list[str]) -> int:
@@ -132,11 +143,14 @@ class _Tracer:
 
     def _install_filter(self) -> None:
         numbers = [_MMAP] if self._action == NO_MEMORY else sorted(_WRITES)
-        # Load the call's number; for each of ours, jump to the last instruction, which asks the tracer.
+        # Load the call's number; for each of ours, jump to the last instruction, which asks the
+        # tracer.
         code = struct.pack("HBBI", 0x20, 0, 0, 0)
         for k, number in enumerate(numbers):
             code += struct.pack("HBBI", 0x15, len(numbers) - k, 0, number)
-        code += struct.pack("HBBI", 0x06, 0, 0, 0x7FFF0000) + struct.pack("HBBI", 0x06, 0, 0, 0x7FF00000)
+        code += struct.pack("HBBI", 0x06, 0, 0, 0x7FFF0000) + struct.pack(
+            "HBBI", 0x06, 0, 0, 0x7FF00000
+        )
         buffer = ctypes.create_string_buffer(code)
         program = struct.pack("HxxxxxxQ", len(code) // 8, ctypes.addressof(buffer))
         no_new_privileges, seccomp, with_filter = 38, 22, 2
@@ -166,7 +180,8 @@ class _Tracer:
     def _counted(self, thread: int, number: int, arguments: list[int]) -> str | None:
         """Return the name and the path of a call that counts."""
         if number == _MMAP:
-            is_large = arguments[3] & _ANONYMOUS and arguments[1] >= _LARGE and arguments[2]  # some protection: used
+            # some protection: used
+            is_large = arguments[3] & _ANONYMOUS and arguments[1] >= _LARGE and arguments[2]
             return f"mmap {arguments[1] >> 20} MiB" if is_large else None
         name, kind = _WRITES[number]
         if name == "open" and not arguments[1 + (kind == _AT_FOLDER)] & _FOR_WRITING:
@@ -175,9 +190,15 @@ class _Tracer:
             if kind == _AT_FD:
                 path = os.readlink(f"/proc/{thread}/fd/{arguments[0] & 0xFFFFFFFF}")
             else:
-                first = ctypes.c_int(arguments[0] & 0xFFFFFFFF).value if kind == _AT_FOLDER else -100
-                base = os.readlink(f"/proc/{thread}/cwd" if first < 0 else f"/proc/{thread}/fd/{first}")
-                path = os.path.normpath(os.path.join(base, _text(thread, arguments[kind == _AT_FOLDER])))
+                first = (
+                    ctypes.c_int(arguments[0] & 0xFFFFFFFF).value if kind == _AT_FOLDER else -100
+                )
+                base = os.readlink(
+                    f"/proc/{thread}/cwd" if first < 0 else f"/proc/{thread}/fd/{first}"
+                )
+                path = os.path.normpath(
+                    os.path.join(base, _text(thread, arguments[kind == _AT_FOLDER]))
+                )
         except OSError:
             return None
         return f"{name} {path}" if path.startswith(self._folder + os.sep) else None
@@ -189,7 +210,8 @@ def _text(thread: int, address: int) -> str:
         memory.seek(address)
         found = b""
         while b"\0" not in found and len(found) < 4096:
-            found += memory.read(4096 - (address + len(found)) % 4096)  # not beyond the page, which may be the last one
+            # not beyond the page, which may be the last one
+            found += memory.read(4096 - (address + len(found)) % 4096)
     return os.fsdecode(found.partition(b"\0")[0])
 
 

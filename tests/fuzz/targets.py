@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What reads files and messages of others: each a function that may raise nothing but ScopeError, and valid inputs."""
+"""What reads files and messages of others: each a function that may raise nothing but ScopeError,
+and valid inputs.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,9 @@ ASSETS = Path(__file__).resolve().parents[2] / "assets"
 
 @dataclass(frozen=True)
 class Target:
-    """A reader of a file with one of ``suffixes``, and ``seeds``, which make valid inputs in a folder."""
+    """A reader of a file with one of ``suffixes``, and ``seeds``, which make valid inputs in a
+    folder.
+    """
 
     read: Callable[[Path], object]
     suffixes: tuple[str, ...]
@@ -108,7 +112,10 @@ def _pictures(_: Path) -> list[bytes]:
     import cv2
 
     picture = (np.indices((24, 32)).sum(axis=0) * 4).astype(np.uint8)[..., None].repeat(3, axis=2)
-    return [cv2.imencode(suffix, picture)[1].tobytes() for suffix in (".png", ".jpg", ".webp", ".tiff", ".bmp")]
+    return [
+        cv2.imencode(suffix, picture)[1].tobytes()
+        for suffix in (".png", ".jpg", ".webp", ".tiff", ".bmp")
+    ]
 
 
 def _videos(folder: Path) -> list[bytes]:
@@ -127,7 +134,9 @@ def _box(name: bytes, content: bytes) -> bytes:
 
 
 def _heif(_: Path) -> list[bytes]:
-    locations = _box(b"iloc", struct.pack(">IBBH", 0, 0x44, 0, 1) + struct.pack(">HHHII", 1, 0, 1, 400, 20))
+    locations = _box(
+        b"iloc", struct.pack(">IBBH", 0, 0x44, 0, 1) + struct.pack(">HHHII", 1, 0, 1, 400, 20)
+    )
     entry = _box(b"infe", struct.pack(">IHH", 2 << 24, 1, 0) + b"hvc1\0")
     size = _box(b"ispe", struct.pack(">III", 0, 32, 24)) + _box(b"irot", b"\1")
     uses = _box(b"ipma", struct.pack(">II", 0, 1) + struct.pack(">HBBB", 1, 2, 1, 2))
@@ -138,17 +147,28 @@ def _heif(_: Path) -> list[bytes]:
         _box(b"iprp", _box(b"ipco", size) + uses),
         _box(b"iref", struct.pack(">I", 0) + _box(b"dimg", struct.pack(">HHH", 1, 1, 1))),
     ]
-    return [_box(b"ftyp", b"heic\0\0\0\0mif1heic") + _box(b"meta", struct.pack(">I", 0) + b"".join(inside))]
+    return [
+        _box(b"ftyp", b"heic\0\0\0\0mif1heic")
+        + _box(b"meta", struct.pack(">I", 0) + b"".join(inside))
+    ]
 
 
 def _exif(_: Path) -> list[bytes]:
     found = []
     for order in "<>":
-        tags = struct.pack(f"{order}HHIHH", 274, 3, 1, 6, 0) + struct.pack(f"{order}HHII", 34665, 4, 1, 38)
+        tags = struct.pack(f"{order}HHIHH", 274, 3, 1, 6, 0) + struct.pack(
+            f"{order}HHII", 34665, 4, 1, 38
+        )
         inner = struct.pack(f"{order}HHHIHHI", 1, 41989, 3, 1, 26, 0, 0)
         start = (b"II*\0" if order == "<" else b"MM\0*") + struct.pack(f"{order}I", 8)
         found.append(start + struct.pack(f"{order}H", 2) + tags + bytes(4) + inner)
-    jpeg = b"\xff\xd8\xff\xe1" + struct.pack(">H", len(found[0]) + 8) + b"Exif\0\0" + found[0] + b"\xff\xd9"
+    jpeg = (
+        b"\xff\xd8\xff\xe1"
+        + struct.pack(">H", len(found[0]) + 8)
+        + b"Exif\0\0"
+        + found[0]
+        + b"\xff\xd9"
+    )
     chunk = struct.pack(">I", len(found[1])) + b"eXIf" + found[1] + bytes(4)
     return [*found, jpeg, b"\x89PNG\r\n\x1a\n" + chunk]
 
@@ -156,7 +176,10 @@ def _exif(_: Path) -> list[bytes]:
 def _bodies(_: Path) -> list[bytes]:
     with np.load(ASSETS / "body" / "scope.npz") as file:
         arrays = {key: file[key] for key in file.files}
-    return [npz(arrays), *(npz(_small_tables(family)) for family in ("smpl", "smplh", "smplx", "star"))]
+    return [
+        npz(arrays),
+        *(npz(_small_tables(family)) for family in ("smpl", "smplh", "smplx", "star")),
+    ]
 
 
 def _small_tables(family: str) -> dict[str, np.ndarray]:
@@ -175,7 +198,14 @@ def _pickled_bodies(_: Path) -> list[bytes]:
 
 def _motions(_: Path) -> list[bytes]:
     from scope.scope_addon.edit.pins.corrected_motion import with_corrections
-    from scope.scope_addon.edit.pins.corrections import Contact, Exchange, FeetOnFloor, Interpolation, Pin, Upright
+    from scope.scope_addon.edit.pins.corrections import (
+        Contact,
+        Exchange,
+        FeetOnFloor,
+        Interpolation,
+        Pin,
+        Upright,
+    )
     from scope.solver.loaders.body_file import load_body
 
     from ..made_motion import made_face, made_motion
@@ -183,13 +213,22 @@ def _motions(_: Path) -> list[bytes]:
     poses, trans = np.zeros((6, 72)), np.zeros((6, 3))
     body = load_body("scope")
     motions = [made_motion(body, poses, trans, face=face) for face in ({}, made_face(6))]
-    measured = (Pin(2, "head", (320.0, 200.0)), Contact(1, 3, "left"), Exchange(4, 5), Upright.of(np.eye(4)))
+    measured = (
+        Pin(2, "head", (320.0, 200.0)),
+        Contact(1, 3, "left"),
+        Exchange(4, 5),
+        Upright.of(np.eye(4)),
+    )
     corrections = (*measured, Interpolation(1, 2), FeetOnFloor(lift=False))
-    return [motion.to_bytes() for motion in (*motions, with_corrections(motions[0], body, corrections))]
+    return [
+        motion.to_bytes() for motion in (*motions, with_corrections(motions[0], body, corrections))
+    ]
 
 
 def _smpl_motions(folder: Path) -> list[bytes]:
-    """Return motions as SMPL's, AMASS's older and newer, AIST++'s and SMPL fits' files name their arrays."""
+    """Return motions as SMPL's, AMASS's older and newer, AIST++'s and SMPL fits' files name their
+    arrays.
+    """
     joints = np.linspace(-0.6, 0.6, 5 * 55 * 3, dtype=np.float32).reshape(5, 55, 3)
     place = np.ones((5, 3))
 
@@ -197,15 +236,26 @@ def _smpl_motions(folder: Path) -> list[bytes]:
         return joints[:, first:last].reshape(5, -1)
 
     layouts: list[dict[str, Any]] = [
-        {"poses": flat(0, 24), "trans": place, "mocap_framerate": np.array(30.0), "gender": np.array("male")},
+        {
+            "poses": flat(0, 24),
+            "trans": place,
+            "mocap_framerate": np.array(30.0),
+            "gender": np.array("male"),
+        },
         {"poses": flat(0, 52), "trans": place, "betas": np.zeros(16)},
-        {"root_orient": flat(0, 1), "pose_body": flat(1, 22), "pose_hand": flat(22, 52), "fps": np.array(120)},
+        {
+            "root_orient": flat(0, 1),
+            "pose_body": flat(1, 22),
+            "pose_hand": flat(22, 52),
+            "fps": np.array(120),
+        },
         {"smpl_poses": flat(0, 24), "smpl_trans": place, "smpl_scaling": np.array([2.0])},
         {"global_orient": flat(0, 1), "body_pose": flat(1, 24), "transl": place},
     ]
     seeds = [npz(layout) for layout in layouts]
     (folder / "seed.npz").write_bytes(seeds[0])
-    _import_smpl_motion(folder / "seed.npz")  # compiles what it needs, which takes longer than an input may
+    # compiles what it needs, which takes longer than an input may
+    _import_smpl_motion(folder / "seed.npz")
     return seeds
 
 
@@ -217,7 +267,11 @@ def npz(arrays: dict[str, Any]) -> bytes:
 
 
 def _calibrations(_: Path) -> list[bytes]:
-    ours = {"intrinsics": [[500, 0, 320], [0, 500, 180], [0, 0, 1]], "dist": [0.1, 0, 0, 0, 0], "size": [640, 360]}
+    ours = {
+        "intrinsics": [[500, 0, 320], [0, 500, 180], [0, 0, 1]],
+        "dist": [0.1, 0, 0, 0, 0],
+        "size": [640, 360],
+    }
     return [json.dumps(ours).encode()]
 
 
@@ -248,7 +302,12 @@ def _rigs(_: Path) -> list[bytes]:
     separate = json.dumps({**document, "buffers": [{"byteLength": len(data), "uri": uri}]}).encode()
     text = json.dumps(document).encode()
     text += b" " * (-len(text) % 4)
-    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(data), b"BIN\0") + data
+    chunks = (
+        struct.pack("<I4s", len(text), b"JSON")
+        + text
+        + struct.pack("<I4s", len(data), b"BIN\0")
+        + data
+    )
     glb = struct.pack("<4sII", b"glTF", 2, len(chunks) + 12) + chunks
     packed = zlib.compress(bytes(24))
     array = b"d" + struct.pack("<III", 3, 1, len(packed)) + packed
@@ -259,7 +318,9 @@ def _rigs(_: Path) -> list[bytes]:
 
 
 TARGETS = {
-    "picture": Target(_open_picture_or_video, (".png", ".jpg", ".webp", ".tiff", ".bmp", ".heic"), _pictures),
+    "picture": Target(
+        _open_picture_or_video, (".png", ".jpg", ".webp", ".tiff", ".bmp", ".heic"), _pictures
+    ),
     "video": Target(_open_picture_or_video, (".mp4", ".mov"), _videos),
     "heif": Target(_read_layout, (".heic",), _heif),
     "exif": Target(_read_exif, (".jpg",), _exif),

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The n-th system call of a write fails, for every n: the old result or the new one, no leftovers, a good next run."""
+"""The n-th system call of a write fails, for every n: the old result or the new one, no leftovers,
+a good next run.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,9 @@ def test_a_motion_is_the_old_or_the_new_one(tmp_path: Path, body: Body) -> None:
     second.save(tmp_path / "out.npz")
     new = contents(tmp_path)
     first.save(tmp_path / "out.npz")
-    count = all_faults(lambda: second.save(tmp_path / "out.npz"), lambda: contents(tmp_path), old, new)
+    count = all_faults(
+        lambda: second.save(tmp_path / "out.npz"), lambda: contents(tmp_path), old, new
+    )
     assert count > 4
 
 
@@ -33,7 +37,12 @@ def test_a_bone_map_is_the_old_or_the_new_one(tmp_path: Path) -> None:
     save_bone_map(second, path)
     new = contents(tmp_path)
     save_bone_map(first, path)
-    assert all_faults(lambda: save_bone_map(second, path), lambda: contents(tmp_path), contents(tmp_path), new) > 4
+    assert (
+        all_faults(
+            lambda: save_bone_map(second, path), lambda: contents(tmp_path), contents(tmp_path), new
+        )
+        > 4
+    )
     assert load_bone_map(path) == second
 
 

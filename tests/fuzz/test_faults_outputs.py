@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The n-th system call of an export, a capture's outputs or a batch fails, for every n: old or new files, no others."""
+"""The n-th system call of an export, a capture's outputs or a batch fails, for every n: old or new
+files, no others.
+"""
 
 from __future__ import annotations
 
@@ -84,8 +86,12 @@ def test_an_export_is_the_old_or_the_new_one(tmp_path, temporary, small, motion,
             except ScopeError as error:
                 said.append(str(error))
         is_new = path.read_bytes() != OLD
-        assert not is_new or abs(path.stat().st_size - whole) < 0.02 * whole, f"after a fault at call {n}"
-        assert sorted(p.name for p in tmp_path.iterdir()) == ["temporary", path.name], f"after a fault at call {n}"
+        assert not is_new or abs(path.stat().st_size - whole) < 0.02 * whole, (
+            f"after a fault at call {n}"
+        )
+        assert sorted(p.name for p in tmp_path.iterdir()) == ["temporary", path.name], (
+            f"after a fault at call {n}"
+        )
         assert list(temporary.iterdir()) == [], f"after a fault at call {n}"
         assert (len(bpy.data.objects), len(bpy.data.scenes)) == objects
         if len(calls) < n:
@@ -107,11 +113,20 @@ def test_all_outputs_of_a_capture_are_old_or_new(tmp_path, temporary, monkeypatc
         "execution": "CPU",
         "warnings": [],
     }
-    monkeypatch.setattr(pipeline, "capture", lambda *_, **__: SimpleNamespace(motions=[motion], report=report))
+    monkeypatch.setattr(
+        pipeline, "capture", lambda *_, **__: SimpleNamespace(motions=[motion], report=report)
+    )
     out = tmp_path / "out"
     out.mkdir()
     names = ("walk.npz", "walk.bvh", "overlay.png")
-    command = ["capture", str(tmp_path / "walk.png"), "--quiet", "--json", "--overlay", str(out / names[2])]
+    command = [
+        "capture",
+        str(tmp_path / "walk.png"),
+        "--quiet",
+        "--json",
+        "--overlay",
+        str(out / names[2]),
+    ]
     command += [part for name in names[:2] for part in ("-o", str(out / name))]
     assert cli.main(command) == 0
     new = {name: (out / name).read_bytes() for name in names}
@@ -133,7 +148,9 @@ def test_all_outputs_of_a_capture_are_old_or_new(tmp_path, temporary, monkeypatc
         else:
             assert len(json.loads(said.out)["outputs"]) == 3
         for name in names:
-            assert (out / name).read_bytes() in (OLD, new[name]), f"{name} after a fault at call {n}"
+            assert (out / name).read_bytes() in (OLD, new[name]), (
+                f"{name} after a fault at call {n}"
+            )
         assert sorted(p.name for p in out.iterdir()) == sorted(names), f"after a fault at call {n}"
         assert list(temporary.iterdir()) == [], f"after a fault at call {n}"
         if len(calls) < n:

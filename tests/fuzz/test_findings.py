@@ -2,8 +2,8 @@
 """What once broke under attack, F1 to F15 and three more, each as its finder saw it: from outside.
 
 Details are tested beside the modules, and all of F1, damaged machine code and no place for it, in
-``tests/solver/compiled/test_code_cache.py``. Where a finding was a crash, much memory or the shell's, a process of its
-own is started, so that it would fail alone.
+``tests/solver/compiled/test_code_cache.py``. Where a finding was a crash, much memory or the
+shell's, a process of its own is started, so that it would fail alone.
 """
 
 from __future__ import annotations
@@ -45,8 +45,12 @@ Said = Callable[..., str]
 
 
 @pytest.fixture
-def refused(tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Said:
-    """Run a command line in the test's folder; check that it fails in one sentence and writes nothing."""
+def refused(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> Said:
+    """Run a command line in the test's folder; check that it fails in one sentence and writes
+    nothing.
+    """
     monkeypatch.chdir(tmp_path)
 
     def run(*arguments: str, status: int = 1) -> str:
@@ -68,12 +72,26 @@ def one_sentence(said: str) -> bool:
 def shell(line: str, folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
     """Run a line of the shell, in which SCOPE is the program."""
     line = line.replace("SCOPE", shlex.join(PROGRAM))
-    options: dict[str, Any] = {"capture_output": True, "text": True, "check": False, "stdin": subprocess.DEVNULL}
-    return subprocess.run(["bash", "-c", line], cwd=folder, env={**os.environ, **environment}, **options)
+    options: dict[str, Any] = {
+        "capture_output": True,
+        "text": True,
+        "check": False,
+        "stdin": subprocess.DEVNULL,
+    }
+    return subprocess.run(
+        ["bash", "-c", line], cwd=folder, env={**os.environ, **environment}, **options
+    )
 
 
-def python(code: str, folder: Path, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    options: dict[str, Any] = {"capture_output": True, "text": True, "check": False, "errors": "surrogateescape"}
+def python(
+    code: str, folder: Path, *arguments: str, **environment: str
+) -> subprocess.CompletedProcess[str]:
+    options: dict[str, Any] = {
+        "capture_output": True,
+        "text": True,
+        "check": False,
+        "errors": "surrogateescape",
+    }
     command = [sys.executable, "-c", code, *arguments]
     return subprocess.run(command, cwd=folder, env={**os.environ, **environment}, **options)
 
@@ -111,20 +129,28 @@ def test_f3_a_picture_of_too_many_pixels(tmp_path: Path) -> None:
     shutil.copy(CORPUS / "picture-20000.png", tmp_path / "bomb.png")
     done = shell("ulimit -v 3000000; SCOPE capture bomb.png -o a.npz", tmp_path)
     assert done.returncode == 1
-    assert done.stderr.startswith("scope: bomb.png has too many pixels, and at most 134 million can be read")
+    assert done.stderr.startswith(
+        "scope: bomb.png has too many pixels, and at most 134 million can be read"
+    )
     assert one_sentence(done.stderr)
 
 
 @pytest.mark.parametrize(("width", "height"), [(4000, 2), (65_000, 3)])
-def test_f8_a_picture_that_is_very_long(tmp_path: Path, refused: Said, width: int, height: int) -> None:
+def test_f8_a_picture_that_is_very_long(
+    tmp_path: Path, refused: Said, width: int, height: int
+) -> None:
     """The detector ran thousands of times."""
     cv2.imwrite(str(tmp_path / "long.png"), np.zeros((height, width, 3), np.uint8))
-    assert f"long.png shows {width} × {height} pixels" in refused("capture", "long.png", "-o", "a.npz")
+    assert f"long.png shows {width} × {height} pixels" in refused(
+        "capture", "long.png", "-o", "a.npz"
+    )
 
 
 def test_f8_pixels_that_are_very_wide(tmp_path: Path, refused: Said) -> None:
     """An aspect ratio of 255:1, likewise."""
-    patch_track_header(write_video(tmp_path / "wide.mp4", [np.zeros((48, 64, 3), np.uint8)] * 2), None, 64 * 255)
+    patch_track_header(
+        write_video(tmp_path / "wide.mp4", [np.zeros((48, 64, 3), np.uint8)] * 2), None, 64 * 255
+    )
     assert "wide.mp4 shows 16320 × 48 pixels" in refused("capture", "wide.mp4", "-o", "a.npz")
 
 
@@ -161,7 +187,9 @@ GLTF: dict[str, Any] = {
 
 @linux
 def test_f4_rigs_that_ask_for_everything(tmp_path: Path) -> None:
-    """NaN gave a traceback; a count or /dev/zero took 9 GiB; a pipe was waited for; FBX took 60 s and 7.8 GiB."""
+    """NaN gave a traceback; a count or /dev/zero took 9 GiB; a pipe was waited for; FBX took 60 s
+    and 7.8 GiB.
+    """
     walk(tmp_path)
     bones = [GLTF["nodes"][0], {"translation": [np.nan] * 3}]
     glb(tmp_path / "nan.glb", {**GLTF, "nodes": bones}, struct.pack("<f", np.nan) * 32)
@@ -195,19 +223,30 @@ def test_f4_rigs_that_ask_for_everything(tmp_path: Path) -> None:
 # F5, F6: bodies
 
 
-@pytest.mark.parametrize("header", ["{'shape': (3,", "{'a':\n\t 1}\n  x", " {\n1\n  2}\n\n x", "\0{"])
+@pytest.mark.parametrize(
+    "header", ["{'shape': (3,", "{'a':\n\t 1}\n  x", " {\n1\n  2}\n\n x", "\0{"]
+)
 def test_f5_headers_at_which_numpy_fails(tmp_path: Path, refused: Said, header: str) -> None:
     """TokenError and IndentationError of the arrays' headers were not caught."""
-    with zipfile.ZipFile(ASSETS / "body" / "scope.npz") as whole, zipfile.ZipFile(tmp_path / "body.npz", "w") as bad:
+    with (
+        zipfile.ZipFile(ASSETS / "body" / "scope.npz") as whole,
+        zipfile.ZipFile(tmp_path / "body.npz", "w") as bad,
+    ):
         for name in whole.namelist():
-            changed = b"\x93NUMPY\1\0" + struct.pack("<H", len(header)) + header.encode() + bytes(99)
+            changed = (
+                b"\x93NUMPY\1\0" + struct.pack("<H", len(header)) + header.encode() + bytes(99)
+            )
             bad.writestr(name, changed if name == "v_template.npy" else whole.read(name))
-    assert "body.npz is not a readable body file" in refused("capture", "--body", "body.npz", "-o", "a.npz")
+    assert "body.npz is not a readable body file" in refused(
+        "capture", "--body", "body.npz", "-o", "a.npz"
+    )
 
 
 @pytest.mark.parametrize("factors", [(1, 0, 1), (1e-9, 1e-9, 1e-9), (0, 0, 0)])
 @pytest.mark.parametrize("form", ["scope", "smpl"])
-def test_f6_flat_and_tiny_bodies(tmp_path: Path, refused: Said, form: str, factors: tuple[float, ...]) -> None:
+def test_f6_flat_and_tiny_bodies(
+    tmp_path: Path, refused: Said, form: str, factors: tuple[float, ...]
+) -> None:
     """``argmax of an empty sequence``; one of Scope's own form was captured, 134 pixels off."""
     with np.load(ASSETS / "body" / "scope.npz") as file:
         body = {key: file[key] for key in file.files}
@@ -216,7 +255,10 @@ def test_f6_flat_and_tiny_bodies(tmp_path: Path, refused: Said, form: str, facto
         count, joints = len(body["v_template"]), body["kintree_table"].shape[1]
         body["weights"] = np.eye(joints)[np.arange(count) % joints]
         body |= {"J_regressor": np.full((joints, count), 1 / count), "f": body["faces"][:, :3]}
-        body = {k: body[k] for k in ("v_template", "shapedirs", "kintree_table", "weights", "J_regressor", "f")}
+        body = {
+            k: body[k]
+            for k in ("v_template", "shapedirs", "kintree_table", "weights", "J_regressor", "f")
+        }
     (tmp_path / "body.npz").write_bytes(npz(body))
     assert "v_template measures" in refused("capture", "--body", "body.npz", "-o", "a.npz")
 
@@ -246,7 +288,11 @@ def test_f7_a_constant_of_12_gigabytes(tmp_path: Path, refused: Said) -> None:
 MOTION = """
 import sys
 from scope.scope_addon import cli
-cli.run_capture = lambda args: (args.output[0].write_text("motion"), print("of a library"), {"frames": 3})[-1]
+def run_capture(args):
+    args.output[0].write_text("motion")
+    print("of a library")
+    return {"frames": 3}
+cli.run_capture = run_capture
 cli.run()
 """
 
@@ -265,21 +311,29 @@ def captured(redirection: str, folder: Path) -> subprocess.CompletedProcess[str]
     [
         ("COMMAND > /dev/full", "(No space left on device)"),
         ("COMMAND >&-", "(Bad file descriptor)"),
-        ("mkfifo gone; (read < gone; COMMAND) | (exec <&-; echo > gone); exit ${PIPESTATUS[0]}", "(Broken pipe)"),
+        (
+            "mkfifo gone; (read < gone; COMMAND) | (exec <&-; echo > gone); exit ${PIPESTATUS[0]}",
+            "(Broken pipe)",
+        ),
     ],
 )
 def test_f9_a_report_that_cannot_be_written(tmp_path: Path, redirection: str, says: str) -> None:
     """``--json >/dev/full`` and ``--json | true`` ended with a wrong status or message."""
     done = captured(redirection, tmp_path)
     assert done.returncode == 1
-    assert f"the report cannot be written to standard output {says}; all results are complete" in done.stderr
+    assert (
+        f"the report cannot be written to standard output {says}; all results are complete"
+        in done.stderr
+    )
     assert "Traceback" not in done.stderr
     assert "Exception" not in done.stderr
 
 
 @posix
 @pytest.mark.parametrize("redirection", ["COMMAND 2>&-", "COMMAND <&- 2>&-", "COMMAND <&-"])
-def test_f9_messages_that_cannot_be_written_change_nothing(tmp_path: Path, redirection: str) -> None:
+def test_f9_messages_that_cannot_be_written_change_nothing(
+    tmp_path: Path, redirection: str
+) -> None:
     """``2>&-`` ended with a wrong status, or wrote messages into the next file that was opened."""
     done = captured(redirection, tmp_path)
     assert (done.returncode, done.stdout) == (0, '{"frames": 3}\n')
@@ -288,7 +342,9 @@ def test_f9_messages_that_cannot_be_written_change_nothing(tmp_path: Path, redir
 # F10, F14, F15: one sentence, whatever happens
 
 
-def test_f10_an_error_of_our_own(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_f10_an_error_of_our_own(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Whatever nobody had thought of came as a traceback."""
 
     def fail(_: object) -> None:
@@ -298,7 +354,9 @@ def test_f10_an_error_of_our_own(capsys: pytest.CaptureFixture[str], monkeypatch
     assert main(["capture"]) == 1
     out, said = capsys.readouterr()
     assert out == ""
-    assert said.startswith("scope: an internal error, LinAlgError: Singular matrix; please report it")
+    assert said.startswith(
+        "scope: an internal error, LinAlgError: Singular matrix; please report it"
+    )
     assert said.count("\n") == 1
     monkeypatch.setenv("SCOPE_TRACEBACK", "1")
     with pytest.raises(np.linalg.LinAlgError):
@@ -317,7 +375,9 @@ run()
 def test_f10_a_full_disk(tmp_path: Path) -> None:
     """The writer's traceback came before the sentence."""
     walk(tmp_path)
-    done = python(FULL, tmp_path, "import", "walk.npz", "-o", "out.npz", PYTHONDONTWRITEBYTECODE="1")
+    done = python(
+        FULL, tmp_path, "import", "walk.npz", "-o", "out.npz", PYTHONDONTWRITEBYTECODE="1"
+    )
     assert done.returncode == 1
     assert one_sentence(done.stderr), done.stderr
     assert "out.npz" in done.stderr
@@ -325,7 +385,9 @@ def test_f10_a_full_disk(tmp_path: Path) -> None:
 
 
 @posix
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGINT)])
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGINT)]
+)
 def test_f14_a_signal_while_the_program_is_loaded(tmp_path: Path, number: int) -> None:
     """SIGTERM in the first two seconds ended it without a word.
 
@@ -333,7 +395,8 @@ def test_f14_a_signal_while_the_program_is_loaded(tmp_path: Path, number: int) -
     """
     code = (
         "import os, runpy, signal, sys\n"
-        f"signal.signal({int(number)}, signal.SIG_DFL)\n"  # under nohup, SIGHUP is ignored, and stays so
+        # under nohup, SIGHUP is ignored, and stays so
+        f"signal.signal({int(number)}, signal.SIG_DFL)\n"
         "class Finder:\n"
         "    def find_spec(name, *_):\n"
         f"        name == 'numpy' and os.kill(os.getpid(), {int(number)})\n"
@@ -349,13 +412,23 @@ def test_f14_a_signal_while_the_program_is_loaded(tmp_path: Path, number: int) -
 @pytest.mark.parametrize(
     ("limit_kb", "output", "says"),
     [
-        (1_500_000, "out.glb", "this shell limits a process to 1.54 GB of address space, but a capture needs 3.20 GB"),
-        (500_000, "out.npz", "this shell limits a process to 0.51 GB of address space, but a capture needs 2.50 GB"),
+        (
+            1_500_000,
+            "out.glb",
+            "this shell limits a process to 1.54 GB of address space, but a capture needs 3.20 GB",
+        ),
+        (
+            500_000,
+            "out.npz",
+            "this shell limits a process to 0.51 GB of address space, but a capture needs 2.50 GB",
+        ),
         (250_000, "out.npz", "there is too little memory to load the program; free memory"),
         (110_000, "out.npz", "there is too little memory to load the program; free memory"),
     ],
 )
-def test_f15_a_shell_that_limits_memory(tmp_path: Path, limit_kb: int, output: str, says: str) -> None:
+def test_f15_a_shell_that_limits_memory(
+    tmp_path: Path, limit_kb: int, output: str, says: str
+) -> None:
     """``ulimit -v 1500000`` gave SIGSEGV: Blender's module was half loaded."""
     done = shell(f"ulimit -v {limit_kb}; exec SCOPE capture -o {output}", tmp_path)
     assert done.returncode == 1
@@ -379,7 +452,9 @@ with atomic_path(pathlib.Path("o.fbx")) as temporary:
 
 @posix
 def test_f11_nothing_is_left_and_fbx_files_are_the_same(tmp_path: Path) -> None:
-    """Exports left ``blender_XXXXXX`` in TMPDIR, a killed one also ``.o.xxxx.fbx``; the same motion's .fbx differed."""
+    """Exports left ``blender_XXXXXX`` in TMPDIR, a killed one also ``.o.xxxx.fbx``; the same
+    motion's .fbx differed.
+    """
     for name in ("results", "temporary"):
         (tmp_path / name).mkdir()
     results = tmp_path / "results"
@@ -429,15 +504,17 @@ for kernel in (inner, outer):
 """
 LOADED = """
 from package.kernels import inner, outer
-print(outer(0.5) == inner(0.5) + inner(1.0), *(sum(kernel.stats.cache_hits.values()) for kernel in (inner, outer)))
+hits = (sum(kernel.stats.cache_hits.values()) for kernel in (inner, outer))
+print(outer(0.5) == inner(0.5) + inner(1.0), *hits)
 """
 
 
 def test_the_run_that_compiles_rounds_as_later_ones(tmp_path: Path) -> None:
-    """The capture that compiled differed by 8e-13: callers ran whichever copy of a callee was made or loaded first.
+    """The capture that compiled differed by 8e-13: callers ran whichever copy of a callee was made
+    or loaded first.
 
-    Copies of small kernels round alike, so that only their being separate can be seen here. One second of the sample
-    clip shows it in two minutes: see "bit for bit" in docs/command_line.md.
+    Copies of small kernels round alike, so that only their being separate can be seen here. One
+    second of the sample clip shows it in two minutes: see "bit for bit" in docs/command_line.md.
     """
     (make_package(tmp_path) / "kernels.py").write_text(LONG_CALLEE)
     cache = str(tmp_path / "cache")
@@ -453,7 +530,9 @@ FOLDER = "from scope.scope_addon.job.private_folder import private_folder; print
 @linux
 @pytest.mark.parametrize("prepared", ["link", "open", "file"])
 def test_the_fallback_cache_is_the_users_own(tmp_path: Path, prepared: str) -> None:
-    """It was a predictable folder in the system's temporary one, and what lies in it is unpickled."""
+    """It was a predictable folder in the system's temporary one, and what lies in it is
+    unpickled.
+    """
     caches, theirs = tmp_path / "caches", tmp_path / "theirs"
     caches.mkdir()
     theirs.mkdir()
@@ -467,6 +546,10 @@ def test_the_fallback_cache_is_the_users_own(tmp_path: Path, prepared: str) -> N
     done = python(FOLDER, tmp_path, XDG_CACHE_HOME=str(caches), TMPDIR=str(tmp_path))
     found = Path(done.stdout.strip())
     status = found.lstat()
-    assert (stat.S_IMODE(status.st_mode), status.st_uid, stat.S_ISDIR(status.st_mode)) == (0o700, os.geteuid(), True)
+    assert (stat.S_IMODE(status.st_mode), status.st_uid, stat.S_ISDIR(status.st_mode)) == (
+        0o700,
+        os.geteuid(),
+        True,
+    )
     assert (found.parent == caches) == (prepared == "open")
     assert list(theirs.iterdir()) == []

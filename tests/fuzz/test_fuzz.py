@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Damaged inputs of every reader give one sentence or none: past findings and new ones; more by ./scripts/fuzz."""
+"""Damaged inputs of every reader give one sentence or none: past findings and new ones; more by
+./scripts/fuzz.
+"""
 
 from __future__ import annotations
 
@@ -48,7 +50,11 @@ def is_of_earlier_captures(path: Path) -> bool:
 
 @pytest.mark.parametrize(
     "path",
-    [path for path in sorted(CORPUS.iterdir()) if not (is_metadata(path) or is_of_earlier_captures(path))],
+    [
+        path
+        for path in sorted(CORPUS.iterdir())
+        if not (is_metadata(path) or is_of_earlier_captures(path))
+    ],
     ids=lambda path: path.name,
 )
 def test_past_findings_are_refused(path: Path) -> None:
@@ -58,7 +64,9 @@ def test_past_findings_are_refused(path: Path) -> None:
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("path", sorted(filter(is_metadata, CORPUS.iterdir())), ids=lambda path: path.name)
+@pytest.mark.parametrize(
+    "path", sorted(filter(is_metadata, CORPUS.iterdir())), ids=lambda path: path.name
+)
 def test_hostile_metadata_count_as_absent(path: Path) -> None:
     """They claim 4 billion items, tags or bytes, or contain themselves."""
     data = path.read_bytes()
@@ -66,9 +74,13 @@ def test_hostile_metadata_count_as_absent(path: Path) -> None:
     assert (read_exif(data), animation_length(data)) == (Exif(), 1)
 
 
-@pytest.mark.parametrize("path", sorted(filter(is_of_earlier_captures, CORPUS.iterdir())), ids=lambda path: path.name)
+@pytest.mark.parametrize(
+    "path", sorted(filter(is_of_earlier_captures, CORPUS.iterdir())), ids=lambda path: path.name
+)
 def test_hostile_times_of_earlier_captures_count_as_absent(tmp_path: Path, path: Path) -> None:
-    """They have times that no sum holds, numbers that no float holds, names that UTF-8 lacks, or nest without end."""
+    """They have times that no sum holds, numbers that no float holds, names that UTF-8 lacks, or
+    nest without end.
+    """
     (tmp_path / "times.json").write_bytes(path.read_bytes())
     assert load_stage_times(tmp_path, KEY) == {}
     check("times", tmp_path / "times.json")

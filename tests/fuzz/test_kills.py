@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A command that is killed, or that the disk or the memory fails, at a few calls; at all by ./scripts/fuzz --faults."""
+"""A command that is killed, or that the disk or the memory fails, at a few calls; at all by
+./scripts/fuzz --faults.
+"""
 
 from __future__ import annotations
 
@@ -27,13 +29,18 @@ BY_NAME = {command.name: command for command in COMMANDS}
         ("compile", KILL, (8,)),  # before it renames
     ],
 )
-def test_files_are_old_or_whole_and_the_next_run_is_good(name: str, action: str, calls: tuple[int, ...]) -> None:
+def test_files_are_old_or_whole_and_the_next_run_is_good(
+    name: str, action: str, calls: tuple[int, ...]
+) -> None:
     assert check_command(BY_NAME[name], action, calls) == (len(calls), [])
 
 
 def test_several_commands_and_faults_can_be_named() -> None:
     """Names of two commands chose neither, and nothing was run."""
-    assert [(c.name, a) for c, a in chosen(["live", "cache", KILL])] == [("live", KILL), ("cache", KILL)]
+    assert [(c.name, a) for c, a in chosen(["live", "cache", KILL])] == [
+        ("live", KILL),
+        ("cache", KILL),
+    ]
     assert [(c.name, a) for c, a in chosen(["compile"])] == [("compile", KILL), ("compile", FULL)]
     assert len(chosen([])) == sum(len(command.actions) for command in COMMANDS)
     with pytest.raises(SystemExit, match="no command or fault lives; there are batch, "):

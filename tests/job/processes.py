@@ -8,7 +8,8 @@ from collections.abc import Callable
 
 import psutil
 
-# A defect is found that late; a worker, whose priority is low, may take minutes on a computer that has other work.
+# A defect is found that late; a worker, whose priority is low, may take minutes on a computer that
+# has other work.
 _LONGEST_S = 900.0
 
 

@@ -28,8 +28,9 @@ from .processes import runs, wait_for
 RECORD = r"\.[ab]\.finished-[0-9a-f]{16}\.json"  # of a clip's results
 FRAMES = 31  # of the sample clip up to --end 1, both ends included
 
-# Replaces the capture: the clip's text decides the outcome, and every call is logged in the folder of the clips. What
-# "hangs" runs until its standard input ends, what "lingers" also does after it has written its results.
+# Replaces the capture: the clip's text decides the outcome, and every call is logged in the folder
+# of the clips. What "hangs" runs until its standard input ends, what "lingers" also does after it
+# has written its results.
 PROGRAM = """
 import json, sys, pathlib
 clip = pathlib.Path(sys.argv[2])
@@ -59,7 +60,13 @@ print(json.dumps({"frames": 3, "outputs": outputs, "warnings": warnings}))
 def folder(tmp_path):
     clips = tmp_path / "clips"
     clips.mkdir()
-    for name, text in {"a.mp4": "ok", "b.mov": "broken", "c.png": "nobody", "d.avi": "crash", "e.webm": "fine"}.items():
+    for name, text in {
+        "a.mp4": "ok",
+        "b.mov": "broken",
+        "c.png": "nobody",
+        "d.avi": "crash",
+        "e.webm": "fine",
+    }.items():
         (clips / name).write_text(text)
     (clips / "notes.txt").write_text("not footage")
     return clips
@@ -82,17 +89,23 @@ def batch(folder, out, options=None, suffixes=(".npz", ".glb")):
     return Batch(folder, out, program, options or {}, suffixes)
 
 
-def test_a_report_that_takes_long_to_write_is_not_written_after_every_clip(folder, tmp_path, monkeypatch):
-    def one_by_one(runner, tasks):  # several clips that end while the report is written come as one outcome
+def test_a_report_that_takes_long_to_write_is_not_written_after_every_clip(
+    folder, tmp_path, monkeypatch
+):
+    # several clips that end while the report is written come as one outcome
+    def one_by_one(runner, tasks):
         for task in tasks:
             yield {task.name: runner._capture(task)}
 
     monkeypatch.setattr(LocalRunner, "outcomes", one_by_one)
     monkeypatch.setattr("scope.scope_addon.job.batch._QUICK_S", 0.0)
-    monkeypatch.setattr("scope.scope_addon.job.batch._WRITING_SHARE", 1e-12)  # the next one is due in years
+    # the next one is due in years
+    monkeypatch.setattr("scope.scope_addon.job.batch._WRITING_SHARE", 1e-12)
     written = []
     text = "scope.scope_addon.job.batch.json_text"
-    monkeypatch.setattr(text, lambda report, indent: written.append(len(report["files"])) or json.dumps(report))
+    monkeypatch.setattr(
+        text, lambda report, indent: written.append(len(report["files"])) or json.dumps(report)
+    )
     report = batch(folder, tmp_path / "out").run(1)
     assert written == [1, 5]  # after the first clip, and at the end
     assert json.loads((tmp_path / "out" / REPORT_NAME).read_text("utf-8")) == report
@@ -103,14 +116,26 @@ def test_every_clip_has_its_own_outcome(folder, tmp_path, jobs):
     out = tmp_path / "out"
     report = batch(folder, out).run(jobs)
     statuses = {e["file"]: e["status"] for e in report["files"]}
-    assert statuses == {"a.mp4": "done", "b.mov": "failed", "c.png": "no_person", "d.avi": "failed", "e.webm": "done"}
+    assert statuses == {
+        "a.mp4": "done",
+        "b.mov": "failed",
+        "c.png": "no_person",
+        "d.avi": "failed",
+        "e.webm": "done",
+    }
     assert report["exit_status"] == 1
     assert report["counts"] == {"done": 2, "skipped": 0, "no_person": 1, "failed": 2}
     assert json.loads((out / REPORT_NAME).read_text("utf-8")) == report
     messages = {e["file"]: e.get("message") for e in report["files"]}
     assert messages["b.mov"] == "it is not a video"
     assert "status" in messages["d.avi"]
-    assert sorted(p.name for p in out.iterdir()) == ["a.glb", "a.npz", "e.glb", "e.npz", REPORT_NAME]
+    assert sorted(p.name for p in out.iterdir()) == [
+        "a.glb",
+        "a.npz",
+        "e.glb",
+        "e.npz",
+        REPORT_NAME,
+    ]
 
 
 def test_warnings_of_a_clip_are_shown(folder, tmp_path):
@@ -195,7 +220,10 @@ def test_a_damaged_report_is_ignored(folder, tmp_path):
 def test_clips_of_several_people_share_no_name_with_a_persons_result(tmp_path):
     for name in ("walk.mp4", "walk.person2.mp4"):
         (tmp_path / name).write_text("x")
-    assert list(batch(tmp_path, tmp_path / "out").clips(recursive=False)) == ["walk", "walk.person2"]
+    assert list(batch(tmp_path, tmp_path / "out").clips(recursive=False)) == [
+        "walk",
+        "walk.person2",
+    ]
     several = batch(tmp_path, tmp_path / "out", {"--people": "all"})
     assert list(several.clips(recursive=False)) == ["walk", "walk.person2.mp4"]
 
@@ -241,7 +269,10 @@ def test_a_clip_that_ends_while_the_batch_is_stopped_is_finished(folder, tmp_pat
     with pytest.raises(KeyboardInterrupt):
         batch(folder, out).run(1, progress=interrupt)
     report = json.loads((out / REPORT_NAME).read_text("utf-8"))
-    assert {entry["file"]: entry["status"] for entry in report["files"]} == {"a.mp4": "done", "b.mov": "done"}
+    assert {entry["file"]: entry["status"] for entry in report["files"]} == {
+        "a.mp4": "done",
+        "b.mov": "done",
+    }
     calls(folder)
     batch(folder, out).run(1)
     assert calls(folder) == ["c.png", "d.avi", "e.webm"]
@@ -262,7 +293,9 @@ def test_an_interrupt_while_clips_are_being_started_stops_the_first(folder, tmp_
             wait_for(begun.exists)
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(Batch, "clips", lambda *_: Interrupting({"a": folder / "a.mp4", "b": folder / "b.mov"}))
+    monkeypatch.setattr(
+        Batch, "clips", lambda *_: Interrupting({"a": folder / "a.mp4", "b": folder / "b.mov"})
+    )
     with pytest.raises(KeyboardInterrupt):
         Batch(folder, tmp_path / "out", [sys.executable, "-c", code], {}, (".npz",)).run(1)
     assert not ended.exists()
@@ -277,7 +310,16 @@ def test_a_value_may_begin_with_a_hyphen(folder, tmp_path):
 
 
 def test_overlays_and_pages_of_a_batch_lie_next_to_the_results(folder, tmp_path):
-    argv = ["batch", str(folder), "--out", str(tmp_path / "out"), "--formats", "npz", "--overlays", "--reports"]
+    argv = [
+        "batch",
+        str(folder),
+        "--out",
+        str(tmp_path / "out"),
+        "--formats",
+        "npz",
+        "--overlays",
+        "--reports",
+    ]
     main(argv, program=[sys.executable, "-c", PROGRAM])
     passed = [json.loads(line) for line in (folder / "calls.log").read_text("utf-8").splitlines()]
     args = {Path(each[1]).name: cli.build_parser().parse_args(each) for each in passed}
@@ -300,7 +342,18 @@ def test_a_clip_that_was_finished_when_the_batch_was_killed_is_not_captured_agai
     clips.mkdir()
     shutil.copy(SAMPLE, clips / "a.mp4")
     (tmp_path / "clip.py").write_text(KILLS_THE_BATCH)
-    argv = ["batch", str(clips), "--out", str(out), "--formats", "npz", "--quality", "fast", "--end", "1"]
+    argv = [
+        "batch",
+        str(clips),
+        "--out",
+        str(out),
+        "--formats",
+        "npz",
+        "--quality",
+        "fast",
+        "--end",
+        "1",
+    ]
     program = [sys.executable, str(tmp_path / "clip.py")]
     code = f"import sys\nfrom scope.scope_addon.cli import main\nmain({argv}, program={program})\n"
     killed = subprocess.run([sys.executable, "-c", code], check=False, stderr=subprocess.DEVNULL)
@@ -311,7 +364,11 @@ def test_a_clip_that_was_finished_when_the_batch_was_killed_is_not_captured_agai
 
     assert main(argv, program=refuses) == 0
     (entry,) = json.loads((out / REPORT_NAME).read_text("utf-8"))["files"]
-    assert (entry["status"], entry["outputs"], entry["report"]["frames"]) == ("skipped", ["a.npz"], FRAMES)
+    assert (entry["status"], entry["outputs"], entry["report"]["frames"]) == (
+        "skipped",
+        ["a.npz"],
+        FRAMES,
+    )
     assert sorted(os.listdir(out)) == ["a.npz", REPORT_NAME]
     assert main(argv, program=refuses) == 0
 
@@ -359,7 +416,12 @@ def test_the_clips_of_a_killed_batch_end_and_leave_no_partial_file(tmp_path, at)
         f"main({argv}, program=[sys.executable, {str(tmp_path / 'clip.py')!r}])\n"
     )
     process = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.DEVNULL)
-    wait_for(lambda: len([p for p in clips.glob("*.pid") if p.read_text("utf-8")]) == 2 or process.poll() is not None)
+    wait_for(
+        lambda: (
+            len([p for p in clips.glob("*.pid") if p.read_text("utf-8")]) == 2
+            or process.poll() is not None
+        )
+    )
     assert process.poll() is None
     process.kill()
     process.wait()
@@ -380,18 +442,27 @@ def test_the_clips_of_a_killed_batch_end_and_leave_no_partial_file(tmp_path, at)
 def test_a_signal_ends_the_batch_and_its_clips_despite_an_earlier_handler(folder, tmp_path, number):
     """Blender handles Ctrl-C itself, and only sets a flag."""
     (tmp_path / "clip.py").write_text(
-        "import os, pathlib, sys\npathlib.Path(sys.argv[2] + '.pid').write_text(str(os.getpid()))\nsys.stdin.read()\n"
+        "import os, pathlib, sys\npathlib.Path(sys.argv[2] + "
+        "'.pid').write_text(str(os.getpid()))\nsys.stdin.read()\n"
     )
     code = (
         "import signal, sys\n"
         "from scope.scope_addon.cli import main\n"
         "for number in (signal.SIGINT, signal.SIGTERM):\n"
         "    signal.signal(number, lambda *_: None)\n"
-        f"argv = ['batch', {str(folder)!r}, '--out', {str(tmp_path / 'out')!r}, '--jobs', '2', '--formats', 'npz']\n"
+        f"argv = ['batch', {str(folder)!r}, '--out', {str(tmp_path / 'out')!r}, '--jobs', '2', "
+        "'--formats', 'npz']\n"
         f"sys.exit(main(argv, program=[sys.executable, {str(tmp_path / 'clip.py')!r}]))\n"
     )
-    process = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE, text=True, start_new_session=True)
-    wait_for(lambda: len([p for p in folder.glob("*.pid") if p.read_text("utf-8")]) == 2 or process.poll() is not None)
+    process = subprocess.Popen(
+        [sys.executable, "-c", code], stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    wait_for(
+        lambda: (
+            len([p for p in folder.glob("*.pid") if p.read_text("utf-8")]) == 2
+            or process.poll() is not None
+        )
+    )
     pids = [p.read_text("utf-8") for p in folder.glob("*.pid")]
     if number == signal.SIGINT:
         os.killpg(process.pid, number)  # as a terminal does
@@ -399,7 +470,10 @@ def test_a_signal_ends_the_batch_and_its_clips_despite_an_earlier_handler(folder
         process.send_signal(number)
     _, stderr = process.communicate(timeout=300)
     assert process.returncode == 130
-    assert stderr.splitlines()[-1] == "scope: stopped; finished clips are kept; run the same command again to continue"
+    assert (
+        stderr.splitlines()[-1]
+        == "scope: stopped; finished clips are kept; run the same command again to continue"
+    )
     assert not any(runs(int(pid)) for pid in pids)
 
 
@@ -455,7 +529,9 @@ def test_bad_arguments(tmp_path, capsys, argv, says):
         (["--hands", "--body", str(BUILT_IN["scope"])], 2, "no finger joints"),
     ],
 )
-def test_invalid_options_are_reported_once_before_the_first_clip(folder, tmp_path, capsys, argv, status, says):
+def test_invalid_options_are_reported_once_before_the_first_clip(
+    folder, tmp_path, capsys, argv, status, says
+):
     (tmp_path / "lens.json").write_text("{}")
     (tmp_path / "net.onnx").write_bytes(b"no network")
     given = [a.format(tmp=tmp_path) for a in argv]

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Finished captures are found, unfinished ones never, and the least recently used are pruned first."""
+"""Finished captures are found, unfinished ones never, and the least recently used are pruned
+first.
+"""
 
 import os
 import shutil
@@ -137,7 +139,11 @@ def test_clearing_keeps_compiled_code_except_that_of_replaced_versions(cache):
     of_numba = cache.kernels / "gauss_newton_" / "optimizer.optimize-134.py311.nbi"
     replaced, used, other = (
         cache.kernels / name / "optimizer.optimize-0123456789ab.code"
-        for name in ("solver-01234567-000000000000", "solver-01234567-ffffffffffff", "solver-89abcdef-000000000000")
+        for name in (
+            "solver-01234567-000000000000",
+            "solver-01234567-ffffffffffff",
+            "solver-89abcdef-000000000000",
+        )
     )
     for path in (of_numba, replaced, used, other):
         path.parent.mkdir(parents=True)
@@ -149,5 +155,11 @@ def test_clearing_keeps_compiled_code_except_that_of_replaced_versions(cache):
     assert 1200 <= freed < 1300
     assert cache.clear() == freed
     assert cache.find("a") is None
-    assert [path.exists() for path in (of_numba, replaced, used, other, marker)] == [False, False, True, True, True]
+    assert [path.exists() for path in (of_numba, replaced, used, other, marker)] == [
+        False,
+        False,
+        True,
+        True,
+        True,
+    ]
     assert cache.size() == 0

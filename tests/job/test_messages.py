@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The worker's messages: what is none is ignored, and what cannot be used is an error of one sentence."""
+"""The worker's messages: what is none is ignored, and what cannot be used is an error of one
+sentence.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +10,21 @@ import sys
 import time
 
 import pytest
-from scope.scope_addon.job.messages import LONGEST_LINE, WARM_UP_FIELDS, WorkerFailedError, parse_message
+from scope.scope_addon.job.messages import (
+    LONGEST_LINE,
+    WARM_UP_FIELDS,
+    WorkerFailedError,
+    parse_message,
+)
 from scope.scope_addon.job.process import WorkerProcess
 
 PROGRESS = {"event": "progress", "stage": "solving", "done": 3, "total": 10}
 PREVIEW = {"event": "preview", "file": "preview.rgba", "width": 320, "height": 180, "frame": 7}
-RESULT = {"event": "result", "motions": ["person1.npz"], "report": {"fps": {"total": 9.5}, "warnings": ["dark"]}}
+RESULT = {
+    "event": "result",
+    "motions": ["person1.npz"],
+    "report": {"fps": {"total": 9.5}, "warnings": ["dark"]},
+}
 
 
 def line(message, **changes):
@@ -34,8 +45,23 @@ def test_only_a_capture_must_have_motions():
 
 @pytest.mark.parametrize(
     "text",
-    [b"", b"\n", b"Warning: a library prints\n", b'{"event": "prog', b"[1]", b"null", b'{"event": 3}', b'{"event": []}']
-    + [b'{"event": "compiled"}', b'{"event": "unheard of"}', b"\xff\xfe{", b"[" * 100_000, b'{"a":' * 100_000]
+    [
+        b"",
+        b"\n",
+        b"Warning: a library prints\n",
+        b'{"event": "prog',
+        b"[1]",
+        b"null",
+        b'{"event": 3}',
+        b'{"event": []}',
+    ]
+    + [
+        b'{"event": "compiled"}',
+        b'{"event": "unheard of"}',
+        b"\xff\xfe{",
+        b"[" * 100_000,
+        b'{"a":' * 100_000,
+    ]
     + [b"9" * 5000, b'{"event": "progress", "done": ' + b"9" * 5000 + b"}"],
 )
 def test_what_is_no_message_is_ignored(text):
@@ -68,7 +94,9 @@ def test_what_is_no_message_is_ignored(text):
 )
 def test_what_cannot_be_used_is_an_error(message, changes):
     with pytest.raises(
-        WorkerFailedError, match=rf"{message['event']} without a valid {next(iter(changes))}\); try again"
+        WorkerFailedError,
+        match=rf"{message['event']} without a valid {next(iter(changes))}\); "
+        rf"try again",
     ):
         parse_message(line(message, **changes))
 

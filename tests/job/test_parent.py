@@ -31,11 +31,15 @@ with atomic_path(Path(sys.argv[1])) as temporary:
 """
 
 
-@pytest.mark.parametrize(("grace", "swallowed"), [(600.0, "ZeroDivisionError"), (0.2, "KeyboardInterrupt")])
+@pytest.mark.parametrize(
+    ("grace", "swallowed"), [(600.0, "ZeroDivisionError"), (0.2, "KeyboardInterrupt")]
+)
 def test_no_partial_file_is_left_whether_or_not_the_main_thread_stops(tmp_path, grace, swallowed):
     code = CHILD.format(grace=grace, swallowed=swallowed)
     command = [sys.executable, "-c", code, str(tmp_path / "result.npz")]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as child:
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+    ) as child:
         assert child.stdin is not None
         assert child.stdout is not None
         assert child.stdout.readline().strip() == b"writing"
@@ -45,7 +49,9 @@ def test_no_partial_file_is_left_whether_or_not_the_main_thread_stops(tmp_path, 
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(("error", "ends"), [(BrokenPipeError(), True), (OSError(9, "Bad file descriptor"), False)])
+@pytest.mark.parametrize(
+    ("error", "ends"), [(BrokenPipeError(), True), (OSError(9, "Bad file descriptor"), False)]
+)
 def test_only_the_end_of_the_pipe_ends_the_process(monkeypatch, error, ends):
     def fails(_):
         raise error
@@ -62,10 +68,13 @@ def test_only_the_end_of_the_pipe_ends_the_process(monkeypatch, error, ends):
 def test_what_the_parent_writes_is_heard(tmp_path):
     code = (
         "import sys, time\nfrom scope.scope_addon.job import parent\n"
-        "parent.when_parent_ends(lambda: print('ended', flush=True), lambda piece: print(piece, flush=True))\n"
+        "parent.when_parent_ends(lambda: print('ended', flush=True), lambda piece: print(piece, "
+        "flush=True))\n"
         "print('begun', flush=True)\ntime.sleep(600)"
     )
-    with subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as child:
+    with subprocess.Popen(
+        [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as child:
         assert child.stdin is not None
         assert child.stdout is not None
         heard = [child.stdout.readline()]
@@ -96,7 +105,9 @@ def test_on_windows_the_pipe_is_polled_and_only_what_is_there_is_read(monkeypatc
     monkeypatch.setattr(parent.os, "read", read)
     monkeypatch.setattr(parent, "_POLLING_INTERVAL_S", 0.0)
     monkeypatch.setitem(sys.modules, "_winapi", types.SimpleNamespace(PeekNamedPipe=peek))
-    monkeypatch.setitem(sys.modules, "msvcrt", types.SimpleNamespace(get_osfhandle=lambda fd: 100 + fd))
+    monkeypatch.setitem(
+        sys.modules, "msvcrt", types.SimpleNamespace(get_osfhandle=lambda fd: 100 + fd)
+    )
     with pytest.raises(BrokenPipeError):
         parent._wait_for_end_of_stdin(heard.append)
     assert looks == [(100, 0)] * 4

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The preview: complete, small, bottom row first, and with the skeleton or body where the person is."""
+"""The preview: complete, small, bottom row first, and with the skeleton or body where the person
+is.
+"""
 
 import threading
 
@@ -20,7 +22,12 @@ from .processes import wait_for
 
 def observation(pixels, confidence=1.0):
     return Observation(
-        np.asarray(pixels, float), np.full(33, confidence), np.zeros((33, 3)), 1.0, Region((0.0, 0.0), 1.0, 0.0), True
+        np.asarray(pixels, float),
+        np.full(33, confidence),
+        np.zeros((33, 3)),
+        1.0,
+        Region((0.0, 0.0), 1.0, 0.0),
+        True,
     )
 
 
@@ -99,10 +106,15 @@ def test_the_skeleton_is_drawn_if_the_body_cannot_be_fitted(tmp_path):
     sent = []
     with PreviewWriter(tmp_path, lambda event, **values: sent.append(event)) as writer:
         writer._rasterizer.result()
-        image, seen = np.zeros((50, 50, 3), np.uint8), observation(np.linspace([5.0, 5.0], [45.0, 40.0], 33))
+        image, seen = (
+            np.zeros((50, 50, 3), np.uint8),
+            observation(np.linspace([5.0, 5.0], [45.0, 40.0], 33)),
+        )
         writer(Frame(0, 0.0, image), seen, Broken())
         wait_for(lambda: sent == ["preview"])
-        shown = np.frombuffer((tmp_path / FILE).read_bytes(), np.uint8).reshape(LONGER_SIDE, LONGER_SIDE, 4)
+        shown = np.frombuffer((tmp_path / FILE).read_bytes(), np.uint8).reshape(
+            LONGER_SIDE, LONGER_SIDE, 4
+        )
     np.testing.assert_array_equal(shown[::-1], draw(image, seen))
     assert shown[..., :3].max() > 200
 
@@ -119,7 +131,11 @@ def test_previews_do_not_wait_for_the_rasterizer_to_compile(tmp_path, monkeypatc
     monkeypatch.setattr(preview, "load_rasterizer", compiled.wait)
     with PreviewWriter(tmp_path, lambda event, **values: sent.append(event)) as writer:
         for k, expected in ((0, ["preview"]), (1, ["preview", "fitted", "preview"])):
-            writer(Frame(k, 0.0, np.zeros((50, 50, 3), np.uint8)), observation(np.full((33, 2), 20.0)), Ready())
+            writer(
+                Frame(k, 0.0, np.zeros((50, 50, 3), np.uint8)),
+                observation(np.full((33, 2), 20.0)),
+                Ready(),
+            )
             writer._drawing.result()
             assert sent == expected
             compiled.set()
@@ -137,7 +153,10 @@ def test_the_preview_shows_the_body_at_the_ground_truth(body):
         pixels = pixels[:, :2] / pixels[:, 2:] * (LONGER_SIDE / max(frame.image_rgb.shape))
         left, top = np.floor(pixels.min(axis=0)).astype(int) - 12
         right, bottom = np.ceil(pixels.max(axis=0)).astype(int) + 12
-        near = [changed[max(v - 2, 0) : v + 3, max(u - 2, 0) : u + 3].any() for u, v in pixels.round().astype(int)]
+        near = [
+            changed[max(v - 2, 0) : v + 3, max(u - 2, 0) : u + 3].any()
+            for u, v in pixels.round().astype(int)
+        ]
         outside = changed.copy()
         outside[max(top, 0) : bottom + 1, max(left, 0) : right + 1] = False
         checked.append((np.mean(near), outside.sum() / changed.sum()))

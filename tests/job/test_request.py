@@ -5,7 +5,12 @@ import os
 
 from scope.scope_addon.job.request import program_version
 
-FILES = ("solver/fit.py", "scope_addon/capture/a.py", "assets/networks/pose.onnx", "assets/body/scope.npz")
+FILES = (
+    "solver/fit.py",
+    "scope_addon/capture/a.py",
+    "assets/networks/pose.onnx",
+    "assets/body/scope.npz",
+)
 
 
 def program(folder, changed=None):

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The folder of a capture stays when it is killed or cancelled, and is removed when it is finished, or old."""
+"""The folder of a capture stays when it is killed or cancelled, and is removed when it is finished,
+or old.
+"""
 
 from __future__ import annotations
 
@@ -65,7 +67,9 @@ def test_what_is_old_or_too_much_is_removed(tmp_path, footage, monkeypatch):
 
 def test_folders_in_it_count_by_their_size_and_time(tmp_path, footage, monkeypatch):
     folders = [tmp_path / FOLDER / name for name in ("hour", "written", "month")]
-    for folder, age_s, inner_s in zip(folders, (3600, 86400, 30 * 86400), (3600, 0, 30 * 86400), strict=True):
+    for folder, age_s, inner_s in zip(
+        folders, (3600, 86400, 30 * 86400), (3600, 0, 30 * 86400), strict=True
+    ):
         windows = folder / "windows-0"
         windows.mkdir(parents=True)
         (windows / "window00000.npz").write_bytes(bytes(1000))

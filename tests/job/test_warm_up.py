@@ -9,7 +9,8 @@ from scope.scope_addon.job.process import START_SCRIPT, WorkerProcess
 
 from .processes import wait_for
 
-# With the lowest priority, it takes seventy times as long while every core has other work, such as other tests.
+# With the lowest priority, it takes seventy times as long while every core has other work, such as
+# other tests.
 START = """
 import os, runpy
 os.nice = lambda _: 0
@@ -24,7 +25,8 @@ from scope.scope_addon.job.worker import Reporter, run
 from scope.scope_addon.job.warm_up import ROOT
 from scope.solver.compiled.code_cache import compiled_kernels
 with tempfile.TemporaryDirectory() as folder:
-    status = run(JobRequest(str(SAMPLE), quality="fast", end="0.5", threads=1), Path(folder), Reporter(sys.stderr))
+    request = JobRequest(str(SAMPLE), quality="fast", end="0.5", threads=1)
+    status = run(request, Path(folder), Reporter(sys.stderr))
 print(json.dumps([status, compiled_kernels(ROOT)]))
 """
 
@@ -40,5 +42,7 @@ def test_a_capture_after_a_warm_up_compiles_nothing(tmp_path):
     worker.wait()
     worker.close()
     assert messages[-1]["compiled"] >= 0
-    done = subprocess.run([sys.executable, "-c", CAPTURE], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", CAPTURE], capture_output=True, text=True, check=True
+    )
     assert json.loads(done.stdout) == [0, 0], done.stderr[-2000:]

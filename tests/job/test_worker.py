@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The real worker process without Blender: search path, messages, and its end when the parent ends."""
+"""The real worker process without Blender: search path, messages, and its end when the parent
+ends.
+"""
 
 import inspect
 import json
@@ -40,7 +42,12 @@ def test_an_isolated_worker_starts_and_reports(folder, tmp_path):
     request = JobRequest(played_again_and_again(tmp_path / "long.mp4"), quality="fast", threads=1)
     worker = WorkerProcess(request, folder, None, [sys.executable, "-I"])
     messages = []
-    wait_for(lambda: messages.extend(worker.poll()) or {"progress", "preview"} <= {m["event"] for m in messages})
+    wait_for(
+        lambda: (
+            messages.extend(worker.poll())
+            or {"progress", "preview"} <= {m["event"] for m in messages}
+        )
+    )
     assert all(m["event"] in {"progress", "preview"} for m in messages)
     assert worker.alive
     worker.close()
@@ -69,7 +76,13 @@ def test_the_worker_ends_when_its_parent_is_killed(folder, tmp_path):
 
 
 def test_a_worker_without_a_request_leaves_nothing_behind(folder):
-    command = [sys.executable, str(START_SCRIPT), str(ROOT), str(folder), *(p for p in sys.path if p)]
+    command = [
+        sys.executable,
+        str(START_SCRIPT),
+        str(ROOT),
+        str(folder),
+        *(p for p in sys.path if p),
+    ]
     assert subprocess.run(command, stdin=subprocess.DEVNULL, check=False).returncode == 1
     assert not folder.exists()
 
@@ -114,7 +127,9 @@ def test_a_missing_interpreter_is_an_error(folder):
 
 
 def test_requests_are_sent_as_one_line():
-    request = JobRequest("a\nb.mp4", quality="fast", fov_deg=60.0, heights_m=(1.8, 1.7), calibration="lens.json")
+    request = JobRequest(
+        "a\nb.mp4", quality="fast", fov_deg=60.0, heights_m=(1.8, 1.7), calibration="lens.json"
+    )
     assert "\n" not in request.to_json()
     assert JobRequest.from_json(request.to_json()) == request
     assert request != JobRequest("a\nb.mp4", quality="fast")
@@ -163,10 +178,13 @@ def test_keys_differ_if_the_result_may_differ(tmp_path):
 
 
 def test_the_code_version_changes_with_every_file_that_decides_the_result(tmp_path):
-    networks = [network_path(name) for name in (*LANDMARK_NETWORK_OF_QUALITY.values(), *OTHER_NETWORKS)]
+    networks = [
+        network_path(name) for name in (*LANDMARK_NETWORK_OF_QUALITY.values(), *OTHER_NETWORKS)
+    ]
     deciding = [*networks, *set(BUILT_IN.values()), GROWTH, LIFTER_FILE, learned_prior.BUILT_IN]
     deciding += [Path(inspect.getfile(part)) for part in (learned_prior, pipeline, Motion)]
-    deciding.append(ROOT / "scope_addon" / "scene" / "export" / "export.py")  # which cannot be imported without Blender
+    # which cannot be imported without Blender
+    deciding.append(ROOT / "scope_addon" / "scene" / "export" / "export.py")
     others = [SAMPLE, ROOT / "README.md", ROOT / "scope_addon" / "ui" / "panel.py"]
     copies = [tmp_path / Path(file).relative_to(ROOT) for file in (*deciding, *others)]
     for copy in copies:
@@ -183,9 +201,14 @@ def test_the_code_version_changes_with_every_file_that_decides_the_result(tmp_pa
 
 def test_compiled_code_is_stored_in_the_given_folder(folder, tmp_path):
     script = tmp_path / "script.py"
-    result = "{'event': 'result', 'motions': ['a.npz'], 'report': {}, 'at': os.environ['NUMBA_CACHE_DIR']}"
+    result = (
+        "{'event': 'result', 'motions': ['a.npz'], 'report': {}, 'at': "
+        "os.environ['NUMBA_CACHE_DIR']}"
+    )
     script.write_text(f"import json, os; print(json.dumps({result}))")
-    worker = WorkerProcess(JobRequest(SAMPLE), folder, tmp_path / "kernels", [sys.executable, "-I"], script)
+    worker = WorkerProcess(
+        JobRequest(SAMPLE), folder, tmp_path / "kernels", [sys.executable, "-I"], script
+    )
     messages = []
     wait_for(lambda: messages.extend(worker.poll()) or worker.finished)
     worker.wait()

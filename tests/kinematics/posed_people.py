@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Two people in motions whose contact with the floor is known, as a static camera would see them.
 
-Each is (body with contact points, rotations (T, K+1, 3, 3), root (T, 3), a function from both to part rotations, joints
-and contact points, T_world_camera (4, 4), times (T,)), metres, camera frame.
+Each is (body with contact points, rotations (T, K+1, 3, 3), root (T, 3), a function from both to
+part rotations, joints and contact points, T_world_camera (4, 4), times (T,)), metres, camera frame.
 """
 
 import numpy as np
@@ -48,7 +48,9 @@ def stepping_person():
 
 
 def plank_person():
-    """A person on toes and palms for two seconds, seen from the side, 4 m from a camera 1.5 m high."""
+    """A person on toes and palms for two seconds, seen from the side, 4 m from a camera 1.5 m
+    high.
+    """
     body = load_body("scope")
     supported, times = with_contact_points(body, np.zeros(body.P)), np.arange(60) / FPS
     T_world_camera = world_from_level_camera(np.array([0.0, -1.0, -0.2]), height=1.5)
@@ -57,7 +59,8 @@ def plank_person():
         omega[body.joint_names.index(f"{side}_shoulder")] = rotations.exp([0, -sign * np.pi / 2, 0])
         omega[body.joint_names.index(f"{side}_wrist")] = rotations.exp([0, 0, sign * np.pi / 2])
         omega[body.joint_names.index(f"{side}_ankle")] = rotations.exp([0.5, 0, 0])
-    down = rotations.exp(np.array([np.pi / 2, 0, 0])) @ rotations.exp(np.array([np.pi / 2, 0, 0]))  # model z down
+    # model z down
+    down = rotations.exp(np.array([np.pi / 2, 0, 0])) @ rotations.exp(np.array([np.pi / 2, 0, 0]))
 
     def place(local, root):
         R, t = body.forward_kinematics(local, root)
@@ -65,7 +68,11 @@ def plank_person():
 
     pitch = 0.0
     for _ in range(30):  # until toes and palms are level
-        omega[0] = rotations.exp(np.array([0, 0, np.pi / 2])) @ rotations.exp(np.array([pitch, 0, 0])) @ down
+        omega[0] = (
+            rotations.exp(np.array([0, 0, np.pi / 2]))
+            @ rotations.exp(np.array([pitch, 0, 0]))
+            @ down
+        )
         points = place(omega[None], np.zeros((1, 3)))[2][0]
         toes, palms = points[[1, 3]].mean(0), points[4:].mean(0)
         pitch += 0.5 * (palms - toes)[2] / np.linalg.norm(palms - toes)

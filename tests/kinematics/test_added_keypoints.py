@@ -17,14 +17,20 @@ def test_points_that_keep_their_offset_move_with_their_part_and_others_stay():
     assert body.keypoint_names == (*BODY.keypoint_names, "one", "two")
     R, t = body.forward_kinematics(OMEGA, np.zeros(3), BETAS)
     points = body.keypoints(R, t, BETAS)
-    np.testing.assert_allclose(points[-2:], t[parts] + np.einsum("nij,nj->ni", R[parts], offsets), atol=1e-6)
+    np.testing.assert_allclose(
+        points[-2:], t[parts] + np.einsum("nij,nj->ni", R[parts], offsets), atol=1e-6
+    )
     np.testing.assert_array_equal(points[:-2], BODY.keypoints(R, t, BETAS))
 
 
 def test_points_with_shape_directions_follow_the_shape():
     vertices = np.array([100, 2000, 9000])
     parts = BODY.skin_joints[vertices, BODY.skin_weights[vertices].argmax(1)]
-    body = with_keypoints(BODY, map(str, vertices), parts, BODY.v_template[vertices], BODY.shapedirs[vertices])
+    body = with_keypoints(
+        BODY, map(str, vertices), parts, BODY.v_template[vertices], BODY.shapedirs[vertices]
+    )
     straight = np.tile(np.eye(3), (BODY.K + 1, 1, 1))
     R, t = body.forward_kinematics(straight, np.zeros(3), BETAS)
-    np.testing.assert_allclose(body.keypoints(R, t, BETAS)[-3:], BODY.rest_vertices(BETAS)[vertices], atol=1e-5)
+    np.testing.assert_allclose(
+        body.keypoints(R, t, BETAS)[-3:], BODY.rest_vertices(BETAS)[vertices], atol=1e-5
+    )

@@ -20,10 +20,14 @@ def test_model_up_is_world_up_and_model_front_faces_blenders_front_view():
 def test_level_camera_sees_the_sky_at_negative_y_and_looks_along_world_y():
     T = axes.world_from_level_camera(np.array([0, -2.0, 0]), height=1.5)
     assert np.allclose(T[:3, :3], axes.R_WORLD_LEVELCAMERA)
-    assert np.allclose(axes.transform_points(T, np.array([[0, 0, 4.0], [1, 1.5, 4.0]])), [[0, 4, 1.5], [1, 4, 0]])
+    assert np.allclose(
+        axes.transform_points(T, np.array([[0, 0, 4.0], [1, 1.5, 4.0]])), [[0, 4, 1.5], [1, 4, 0]]
+    )
 
 
-@pytest.mark.parametrize("up", [[0, -1, 0.3], [0.2, -1, -0.4], [0, 0, 1.0], [0, 0, -1.0], [1, 0, 0]])
+@pytest.mark.parametrize(
+    "up", [[0, -1, 0.3], [0.2, -1, -0.4], [0, 0, 1.0], [0, 0, -1.0], [1, 0, 0]]
+)
 def test_the_given_up_becomes_world_z(up):
     T = axes.world_from_level_camera(np.array(up, float))
     assert np.allclose(T[:3, :3] @ (np.array(up) / np.linalg.norm(up)), [0, 0, 1])
@@ -31,7 +35,9 @@ def test_the_given_up_becomes_world_z(up):
     assert np.isclose(np.linalg.det(T[:3, :3]), 1)
 
 
-@pytest.mark.parametrize("up", [[0, -1, 0.3], [0.2, -1, -0.4], [0.7, -1, 0.6], [1, 0, 0], [-0.5, 0.8, 0.1]])
+@pytest.mark.parametrize(
+    "up", [[0, -1, 0.3], [0.2, -1, -0.4], [0.7, -1, 0.6], [1, 0, 0], [-0.5, 0.8, 0.1]]
+)
 def test_the_optical_axis_points_along_world_y_however_the_camera_is_rolled(up):
     axis = axes.world_from_level_camera(np.array(up, float))[:3, :3] @ [0, 0, 1]
     assert np.isclose(axis[0], 0)

@@ -33,7 +33,10 @@ POSES = {
     "arms beside the hips": posed(left_shoulder=[0, 0, -1.4], right_shoulder=[0, 0, 1.4]),
     "a forearm through the belly": posed(left_shoulder=[0, 0, -1.45], left_elbow=[0, 0, -1.2]),
     "seated, a hand in the thigh": posed(
-        left_hip=[-1.5, 0, 0], right_hip=[-1.5, 0, 0], left_shoulder=[0, 0, -1.7], left_elbow=[0, -0.7, 0]
+        left_hip=[-1.5, 0, 0],
+        right_hip=[-1.5, 0, 0],
+        left_shoulder=[0, 0, -1.7],
+        left_elbow=[0, -0.7, 0],
     ),
 }
 
@@ -43,13 +46,19 @@ def surface() -> BodySurface:
 
 
 def distances_outside(points: np.ndarray, R: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """Signed distances (C,) from trunk, legs and head: by samples of all their triangles, inside by the winding number.
+    """Signed distances (C,) from trunk, legs and head: by samples of all their triangles, inside by
+    the winding number.
 
-    The arms' own triangles are left out, and so are the holes that they leave: the shoulders are far from all points.
+    The arms' own triangles are left out, and so are the holes that they leave: the shoulders are
+    far from all points.
     """
     v, triangles = BODY.skin(R[0], t[0], BETAS), BODY.triangles()
     part = BODY.strongest_joints
-    arms = [k for k, name in enumerate(BODY.joint_names) if name.endswith(("shoulder", "elbow", "wrist", "hand"))]
+    arms = [
+        k
+        for k, name in enumerate(BODY.joint_names)
+        if name.endswith(("shoulder", "elbow", "wrist", "hand"))
+    ]
     corners = v[triangles[~np.isin(part[triangles], arms).any(axis=1)]]
     a, b, c = (corners[None, :, k] - points[:, None] for k in range(3))
     lengths = [np.linalg.norm(each, axis=-1) for each in (a, b, c)]
@@ -67,7 +76,9 @@ def distances_outside(points: np.ndarray, R: np.ndarray, t: np.ndarray) -> np.nd
 
 
 @pytest.mark.parametrize("pose", POSES)
-def test_heights_are_the_distances_from_the_skin_less_the_room_that_the_arm_needs(pose: str) -> None:
+def test_heights_are_the_distances_from_the_skin_less_the_room_that_the_arm_needs(
+    pose: str,
+) -> None:
     (R, t), own = POSES[pose], surface()
     body = with_contact_points(with_arm_points(BODY), BETAS)
     planes = own.planes(R, t)
@@ -85,7 +96,11 @@ def test_arms_enter_the_body_in_some_poses_and_in_others_not() -> None:
     assert not lowest["arms out"].near.any()
     assert lowest["arms beside the hips"].near.any()
     assert lowest["arms beside the hips"].height.min() > 0.03
-    for pose in ("arms through the hips", "a forearm through the belly", "seated, a hand in the thigh"):
+    for pose in (
+        "arms through the hips",
+        "a forearm through the belly",
+        "seated, a hand in the thigh",
+    ):
         assert lowest[pose].height[lowest[pose].near].min() < -0.03, pose
 
 
@@ -123,11 +138,18 @@ def test_points_are_where_the_shape_has_them() -> None:
     skin, points = child.skin(R, t, betas), body.keypoints(R, t, betas)[own.indices]
     part = child.strongest_joints
     names = child.joint_names
-    trunk = [k for k, name in enumerate(names) if name.startswith("spine") or name.endswith(("hip", "pelvis"))]
+    trunk = [
+        k
+        for k, name in enumerate(names)
+        if name.startswith("spine") or name.endswith(("hip", "pelvis"))
+    ]
     nearest = np.linalg.norm(points[:, None] - skin[np.isin(part, trunk)], axis=-1).min(axis=1)
-    foot = planes.normal[0] * (planes.offset[0] - own._room)[:, None]  # of each plane, which the nearest vertex is on
+    # of each plane, which the nearest vertex is on
+    foot = planes.normal[0] * (planes.offset[0] - own._room)[:, None]
     assert planes.near.all()
-    np.testing.assert_allclose(np.abs((planes.normal[0] * (points - foot)).sum(-1)), nearest, atol=0.02)
+    np.testing.assert_allclose(
+        np.abs((planes.normal[0] * (points - foot)).sum(-1)), nearest, atol=0.02
+    )
 
 
 def shifted(**changes: Any) -> BodySurface:
@@ -139,7 +161,10 @@ def test_a_mesh_with_inward_faces_or_a_joint_named_twice_gives_the_same_planes()
     R, t = POSES["seated, a hand in the thigh"]
     here = surface().planes(R, t)
     halves = np.concatenate([BODY.skin_weights, BODY.skin_weights], axis=1) / 2
-    twice = {"skin_joints": np.concatenate([BODY.skin_joints, BODY.skin_joints], axis=1), "skin_weights": halves}
+    twice = {
+        "skin_joints": np.concatenate([BODY.skin_joints, BODY.skin_joints], axis=1),
+        "skin_weights": halves,
+    }
     for changes in ({"faces": BODY.faces[:, [0, 3, 2, 1]]}, twice):
         there = shifted(**changes).planes(R, t)
         np.testing.assert_allclose(there.height, here.height, atol=1e-6)

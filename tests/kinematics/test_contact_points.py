@@ -5,7 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scope.scope_addon.kinematics.contact_points import CONTACT_POINTS, contact_point_positions, with_contact_points
+from scope.scope_addon.kinematics.contact_points import (
+    CONTACT_POINTS,
+    contact_point_positions,
+    with_contact_points,
+)
 from scope.solver import rotations
 from scope.solver.loaders.body_file import load_body
 
@@ -32,10 +36,16 @@ def test_contact_points_are_keypoints_at_the_end_of_the_mesh(which, size):
 
 def test_contact_points_follow_their_parts():
     body = load_body("scope")
-    supported, pose = with_contact_points(body, np.zeros(body.P)), np.tile(np.eye(3), (body.K + 1, 1, 1))
+    supported, pose = (
+        with_contact_points(body, np.zeros(body.P)),
+        np.tile(np.eye(3), (body.K + 1, 1, 1)),
+    )
     bent = pose.copy()
     bent[body.joint_names.index("left_hip")] = rotations.exp(np.array([-0.8, 0.0, 0.0]))
-    still, moved = (contact_point_positions(supported, *body.forward_kinematics(p, np.zeros(3))) for p in (pose, bent))
+    still, moved = (
+        contact_point_positions(supported, *body.forward_kinematics(p, np.zeros(3)))
+        for p in (pose, bent)
+    )
     np.testing.assert_allclose(moved[2:], still[2:], atol=1e-12)
     hip = body.forward_kinematics(pose, np.zeros(3))[1][body.joint_names.index("left_hip")]
     np.testing.assert_allclose(

@@ -41,7 +41,9 @@ def test_heights_and_frames_under_the_floor_of_a_motion():
 
 
 def test_somebody_who_lands_lower_is_on_another_floor_from_the_fall_on():
-    heights = np.where(TIMES < 1.0, 0.02, -np.minimum(1.8, 6 * (TIMES - 0.95)))[:, None] * np.ones(4)
+    heights = np.where(TIMES < 1.0, 0.02, -np.minimum(1.8, 6 * (TIMES - 0.95)))[:, None] * np.ones(
+        4
+    )
     assert lower_floors(heights, STANDING, TIMES) == [(30, 60)]
     assert upper_floors(heights, STANDING, TIMES) == []
 
@@ -50,7 +52,8 @@ def test_a_depth_error_is_no_floor():
     heights = np.where((TIMES > 1.0) & (TIMES < 1.5), -0.3, 0.0)[:, None] * np.ones(4)
     assert lower_floors(heights, np.zeros((60, 4)), TIMES) == []  # in the air
     assert steps(heights, np.zeros((60, 4)), TIMES) == []
-    assert lower_floors(heights, STANDING, TIMES) == [(31, 45)]  # but feet at rest need something to stand on
+    # but feet at rest need something to stand on
+    assert lower_floors(heights, STANDING, TIMES) == [(31, 45)]
 
 
 def test_somebody_on_a_wall_is_on_an_upper_floor_but_a_jump_is_none():

@@ -16,7 +16,9 @@ def body():
 def moved(body, omega, shift):
     """Part poses before and after."""
     poses = body.forward_kinematics(omega, np.zeros((len(omega), 3)))
-    return poses, body.forward_kinematics(move_feet(body, omega, poses, shift), np.zeros((len(omega), 3)))
+    return poses, body.forward_kinematics(
+        move_feet(body, omega, poses, shift), np.zeros((len(omega), 3))
+    )
 
 
 def random_legs(body, count, seed):
@@ -33,16 +35,24 @@ def test_ankles_arrive_and_everything_else_stays(body):
     shift = 0.02 * np.random.default_rng(2).normal(size=(40, 2, 3)) + [0, 0.06, 0]
     (R, t), (R_new, t_new) = moved(body, omega, shift)
     for side, name in enumerate(("left", "right")):
-        hip, knee, ankle, foot = (body.joint_names.index(f"{name}_{part}") for part in ("hip", "knee", "ankle", "foot"))
+        hip, knee, ankle, foot = (
+            body.joint_names.index(f"{name}_{part}") for part in ("hip", "knee", "ankle", "foot")
+        )
         np.testing.assert_allclose(t_new[:, ankle], t[:, ankle] + shift[:, side], atol=2e-3)
         np.testing.assert_allclose(R_new[:, [ankle, foot]], R[:, [ankle, foot]], atol=1e-9)
         others = [k for k in range(body.K + 1) if k not in (knee, ankle, foot)]
-        legs = [body.joint_names.index(f"{s}_{p}") for s in ("left", "right") for p in ("knee", "ankle", "foot")]
+        legs = [
+            body.joint_names.index(f"{s}_{p}")
+            for s in ("left", "right")
+            for p in ("knee", "ankle", "foot")
+        ]
         np.testing.assert_allclose(
-            t_new[:, [k for k in others if k not in legs]], t[:, [k for k in others if k not in legs]]
+            t_new[:, [k for k in others if k not in legs]],
+            t[:, [k for k in others if k not in legs]],
         )
         np.testing.assert_allclose(
-            np.linalg.norm(t_new[:, knee] - t_new[:, hip], axis=1), np.linalg.norm(t[:, knee] - t[:, hip], axis=1)
+            np.linalg.norm(t_new[:, knee] - t_new[:, hip], axis=1),
+            np.linalg.norm(t[:, knee] - t[:, hip], axis=1),
         )
 
 
@@ -50,7 +60,9 @@ def test_straight_legs_bend_forwards(body):
     omega = np.tile(np.eye(3), (1, body.K + 1, 1, 1))
     for angle in (-0.05, 0.0, 0.05):  # knees that the noise of a fit turns sideways
         for side in ("left", "right"):
-            omega[:, body.joint_names.index(f"{side}_knee")] = rotations.exp(np.array([0.02, 0.0, angle]))
+            omega[:, body.joint_names.index(f"{side}_knee")] = rotations.exp(
+                np.array([0.02, 0.0, angle])
+            )
         (_, t), (_, t_new) = moved(body, omega, np.tile([0.0, 0.12, 0.0], (1, 2, 1)))
         for side in ("left", "right"):
             knee, ankle = (body.joint_names.index(f"{side}_{part}") for part in ("knee", "ankle"))
@@ -64,8 +76,12 @@ def test_a_goal_out_of_reach_stretches_the_leg_without_a_snap(body):
     omega = random_legs(body, 30, 3)
     (_, t), (_, t_new) = moved(body, omega, np.tile([0.0, -0.6, 0.0], (30, 2, 1)))
     for side in ("left", "right"):
-        hip, knee, ankle = (body.joint_names.index(f"{side}_{part}") for part in ("hip", "knee", "ankle"))
-        bones = np.linalg.norm(t[:, knee] - t[:, hip], axis=1) + np.linalg.norm(t[:, ankle] - t[:, knee], axis=1)
+        hip, knee, ankle = (
+            body.joint_names.index(f"{side}_{part}") for part in ("hip", "knee", "ankle")
+        )
+        bones = np.linalg.norm(t[:, knee] - t[:, hip], axis=1) + np.linalg.norm(
+            t[:, ankle] - t[:, knee], axis=1
+        )
         reach = np.linalg.norm(t_new[:, ankle] - t_new[:, hip], axis=1) / bones
         assert np.all(reach < 0.9951)
         assert np.all(reach > 0.99)

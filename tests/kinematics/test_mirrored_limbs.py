@@ -5,7 +5,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.scope_addon.kinematics.mirrored_limbs import LIMBS, bone_depths, mirrored_limb, runs_of_one_sign
+from scope.scope_addon.kinematics.mirrored_limbs import (
+    LIMBS,
+    bone_depths,
+    mirrored_limb,
+    runs_of_one_sign,
+)
 from scope.solver import load_body
 from scope.solver.rotations import exp
 
@@ -14,7 +19,9 @@ FRAMES = 6
 
 
 def _posed(rotations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    return BODY.forward_kinematics(rotations, np.tile([0.3, -0.2, 3.0], (len(rotations), 1)), np.zeros(BODY.P))
+    return BODY.forward_kinematics(
+        rotations, np.tile([0.3, -0.2, 3.0], (len(rotations), 1)), np.zeros(BODY.P)
+    )
 
 
 @pytest.mark.parametrize("names", LIMBS)
@@ -41,7 +48,9 @@ def test_a_mirrored_bone_has_the_other_depth_and_looks_the_same(
         along, across = (bone * sight).sum(axis=1), np.cross(bone, sight)
         np.testing.assert_allclose((other * sight).sum(axis=1), -along, atol=1e-9)
         np.testing.assert_allclose(np.cross(other, sight), across, atol=1e-9)
-        np.testing.assert_allclose(bone_depths(before[:, start], before[:, end], center), along, atol=1e-9)
+        np.testing.assert_allclose(
+            bone_depths(before[:, start], before[:, end], center), along, atol=1e-9
+        )
 
 
 def _is_below(part: int, ancestor: int) -> bool:

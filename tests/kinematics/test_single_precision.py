@@ -28,7 +28,9 @@ class Record:
 def test_only_large_arrays_are_rounded() -> None:
     rng = np.random.default_rng(0)
     large, quaternion, point = (rng.normal(0, 5, (50, *shape)) for shape in ((33, 3), (4,), (3,)))
-    record = Record(large, quaternion, point, np.arange(50) / 30, np.arange(400).reshape(50, 8), "a")
+    record = Record(
+        large, quaternion, point, np.arange(50) / 30, np.arange(400).reshape(50, 8), "a"
+    )
     small = to_single_precision(record)
     assert small.large.dtype == np.float32
     np.testing.assert_allclose(small.large, record.large, atol=1e-6)
@@ -46,17 +48,32 @@ def walk(frames: int) -> tuple[Track, FittedTrack]:
     valid = np.ones(frames, bool)
     valid[10:13] = False
     nothing = np.zeros((frames, 33, 3), np.float32)
-    track = Track(np.arange(frames), times, valid, nothing[..., :2], nothing[..., 0], nothing, np.arange(frames) == 0)
-    return track, FittedTrack(exp(pose), root, np.zeros(body.P), valid, np.ones((frames, body.K + 1)), 1.0)
+    track = Track(
+        np.arange(frames),
+        times,
+        valid,
+        nothing[..., :2],
+        nothing[..., 0],
+        nothing,
+        np.arange(frames) == 0,
+    )
+    return track, FittedTrack(
+        exp(pose), root, np.zeros(body.P), valid, np.ones((frames, body.K + 1)), 1.0
+    )
 
 
 def test_a_fit_in_single_precision_is_placed_within_a_hundredth_of_a_millimetre() -> None:
     body, (track, fitted) = load_body("scope"), walk(120)
-    exact, small = place_track(body, track, fitted, True), place_track(body, track, to_single_precision(fitted), True)
+    exact, small = (
+        place_track(body, track, fitted, True),
+        place_track(body, track, to_single_precision(fitted), True),
+    )
     np.testing.assert_allclose(small.joints, exact.joints, atol=1e-5)
     np.testing.assert_allclose(small.soles, exact.soles, atol=1e-5)
     # and as the same formula in double precision has it
-    joints = exact.body.forward_kinematics(exact.rotations, exact.root - exact.body.rest_joints(exact.betas)[0])[1]
+    joints = exact.body.forward_kinematics(
+        exact.rotations, exact.root - exact.body.rest_joints(exact.betas)[0]
+    )[1]
     np.testing.assert_allclose(small.joints, joints, atol=1e-5)
 
 

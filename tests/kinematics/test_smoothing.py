@@ -17,7 +17,9 @@ from scope.solver.rotations import matrix_from_quaternion
 def turn(angle):
     c, s = np.cos(angle), np.sin(angle)
     z, one = np.zeros_like(angle), np.ones_like(angle)
-    return np.stack([np.stack([c, -s, z], -1), np.stack([s, c, z], -1), np.stack([z, z, one], -1)], -2)
+    return np.stack(
+        [np.stack([c, -s, z], -1), np.stack([s, c, z], -1), np.stack([z, z, one], -1)], -2
+    )
 
 
 @pytest.mark.parametrize("cutoff", [2.0, 6.0])
@@ -70,7 +72,11 @@ def test_a_clip_in_reverse_is_smoothed_to_the_reverse():
     """Which is what no phase shift means."""
     values = np.random.default_rng(7).normal(size=(60, 3))
     times = np.arange(60) / 30
-    assert np.allclose(gaussian_smooth(values[::-1], times, 4.0), gaussian_smooth(values, times, 4.0)[::-1], atol=1e-12)
+    assert np.allclose(
+        gaussian_smooth(values[::-1], times, 4.0),
+        gaussian_smooth(values, times, 4.0)[::-1],
+        atol=1e-12,
+    )
 
 
 @pytest.mark.parametrize(("count", "cutoff"), [(1, 2.0), (2, 2.0), (9, 0.0), (9, -1.0)])
@@ -91,11 +97,18 @@ def test_quaternions_are_of_unit_length_and_have_no_jumps():
 
 def test_rotations_stay_rotations_and_cross_pi_without_a_jump():
     times = np.arange(240) / 60
-    R = turn(np.linspace(0, 4 * np.pi, 240) + 0.05 * np.random.default_rng(1).normal(size=240))[:, None]
+    R = turn(np.linspace(0, 4 * np.pi, 240) + 0.05 * np.random.default_rng(1).normal(size=240))[
+        :, None
+    ]
     smooth = smooth_rotations(R, times)
     assert np.allclose(smooth @ np.swapaxes(smooth, -1, -2), np.eye(3), atol=1e-9)
     steps = np.arccos(
-        np.clip((np.trace(np.swapaxes(smooth[:-1, 0], -1, -2) @ smooth[1:, 0], axis1=1, axis2=2) - 1) / 2, -1, 1)
+        np.clip(
+            (np.trace(np.swapaxes(smooth[:-1, 0], -1, -2) @ smooth[1:, 0], axis1=1, axis2=2) - 1)
+            / 2,
+            -1,
+            1,
+        )
     )
     assert steps.max() < 2.0 * (4 * np.pi / 239)
 

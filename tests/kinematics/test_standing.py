@@ -31,7 +31,9 @@ def test_a_raised_foot_is_told_from_one_in_contact(step):
 
 
 def test_a_foot_at_rest_at_a_wrong_depth_is_in_contact_and_a_raised_one_is_not(step):
-    """A foot estimated too near or too far along its line of sight seems to be above or below the floor."""
+    """A foot estimated too near or too far along its line of sight seems to be above or below the
+    floor.
+    """
     _, omega, root, place, T_world_camera, times = step
     up = T_world_camera[2, :3]
     soles = place(omega[:1], root[:1])[2][:, :4].repeat(len(times), axis=0)
@@ -41,19 +43,23 @@ def test_a_foot_at_rest_at_a_wrong_depth_is_in_contact_and_a_raised_one_is_not(s
     higher = ((far[:, :2] - soles[:, :2]) @ up).mean()
     assert higher > 0.1
     assert (standing.standing_probability(far, up, times, CAMERA)[:, :2] > 0.5).all()
-    assert (standing.standing_probability(far, up, times)[:, :2] < 0.1).all()  # nobody knows where the sight is
+    # nobody knows where the sight is
+    assert (standing.standing_probability(far, up, times)[:, :2] < 0.1).all()
 
     raised = soles.copy()
     raised[:, :2] += 0.35 * up
     assert (standing.standing_probability(raised, up, times, CAMERA)[:, :2] < 0.1).all()
 
     moving = far.copy()
-    moving[:, :2, 0] += 0.06 * np.sin(2 * np.pi * times)[:, None]  # up to 0.38 m/s, and slow where it turns round
+    # up to 0.38 m/s, and slow where it turns round
+    moving[:, :2, 0] += 0.06 * np.sin(2 * np.pi * times)[:, None]
     assert (standing.standing_probability(moving, up, times, CAMERA)[:, :2] < 0.3).all()
     at = np.array([2.0, -1.0, 3.0])
     for center in (at, np.tile(at, (len(times), 1))):
         elsewhere = standing.standing_probability(far + at, up, times, center)
-        np.testing.assert_allclose(elsewhere, standing.standing_probability(far, up, times, CAMERA), atol=1e-9)
+        np.testing.assert_allclose(
+            elsewhere, standing.standing_probability(far, up, times, CAMERA), atol=1e-9
+        )
 
 
 @pytest.mark.parametrize("rate", [30.0, 60.0])
@@ -76,8 +82,12 @@ def test_an_upward_acceleration_does_not_end_a_contact():
     soles = np.zeros((len(times), 2, 3))
     soles[:, :, 2] = (0.5 * 8.0 * (times - 0.5) ** 2)[:, None]
     now = np.abs(times - 0.5) < 1e-9
-    assert (standing.standing_probability(soles, np.array([0.0, 0.0, 1.0]), times)[now] > 0.95).all()
-    assert (standing.standing_probability(-soles, np.array([0.0, 0.0, 1.0]), times)[now] < 0.1).all()
+    assert (
+        standing.standing_probability(soles, np.array([0.0, 0.0, 1.0]), times)[now] > 0.95
+    ).all()
+    assert (
+        standing.standing_probability(-soles, np.array([0.0, 0.0, 1.0]), times)[now] < 0.1
+    ).all()
 
 
 def test_both_feet_rest_on_stairs_where_the_ground_is_uneven(step):
@@ -87,10 +97,15 @@ def test_both_feet_rest_on_stairs_where_the_ground_is_uneven(step):
     stairs[:, :2] += 0.34 * up  # the left one, two steps higher
     for center in (CAMERA, None):
         assert (standing.standing_probability(stairs, up, times, center)[:, :2] < 0.2).all()
-        assert (standing.standing_probability(stairs, up, times, center, uneven_ground=True) > 0.8).all()
+        assert (
+            standing.standing_probability(stairs, up, times, center, uneven_ground=True) > 0.8
+        ).all()
     moving = stairs.copy()
     moving[:, :2, 0] += 1.0 * times[:, None]
-    assert (standing.standing_probability(moving, up, times, CAMERA, uneven_ground=True)[3:-3, :2] < 0.01).all()
+    assert (
+        standing.standing_probability(moving, up, times, CAMERA, uneven_ground=True)[3:-3, :2]
+        < 0.01
+    ).all()
 
 
 def test_palms_at_rest_on_the_floor_are_in_contact(plank):
@@ -124,7 +139,9 @@ UP, TIMES = np.array([0.0, 0.0, 1.0]), np.arange(60) / 30
 
 
 def sliding(heights, speeds, away=(0.0, 5.0)):
-    """Return points (T, n, 3) at constant heights that move along x at constant speeds, through `away` in frame 30."""
+    """Return points (T, n, 3) at constant heights that move along x at constant speeds, through
+    `away` in frame 30.
+    """
     points = np.zeros((len(TIMES), len(heights), 3))
     points[..., 0] = (TIMES - TIMES[30])[:, None] * speeds
     points[..., :2] += away
@@ -135,7 +152,9 @@ def sliding(heights, speeds, away=(0.0, 5.0)):
 def test_without_a_camera_the_probability_is_the_documented_function_of_speed_and_height():
     heights, speeds = np.array([0.0, 0.02, 0.05, 0.08]), np.array([0.1, 0.35, 0.5, 0.0])
     p = standing.standing_probability(sliding(heights, speeds), UP, TIMES)[30]
-    np.testing.assert_allclose(p, s(4 * (1 - speeds / 0.35)) * s(4 * (1 - heights / 0.05)), rtol=1e-6)
+    np.testing.assert_allclose(
+        p, s(4 * (1 - speeds / 0.35)) * s(4 * (1 - heights / 0.05)), rtol=1e-6
+    )
 
 
 def test_a_still_point_may_be_higher_by_what_an_error_in_depth_explains():
@@ -145,11 +164,14 @@ def test_a_still_point_may_be_higher_by_what_an_error_in_depth_explains():
     sight = (points[30] - center) / np.linalg.norm(points[30] - center, axis=1, keepdims=True)
     allowed = 0.05 + 0.4 * np.abs(sight[:, 2]) * s(4 * (1 - speeds / 0.12))
     p = standing.standing_probability(points, UP, TIMES, center)[30]
-    np.testing.assert_allclose(p, s(4 * (1 - speeds / 0.35)) * s(4 * (1 - heights / allowed)), rtol=0.002)
+    np.testing.assert_allclose(
+        p, s(4 * (1 - speeds / 0.35)) * s(4 * (1 - heights / allowed)), rtol=0.002
+    )
 
 
 def test_motion_along_the_line_of_sight_is_left_out_of_the_speed():
-    near = sliding(np.zeros(2), np.array([0.0, 0.8]))  # the second moves along the x axis, away from the camera
+    # the second moves along the x axis, away from the camera
+    near = sliding(np.zeros(2), np.array([0.0, 0.8]))
     center = np.array([-4.0, 5.0, 0.0])
     assert standing.standing_probability(near, UP, TIMES, center)[30].min() > 0.9
     assert standing.standing_probability(near, UP, TIMES)[30, 1] < 0.1
@@ -165,12 +187,15 @@ def test_palms_and_the_soles_above_them_have_the_documented_probabilities():
     speeds = np.array([0, 0, 0, 0, 0.2, 0.4])
     for d in (0.0, 0.25, 0.4):  # height of the soles above the lower palm
         points = sliding(np.array([d, d, d, d, 0.0, 0.06]), speeds)
-        center = np.array([0.0, 0.0, 1e6])  # far above, so that the speed is that across the line of sight
+        # far above, so that the speed is that across the line of sight
+        center = np.array([0.0, 0.0, 1e6])
         stands = standing.standing_probability(points[:, :4], UP, TIMES, center)[30]
         p = standing.resting_probability(points, UP, TIMES, center)[30]
         np.testing.assert_allclose(p[:4], stands * s(8 * (1 - d / 0.5)) / s(8), rtol=1e-6)
         above = np.array([0.0, 0.06]) - d
-        np.testing.assert_allclose(p[4:], s(4 * (1 - speeds[4:] / 0.35)) * s(4 * (1 - above / 0.12)), rtol=1e-6)
+        np.testing.assert_allclose(
+            p[4:], s(4 * (1 - speeds[4:] / 0.35)) * s(4 * (1 - above / 0.12)), rtol=1e-6
+        )
 
 
 def test_lines_of_sight_have_unit_length_and_none_leads_to_the_camera_itself():

@@ -15,7 +15,9 @@ def mjpeg_server(pictures, interval_s=0.03, rounds=1, left=None):
     :param left: an event to set when a client has left.
     :return: context manager that gives the address.
     """
-    jpegs = [cv2.imencode(".jpg", cv2.cvtColor(p, cv2.COLOR_RGB2BGR))[1].tobytes() for p in pictures]
+    jpegs = [
+        cv2.imencode(".jpg", cv2.cvtColor(p, cv2.COLOR_RGB2BGR))[1].tobytes() for p in pictures
+    ]
     stopped = threading.Event()
 
     class Handler(BaseHTTPRequestHandler):
@@ -25,7 +27,10 @@ def mjpeg_server(pictures, interval_s=0.03, rounds=1, left=None):
             self.end_headers()
             try:
                 for jpeg in jpegs * rounds:
-                    head = f"--frame\r\nContent-Type: image/jpeg\r\nContent-Length: {len(jpeg)}\r\n\r\n"
+                    head = (
+                        f"--frame\r\nContent-Type: image/jpeg\r\nContent-Length: "
+                        f"{len(jpeg)}\r\n\r\n"
+                    )
                     self.wfile.write(head.encode() + jpeg + b"\r\n")
                     if stopped.wait(interval_s):
                         return

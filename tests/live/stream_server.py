@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Streams as servers give them: MPEG transport streams in pieces, and fragmented .mp4 from the middle on.
+"""Streams as servers give them: MPEG transport streams in pieces, and fragmented .mp4 from the
+middle on.
 
-A transport stream consists of packets of 188 bytes. Seven of them make a datagram, or an RTP packet (RFC 2250), which
-RTSP sends over its own connection if it is asked to (RFC 2326, "interleaved").
+A transport stream consists of packets of 188 bytes. Seven of them make a datagram, or an RTP packet
+(RFC 2250), which RTSP sends over its own connection if it is asked to (RFC 2326, "interleaved").
 """
 
 import io
@@ -19,7 +20,10 @@ from threading import Event, Thread
 import av
 
 DATAGRAM = 7 * 188
-_WITHOUT_SCENE_CUTS = {"libx264": {"sc_threshold": "0"}, "libx265": {"x265-params": "scenecut=0:log-level=none"}}
+_WITHOUT_SCENE_CUTS = {
+    "libx264": {"sc_threshold": "0"},
+    "libx265": {"x265-params": "scenecut=0:log-level=none"},
+}
 FRAGMENTED = {"movflags": "frag_every_frame+empty_moov+default_base_moof"}
 
 
@@ -42,12 +46,18 @@ def served(folder, name, data):
 def encoded(images, codec="mpeg2video", kind="mpegts", group=10, begins_s=0.0, rate=30):
     """Return RGB images as a stream whose key frames are ``group`` frames apart."""
     target = io.BytesIO()
-    with av.open(target, "w", format=kind, options=FRAGMENTED if kind == "mp4" else {}) as container:
+    with av.open(
+        target, "w", format=kind, options=FRAGMENTED if kind == "mp4" else {}
+    ) as container:
         stream = container.add_stream(codec, rate=rate)
         stream.height, stream.width = images[0].shape[:2]
         stream.pix_fmt = "yuvj420p" if codec == "mjpeg" else "yuv420p"
         stream.bit_rate = 4_000_000
-        stream.gop_size, stream.max_b_frames, stream.options = group, 0, _WITHOUT_SCENE_CUTS.get(codec, {})
+        stream.gop_size, stream.max_b_frames, stream.options = (
+            group,
+            0,
+            _WITHOUT_SCENE_CUTS.get(codec, {}),
+        )
         for k, image in enumerate(images):
             frame = av.VideoFrame.from_ndarray(image, format="rgb24")
             frame.time_base, frame.pts = Fraction(1, rate), round(begins_s * rate) + k
@@ -62,9 +72,14 @@ def without_first(data, number, kind="mp4"):
 
 
 def without(data, numbers, kind="mpegts"):
-    """Return a stream without its packets of these numbers, of whose loss it says nothing itself."""
+    """Return a stream without its packets of these numbers, of whose loss it says nothing
+    itself.
+    """
     target = io.BytesIO()
-    with av.open(io.BytesIO(data)) as source, av.open(target, "w", format=kind, options=FRAGMENTED) as container:
+    with (
+        av.open(io.BytesIO(data)) as source,
+        av.open(target, "w", format=kind, options=FRAGMENTED) as container,
+    ):
         stream = container.add_stream_from_template(source.streams.video[0])
         for k, packet in enumerate(source.demux(video=0)):
             if packet.dts is not None and k not in numbers:
@@ -91,7 +106,11 @@ def with_damage(data, numbers, kind="mpegts"):
             if k in numbers:
                 half = packet.size // 2
                 damaged = av.Packet(bytes(packet)[:half] + bytes(packet.size - half))
-                damaged.pts, damaged.dts, damaged.time_base = packet.pts, packet.dts, packet.time_base
+                damaged.pts, damaged.dts, damaged.time_base = (
+                    packet.pts,
+                    packet.dts,
+                    packet.time_base,
+                )
                 packet = damaged
             packet.stream = stream
             container.mux(packet)
@@ -145,7 +164,12 @@ def sent_by_udp(data, interval_s=0.002):
 @contextmanager
 def served_as_hls(folder, parts, seconds):
     """Serve transport streams as the segments of an HLS playlist; gives its address."""
-    lines = ["#EXTM3U", "#EXT-X-VERSION:3", f"#EXT-X-TARGETDURATION:{seconds}", "#EXT-X-MEDIA-SEQUENCE:0"]
+    lines = [
+        "#EXTM3U",
+        "#EXT-X-VERSION:3",
+        f"#EXT-X-TARGETDURATION:{seconds}",
+        "#EXT-X-MEDIA-SEQUENCE:0",
+    ]
     for number, part in enumerate(parts):
         (folder / f"part{number}.ts").write_bytes(part)
         lines += [f"#EXTINF:{seconds:.3f},", f"part{number}.ts"]
@@ -167,8 +191,12 @@ def rtp_of_h264(data, rate=30):
         payloads = [payload for unit in units for payload in _payloads(unit)]
         ends = [False] * (len(payloads) - 1) + [True]
         parts = zip(ends, payloads, strict=True)
-        pictures.append([_rtp(96, next(numbers), 90000 // rate * k, end, payload) for end, payload in parts])
-    description = "m=video 0 RTP/AVP 96\r\na=rtpmap:96 H264/90000\r\na=fmtp:96 packetization-mode=1\r\n"
+        pictures.append(
+            [_rtp(96, next(numbers), 90000 // rate * k, end, payload) for end, payload in parts]
+        )
+    description = (
+        "m=video 0 RTP/AVP 96\r\na=rtpmap:96 H264/90000\r\na=fmtp:96 packetization-mode=1\r\n"
+    )
     return pictures, description + "a=control:track0\r\n"
 
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The approach to a new estimate against its closed form, and against what a jump of velocity would do."""
+"""The approach to a new estimate against its closed form, and against what a jump of velocity would
+do.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,9 @@ BEFORE, AFTER = calibration(1.0), calibration(1.1)
 
 
 def course(step_s, seconds, world_s=SETTLING_S, before=BEFORE, after=AFTER):
-    """The calibrations of an approach that has long been at one estimate, from when another one comes."""
+    """The calibrations of an approach that has long been at one estimate, from when another one
+    comes.
+    """
     gradual = GradualCalibration(before, SETTLING_S)
     return [gradual.step(after, step_s, world_s) for _ in range(round(seconds / step_s))]
 
@@ -55,5 +59,6 @@ def test_everything_has_arrived_when_it_is_said_to_at_any_rate():
 def test_a_settled_world_follows_slowly_while_the_shape_does_not():
     world_s = following_s(CALIBRATED_S + SETTLED_S)
     last = course(1 / 30, 1.0, world_s, after=calibration(1.1, beta=2.0))[-1]
-    assert 1.005 < last.camera_position[2] < 1.01  # about a tenth of it in a second, less the delay of the other stages
+    # about a tenth of it in a second, less the delay of the other stages
+    assert 1.005 < last.camera_position[2] < 1.01
     assert last.betas == pytest.approx(2.0, abs=0.01)

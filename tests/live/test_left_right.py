@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Left and right without looking ahead: swaps of the network are undone in the frames in which they come."""
+"""Left and right without looking ahead: swaps of the network are undone in the frames in which they
+come.
+"""
 
 from __future__ import annotations
 
@@ -31,8 +33,8 @@ def read(swapped: np.ndarray, answers: dict[int, int | None], *, wait: bool = Fa
     """Return which frames (COUNT,) are read with left and right exchanged against the truth.
 
     :param swapped: (COUNT,) frames in which the network exchanges them.
-    :param answers: the reference network's: frame that it was asked about, and frame before which it answers; None: it
-        has answered at once.
+    :param answers: the reference network's: frame that it was asked about, and frame before which
+        it answers; None: it has answered at once.
     """
     truth, sides, wrong = turning_body(), CausalLeftRight(wait=wait), []
     pending: dict[int, Future] = {frame: Future() for frame in answers}
@@ -42,7 +44,14 @@ def read(swapped: np.ndarray, answers: dict[int, int | None], *, wait: bool = Fa
                 pending[frame].set_result(truth[frame])
         seen = truth[k][MIRROR_PARTNER] if swapped[k] else truth[k]
         given = Observation(
-            seen[:, :2], seen[:, 0], seen, 1.0, Region((0.0, 0.0), 1.0, 0.0), k == 0, None, pending.get(k)
+            seen[:, :2],
+            seen[:, 0],
+            seen,
+            1.0,
+            Region((0.0, 0.0), 1.0, 0.0),
+            k == 0,
+            None,
+            pending.get(k),
         )
         found = sides(given)
         assert np.array_equal(found.keypoints_px, found.world_landmarks[:, :2])
@@ -70,7 +79,9 @@ def test_a_person_who_is_found_swapped_is_turned_by_the_first_answer() -> None:
 
 
 def test_a_late_answer_counts_from_when_it_comes() -> None:
-    wrong = read(frames(range(COUNT)), {0: None, 20: 26}) | read(frames(range(5, COUNT)), {0: None, 20: 26})
+    wrong = read(frames(range(COUNT)), {0: None, 20: 26}) | read(
+        frames(range(5, COUNT)), {0: None, 20: 26}
+    )
     assert not wrong.any()
     wrong = read(frames(range(COUNT)), {10: 15})
     assert wrong[:15].all()

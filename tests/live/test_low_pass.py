@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The causal filters against what is known of them in closed form, and against what they are for."""
+"""The causal filters against what is known of them in closed form, and against what they are
+for.
+"""
 
 import numpy as np
 import pytest
@@ -56,14 +58,18 @@ def test_the_lead_grows_after_the_start_so_that_a_wrong_first_value_does_not_ove
 def roots_of_a_pose_filter(distances, rate):
     """The pelvis (n, 3) of a body straight in front of the camera, after the filters have begun."""
     poses = PoseFilter()
-    roots = [poses(np.eye(3)[None], np.array([0.0, 0.0, z]), k / rate)[1] for k, z in enumerate(distances)]
+    roots = [
+        poses(np.eye(3)[None], np.array([0.0, 0.0, z]), k / rate)[1]
+        for k, z in enumerate(distances)
+    ]
     return np.array(roots)[rate:]
 
 
 def test_noise_of_the_distance_moves_the_body_gently():
     noise = np.random.default_rng(0).normal(0, 0.01, 1200)
     roots = roots_of_a_pose_filter(4 + noise, 60)
-    assert np.linalg.norm(60**3 * np.diff(roots, 3, axis=0), axis=1).mean() < 50.0  # m/s³; four stages of 3 Hz: 77
+    # m/s³; four stages of 3 Hz: 77
+    assert np.linalg.norm(60**3 * np.diff(roots, 3, axis=0), axis=1).mean() < 50.0
 
 
 @pytest.mark.parametrize("rate", [15, 30, 60])

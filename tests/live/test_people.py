@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Several people: each keeps their session, also after they were away, and all stand in one world."""
+"""Several people: each keeps their session, also after they were away, and all stand in one
+world.
+"""
 
 from __future__ import annotations
 
@@ -34,13 +36,21 @@ def person(x_px, clothes, side_px=300.0):
     colour = np.zeros((2, SIZE // 2))
     colour[:, clothes] = 1.0
     return Observation(
-        keypoints, np.ones(33), np.ones((33, 3)), 1.0, Region((x_px, 400.0), side_px, 0.0), False, colour.ravel()
+        keypoints,
+        np.ones(33),
+        np.ones((33, 3)),
+        1.0,
+        Region((x_px, 400.0), side_px, 0.0),
+        False,
+        colour.ravel(),
     )
 
 
 @pytest.fixture
 def followed(body, monkeypatch):
-    """Return a function that follows two people through a scripted clip: whom each session follows by frame."""
+    """Return a function that follows two people through a scripted clip: whom each session follows
+    by frame.
+    """
 
     class Session:
         def __init__(self, *_):
@@ -91,7 +101,10 @@ def test_a_stranger_gets_a_session_only_when_its_person_has_been_away_for_long(f
 def beside(body, networks):
     """People and poses of the sample clip beside itself."""
     with open_video(SAMPLE) as video:
-        frames = [Frame(f.index, f.timestamp_s, np.hstack([f.image_rgb] * 2)) for f in islice(video, FRAMES)]
+        frames = [
+            Frame(f.index, f.timestamp_s, np.hstack([f.image_rgb] * 2))
+            for f in islice(video, FRAMES)
+        ]
     height, width = frames[0].image_rgb.shape[:2]
     camera = choose_camera(width, height, fov_deg=85.0)
     people = LivePeople(body, PeopleTracker("fast", 1, 2), camera, (width, height), count=2)
@@ -110,7 +123,8 @@ def test_both_are_seen_in_one_world(beside):
     for pose in (first, second):
         assert abs(pose.joints[[10, 11], 2].min()) < 0.1  # toes on the floor
     relative = [pose.joints - pose.joints[0] for pose in (first, second)]
-    assert np.median(np.linalg.norm(relative[0] - relative[1], axis=1)) < 0.15  # seen from two sides
+    # seen from two sides
+    assert np.median(np.linalg.norm(relative[0] - relative[1], axis=1)) < 0.15
 
 
 def test_the_recordings_begin_together(beside, body, tmp_path):
@@ -130,7 +144,9 @@ def test_the_recordings_begin_together(beside, body, tmp_path):
 
 def test_who_was_never_seen_has_no_file(beside, body, tmp_path):
     people, steps, size = beside
-    recording = PeopleRecording([tmp_path / "a.npz", tmp_path / "b.npz"], body, SimpleNamespace(name="two", fps=30))
+    recording = PeopleRecording(
+        [tmp_path / "a.npz", tmp_path / "b.npz"], body, SimpleNamespace(name="two", fps=30)
+    )
     recording.begin(people, size)
     for poses in steps:
         recording.send(poses[0], 0.0)

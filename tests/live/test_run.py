@@ -18,7 +18,9 @@ WIDE, TALL = np.zeros((96, 160, 3), np.uint8), np.zeros((160, 96, 3), np.uint8)
 @pytest.mark.usefixtures("networks")
 def test_pictures_of_another_shape_are_said_and_begin_new_estimates(body):
     given, said, sizes, poses = threading.Semaphore(1), [], [], []
-    source = FakeSource([0.0, 0.1, 0.2], ends=True, images=[WIDE, WIDE, TALL], before=lambda _: given.acquire())
+    source = FakeSource(
+        [0.0, 0.1, 0.2], ends=True, images=[WIDE, WIDE, TALL], before=lambda _: given.acquire()
+    )
 
     def send(pose, latency_ms):
         poses.append(pose)
@@ -29,7 +31,9 @@ def test_pictures_of_another_shape_are_said_and_begin_new_estimates(body):
     assert len(poses) == 3
     assert sizes == [(160, 96), (96, 160)]
     assert len(said) == 1
-    assert said[0].startswith("fake now delivers images of another shape (96 × 160): body, lens and floor are")
+    assert said[0].startswith(
+        "fake now delivers images of another shape (96 × 160): body, lens and floor are"
+    )
 
 
 @pytest.mark.usefixtures("networks")
@@ -45,9 +49,13 @@ def test_a_recording_ends_where_pictures_of_another_shape_begin(body, tmp_path):
         return SimpleNamespace(sessions=[SimpleNamespace(camera=camera)] * 2)
 
     def pose(person, time_s):
-        return SimpleNamespace(person=person, index=round(10 * time_s), timestamp_s=time_s, presence=Presence.SEEN)
+        return SimpleNamespace(
+            person=person, index=round(10 * time_s), timestamp_s=time_s, presence=Presence.SEEN
+        )
 
-    recording = PeopleRecording([tmp_path / "a.npz", tmp_path / "b.npz"], body, SimpleNamespace(name="fake"))
+    recording = PeopleRecording(
+        [tmp_path / "a.npz", tmp_path / "b.npz"], body, SimpleNamespace(name="fake")
+    )
     recording.begin(people("of nobody yet"), (96, 160))
     recording.begin(people("first"), (160, 96))
     recording.send(pose(0, 1.0), 0.0)

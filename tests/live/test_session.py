@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Poses of the first two seconds of the sample clip: causal, calm, and close to the offline capture."""
+"""Poses of the first two seconds of the sample clip: causal, calm, and close to the offline
+capture.
+"""
 
 from fractions import Fraction
 from itertools import islice
@@ -23,7 +25,8 @@ from scope.scope_addon.motion import Motion
 
 LATE = 2  # frames of the delay of 60 ms
 LEAD = 12  # frames until the filters know how the body moves
-FRAMES, EMPTY = 46, 8  # one and a half seconds, and frames without a person after them, a tenth of a second apart
+# one and a half seconds, and frames without a person after them, a tenth of a second apart
+FRAMES, EMPTY = 46, 8
 
 
 @pytest.fixture(scope="module")
@@ -77,11 +80,16 @@ def test_later_frames_do_not_change_earlier_poses(body, live, frames):
 
 def test_the_recording_is_close_to_the_offline_capture(body, recorded):
     (offline,) = capture(
-        SAMPLE, body, CaptureOptions(quality="fast", threads=1, wanted=VideoRange(end_s=(FRAMES - 1) / 30))
+        SAMPLE,
+        body,
+        CaptureOptions(quality="fast", threads=1, wanted=VideoRange(end_s=(FRAMES - 1) / 30)),
     ).motions
     assert len(recorded) == FRAMES - LATE  # the last poses would have been given later
     assert list(recorded.frames) == list(offline.frames[:-LATE])
-    relative = [m.joints_cam[: FRAMES - LATE] - m.joints_cam[: FRAMES - LATE, :1] for m in (recorded, offline)]
+    relative = [
+        m.joints_cam[: FRAMES - LATE] - m.joints_cam[: FRAMES - LATE, :1]
+        for m in (recorded, offline)
+    ]
     assert np.median(np.linalg.norm(relative[0] - relative[1], axis=-1)) < 0.025
     assert jerk(relative[0]) < 1.5 * jerk(relative[1])
     assert jerk(world_joints(recorded)) < 1.5 * jerk(world_joints(offline)[: FRAMES - LATE])
@@ -90,7 +98,10 @@ def test_the_recording_is_close_to_the_offline_capture(body, recorded):
 def test_feet_that_stand_do_not_slide(recorded):
     world = world_joints(recorded)[LEAD:]
     for joint in (7, 8, 10, 11):  # ankles and toes of somebody who stands still
-        assert np.linalg.norm(world[:, joint] - np.median(world[:, joint], axis=0), axis=1).max() < 0.02
+        assert (
+            np.linalg.norm(world[:, joint] - np.median(world[:, joint], axis=0), axis=1).max()
+            < 0.02
+        )
 
 
 def test_dropped_frames_are_filled_in_and_not_valid(recorded, live):
@@ -105,7 +116,8 @@ def test_dropped_frames_are_filled_in_and_not_valid(recorded, live):
 def test_feet_stand_on_the_floor_and_the_world_does_not_jump(live):
     poses = live[1][:FRAMES]
     feet = np.array([pose.joints[[10, 11], 2] for pose in poses])
-    assert np.abs(np.median(feet)) < 0.12  # the joints of toes are some centimetres above their soles
+    # the joints of toes are some centimetres above their soles
+    assert np.abs(np.median(feet)) < 0.12
     camera = np.array([pose.T_world_camera[:3, 3] for pose in poses])
     assert np.linalg.norm(np.diff(camera, axis=0), axis=1).max() < 0.05
 

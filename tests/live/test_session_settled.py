@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What holds once the estimates of the first seconds are reached: the sample clip there and back, ten seconds.
+"""What holds once the estimates of the first seconds are reached: the sample clip there and back,
+ten seconds.
 
-The networks look at every second frame of the clip once; the way back is what they found, in reverse.
+The networks look at every second frame of the clip once; the way back is what they found, in
+reverse.
 """
 
 from __future__ import annotations
@@ -20,7 +22,9 @@ from scope.scope_addon.live.pose import Presence
 from scope.scope_addon.live.session import CALIBRATED_S, CERTAIN_S, SETTLED_S, following_s
 
 RATE = 15.0
-LATE = 2  # frames after a foot has landed in which smoothing still shows the step: 60 ms, and the time of its filters
+# frames after a foot has landed in which smoothing still shows the step: 60 ms, and the time of its
+# filters
+LATE = 2
 SHORTEST = 4  # frames for which a foot stands
 
 
@@ -29,11 +33,16 @@ def played(body, networks):
     """The poses, and the clip's frame that each of them shows."""
     with open_video(SAMPLE) as video:
         images = [frame.image_rgb for frame in video if frame.index % 2 == 0]
-    tracker, order = PeopleTracker("fast", 1), [*range(len(images)), *range(len(images) - 2, -1, -1)]
+    tracker, order = (
+        PeopleTracker("fast", 1),
+        [*range(len(images)), *range(len(images) - 2, -1, -1)],
+    )
     found = [tracker.step(image, time_s=k / RATE) for k, image in enumerate(images)]
     size = images[0].shape[1], images[0].shape[0]
     at = iter(order)
-    people = LivePeople(body, SimpleNamespace(step=lambda *_: found[next(at)]), choose_camera(*size), size)
+    people = LivePeople(
+        body, SimpleNamespace(step=lambda *_: found[next(at)]), choose_camera(*size), size
+    )
     poses, focal = [], []
     for k, row in enumerate(order):
         poses.append(people.step(Frame(k, k / RATE, images[row]))[0])
@@ -75,26 +84,33 @@ def test_feet_that_stand_by_the_ground_truth_do_not_slide(played):
 
 
 def test_after_an_hour_of_sleep_the_body_is_where_it_was(body, played):
-    """The clock leaps by an hour, and the first frame after it shows the same as the last one before.
+    """The clock leaps by an hour, and the first frame after it shows the same as the last one
+    before.
 
-    That frame is fitted from nothing and lifted as a still, which may take an arm for its mirror image in depth, and
-    puts an ankle 10 cm farther away.
+    That frame is fitted from nothing and lifted as a still, which may take an arm for its mirror
+    image in depth, and puts an ankle 10 cm farther away.
     """
     poses, _, _, people = played
     last, size = poses[-1], (480, 640, 3)
-    awake = [people.step(Frame(200 + k, 3600 + (200 + k) / RATE, np.zeros(size, np.uint8)))[0] for k in range(12)]
+    awake = [
+        people.step(Frame(200 + k, 3600 + (200 + k) / RATE, np.zeros(size, np.uint8)))[0]
+        for k in range(12)
+    ]
     assert all(pose.presence is Presence.SEEN and pose.is_settled for pose in awake)
     T = np.array([pose.T_world_camera for pose in (last, *awake)])
     assert np.abs(np.diff(T, axis=0)).max() < 0.002
     joints = np.array([pose.joints for pose in awake])
     arms = [any(part in name for part in ("elbow", "wrist", "hand")) for name in body.joint_names]
     assert np.linalg.norm(joints[0] - last.joints, axis=1)[~np.array(arms)].max() < 0.12
-    assert np.linalg.norm(np.diff(joints[:, 0], axis=0), axis=-1).max() < 0.03  # nor does it move abruptly then
+    # nor does it move abruptly then
+    assert np.linalg.norm(np.diff(joints[:, 0], axis=0), axis=-1).max() < 0.03
     np.testing.assert_allclose(awake[-1].betas, last.betas, atol=0.01)
 
 
 def test_a_world_that_has_settled_can_be_mended_and_cannot_walk():
-    """Frames are fitted to the floor as it is: estimates with a bias b would raise it for as long as it runs."""
+    """Frames are fitted to the floor as it is: estimates with a bias b would raise it for as long
+    as it runs.
+    """
 
     def moved(begin_s, end_s, step_s):
         return sum(1 - np.exp(-step_s / following_s(t)) for t in np.arange(begin_s, end_s, step_s))

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Poses after the causal filter: still ones stay, moving ones come as late as is said, and noise is less."""
+"""Poses after the causal filter: still ones stay, moving ones come as late as is said, and noise is
+less.
+"""
 
 import numpy as np
 import pytest
@@ -10,10 +12,14 @@ AXIS = np.array([0.6, 0.0, 0.8])
 PLACE = np.array([0.4, 0.2, 4.0])
 
 
-def filtered(angles: np.ndarray, places: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def filtered(
+    angles: np.ndarray, places: np.ndarray, times: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the filtered angles about the axis, and places (T, 3)."""
     smooth = PoseFilter()
-    found = [smooth(exp(a * AXIS)[None], p, t) for a, p, t in zip(angles, places, times, strict=True)]
+    found = [
+        smooth(exp(a * AXIS)[None], p, t) for a, p, t in zip(angles, places, times, strict=True)
+    ]
     return np.array([log(R[0]) @ AXIS for R, _ in found]), np.array([p for _, p in found])
 
 
@@ -49,7 +55,9 @@ def test_the_distance_is_smoothed_more_than_the_place_in_the_image() -> None:
     times = np.arange(600) / 60
     shaking, left = 0.02 * np.sin(2 * np.pi * 4.0 * times), []
     for direction in ([1.0, 0.0, 0.0], [0.0, 0.0, 1.0]):
-        _, places = filtered(np.zeros(600), np.array([0.0, 0.0, 4.0]) + np.outer(shaking, direction), times)
+        _, places = filtered(
+            np.zeros(600), np.array([0.0, 0.0, 4.0]) + np.outer(shaking, direction), times
+        )
         left.append((places @ direction)[120:].std())
     assert left[1] < 0.8 * left[0]
 

@@ -33,20 +33,28 @@ from .stream_server import (
 
 @pytest.fixture(autouse=True)
 def patient(monkeypatch):
-    """However long a busy computer does not run a server's thread, its stream does not count as interrupted."""
+    """However long a busy computer does not run a server's thread, its stream does not count as
+    interrupted.
+    """
     for module in (newest_frame, stream):
         monkeypatch.setattr(module, "STALLED_S", 300.0)
 
 
 def test_a_file_is_paced_by_its_timestamps():
     clock = FakeClock()
-    arrived = [(p.timestamp_s, p.arrived_s) for p in islice(open_source(str(SAMPLE)).pictures(clock), 6)]
+    arrived = [
+        (p.timestamp_s, p.arrived_s) for p in islice(open_source(str(SAMPLE)).pictures(clock), 6)
+    ]
     assert [time_s for time_s, _ in arrived] == pytest.approx(np.arange(6) / 30, abs=1e-3)
-    assert [arrived_s - 100.0 for _, arrived_s in arrived] == pytest.approx(np.arange(6) / 30, abs=1e-3)
+    assert [arrived_s - 100.0 for _, arrived_s in arrived] == pytest.approx(
+        np.arange(6) / 30, abs=1e-3
+    )
 
 
 def test_a_file_goes_on_where_it_was_when_the_computer_slept():
-    """Nothing that would have been shown meanwhile is made up for, which would be shown as fast as it can be read."""
+    """Nothing that would have been shown meanwhile is made up for, which would be shown as fast as
+    it can be read.
+    """
     clock, arrived = FakeClock(), []
     for picture in islice(open_source(str(SAMPLE)).pictures(clock), 8):
         arrived.append(picture.arrived_s - 100.0)
@@ -68,11 +76,13 @@ def test_a_stream_is_read_and_after_its_end_read_again(pictures):
     with mjpeg_server(pictures, rounds=3) as address:
         source = open_source(address)
         with NewestFrame(source, clock, reconnect_s=0.05, say=said.append) as reader:
-            while len(taken) < 15 and (picture := reader.take()) is not None:  # of twelve, before it is interrupted
+            # of twelve, before it is interrupted
+            while len(taken) < 15 and (picture := reader.take()) is not None:
                 taken.append(picture)
     assert len(taken) == 15
     assert taken[0].image_rgb.shape == pictures[0].shape
-    first = pictures[taken[0].index % len(pictures)]  # on a busy machine, others have come before it is taken
+    # on a busy machine, others have come before it is taken
+    first = pictures[taken[0].index % len(pictures)]
     assert np.abs(taken[0].image_rgb.astype(int) - first).mean() < 12  # JPEG, and its colours
     assert all(b.timestamp_s > a.timestamp_s for a, b in zip(taken, taken[1:], strict=False))
     assert said
@@ -109,7 +119,9 @@ def test_a_stream_s_mirroring_is_applied(tmp_path):
 
 
 def moving(count, size=(160, 96), first=0):
-    """Pictures of a slope over which a bright bar moves; the k-th is told from the others by `which`."""
+    """Pictures of a slope over which a bright bar moves; the k-th is told from the others by
+    `which`.
+    """
     width, height = size
     pictures = np.zeros((count, height, width, 3), np.uint8)
     pictures += np.linspace(20, 120, height).astype(np.uint8)[:, None, None]
@@ -126,13 +138,18 @@ def which(image):
 
 
 def all_pictures(address):
-    """The pictures of a stream during which no time passes, so that nothing is shown because it has been waited for."""
-    return [picture for picture in open_source(address).pictures(FakeClock()) if picture is not None]
+    """The pictures of a stream during which no time passes, so that nothing is shown because it has
+    been waited for.
+    """
+    return [
+        picture for picture in open_source(address).pictures(FakeClock()) if picture is not None
+    ]
 
 
 @pytest.mark.parametrize("missed", [0, 4])
 def test_a_stream_begins_with_its_first_key_frame(tmp_path, missed):
-    data = without_first(encoded(moving(30), "mpeg4", "mp4"), missed)  # whose decoder shows the others on grey
+    # whose decoder shows the others on grey
+    data = without_first(encoded(moving(30), "mpeg4", "mp4"), missed)
     with served(tmp_path, "a.mp4", data) as address:
         shown = [which(picture.image_rgb) for picture in all_pictures(address)]
     assert [k for k, _ in shown] == list(range(10 if missed else 0, 30))
@@ -184,7 +201,9 @@ def test_a_stream_all_of_whose_pictures_are_damaged_is_shown_after_a_while(tmp_p
     clock.now = lambda: next(times)
     data = with_damage(encoded(noisy(100), "mpeg4"), range(100))
     with served(tmp_path, "a.ts", data) as address:
-        first = next(picture for picture in open_source(address).pictures(clock) if picture is not None)
+        first = next(
+            picture for picture in open_source(address).pictures(clock) if picture is not None
+        )
     assert 100.0 + DAMAGED_S <= first.timestamp_s <= 100.3 + DAMAGED_S
 
 
@@ -204,7 +223,9 @@ def test_a_server_s_timestamps_may_jump_and_its_rate_change(tmp_path):
 
 
 def test_a_transport_stream_in_datagrams_is_read():
-    """Datagrams may be lost, also on this computer, and pictures with them: until so many follow each other."""
+    """Datagrams may be lost, also on this computer, and pictures with them: until so many follow
+    each other.
+    """
     following = []
     with sent_by_udp(encoded(moving(36))) as address:
         for picture in islice(open_source(address).pictures(FakeClock()), 5000):
@@ -231,7 +252,14 @@ def test_a_playlist_does_not_open_files_of_this_computer(tmp_path):
     """Nor does it say whether they are there."""
     secret = tmp_path / "secret.ts"
     secret.write_bytes(encoded(moving(12)))
-    lines = ["#EXTM3U", "#EXT-X-TARGETDURATION:1", "#EXTINF:1.0,", secret.as_uri(), "#EXT-X-ENDLIST", ""]
+    lines = [
+        "#EXTM3U",
+        "#EXT-X-TARGETDURATION:1",
+        "#EXTINF:1.0,",
+        secret.as_uri(),
+        "#EXT-X-ENDLIST",
+        "",
+    ]
     with served(tmp_path, "list.m3u8", "\n".join(lines).encode()) as address:
         with pytest.raises(VideoError, match="cannot be opened|was interrupted|carries no video"):
             all_pictures(address)
@@ -239,20 +267,28 @@ def test_a_playlist_does_not_open_files_of_this_computer(tmp_path):
 
 def test_an_rtsp_server_is_read_over_its_own_connection():
     with rtsp_server(*rtp_of_transport_stream(encoded(moving(36)))) as address:
-        shown = [which(picture.image_rgb) for picture in islice(open_source(address).pictures(FakeClock()), 20)]
+        shown = [
+            which(picture.image_rgb)
+            for picture in islice(open_source(address).pictures(FakeClock()), 20)
+        ]
     assert [k for k, _ in shown] == list(range(20))
     assert max(off for _, off in shown) < 10
 
 
 def test_a_stream_that_changes_its_resolution_keeps_the_first_one(tmp_path):
-    data = encoded(moving(12)) + encoded(moving(12, (80, 48), first=12)) + encoded(moving(12, first=24))
+    data = (
+        encoded(moving(12))
+        + encoded(moving(12, (80, 48), first=12))
+        + encoded(moving(12, first=24))
+    )
     taken = []
     with served(tmp_path, "a.ts", data) as address:
         with NewestFrame(open_source(address), FakeClock(), received=taken.append) as reader:
             reader._thread.join(300)
     assert {picture.image_rgb.shape for picture in taken} == {(96, 160, 3)}
     shown = [which(picture.image_rgb) for picture in taken]
-    assert [k for k, _ in shown if k not in (11, 23)] == [k for k in range(36) if k not in (11, 23)]  # before a change
+    # before a change
+    assert [k for k, _ in shown if k not in (11, 23)] == [k for k in range(36) if k not in (11, 23)]
     assert max(off for _, off in shown) < 10
 
 
@@ -260,8 +296,14 @@ def test_a_stream_that_changes_its_resolution_keeps_the_first_one(tmp_path):
     ("text", "message"),
     [
         ("missing.mp4", "missing.mp4 does not exist; check the path"),
-        ("10.0.0.7/stream", "10.0.0.7/stream does not exist; .* and a stream with its kind, as in rtsp://"),
-        ("gopher://host/x", "'gopher' is not a kind of stream that can be read; use http, https, rtsp"),
+        (
+            "10.0.0.7/stream",
+            "10.0.0.7/stream does not exist; .* and a stream with its kind, as in rtsp://",
+        ),
+        (
+            "gopher://host/x",
+            "'gopher' is not a kind of stream that can be read; use http, https, rtsp",
+        ),
         ("file:///etc/passwd", "'file' is not a kind of stream"),
     ],
 )
@@ -272,12 +314,18 @@ def test_what_is_no_source_is_said(text, message):
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="devices of Linux")
 def test_a_camera_that_does_not_exist_is_said():
-    with pytest.raises(VideoError, match="camera 987 does not exist; (choose one of /dev|connect a camera)"):
+    with pytest.raises(
+        VideoError, match="camera 987 does not exist; (choose one of /dev|connect a camera)"
+    ):
         open_source("987")
 
 
 def test_a_server_that_does_not_run_is_said_without_the_password():
-    with pytest.raises(VideoError, match=r"^http://127.0.0.1:9/v cannot be opened \(connection refused\); check"):
+    with pytest.raises(
+        VideoError,
+        match=r"^http://127.0.0.1:9/v cannot be opened \(connection "
+        r"refused\); check",
+    ):
         next(iter(open_source("http://me:secret@127.0.0.1:9/v").pictures(Clock())))
 
 

@@ -25,7 +25,11 @@ def test_latencies_are_the_median_and_what_one_in_twenty_exceeds() -> None:
 
 def test_before_the_second_pose_there_is_no_rate() -> None:
     statistics = Statistics()
-    assert (statistics.rate, statistics.recent_rate, statistics.latency_ms()) == (0.0, 0.0, (0.0, 0.0))
+    assert (statistics.rate, statistics.recent_rate, statistics.latency_ms()) == (
+        0.0,
+        0.0,
+        (0.0, 0.0),
+    )
     statistics.add(1.0, 1.5)
     assert (statistics.rate, statistics.recent_rate, statistics.poses) == (0.0, 0.0, 1)
     statistics.add(1.0, 1.5)  # of another person, at the same time

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One declaration of every option: command line, worker and pipeline agree on names, defaults, choices and ranges."""
+"""One declaration of every option: command line, worker and pipeline agree on names, defaults,
+choices and ranges.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,11 @@ from scope.scope_addon.capture.options import CaptureOptions, capture_options, c
 from scope.scope_addon.capture.perception.execution import CHOICES
 from scope.scope_addon.capture.perception.sessions import LANDMARK_NETWORK_OF_QUALITY
 from scope.scope_addon.cli import build_parser, main
-from scope.scope_addon.command_line.arguments import body_and_options, non_default_arguments, option_values
+from scope.scope_addon.command_line.arguments import (
+    body_and_options,
+    non_default_arguments,
+    option_values,
+)
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.job.request import JobRequest
 from scope.scope_addon.options import OPTIONS, Argument, Option, Place, option, options_at
@@ -24,8 +30,10 @@ from scope.solver.loaders.body_file import load_body
 
 # Listed again on purpose, because users' scripts rely on the flags.
 FLAGS = """
---quality --people --start --end --fps --body --hands --face --height --focal-mm --fov --calibration --no-smoothing
---uneven-ground --shape-keys --bvh-unit --file-per-person --retarget --rig-object --bone-map --expression-map
+--quality --people --start --end --fps --body --hands --face --height --focal-mm --fov --calibration
+--no-smoothing
+--uneven-ground --shape-keys --bvh-unit --file-per-person --retarget --rig-object --bone-map
+--expression-map
 --retarget-root --detector --keypoints --provider --threads --json --quiet
 """.split()
 EXTRA = Option(
@@ -79,7 +87,8 @@ def test_command_line_and_worker_have_the_same_defaults():
 
 def test_the_typed_fields_of_the_pipeline_are_the_declared_options():
     fields = {field.name for field in dataclasses.fields(CaptureOptions)}
-    # wanted: start, end and fps; window_s: of long clips, which the parts of one on several machines have in common
+    # wanted: start, end and fps; window_s: of long clips, which the parts of one on several
+    # machines have in common
     assert fields == {each.name for each in options_at(Place.CAPTURE)} | {"wanted", "window_s"}
     for each in options_at(Place.CAPTURE | Place.WORKER):
         assert getattr(CaptureOptions(), each.name) == each.default
@@ -92,7 +101,9 @@ def test_the_choices_are_those_of_the_code_behind_them():
     assert option("retarget_root").values == ROOTS
 
 
-@pytest.mark.parametrize(("name", "step"), [("focal_mm", 0.01), ("fov_deg", 0.01), ("threads", 1), ("people", 1)])
+@pytest.mark.parametrize(
+    ("name", "step"), [("focal_mm", 0.01), ("fov_deg", 0.01), ("threads", 1), ("people", 1)]
+)
 def test_the_declared_range_is_what_the_capture_accepts(body, name, step):
     declared = option(name)
     for limit, outside in ((declared.minimum, -step), (declared.maximum, step)):
@@ -118,10 +129,28 @@ def test_heights_outside_the_declared_range_are_errors(body, outside):
 
 def test_arguments_reach_the_pipeline(tmp_path):
     lens = tmp_path / "lens.json"
-    argv = ["--quality", "fast", "--people", "2", "--start", "1.5", "--end", "3", "--fps", "12", "--fov", "60"]
+    argv = [
+        "--quality",
+        "fast",
+        "--people",
+        "2",
+        "--start",
+        "1.5",
+        "--end",
+        "3",
+        "--fps",
+        "12",
+        "--fov",
+        "60",
+    ]
     argv += ["--height", "175,162", "--no-smoothing", "--threads", "2", "--provider", "cpu"]
     options = body_and_options(parsed(*argv))[1]
-    assert (options.quality, options.people, options.fov_deg, options.threads) == ("fast", 2, 60.0, 2)
+    assert (options.quality, options.people, options.fov_deg, options.threads) == (
+        "fast",
+        2,
+        60.0,
+        2,
+    )
     assert (options.wanted.start_s, options.wanted.end_s, options.wanted.fps) == (1.5, 3.0, 12)
     assert options.heights_m == pytest.approx((1.75, 1.62))
     assert (options.smoothing, options.provider, options.focal_mm) == (False, "cpu", None)
@@ -176,7 +205,19 @@ def test_hands_that_are_none_of_the_choices_are_an_error(body):
 
 
 def test_a_batch_passes_on_only_arguments_that_were_given():
-    argv = ["batch", ".", "--out", ".", "--jobs", "2", "--json", "--quiet", "--no-smoothing", "--people", "all"]
+    argv = [
+        "batch",
+        ".",
+        "--out",
+        ".",
+        "--jobs",
+        "2",
+        "--json",
+        "--quiet",
+        "--no-smoothing",
+        "--people",
+        "all",
+    ]
     argv += ["--height", "175,162", "--quality", "best"]  # the last is the default
     given = non_default_arguments(build_parser().parse_args(argv))
     assert given == {"--no-smoothing": None, "--people": "all", "--height": "175,162"}
@@ -217,8 +258,11 @@ def test_the_declarations_load_nothing_but_the_standard_library():
         "import importlib.util, sys\n"
         "before = set(sys.modules)\n"
         "import scope.scope_addon.options\n"
-        "loaded = {n.split('.')[0] for n in set(sys.modules) - before} - set(sys.stdlib_module_names)\n"
+        "loaded = {n.split('.')[0] for n in set(sys.modules) - before} - "
+        "set(sys.stdlib_module_names)\n"
         "print(sorted(loaded))\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd="/")
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd="/"
+    )
     assert done.stdout.strip() == "['scope']"

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The page about a capture as a browser's parser sees it: well-formed, escaped, small, and without any request."""
+"""The page about a capture as a browser's parser sees it: well-formed, escaped, small, and without
+any request.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,9 @@ W, H, FRAMES = 96, 64, 9
 
 
 class Page(HTMLParser):
-    """Every element with its attributes and text; fails on elements that are not closed in order."""
+    """Every element with its attributes and text; fails on elements that are not closed in
+    order.
+    """
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -61,7 +65,13 @@ class Page(HTMLParser):
 
 
 def report(people: int = 1, **given) -> dict:
-    found = {"people": people, "quality": "best", "body": "scope", "camera": "estimated", "execution": "CPU, 2 threads"}
+    found = {
+        "people": people,
+        "quality": "best",
+        "body": "scope",
+        "camera": "estimated",
+        "execution": "CPU, 2 threads",
+    }
     rates = {"frame_rate": [30, 1], "fps": {"total": 12.3}, "reprojection_px": 2.5, "warnings": []}
     return {**found, **rates, **given}
 
@@ -69,8 +79,12 @@ def report(people: int = 1, **given) -> dict:
 def clip(body, video: Path, people: int = 1, **given) -> CapturedClip:
     trans = np.tile([0.0, 0, 0.95] - body.rest_joints()[0], (FRAMES, 1))
     valid = np.arange(FRAMES) != 4
-    motion = made_motion(body, np.zeros((FRAMES, 3 * (body.K + 1))), trans, valid=valid, image_size=np.array([W, H]))
-    return CapturedClip(video, [motion] * people, body, report(people, **given), f"scope capture '{HOSTILE}'")
+    motion = made_motion(
+        body, np.zeros((FRAMES, 3 * (body.K + 1))), trans, valid=valid, image_size=np.array([W, H])
+    )
+    return CapturedClip(
+        video, [motion] * people, body, report(people, **given), f"scope capture '{HOSTILE}'"
+    )
 
 
 @pytest.fixture
@@ -98,20 +112,35 @@ def test_the_page_is_well_formed_and_all_that_users_name_is_text(body, people):
     tags = [tag for tag, _ in page.elements]
     assert tags.count("img") == 3
     assert tags.count("script") == 5
-    assert not [name for _, attributes in page.elements for name in attributes if name.startswith("on")]
+    assert not [
+        name for _, attributes in page.elements for name in attributes if name.startswith("on")
+    ]
     assert len(text) < 2_000_000
 
 
 def test_the_page_requests_nothing(body):
-    text = capture_page(clip(body, Path("a.mp4")), np.arange(FRAMES), [small_picture(0, np.zeros((H, W, 3), np.uint8))])
+    text = capture_page(
+        clip(body, Path("a.mp4")),
+        np.arange(FRAMES),
+        [small_picture(0, np.zeros((H, W, 3), np.uint8))],
+    )
     page = Page(text)
-    named = [a[name] for _, a in page.elements for name in ("src", "href", "srcset", "action", "data") if name in a]
+    named = [
+        a[name]
+        for _, a in page.elements
+        for name in ("src", "href", "srcset", "action", "data")
+        if name in a
+    ]
     assert named
     assert all(value.startswith("data:") for value in named)
-    policy = next(a["content"] for _, a in page.elements if a.get("http-equiv") == "Content-Security-Policy")
+    policy = next(
+        a["content"] for _, a in page.elements if a.get("http-equiv") == "Content-Security-Policy"
+    )
     assert policy.startswith("default-src 'none';")
     assert "http" not in policy
-    assert not re.search(r"(https?:)?//\w|@import|url\(|fetch\(|XMLHttpRequest|import\(", text.split('id="data"')[0])
+    assert not re.search(
+        r"(https?:)?//\w|@import|url\(|fetch\(|XMLHttpRequest|import\(", text.split('id="data"')[0]
+    )
 
 
 def test_the_data_of_the_view_is_json_that_cannot_end_its_element(body):
@@ -125,7 +154,10 @@ def test_times_in_warnings_lead_to_their_frames_and_the_text_stays_as_printed():
     said = f"a.mp4 cuts to another scene {at_times([2.0, 4.1])}: capture each scene separately"
     page = Page("".join(warning_list([said])))
     assert [a["data-time"] for tag, a in page.elements if tag == "button"] == ["2.0000", "4.1000"]
-    assert "".join(page.texts["li"][:1] + page.texts["button"][:1]) == "a.mp4 cuts to another scene at 2.0 s"
+    assert (
+        "".join(page.texts["li"][:1] + page.texts["button"][:1])
+        == "a.mp4 cuts to another scene at 2.0 s"
+    )
     assert "".join(re.sub("<[^>]*>", "", "".join(warning_list([said])))).strip() == said
 
 
@@ -133,7 +165,9 @@ def test_warnings_are_marked_at_their_times(body):
     text = f"a.mp4 cuts to another scene {at_times([0.2, 9.0])}"  # the clip ends at 8/30 s
     page = capture_page(clip(body, Path("a.mp4"), warnings=[text]), np.arange(FRAMES), [])
     marks = re.findall(
-        r'<rect class="span warned" x="([\d.]+)" y="0" width="([\d.]+)" height="100"><title>([^<]*)<', page
+        r'<rect class="span warned" x="([\d.]+)" y="0" width="([\d.]+)" '
+        r'height="100"><title>([^<]*)<',
+        page,
     )
     assert marks == [("750.0", "1.5", text)] * 2  # in both plots of lines
 
@@ -178,7 +212,12 @@ def test_a_captured_face_is_shown_over_time(body):
     (motion,) = about.motions
     blink = (np.arange(FRAMES) == 3).astype(float)
     talking = replace(motion, face=made_face(FRAMES, jawOpen=0.25, eyeBlinkLeft=blink))
-    assert [name for name, _ in face_rows(talking)] == ["jaw open", "left eye shut", "right eye shut", "confidence"]
+    assert [name for name, _ in face_rows(talking)] == [
+        "jaw open",
+        "left eye shut",
+        "right eye shut",
+        "confidence",
+    ]
     for (_, values), expected in zip(face_rows(talking), (0.25, blink, 0.0, 1.0), strict=True):
         np.testing.assert_allclose(values, np.broadcast_to(expected, FRAMES))
     figures = over_time([talking])

@@ -20,7 +20,9 @@ def test_a_picture_is_a_small_webp_of_the_same_content():
     picture = small_picture(7, image)
     assert (picture.row, picture.width, picture.height) == (7, 800, 500)
     assert picture.url.startswith("data:image/webp;base64,")
-    back = cv2.cvtColor(cv2.imdecode(np.frombuffer(picture.content, np.uint8), cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
+    back = cv2.cvtColor(
+        cv2.imdecode(np.frombuffer(picture.content, np.uint8), cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB
+    )
     assert back.shape == (500, 800, 3)
     assert np.abs(back[250, 600].astype(int) - (250, 60, 20)).max() < 12
     assert back[250, 200].max() < 12

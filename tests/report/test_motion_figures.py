@@ -12,21 +12,28 @@ from ..made_motion import made_motion
 def test_a_walk_of_known_length_and_speed(body):
     T = 61
     trans = np.zeros((T, 3))
-    trans[:, 0] = np.minimum(np.arange(T), 30) / 30 * 1.5  # 1.5 m in a second, then a second of standing
+    # 1.5 m in a second, then a second of standing
+    trans[:, 0] = np.minimum(np.arange(T), 30) / 30 * 1.5
     trans[:, 2] = 0.9 - body.rest_joints()[0, 2]
     contact = np.zeros((T, 4))
     contact[31:, 1] = 1.0
     residual = np.r_[np.full(T - 1, 4.0), 100.0]
     valid = np.arange(T) < T - 1
     motion = made_motion(
-        body, np.zeros((T, 3 * (body.K + 1))), trans, foot_contact=contact, residual_px=residual, valid=valid
+        body,
+        np.zeros((T, 3 * (body.K + 1))),
+        trans,
+        foot_contact=contact,
+        residual_px=residual,
+        valid=valid,
     )
     figures = motion_figures(motion, body)
     assert figures["Frames seen"] == "60 of 61"
     assert figures["Path over the floor"] == "1.50 m"
     assert figures["Highest speed"] == "1.50 m/s"
     assert figures["Pelvis height"] == "0.90 to 0.90 m"
-    assert figures["Reprojection error, mean"] == "4.0 px"  # of the frames in which the person was seen
+    # of the frames in which the person was seen
+    assert figures["Reprojection error, mean"] == "4.0 px"
     assert figures["Left foot in contact"] == "49 % of frames"
     assert figures["Right foot in contact"] == "0 % of frames"
     assert figures["Frames to review"] == "1"

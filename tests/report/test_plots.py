@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Coordinates of plots against values worked out by hand: the plot area is 1000 wide and 100 high, y downwards."""
+"""Coordinates of plots against values worked out by hand: the plot area is 1000 wide and 100 high,
+y downwards.
+"""
 
 from __future__ import annotations
 
@@ -8,11 +10,27 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from scope.scope_addon.report.plots import Axis, Curve, Span, area_path, band_plot, line_path, line_plot, thinned
+from scope.scope_addon.report.plots import (
+    Axis,
+    Curve,
+    Span,
+    area_path,
+    band_plot,
+    line_path,
+    line_plot,
+    thinned,
+)
 
 
 def points(path: str) -> list[tuple[str, float, float]]:
-    return [(pen, float(x), float(y)) for pen, x, y in re.findall(r"([ML])([-\d.]+) ([-\d.]+)", path)]
+    return [
+        (pen, float(x), float(y))
+        for pen, x, y in re.findall(
+            r"([ML])([-\d.]+) "
+            r"([-\d.]+)",
+            path,
+        )
+    ]
 
 
 def test_a_curve_lies_where_its_values_are():
@@ -22,7 +40,10 @@ def test_a_curve_lies_where_its_values_are():
 
 def test_a_logarithmic_axis_gives_every_decade_the_same_height():
     path = line_path(
-        np.array([0.0, 1.0, 2.0]), np.array([1.0, 10.0, 100.0]), Axis(0, 2), Axis(1, 100, logarithmic=True)
+        np.array([0.0, 1.0, 2.0]),
+        np.array([1.0, 10.0, 100.0]),
+        Axis(0, 2),
+        Axis(1, 100, logarithmic=True),
     )
     assert points(path) == [("M", 0, 100), ("L", 500, 50), ("L", 1000, 0)]
 

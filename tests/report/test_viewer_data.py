@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the 3D view reads back from the page's quantized arrays, against the motion and the body themselves."""
+"""What the 3D view reads back from the page's quantized arrays, against the motion and the body
+themselves.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +49,9 @@ def test_joints_and_skin_of_the_page_are_those_of_the_body(body):
     found = body.forward_kinematics(R, t, betas)
     assert np.abs(found[1] - wanted[1]).max() < 5e-4
     V = len(body.v_template)
-    positions = np.array(person["low"]) + decoded(person["positions"], "<u2", V, 3) * np.array(person["step"])
+    positions = np.array(person["low"]) + decoded(person["positions"], "<u2", V, 3) * np.array(
+        person["step"]
+    )
     assert np.abs(positions - body.rest_vertices(betas)).max() < 3e-5
     assert np.abs(np.array(person["rest"]) - body.rest_joints(betas)).max() < 1e-6
     weights = decoded(data["skinWeights"], "u1", V, 4)
@@ -69,7 +73,9 @@ def test_numbers_are_little_endian():
 
 def test_a_very_long_clip_is_thinned(body):
     T = 30_000
-    motion = made_motion(body, np.zeros((T, 3 * (body.K + 1)), np.float32), np.zeros((T, 3), np.float32))
+    motion = made_motion(
+        body, np.zeros((T, 3 * (body.K + 1)), np.float32), np.zeros((T, 3), np.float32)
+    )
     rows = shown_rows([motion])
     assert rows[:3].tolist() == [0, 2, 4]
     assert shown_rows([motion, motion])[:3].tolist() == [0, 4, 8]

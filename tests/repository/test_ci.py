@@ -16,7 +16,8 @@ import pytest
 from ..required import package
 
 ROOT = Path(__file__).resolve().parents[2]
-AFTER_THE_BUILD = {"fuzz", "matrix", "browser"}  # what takes minutes otherwise, so that the build has begun
+# what takes minutes otherwise, so that the build has begun
+AFTER_THE_BUILD = {"fuzz", "matrix", "browser"}
 PREPARES = {"./scripts/setup", "./scripts/debian"}  # which the others call where they need it
 
 
@@ -27,7 +28,9 @@ def scripts(text: str) -> set[str]:
 def test_every_script_of_the_local_run_is_in_the_hosted_one() -> None:
     local = scripts((ROOT / ".ci" / "run").read_text("utf-8"))
     assert {"./scripts/check", "./scripts/test", "./scripts/gate", "./scripts/fuzz"} <= local
-    assert local - PREPARES == scripts((ROOT / ".github" / "workflows" / "ci.yml").read_text("utf-8"))
+    assert local - PREPARES == scripts(
+        (ROOT / ".github" / "workflows" / "ci.yml").read_text("utf-8")
+    )
 
 
 def run_locally(folder: Path, *failing: str) -> subprocess.CompletedProcess[str]:
@@ -36,17 +39,25 @@ def run_locally(folder: Path, *failing: str) -> subprocess.CompletedProcess[str]
         (folder / "scripts").mkdir(exist_ok=True)
         script = folder / name
         status = 3 if script.name in failing else 0
-        waits = "until test -s build/build.log; do sleep 0.05; done; " if script.name in AFTER_THE_BUILD else ""
+        waits = (
+            "until test -s build/build.log; do sleep 0.05; done; "
+            if script.name in AFTER_THE_BUILD
+            else ""
+        )
         script.write_text(f'#!/bin/sh\n{waits}echo "$0 $*," && exit {status}\n')
         script.chmod(0o755)
     (folder / ".ci").mkdir()
     shutil.copy2(ROOT / ".ci" / "run", folder / ".ci" / "run")
-    return subprocess.run([folder / ".ci" / "run"], capture_output=True, text=True, check=False, timeout=60)
+    return subprocess.run(
+        [folder / ".ci" / "run"], capture_output=True, text=True, check=False, timeout=60
+    )
 
 
 @pytest.mark.skipif(os.name == "nt", reason="the first bash there may be that of another Linux")
 @pytest.mark.parametrize("failing", ["debian", "build", "fuzz", "blender"])
-def test_a_failure_fails_the_local_run_and_is_shown_also_in_the_background(tmp_path: Path, failing: str) -> None:
+def test_a_failure_fails_the_local_run_and_is_shown_also_in_the_background(
+    tmp_path: Path, failing: str
+) -> None:
     done = run_locally(tmp_path, failing)
     assert done.returncode == 3
     assert f"./scripts/{failing} " in done.stdout
@@ -64,33 +75,50 @@ def test_a_failure_in_the_background_is_shown_beside_another(tmp_path: Path) -> 
 def test_the_local_run_builds_every_zip_before_the_extension_is_tested(tmp_path: Path) -> None:
     done = run_locally(tmp_path)
     assert done.returncode == 0, done.stderr
-    assert done.stdout.endswith("./scripts/build ,\n./scripts/blender ,\n")  # no platform: all of them
+    # no platform: all of them
+    assert done.stdout.endswith("./scripts/build ,\n./scripts/blender ,\n")
 
 
 def test_all_that_is_run_exists() -> None:
-    assert [name for name in scripts((ROOT / ".ci" / "run").read_text("utf-8")) if not (ROOT / name).is_file()] == []
+    assert [
+        name
+        for name in scripts((ROOT / ".ci" / "run").read_text("utf-8"))
+        if not (ROOT / name).is_file()
+    ] == []
 
 
 def test_actions_of_others_are_pinned_by_hash() -> None:
     """A tag can be moved to other code."""
-    used = re.findall(r"uses: (\S+)", (ROOT / ".github" / "workflows" / "ci.yml").read_text("utf-8"))
+    used = re.findall(
+        r"uses: (\S+)", (ROOT / ".github" / "workflows" / "ci.yml").read_text("utf-8")
+    )
     assert len(used) >= 3
-    assert [action for action in used if not re.fullmatch(r"[\w-]+/[\w-]+@[0-9a-f]{40}", action)] == []
+    assert [
+        action for action in used if not re.fullmatch(r"[\w-]+/[\w-]+@[0-9a-f]{40}", action)
+    ] == []
 
 
 def test_no_job_leaves_the_token_in_the_checkout() -> None:
     """Actions of others, tests and packages run in it, and nothing is pushed."""
-    jobs = package("yaml").safe_load((ROOT / ".github" / "workflows" / "ci.yml").read_text("utf-8"))["jobs"]
+    jobs = package("yaml").safe_load(
+        (ROOT / ".github" / "workflows" / "ci.yml").read_text("utf-8")
+    )["jobs"]
     steps = [step for job in jobs.values() for step in job["steps"]]
-    checkouts = [step["with"] for step in steps if step.get("uses", "").startswith("actions/checkout@")]
+    checkouts = [
+        step["with"] for step in steps if step.get("uses", "").startswith("actions/checkout@")
+    ]
     assert len(checkouts) == len(jobs)
-    assert [settings for settings in checkouts if settings.get("persist-credentials") is not False] == []
+    assert [
+        settings for settings in checkouts if settings.get("persist-credentials") is not False
+    ] == []
 
 
 @pytest.mark.skipif(os.name == "nt", reason="the first bash there may be that of another Linux")
 def test_every_step_is_a_script_that_bash_can_read() -> None:
     """With the values of the matrix filled in."""
-    jobs = package("yaml").safe_load((ROOT / ".github" / "workflows" / "ci.yml").read_text("utf-8"))["jobs"]
+    jobs = package("yaml").safe_load(
+        (ROOT / ".github" / "workflows" / "ci.yml").read_text("utf-8")
+    )["jobs"]
     checked = 0
     for job in jobs.values():
         for entry in job["strategy"]["matrix"]["include"]:
@@ -99,7 +127,9 @@ def test_every_step_is_a_script_that_bash_can_read() -> None:
                 for name, value in entry.items():
                     script = script.replace(f"${{{{ matrix.{name} }}}}", value)
                 assert "${{" not in script
-                done = subprocess.run(["bash", "-n"], input=script, capture_output=True, text=True, check=False)
+                done = subprocess.run(
+                    ["bash", "-n"], input=script, capture_output=True, text=True, check=False
+                )
                 assert done.returncode == 0, done.stderr
                 checked += bool(script)
     assert checked > 15
@@ -116,11 +146,19 @@ PathFinder.find_spec = classmethod(
 
 
 def test_what_runs_without_blender_can_be_collected_without_it(tmp_path: Path) -> None:
-    """On Windows and macOS; a test file that imports Blender's module would keep all the others from running."""
+    """On Windows and macOS; a test file that imports Blender's module would keep all the others
+    from running.
+    """
     workflow = (ROOT / ".github" / "workflows" / "ci.yml").read_text("utf-8")
-    (arguments,) = re.findall(r"python -m pytest --numprocesses auto --dist loadfile\n((?: +--ignore.*\n)+)", workflow)
+    (arguments,) = re.findall(
+        r"python -m pytest --numprocesses auto --dist loadfile\n((?: "
+        r"+--ignore.*\n)+)",
+        workflow,
+    )
     (tmp_path / "sitecustomize.py").write_text(WITHOUT_BLENDER)
     environment = dict(os.environ, PYTHONPATH=str(tmp_path), CI="1")
     command = [sys.executable, "-m", "pytest", "--collect-only", *shlex.split(arguments)]
-    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stdout[-3000:]

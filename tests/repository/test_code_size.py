@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Functions stay short enough to be read at once, and take few enough parameters to be called without looking up."""
+"""Functions stay short enough to be read at once, and take few enough parameters to be called
+without looking up.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 LINES, PARAMETERS, FILE_LINES = 60, 7, 500
 
-# Modules of compiled kernels: they take their arrays one by one, and a call between kernels may cost speed.
+# Modules of compiled kernels: they take their arrays one by one, and a call between kernels may
+# cost speed.
 KERNELS = {"scope_addon/capture/overlay/rasterizer.py"}
 # Called by Blender, which passes as many arguments.
 CALLED_BY_BLENDER = {"draw_item"}
@@ -18,12 +21,16 @@ CALLED_BY_BLENDER = {"draw_item"}
 def functions(path: Path) -> list[ast.FunctionDef | ast.AsyncFunctionDef]:
     """Every function of a file, methods and inner functions included."""
     tree = ast.parse(path.read_text("utf-8"))
-    return [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
+    return [
+        node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+    ]
 
 
 def parameters(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
     """How many a caller passes: all but ``self`` and ``cls``."""
-    names = [a.arg for a in (*function.args.posonlyargs, *function.args.args, *function.args.kwonlyargs)]
+    names = [
+        a.arg for a in (*function.args.posonlyargs, *function.args.args, *function.args.kwonlyargs)
+    ]
     return len(names) - (names[:1] in (["self"], ["cls"]))
 
 
@@ -45,7 +52,9 @@ def test_functions_are_short_and_take_few_parameters() -> None:
 
 def test_the_exceptions_exist() -> None:
     for name in KERNELS:
-        assert any("njit" in ast.unparse(d) for f in functions(ROOT / name) for d in f.decorator_list), name
+        assert any(
+            "njit" in ast.unparse(d) for f in functions(ROOT / name) for d in f.decorator_list
+        ), name
 
 
 def test_files_stay_readable() -> None:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The documentation against the program: every option and key defined once, every link alive, every code block run."""
+"""The documentation against the program: every option and key defined once, every link alive, every
+code block run.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,15 @@ from scope.scope_addon.capture.perception.adapters.keypoint_network import KEYPO
 from scope.scope_addon.cli import SAMPLE, build_parser, main
 from scope.scope_addon.command_line.arguments import body_and_options
 from scope.scope_addon.edit.pins.corrected_motion import with_corrections
-from scope.scope_addon.edit.pins.corrections import Contact, Exchange, FeetOnFloor, Floor, Interpolation, Pin, Upright
+from scope.scope_addon.edit.pins.corrections import (
+    Contact,
+    Exchange,
+    FeetOnFloor,
+    Floor,
+    Interpolation,
+    Pin,
+    Upright,
+)
 from scope.scope_addon.motion import CORRECTION_KEYS, FACE_KEYS, Motion
 from scope.scope_addon.scene.export.output_paths import check_output
 from scope.solver.loaders.body_file import BUILT_IN
@@ -41,8 +51,8 @@ _NOT_OURS = {".venv", "build", "node_modules", "__pycache__"}
 def pages_under(root: Path) -> list[Path]:
     """Return every Markdown file of the repository, without looking into folders of others.
 
-    A folder that is being built changes, or vanishes, while it is listed, and the processes that run these tests must
-    find the same files.
+    A folder that is being built changes, or vanishes, while it is listed, and the processes that
+    run these tests must find the same files.
     """
     pages = []
     for folder, inner, files in os.walk(root):
@@ -62,14 +72,28 @@ def without_code(text: str) -> str:
 
 def blocks(language: str) -> list:
     """(page, code) of every block of a language."""
-    found = [(page, m[2]) for page in PAGES for m in _BLOCK.finditer(page.read_text("utf-8")) if m[1] == language]
+    found = [
+        (page, m[2])
+        for page in PAGES
+        for m in _BLOCK.finditer(page.read_text("utf-8"))
+        if m[1] == language
+    ]
     return [pytest.param(code, id=f"{page.stem}-{k}") for k, (page, code) in enumerate(found)]
 
 
 def commands() -> list:
     """(words) of every line of the shell blocks."""
-    shell = [(page, m[2]) for page in PAGES for m in _BLOCK.finditer(page.read_text("utf-8")) if m[1] == "sh"]
-    words = [(page, shlex.split(line, comments=True)) for page, code in shell for line in code.splitlines()]
+    shell = [
+        (page, m[2])
+        for page in PAGES
+        for m in _BLOCK.finditer(page.read_text("utf-8"))
+        if m[1] == "sh"
+    ]
+    words = [
+        (page, shlex.split(line, comments=True))
+        for page, code in shell
+        for line in code.splitlines()
+    ]
     return [pytest.param(w, id=f"{page.stem}: {shlex.join(w)}") for page, w in words if w]
 
 
@@ -78,7 +102,9 @@ def tables(page: Path) -> list[tuple[str, list[list[str]]]]:
     found: list[tuple[str, list[list[str]]]] = []
     before = ""
     for line in _BLOCK.sub("", page.read_text("utf-8")).splitlines():
-        row = [cell.strip() for cell in line.strip("|").split("|")] if line.startswith("|") else None
+        row = (
+            [cell.strip() for cell in line.strip("|").split("|")] if line.startswith("|") else None
+        )
         if row and not before.startswith("|"):
             found.append((row[0], []))
         elif row and not re.fullmatch(r"[|\s:-]+", line):
@@ -89,7 +115,9 @@ def tables(page: Path) -> list[tuple[str, list[list[str]]]]:
 
 def options() -> dict[str, set[str]]:
     """Every option and positional argument of each command, without --help and what is hidden."""
-    subparsers = next(a for a in build_parser()._actions if isinstance(a, argparse._SubParsersAction))
+    subparsers = next(
+        a for a in build_parser()._actions if isinstance(a, argparse._SubParsersAction)
+    )
     return {
         command: {
             name
@@ -104,15 +132,22 @@ def options() -> dict[str, set[str]]:
 def defined(header: set[str]) -> Counter:
     """How often each name, and on which page, begins a row of a definition table."""
     rows = [
-        (page.name, row[0]) for page in ALL_PAGES for first, rows in tables(page) if first in header for row in rows
+        (page.name, row[0])
+        for page in ALL_PAGES
+        for first, rows in tables(page)
+        if first in header
+        for row in rows
     ]
-    return Counter((page, code.split()[0]) for page, cell in rows for code in re.findall(r"`([^`]+)`", cell))
+    return Counter(
+        (page, code.split()[0]) for page, cell in rows for code in re.findall(r"`([^`]+)`", cell)
+    )
 
 
 def test_the_tables_of_a_page_are_found(tmp_path):
     page = tmp_path / "page.md"
     page.write_text(
-        "| key | b |\n|---|---|\n| `x` | 1 |\n\n```text\n| key |\n```\n\n| other | b |\n|---|---|\n| y | 2 |\n"
+        "| key | b |\n|---|---|\n| `x` | 1 |\n\n```text\n| key |\n```\n\n| other | b "
+        "|\n|---|---|\n| y | 2 |\n"
     )
     assert tables(page) == [("key", [["`x`", "1"]]), ("other", [["y", "2"]])]
 
@@ -120,7 +155,9 @@ def test_the_tables_of_a_page_are_found(tmp_path):
 def test_every_option_is_defined_once_in_the_command_line_page():
     known = set().union(*options().values())
     assert {"-o", "--output", "VIDEO", "--jobs"} <= known
-    assert defined({"option", "argument"}) == Counter({("command_line.md", name): 1 for name in known})
+    assert defined({"option", "argument"}) == Counter(
+        {("command_line.md", name): 1 for name in known}
+    )
     elsewhere = [
         (page.name, row[0])
         for page in ALL_PAGES
@@ -133,7 +170,10 @@ def test_every_option_is_defined_once_in_the_command_line_page():
 
 
 def test_every_key_of_the_motion_file_is_defined_once():
-    keys = {field.name for field in fields(Motion)} - {"corrections", "face"} | {*CORRECTION_KEYS, *FACE_KEYS}
+    keys = {field.name for field in fields(Motion)} - {"corrections", "face"} | {
+        *CORRECTION_KEYS,
+        *FACE_KEYS,
+    }
     assert defined({"key"}) == Counter({("motion_file.md", key): 1 for key in keys})
 
 
@@ -151,20 +191,36 @@ def test_shapes_and_types_of_the_motion_file_are_as_documented(body, tmp_path):
     )
     motion = with_corrections(motion, body, changes)
     motion.save(tmp_path / "a.npz")
-    sizes = {"T": 7, "K": body.K, "P": body.P, "J": motion.keypoints2d.shape[1], "N": 1, "C": 1, "E": 2, "V": 1, "B": 1}
+    sizes = {
+        "T": 7,
+        "K": body.K,
+        "P": body.P,
+        "J": motion.keypoints2d.shape[1],
+        "N": 1,
+        "C": 1,
+        "E": 2,
+        "V": 1,
+        "B": 1,
+    }
     sizes |= {"I": 1, "S": 1}
     sizes |= {"W": len(EXPRESSIONS), "F": motion.face["face_landmarks"].size}
     sizes["U"] = len(motion.corrections["uncorrected_rows"])
-    rows = [row for first, rows in tables(DOCS / "motion_file.md") if first == "key" for row in rows]
+    rows = [
+        row for first, rows in tables(DOCS / "motion_file.md") if first == "key" for row in rows
+    ]
     with np.load(tmp_path / "a.npz") as file:
         for key, shape, kind, _ in rows:
             array = file[key.strip("`")]
             assert array.shape == eval(shape.replace("3(", "3*("), sizes), key
-            assert array.dtype.kind == "U" if kind == "string" else array.dtype == np.dtype(kind), key
+            assert array.dtype.kind == "U" if kind == "string" else array.dtype == np.dtype(kind), (
+                key
+            )
 
 
 def test_every_term_of_the_glossary_is_defined_once():
-    terms = [row[0] for first, rows in tables(DOCS / "glossary.md") if first == "term" for row in rows]
+    terms = [
+        row[0] for first, rows in tables(DOCS / "glossary.md") if first == "term" for row in rows
+    ]
     assert len(terms) > 50
     assert [term for term, count in Counter(terms).items() if count > 1] == []
 
@@ -184,11 +240,20 @@ def test_the_solvers_reference_is_up_to_date():
 def anchors(page: Path) -> set[str]:
     """As they are made from headings where the pages are shown."""
     headings = re.findall(r"^#+ (.+)$", _BLOCK.sub("", page.read_text("utf-8")), re.M)
-    return {re.sub(r"[^\w\- ]", "", re.sub(r"[`*]", "", h).lower()).replace(" ", "-") for h in headings}
+    return {
+        re.sub(r"[^\w\- ]", "", re.sub(r"[`*]", "", h).lower()).replace(" ", "-") for h in headings
+    }
 
 
 def test_folders_of_others_are_not_searched_for_pages(tmp_path):
-    for name in ("a.md", "docs/b.md", "build/c.md", "build/root/docs/d.md", ".venv/e.md", "docs/f.txt"):
+    for name in (
+        "a.md",
+        "docs/b.md",
+        "build/c.md",
+        "build/root/docs/d.md",
+        ".venv/e.md",
+        "docs/f.txt",
+    ):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).touch()
     assert pages_under(tmp_path) == [tmp_path / "a.md", tmp_path / "docs" / "b.md"]
@@ -212,7 +277,9 @@ def test_every_file_that_is_named_exists(page):
     text = _BLOCK.sub("", page.read_text("utf-8"))
     tops = "assets|benchmarks|docs|scope_addon|scripts|solver|tests|tools"
     for name in re.findall(rf"`(?:\./)?((?:{tops})/[\w./-]*)`", text):
-        assert any((folder / name).exists() for folder in (ROOT, page.parent)) or "height.py" in name, name
+        assert (
+            any((folder / name).exists() for folder in (ROOT, page.parent)) or "height.py" in name
+        ), name
 
 
 @pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda p: p.name)
@@ -233,7 +300,9 @@ def folder(tmp_path, monkeypatch):
 
 
 def parsed(words: list[str]) -> argparse.Namespace:
-    """A capture, batch or import, its footage and body replaced by the sample clip and the default body."""
+    """A capture, batch or import, its footage and body replaced by the sample clip and the default
+    body.
+    """
     start = words.index("scope") + 1 if words[0] == "blender" else 0
     argv = [Path(words[start]).name, *words[start + 1 :]]
     args = build_parser().parse_args(argv)
@@ -268,7 +337,11 @@ def test_the_first_capture_of_the_command_line_page_is_run(folder, capfd):
     (folder / "walk.mp4").symlink_to(SAMPLE)
     assert main([*words, "--quality", "fast", "--end", "0.3", "--json"]) == 0
     report = json.loads(capfd.readouterr().out)
-    written = [word for before, word in zip(words, words[1:], strict=False) if before in ("-o", "--overlay")]
+    written = [
+        word
+        for before, word in zip(words, words[1:], strict=False)
+        if before in ("-o", "--overlay")
+    ]
     assert len(written) == 3
     assert report["outputs"] and all((folder / name).stat().st_size > 0 for name in written)  # noqa: PT018
     entries = next(rows for first, rows in tables(DOCS / "command_line.md") if first == "entry")
@@ -278,9 +351,15 @@ def test_the_first_capture_of_the_command_line_page_is_run(folder, capfd):
 def session() -> list:
     """(words) of the captures in the README's session, but that for a rig, which the reader has."""
     readme = (ROOT / "README.md").read_text("utf-8")
-    lines = readme.partition("## A session in the shell\n\n```sh\n")[2].partition("```")[0].splitlines()
+    lines = (
+        readme.partition("## A session in the shell\n\n```sh\n")[2].partition("```")[0].splitlines()
+    )
     words = [shlex.split(line.removeprefix("./scripts/"), comments=True) for line in lines]
-    return [pytest.param(w, id=shlex.join(w)) for w in words if w[0] == "capture" and "--retarget" not in w]
+    return [
+        pytest.param(w, id=shlex.join(w))
+        for w in words
+        if w[0] == "capture" and "--retarget" not in w
+    ]
 
 
 @pytest.mark.usefixtures("blender_module")
@@ -288,7 +367,9 @@ def session() -> list:
 def test_the_captures_of_the_readme_are_run(words, folder):
     (folder / "walk.mp4").symlink_to(SAMPLE)
     assert main([*words, "--quality", "fast", "--end", "0.2", "--quiet"]) == 0
-    written = [word for before, word in zip(words, words[1:], strict=False) if before in ("-o", "--report")]
+    written = [
+        word for before, word in zip(words, words[1:], strict=False) if before in ("-o", "--report")
+    ]
     for name in written or ["walk.glb"]:
         assert (folder / name).stat().st_size > 1000
 
@@ -296,7 +377,9 @@ def test_the_captures_of_the_readme_are_run(words, folder):
 @pytest.mark.parametrize("code", blocks("python"))
 def test_every_python_block_runs(code, body, folder):
     seen = {"joints_cam": np.ones((3, body.K + 1, 3))}
-    made_motion(body, np.zeros((3, 3 * (body.K + 1))), np.zeros((3, 3)), **seen).save(folder / "walk.npz")
+    made_motion(body, np.zeros((3, 3 * (body.K + 1))), np.zeros((3, 3)), **seen).save(
+        folder / "walk.npz"
+    )
     index = list(body.keypoint_set("coco").values())[:17]
     state = solver.State.rest(body.K, body.P)
     rotations = np.concatenate([state.R_camera_root[None], state.Omega[-body.K :]])
@@ -306,7 +389,13 @@ def test_every_python_block_runs(code, body, folder):
     pixels = (points / points[:, 2:] @ K.T)[:, :2]
     confidence = np.ones(17)
     frame = solver.Measurements(K, keypoints2d=solver.Keypoints2D(index, pixels, confidence))
-    names = {"K": K, "pixels": pixels, "confidence": confidence, "frames": [frame] * 3, "times": [0.0, 0.04, 0.08]}
+    names = {
+        "K": K,
+        "pixels": pixels,
+        "confidence": confidence,
+        "frames": [frame] * 3,
+        "times": [0.0, 0.04, 0.08],
+    }
     exec(compile(code, "page", "exec"), names)
     if "fit" in names:
         error = np.linalg.norm(names["fit"].t_camera_part - t, axis=1)

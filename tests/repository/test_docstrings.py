@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Docstrings of public functions say what a caller cannot see: shapes of arrays, and errors.
 
-The source is parsed, not imported. A function's errors are those that it raises itself and those of the functions of
-its module, of private methods and, in the solver, of the checks in validation.py that it calls, unless it catches them.
-What a constructor takes and raises may be said by the docstring of its class.
+The source is parsed, not imported. A function's errors are those that it raises itself and those of
+the functions of its module, of private methods and, in the solver, of the checks in validation.py
+that it calls, unless it catches them. What a constructor takes and raises may be said by the
+docstring of its class.
 """
 
 import ast
@@ -18,13 +19,23 @@ ROOT = Path(__file__).resolve().parents[2]
 SOLVER = ROOT / "solver"
 CHECKS = SOLVER / "validation.py"
 PACKAGES = (SOLVER, ROOT / "scope_addon")
-# (n,), (..., 3), (K+1, 3, P), (M', 3), (), ...: extents are numbers, n, m, capitals and what is added to them.
-EXTENT = r"(?:\.\.\.|\d*\s?(?:[A-Z][A-Z_]*'?|[nmT]|count|None)(?:\s?[+-]\s?\w)*|\d+(?:\s?\+\s?[A-Z])*)"
+# (n,), (..., 3), (K+1, 3, P), (M', 3), (), ...: extents are numbers, n, m, capitals and what is
+# added to them.
+EXTENT = (
+    r"(?:\.\.\.|\d*\s?(?:[A-Z][A-Z_]*'?|[nmT]|count|None)(?:\s?[+-]\s?\w)*|\d+(?:\s?\+\s?[A-Z])*)"
+)
 SHAPE = re.compile(rf"\((?:|\.\.\.|{EXTENT},|{EXTENT}(?:, {EXTENT})+)\)")
 ARRAY = re.compile(r"\b(NDArray|ArrayLike|Array)\b")
 CONSTRUCTORS = ("__init__", "__post_init__")
 INTERNAL = {"AssertionError"}  # a mistake in the program, which no caller handles
-KERNELS = {"kernel", "allocating_kernel", "inlined_kernel", "expanded_kernel", "intrinsic", "compiled"}
+KERNELS = {
+    "kernel",
+    "allocating_kernel",
+    "inlined_kernel",
+    "expanded_kernel",
+    "intrinsic",
+    "compiled",
+}
 
 
 @dataclass(frozen=True)
@@ -39,14 +50,20 @@ class Function:
     @property
     def doc(self) -> str:
         own = ast.get_docstring(self.node) or ""
-        of_class = self.owner is not None and self.node.name in CONSTRUCTORS and ast.get_docstring(self.owner)
+        of_class = (
+            self.owner is not None
+            and self.node.name in CONSTRUCTORS
+            and ast.get_docstring(self.owner)
+        )
         return f"{own}\n{of_class or ''}"
 
     @property
     def array_parameters(self) -> list[str]:
         arguments = self.node.args
         everything = [*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs]
-        return [a.arg for a in everything if a.annotation and ARRAY.search(ast.unparse(a.annotation))]
+        return [
+            a.arg for a in everything if a.annotation and ARRAY.search(ast.unparse(a.annotation))
+        ]
 
     @property
     def is_compiled(self) -> bool:
@@ -54,7 +71,9 @@ class Function:
 
 
 def parse(tree: ast.Module, path: Path) -> list[Function]:
-    """The module's functions and the methods of its classes, private ones included; no nested functions."""
+    """The module's functions and the methods of its classes, private ones included; no nested
+    functions.
+    """
     found = []
     for node in tree.body:
         if isinstance(node, ast.FunctionDef):
@@ -92,7 +111,9 @@ def public_functions() -> dict[str, Function]:
 
 @cache
 def base_classes() -> dict[str, set[str]]:
-    """The direct base classes of every error of ours, by name; all are at the top of their modules."""
+    """The direct base classes of every error of ours, by name; all are at the top of their
+    modules.
+    """
     classes = [
         node
         for tree in trees().values()
@@ -103,25 +124,45 @@ def base_classes() -> dict[str, set[str]]:
 
 
 def with_bases(error: str) -> set[str]:
-    """An error's name and those of all its base classes that are ours, with Python's directly above them."""
+    """An error's name and those of all its base classes that are ours, with Python's directly above
+    them.
+    """
     return {error}.union(*(with_bases(base) for base in base_classes().get(error, ())))
 
 
 def last_name(node: ast.expr) -> str:
     """The name of a class or function, without the module or object before it."""
-    return node.id if isinstance(node, ast.Name) else node.attr if isinstance(node, ast.Attribute) else ""
+    return (
+        node.id
+        if isinstance(node, ast.Name)
+        else node.attr
+        if isinstance(node, ast.Attribute)
+        else ""
+    )
 
 
 @cache
 def groups_of_errors() -> dict[str, set[str]]:
     """What modules catch by the name of a tuple of errors at their top, such as ``_DAMAGED``."""
-    assigned = [node for tree in trees().values() for node in tree.body if isinstance(node, ast.Assign)]
-    tuples = [(node.targets[0], node.value.elts) for node in assigned if isinstance(node.value, ast.Tuple)]
-    return {name.id: set(map(last_name, kinds)) for name, kinds in tuples if isinstance(name, ast.Name)}
+    assigned = [
+        node for tree in trees().values() for node in tree.body if isinstance(node, ast.Assign)
+    ]
+    tuples = [
+        (node.targets[0], node.value.elts) for node in assigned if isinstance(node.value, ast.Tuple)
+    ]
+    return {
+        name.id: set(map(last_name, kinds)) for name, kinds in tuples if isinstance(name, ast.Name)
+    }
 
 
 def caught_by(handler: ast.ExceptHandler) -> set[str]:
-    kinds = handler.type.elts if isinstance(handler.type, ast.Tuple) else [handler.type] if handler.type else []
+    kinds = (
+        handler.type.elts
+        if isinstance(handler.type, ast.Tuple)
+        else [handler.type]
+        if handler.type
+        else []
+    )
     names = {last_name(kind) for kind in kinds} or {"BaseException"}
     return names.union(*(groups_of_errors().get(name, ()) for name in names))
 
@@ -135,15 +176,27 @@ Places = list[tuple[ast.Raise | ast.Call, frozenset[str]]]
 
 @cache
 def raising_places(node: ast.AST, caught: frozenset[str] = frozenset()) -> Places:
-    """The statements that raise and the calls below a node, each with the errors that are caught around it."""
+    """The statements that raise and the calls below a node, each with the errors that are caught
+    around it.
+    """
     if isinstance(node, ast.Try):
         inside = caught.union(*map(caught_by, node.handlers))
         rest = [*node.handlers, *node.orelse, *node.finalbody]
-        parts = [*(raising_places(n, inside) for n in node.body), *(raising_places(n, caught) for n in rest)]
+        parts = [
+            *(raising_places(n, inside) for n in node.body),
+            *(raising_places(n, caught) for n in rest),
+        ]
     elif isinstance(node, ast.With):
-        calls = [item.context_expr for item in node.items if isinstance(item.context_expr, ast.Call)]
-        inside = caught.union(*(map(last_name, call.args) for call in calls if last_name(call.func) == "suppress"))
-        parts = [*(raising_places(n, caught) for n in node.items), *(raising_places(n, inside) for n in node.body)]
+        calls = [
+            item.context_expr for item in node.items if isinstance(item.context_expr, ast.Call)
+        ]
+        inside = caught.union(
+            *(map(last_name, call.args) for call in calls if last_name(call.func) == "suppress")
+        )
+        parts = [
+            *(raising_places(n, caught) for n in node.items),
+            *(raising_places(n, inside) for n in node.body),
+        ]
     else:
         parts = [raising_places(child, caught) for child in ast.iter_child_nodes(node)]
     own: Places = [(node, caught)] if isinstance(node, ast.Raise | ast.Call) else []
@@ -159,13 +212,17 @@ def raised(function: Function, seen: frozenset[str] = frozenset()) -> set[str]:
             name = last_name(node.exc.func) if isinstance(node.exc, ast.Call) else ""
             found = {name} if name[:1].isupper() and name not in INTERNAL else set()
         elif (called := last_name(node.func)) and called not in seen:
-            found = found.union(*(raised(other, seen | {called}) for other in called_functions(function, node)))
+            found = found.union(
+                *(raised(other, seen | {called}) for other in called_functions(function, node))
+            )
         errors |= {error for error in found if not is_caught(error, caught)}
     return errors
 
 
 def called_functions(function: Function, call: ast.Call) -> list[Function]:
-    """The functions of the same module, the private methods and the solver's checks that a call may mean."""
+    """The functions of the same module, the private methods and the solver's checks that a call may
+    mean.
+    """
     called, near = last_name(call.func), modules()[function.module]
     if isinstance(call.func, ast.Attribute):
         return [f for f in near if called[0] == "_" and f.name.endswith(f".{called}")]
@@ -174,7 +231,16 @@ def called_functions(function: Function, call: ast.Call) -> list[Function]:
 
 
 def test_the_parser_finds_shapes_and_errors() -> None:
-    for text in ("(n,)", "(..., 3, 3)", "(K+1, 3, P)", "(M', 3)", "(...)", "(n, 8 + W)", "(count, 3, 3)", "(None, 3)"):
+    for text in (
+        "(n,)",
+        "(..., 3, 3)",
+        "(K+1, 3, P)",
+        "(M', 3)",
+        "(...)",
+        "(n, 8 + W)",
+        "(count, 3, 3)",
+        "(None, 3)",
+    ):
         assert SHAPE.search(text), text
     for text in ("exp(phi)", "(see below)", "(x, y, z)", "f(a, b)"):
         assert not SHAPE.search(text), text
@@ -193,7 +259,11 @@ def test_the_parser_finds_shapes_and_errors() -> None:
 def test_docstrings_give_the_shapes_of_arrays() -> None:
     with_arrays = {name: f for name, f in public_functions().items() if f.array_parameters}
     assert len(with_arrays) > 350
-    missing = {n: f.doc for n, f in with_arrays.items() if len(SHAPE.findall(f.doc)) < len(f.array_parameters)}
+    missing = {
+        n: f.doc
+        for n, f in with_arrays.items()
+        if len(SHAPE.findall(f.doc)) < len(f.array_parameters)
+    }
     assert missing == {}
 
 

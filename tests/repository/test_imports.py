@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Each package needs only its own libraries, and Scope works under two names; see also ``test_rooms``."""
+"""Each package needs only its own libraries, and Scope works under two names; see also
+``test_rooms``.
+"""
 
 import ast
 import subprocess
@@ -42,7 +44,7 @@ module = importlib.util.module_from_spec(spec)
 before = set(sys.modules)
 sys.modules[spec.name] = module
 spec.loader.exec_module(module)
-assert set(sys.modules) - before == {{spec.name}}, "the root package imports something at import time"
+assert set(sys.modules) - before == {{spec.name}}, "the root package imports something"
 importlib.import_module("bl_ext.user_default.scope.solver")
 importlib.import_module("bl_ext.user_default.scope.scope_addon.capture.pipeline")
 importlib.import_module("bl_ext.user_default.scope.scope_addon.cli")
@@ -51,7 +53,9 @@ assert not [name for name in sys.modules if name == "scope" or name.startswith("
 
 
 def run(code: str) -> None:
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd="/")
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd="/"
+    )
     assert done.returncode == 0, done.stderr[-2000:]
 
 
@@ -68,7 +72,9 @@ def test_rooms_without_blender(packages, forbidden):
 
 def test_the_scene_needs_no_networks_and_no_opencv():
     # os._exit, because Blender's module can hang in its exit handlers.
-    code = IMPORT_ALL.format(packages=["scope.scope_addon.scene"], forbidden={"cv2", "onnxruntime", "torch"})
+    code = IMPORT_ALL.format(
+        packages=["scope.scope_addon.scene"], forbidden={"cv2", "onnxruntime", "torch"}
+    )
     run(code + "\nimport os\nos._exit(0)")
 
 
@@ -97,7 +103,8 @@ def test_imports_are_relative():
     absolute = [
         f"{path.relative_to(ROOT).as_posix()}: 'import {module}' is not relative"
         for path in files
-        # The worker's start script runs by path, in a process where the package has not been loaded yet.
+        # The worker's start script runs by path, in a process where the package has not been loaded
+        # yet.
         if path.name != "start_worker.py"
         for level, module in imported(path)
         if module.split(".")[0] == "scope" and not level
@@ -106,7 +113,9 @@ def test_imports_are_relative():
 
 
 def test_no_operator_of_the_panel_opens_a_rigs_file():
-    """As the threat model says: Blender's importers run under limits in a shell, which its window could not have."""
+    """As the threat model says: Blender's importers run under limits in a shell, which its window
+    could not have.
+    """
     reads_files = {"load_rig", "check_rig", "export_on_rig", "rig_source", "RigSource"}
     for path in sources("scope_addon/ui"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -114,6 +123,8 @@ def test_no_operator_of_the_panel_opens_a_rigs_file():
                 assert not reads_files & {alias.name for alias in node.names}, path
     importers = ("import_scene", "libraries.load", "wm.append", "wm.link")
     readers = [
-        path.stem for path in sources("scope_addon") if any(name in path.read_text("utf-8") for name in importers)
+        path.stem
+        for path in sources("scope_addon")
+        if any(name in path.read_text("utf-8") for name in importers)
     ]
     assert readers == ["completeness", "rig_file"]  # the first reads what Scope has just written

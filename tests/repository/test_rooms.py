@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One table says which room may import which, directly or through others; nothing imports in a circle."""
+"""One table says which room may import which, directly or through others; nothing imports in a
+circle.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +13,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 PRODUCT = ("solver", "scope_addon")
 
-# Each room and the rooms that its files may import directly; what these may import in turn, it may reach as well.
-# A name stands for a file, or for a folder and everything below it, unless a longer name fits better.
+# Each room and the rooms that its files may import directly; what these may import in turn, it may
+# reach as well. A name stands for a file, or for a folder and everything below it, unless a longer
+# name fits better.
 SOLVER: dict[str, set[str]] = {"solver": set()}
 CAPTURE = {
     "scope_addon/capture/media": {"scope_addon/files"},
@@ -32,7 +35,8 @@ CAPTURE = {
 }
 ROOMS = {
     **SOLVER,
-    "scope_addon/files": {"solver"},  # the files directly in scope_addon that every room may use, see SHARED
+    # the files directly in scope_addon that every room may use, see SHARED
+    "scope_addon/files": {"solver"},
     "scope_addon/kinematics": {"scope_addon/files"},
     **CAPTURE,
     "scope_addon/options": {"scope_addon/files"},
@@ -46,7 +50,12 @@ ROOMS = {
     "scope_addon/cluster": {"scope_addon/job"},
     "scope_addon/report": {"scope_addon/capture/overlay", "scope_addon/kinematics"},
     "scope_addon/live": {"scope_addon/capture"},
-    "scope_addon/ui": {"scope_addon/scene", "scope_addon/job", "scope_addon/smpl_import", "scope_addon/cli"},
+    "scope_addon/ui": {
+        "scope_addon/scene",
+        "scope_addon/job",
+        "scope_addon/smpl_import",
+        "scope_addon/cli",
+    },
     "scope_addon/command_line": {
         "scope_addon/scene",
         "scope_addon/job",
@@ -57,16 +66,30 @@ ROOMS = {
     },
     "scope_addon/cli": {"scope_addon/command_line"},
 }
-SHARED = ("errors", "installed", "motion", "atomic_write", "footage", "counts", "json_file", "review_spans", "__init__")
+SHARED = (
+    "errors",
+    "installed",
+    "motion",
+    "atomic_write",
+    "footage",
+    "counts",
+    "json_file",
+    "review_spans",
+    "__init__",
+)
 LARGEST_FOLDER = 14  # Python files
-NOT_DRAWN = {"scope_addon/options", "scope_addon/files", "scope_addon/cli"}  # in docs/architecture.md, which says so
-PIPELINE = {"scope_addon/capture/stages", "scope_addon/capture/options"}  # a part of the box of that name
+# in docs/architecture.md, which says so
+NOT_DRAWN = {"scope_addon/options", "scope_addon/files", "scope_addon/cli"}
+# a part of the box of that name
+PIPELINE = {"scope_addon/capture/stages", "scope_addon/capture/options"}
 CAPTURE_FILES = 3  # directly in scope_addon/capture, beside its rooms
 
 
 def modules() -> list[str]:
     """Every module of the product, as a path without its suffix; a package is its folder."""
-    paths = (p.relative_to(ROOT).with_suffix("") for top in PRODUCT for p in (ROOT / top).rglob("*.py"))
+    paths = (
+        p.relative_to(ROOT).with_suffix("") for top in PRODUCT for p in (ROOT / top).rglob("*.py")
+    )
     return sorted((p.parent if p.name == "__init__" else p).as_posix() for p in paths)
 
 
@@ -83,18 +106,27 @@ def room(module: str) -> str:
 
 @cache
 def imported(module: str) -> frozenset[str]:
-    """The modules of the product that a module imports, also inside functions and for type checking."""
+    """The modules of the product that a module imports, also inside functions and for type
+    checking.
+    """
     path = ROOT / module
     package = (path / "__init__.py").is_file()
     base = module.split("/") if package else module.split("/")[:-1]
     found = set()
-    for node in ast.walk(ast.parse((path / "__init__.py" if package else path.with_suffix(".py")).read_text("utf-8"))):
+    for node in ast.walk(
+        ast.parse((path / "__init__.py" if package else path.with_suffix(".py")).read_text("utf-8"))
+    ):
         if isinstance(node, ast.ImportFrom) and node.level:
-            target = "/".join([*base[: len(base) - node.level + 1], *filter(None, (node.module or "").split("."))])
+            target = "/".join(
+                [*base[: len(base) - node.level + 1], *filter(None, (node.module or "").split("."))]
+            )
             for alias in node.names:
                 inner = f"{target}/{alias.name}"
-                # A folder alone may be left over from a package that was removed, with compiled modules in it.
-                is_module = (ROOT / inner / "__init__.py").is_file() or (ROOT / inner).with_suffix(".py").is_file()
+                # A folder alone may be left over from a package that was removed, with compiled
+                # modules in it.
+                is_module = (ROOT / inner / "__init__.py").is_file() or (ROOT / inner).with_suffix(
+                    ".py"
+                ).is_file()
                 found.add(inner if is_module else target)
     return frozenset(m for m in found if m.startswith(PRODUCT) and m != module)
 
@@ -123,14 +155,18 @@ def test_a_module_reaches_only_rooms_of_its_row() -> None:
                 if target not in seen:
                     seen.add(target)
                     if room(target) not in allowed:
-                        leaks.append(f"{' -> '.join((*chain, target))}: not in the row of {room(module)}")
+                        leaks.append(
+                            f"{' -> '.join((*chain, target))}: not in the row of {room(module)}"
+                        )
                     todo.append((target, (*chain, target)))
     assert leaks == []
 
 
 def test_the_table_has_no_circle_and_no_room_that_does_not_exist() -> None:
     for name, below in ROOMS.items():
-        assert not any(name in reachable(other) for other in below), f"{name} and a room of its row reach each other"
+        assert not any(name in reachable(other) for other in below), (
+            f"{name} and a room of its row reach each other"
+        )
         exists = (ROOT / name).is_dir() or (ROOT / f"{name}.py").is_file()
         assert exists or name in ("scope_addon/files", "scope_addon/cli"), f"{name} does not exist"
 
@@ -139,7 +175,9 @@ def test_no_module_imports_itself_through_others() -> None:
     done: set[str] = set()
 
     def visit(module: str, chain: tuple[str, ...]) -> None:
-        assert module not in chain, f"import circle: {' -> '.join((*chain[chain.index(module) :], module))}"
+        assert module not in chain, (
+            f"import circle: {' -> '.join((*chain[chain.index(module) :], module))}"
+        )
         if module not in done:
             for target in imported(module):
                 visit(target, (*chain, module))
@@ -150,8 +188,14 @@ def test_no_module_imports_itself_through_others() -> None:
 
 
 def room_drawn(name: str) -> str:
-    """The room that a box of the drawing stands for; `pipeline` is the folder with the list of stages."""
-    special = {"solver": "solver", "pipeline": "scope_addon/capture", "cli": "scope_addon/command_line"}
+    """The room that a box of the drawing stands for; `pipeline` is the folder with the list of
+    stages.
+    """
+    special = {
+        "solver": "solver",
+        "pipeline": "scope_addon/capture",
+        "cli": "scope_addon/command_line",
+    }
     folders = (f"{top}/{name}" for top in ("scope_addon", "scope_addon/capture"))
     return special.get(name) or next(folder for folder in folders if folder in ROOMS)
 
@@ -165,9 +209,11 @@ def test_the_drawing_of_the_rooms_is_the_table() -> None:
     for start, end in re.findall(r"^ +(\w+) --> (\w+)$", boxes, re.MULTILINE):
         arrows.setdefault(room_drawn(start), set()).add(room_drawn(end))
     drawn = {*arrows, *(end for ends in arrows.values() for end in ends)}
-    rooms = {name for name in ROOMS if name.count("/") == 1 or name.rpartition("/")[0] == "scope_addon/capture"} | {
-        "solver"
-    }
+    rooms = {
+        name
+        for name in ROOMS
+        if name.count("/") == 1 or name.rpartition("/")[0] == "scope_addon/capture"
+    } | {"solver"}
     assert drawn == rooms - PIPELINE - NOT_DRAWN
 
     def along(start: str) -> set[str]:
@@ -181,5 +227,7 @@ def test_folders_stay_small() -> None:
     tops = (*PRODUCT, "tests", "tools", "benchmarks", "scripts")
     folders = [p.parent for top in tops for p in (ROOT / top).rglob("*.py")]
     for folder in set(folders):
-        assert folders.count(folder) <= LARGEST_FOLDER, f"{folder.relative_to(ROOT)}: {folders.count(folder)} files"
+        assert folders.count(folder) <= LARGEST_FOLDER, (
+            f"{folder.relative_to(ROOT)}: {folders.count(folder)} files"
+        )
     assert folders.count(ROOT / "scope_addon" / "capture") <= CAPTURE_FILES

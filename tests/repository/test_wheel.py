@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The wheel contains the product and nothing else, and its solver works with only numpy and numba."""
+"""The wheel contains the product and nothing else, and its solver works with only numpy and
+numba.
+"""
 
 import os
 import shutil
@@ -71,9 +73,24 @@ def wheel(tmp_path_factory) -> Path:
     ignored = shutil.ignore_patterns("__pycache__", "*.onnx", "pictures", "guide", "sample")
     for name in (*PRODUCT, "assets", "tests", "tools", "benchmarks", "scripts"):
         shutil.copytree(ROOT / name, source / name, ignore=ignored)
-    for name in ("__init__.py", "setup.py", "pyproject.toml", "README.md", "LICENSE", "THIRD_PARTY.md"):
+    for name in (
+        "__init__.py",
+        "setup.py",
+        "pyproject.toml",
+        "README.md",
+        "LICENSE",
+        "THIRD_PARTY.md",
+    ):
         shutil.copy(ROOT / name, source)
-    command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--disable-pip-version-check", "--no-deps"]
+    command = [
+        sys.executable,
+        "-m",
+        "pip",
+        "wheel",
+        "--quiet",
+        "--disable-pip-version-check",
+        "--no-deps",
+    ]
     command += ["--no-build-isolation", "--wheel-dir", str(place), str(source)]
     built = subprocess.run(command, capture_output=True, text=True, check=False)
     assert built.returncode == 0, built.stderr
@@ -91,20 +108,28 @@ def installed(wheel, tmp_path_factory) -> Path:
         assert spec is not None
         assert spec.origin is not None
         package = Path(spec.origin).parent
-        for folder in (package, package.with_name(f"{name}.libs")):  # where wheels keep their shared libraries
+        # where wheels keep their shared libraries
+        for folder in (package, package.with_name(f"{name}.libs")):
             if folder.is_dir():
                 (packages / folder.name).symlink_to(folder, target_is_directory=True)
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(packages)
-    return next(path for path in (place / "bin" / "python", place / "Scripts" / "python.exe") if path.exists())
+    return next(
+        path
+        for path in (place / "bin" / "python", place / "Scripts" / "python.exe")
+        if path.exists()
+    )
 
 
 def run(python: Path, *arguments: str) -> subprocess.CompletedProcess:
     environment = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "COVERAGE"))}
-    # Machine code belongs to the content of sources, and the wheel's are those that other tests compile.
+    # Machine code belongs to the content of sources, and the wheel's are those that other tests
+    # compile.
     environment["NUMBA_CACHE_DIR"] = str(places()[0])
     command = [str(python), *arguments]
-    return subprocess.run(command, capture_output=True, text=True, check=False, cwd=python.parent, env=environment)
+    return subprocess.run(
+        command, capture_output=True, text=True, check=False, cwd=python.parent, env=environment
+    )
 
 
 def test_the_wheel_has_every_package_of_the_product_and_its_data(wheel):
@@ -112,28 +137,40 @@ def test_the_wheel_has_every_package_of_the_product_and_its_data(wheel):
         names = {name for name in archive.namelist() if ".dist-info/" not in name}
     modules = {name for name in names if name.endswith(".py")}
     assert {name.rpartition("/")[0] for name in modules} == folders() | {"scope"}
-    on_disk = {f"scope/{p.relative_to(ROOT).as_posix()}" for name in PRODUCT for p in (ROOT / name).rglob("*.py")}
+    on_disk = {
+        f"scope/{p.relative_to(ROOT).as_posix()}"
+        for name in PRODUCT
+        for p in (ROOT / name).rglob("*.py")
+    }
     assert modules == on_disk | {"scope/__init__.py"}
     assert names - modules == DATA
 
 
 def test_every_folder_of_modules_is_a_package():
     """A folder without `__init__.py` can be imported here, but would be missing in the wheel."""
-    assert [f for f in sorted(folders()) if not (ROOT / f.removeprefix("scope/") / "__init__.py").is_file()] == []
+    assert [
+        f
+        for f in sorted(folders())
+        if not (ROOT / f.removeprefix("scope/") / "__init__.py").is_file()
+    ] == []
 
 
 def test_the_wheel_requires_only_numpy_and_numba(wheel):
     with zipfile.ZipFile(wheel) as archive:
         metadata = next(name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
         lines = archive.read(metadata).decode().splitlines()
-    needed = [line.removeprefix("Requires-Dist: ") for line in lines if line.startswith("Requires-Dist: ")]
+    needed = [
+        line.removeprefix("Requires-Dist: ") for line in lines if line.startswith("Requires-Dist: ")
+    ]
     assert [name for name in needed if "extra ==" not in name] == ["numpy", "numba"]
 
 
 def test_the_extras_contain_every_package_of_a_missing_module():
     from scope.scope_addon.installed import EXTRAS
 
-    extras = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["optional-dependencies"]
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"][
+        "optional-dependencies"
+    ]
     assert set(EXTRAS.values()) == set(extras)
     assert set(EXTRAS) == {*CAPTURE_MODULES, "pythonosc", "distributed"}
 
@@ -145,10 +182,13 @@ def test_the_solver_fits_with_only_numpy_and_numba(installed):
     assert float(done.stdout) < 0.02
 
 
-@pytest.mark.parametrize("command", [["capture", "walk.mp4", "-o", "walk.npz"], ["batch", ".", "--out", "."]])
+@pytest.mark.parametrize(
+    "command", [["capture", "walk.mp4", "-o", "walk.npz"], ["batch", ".", "--out", "."]]
+)
 def test_the_command_line_reports_missing_packages(installed, command):
     done = run(installed, "-m", "scope.scope_addon", *command)
     assert done.returncode == 1
     assert done.stderr == (
-        "scope: cv2, onnxruntime, av must be installed for this: pip install 'scope-mocap[capture]'\n"
+        "scope: cv2, onnxruntime, av must be installed for this: pip install "
+        "'scope-mocap[capture]'\n"
     )

@@ -8,7 +8,9 @@ import zlib
 
 def array(kind, length, content, *, compressed=True, size=None):
     data = zlib.compress(content) if compressed else content
-    return kind + struct.pack("<III", length, compressed, len(data) if size is None else size) + data
+    return (
+        kind + struct.pack("<III", length, compressed, len(data) if size is None else size) + data
+    )
 
 
 def node(at, name, properties=(), children=()):
@@ -25,7 +27,10 @@ def node(at, name, properties=(), children=()):
 def fbx(path, *properties):
     header = b"Kaydara FBX Binary  \0\x1a\0" + struct.pack("<I", 7400)
     made = node(
-        27, b"Objects", [b"L" + bytes(8), b"S" + struct.pack("<I", 3) + b"abc"], [lambda at: node(at, b"A", properties)]
+        27,
+        b"Objects",
+        [b"L" + bytes(8), b"S" + struct.pack("<I", 3) + b"abc"],
+        [lambda at: node(at, b"A", properties)],
     )
     path.write_bytes(header + made + bytes(13) + b"footer of any content")
     return path
@@ -34,6 +39,11 @@ def fbx(path, *properties):
 def glb(path, gltf, binary=bytes(400)):
     text = json.dumps(gltf).encode()
     text += b" " * (-len(text) % 4)
-    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(binary), b"BIN\0") + binary
+    chunks = (
+        struct.pack("<I4s", len(text), b"JSON")
+        + text
+        + struct.pack("<I4s", len(binary), b"BIN\0")
+        + binary
+    )
     path.write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks)
     return path

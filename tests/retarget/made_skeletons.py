@@ -15,7 +15,9 @@ MAPPED = [name for name in NAMES if name in PARTS]
 VERTICAL = np.array([0.0, 0.0, 1.0])
 
 
-def body_rig(scale: float = 1.0, heading: float = 0.0, arms_down: float = 0.0, seed: int = 0) -> Skeleton:
+def body_rig(
+    scale: float = 1.0, heading: float = 0.0, arms_down: float = 0.0, seed: int = 0
+) -> Skeleton:
     """Return a rig with the body's joints at rest.
 
     :param scale: of its size.
@@ -38,7 +40,15 @@ def body_rig(scale: float = 1.0, heading: float = 0.0, arms_down: float = 0.0, s
     rng = np.random.default_rng(seed)
     tails = heads + 0.05 * scale * rng.normal(size=heads.shape)
     rotations = exp(rng.normal(size=(len(MAPPED), 3)))
-    return Skeleton(list(MAPPED), parents, parents, heads, tails, rotations, floor=scale * float(vertices[:, 2].min()))
+    return Skeleton(
+        list(MAPPED),
+        parents,
+        parents,
+        heads,
+        tails,
+        rotations,
+        floor=scale * float(vertices[:, 2].min()),
+    )
 
 
 def same_names() -> BoneMap:

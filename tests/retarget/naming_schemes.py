@@ -3,14 +3,18 @@
 
 # Parts in the order of a person's chains, with positions of the left side in a T-pose; metres.
 PLACES = {
-    "pelvis": (0, 0, 0.95), "spine1": (0, 0.01, 1.05), "spine2": (0, 0.02, 1.2), "spine3": (0, 0.01, 1.33),
+    "pelvis": (0, 0, 0.95), "spine1": (0, 0.01, 1.05), "spine2": (0, 0.02, 1.2),
+    "spine3": (0, 0.01, 1.33),
     "neck": (0, 0.02, 1.5), "head": (0, 0, 1.6), "hip": (0.1, 0, 0.9), "knee": (0.1, -0.01, 0.5),
-    "ankle": (0.1, 0.02, 0.08), "foot": (0.1, -0.12, 0.02), "collar": (0.04, 0.0, 1.44), "shoulder": (0.17, 0.02, 1.45),
+    "ankle": (0.1, 0.02, 0.08), "foot": (0.1, -0.12, 0.02), "collar": (0.04, 0.0, 1.44),
+    "shoulder": (0.17, 0.02, 1.45),
     "elbow": (0.43, 0.03, 1.45), "wrist": (0.68, 0.02, 1.45),
 }  # fmt: skip
 PARENTS = {
-    "spine1": "pelvis", "spine2": "spine1", "spine3": "spine2", "neck": "spine3", "head": "neck", "hip": "pelvis",
-    "knee": "hip", "ankle": "knee", "foot": "ankle", "collar": "spine3", "shoulder": "collar", "elbow": "shoulder",
+    "spine1": "pelvis", "spine2": "spine1", "spine3": "spine2", "neck": "spine3", "head": "neck",
+    "hip": "pelvis",
+    "knee": "hip", "ankle": "knee", "foot": "ankle", "collar": "spine3", "shoulder": "collar",
+    "elbow": "shoulder",
     "wrist": "elbow",
 }  # fmt: skip
 SIDED = ("hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist")
@@ -33,7 +37,16 @@ SCHEMES = {
     ),
     "mpfb": (
         ("root", "spine05", "spine03", "spine01", "neck01", "head"),
-        ("upperleg01", "lowerleg01", "foot", "toe1-1", "clavicle", "upperarm01", "lowerarm01", "wrist"),
+        (
+            "upperleg01",
+            "lowerleg01",
+            "foot",
+            "toe1-1",
+            "clavicle",
+            "upperarm01",
+            "lowerarm01",
+            "wrist",
+        ),
         lambda name, side: f"{name}.{side[0].upper()}" if side else name,
     ),
     "smpl": (
@@ -69,5 +82,7 @@ def names_of(scheme):
     centre, sided, spell = SCHEMES[scheme]
     found = {part: spell(name, "") for part, name in zip(CENTRE, centre, strict=True)}
     for side in ("left", "right"):
-        found |= {f"{side}_{part}": spell(name, side) for part, name in zip(SIDED, sided, strict=True)}
+        found |= {
+            f"{side}_{part}": spell(name, side) for part, name in zip(SIDED, sided, strict=True)
+        }
     return found

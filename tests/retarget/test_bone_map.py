@@ -22,9 +22,15 @@ def test_a_map_is_read_as_it_was_saved(tmp_path):
 @pytest.mark.parametrize(
     ("parts", "message"),
     [
-        ({**LEGS, "hips": "pelvis", "tail": "tail"}, "'tail' is mapped to 'tail', which is not a body part"),
+        (
+            {**LEGS, "hips": "pelvis", "tail": "tail"},
+            "'tail' is mapped to 'tail', which is not a body part",
+        ),
         ({**LEGS, "hips": "pelvis", "e": "left_hip"}, "'left_hip' has 2 bones, a and e"),
-        ({"hips": "pelvis", "a": "left_hip", "b": "left_knee"}, "no bone for right_hip, right_knee"),
+        (
+            {"hips": "pelvis", "a": "left_hip", "b": "left_knee"},
+            "no bone for right_hip, right_knee",
+        ),
     ],
 )
 def test_maps_that_no_motion_fits_are_neither_used_nor_written(tmp_path, parts, message):
@@ -45,7 +51,13 @@ def test_no_file_of_another_kind_is_overwritten(tmp_path):
 
 def _legs_and(pelvis):
     """A map of all required parts."""
-    bones = {"a": "left_hip", "b": "left_knee", "c": "right_hip", "d": "right_knee", "PELVIS": "pelvis"}
+    bones = {
+        "a": "left_hip",
+        "b": "left_knee",
+        "c": "right_hip",
+        "d": "right_knee",
+        "PELVIS": "pelvis",
+    }
     text = json.dumps({"format": "scope bone map", "version": 1, "bones": bones})
     return text.replace("PELVIS", pelvis)
 
@@ -57,9 +69,11 @@ def test_a_map_that_an_editor_has_marked_as_unicode_is_read(tmp_path):
 
 @pytest.mark.parametrize(
     "text",
-    ["", "[]", "{" * 5000, "[" * 100000, '{"format": "scope bone map", "version": 1, "bones": {"a": 3}}',
+    ["", "[]", "{" * 5000, "[" * 100000, '{"format": "scope bone map", "version": 1, "bones": '
+                                         '{"a": 3}}',
      '{"format": "scope bone map", "version": 1, "bones": {"a": "tail"}}',
-     '{"format": "scope bone map", "version": 1, "bones": {}}', '{"format": 1}', _legs_and(r"\ud800"),
+     '{"format": "scope bone map", "version": 1, "bones": '
+     '{}}', '{"format": 1}', _legs_and(r"\ud800"),
      _legs_and(r"a\u0000"), _legs_and("")],
 )  # fmt: skip
 def test_hostile_maps_are_refused(tmp_path, text):

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Expression maps: guessed from names that programs give, written and read, and what they make of weights."""
+"""Expression maps: guessed from names that programs give, written and read, and what they make of
+weights.
+"""
 
 from __future__ import annotations
 
@@ -18,11 +20,43 @@ from scope.solver.errors import InputError
 from scope.solver.names import EXPRESSIONS
 
 OCULUS = [
-    f"viseme_{v}" for v in ("sil", "PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa", "E", "I", "O", "U")
+    f"viseme_{v}"
+    for v in ("sil", "PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa", "E", "I", "O", "U")
 ]
-VRM0 = ["A", "I", "U", "E", "O", "Blink", "Blink_L", "Blink_R", "Joy", "Angry", "Sorrow", "Fun", "LookUp", "LookLeft"]
-VRM1 = ["aa", "ih", "ou", "ee", "oh", "blink", "blinkLeft", "blinkRight", "happy", "angry", "sad", "surprised"]
-VROID = [f"Face.M_F00_000_00_Fcl_{n}" for n in ("ALL_Joy", "EYE_Close", "EYE_Close_L", "EYE_Close_R", "MTH_A", "MTH_O")]
+VRM0 = [
+    "A",
+    "I",
+    "U",
+    "E",
+    "O",
+    "Blink",
+    "Blink_L",
+    "Blink_R",
+    "Joy",
+    "Angry",
+    "Sorrow",
+    "Fun",
+    "LookUp",
+    "LookLeft",
+]
+VRM1 = [
+    "aa",
+    "ih",
+    "ou",
+    "ee",
+    "oh",
+    "blink",
+    "blinkLeft",
+    "blinkRight",
+    "happy",
+    "angry",
+    "sad",
+    "surprised",
+]
+VROID = [
+    f"Face.M_F00_000_00_Fcl_{n}"
+    for n in ("ALL_Joy", "EYE_Close", "EYE_Close_L", "EYE_Close_R", "MTH_A", "MTH_O")
+]
 
 
 def weights(**values: float) -> np.ndarray:
@@ -79,7 +113,11 @@ def test_blinks_and_vowels_of_other_conventions(names, closed, open_mouth, round
 @pytest.mark.parametrize("key", ["Sorrow", "sad", "Face.M_F00_000_00_Fcl_BRW_Sorrow"])
 def test_sorrow_is_as_strong_as_the_brows_are_raised(key):
     found = guess_expression_map([key])
-    assert [found.values(weights(browInnerUp=value))[key][0] for value in (0.0, 0.4, 1.0)] == [0, 0.4, 1]
+    assert [found.values(weights(browInnerUp=value))[key][0] for value in (0.0, 0.4, 1.0)] == [
+        0,
+        0.4,
+        1,
+    ]
 
 
 def test_one_eye_alone():
@@ -88,12 +126,17 @@ def test_one_eye_alone():
 
 
 def test_other_names_are_not_guessed():
-    assert guess_expression_map(["Basis", "Key 1", "Bell", "viseme_sil", "viseme_DD", "smirk"]).keys == {}
+    assert (
+        guess_expression_map(["Basis", "Key 1", "Bell", "viseme_sil", "viseme_DD", "smirk"]).keys
+        == {}
+    )
 
 
 def test_what_is_written_is_read_and_other_files_are_kept(tmp_path):
     path, other = tmp_path / "face.json", tmp_path / "package.json"
-    written = ExpressionMap({"mund": {"jawOpen": 1.5, "mouthClose": -1.0}, "auge": {"eyeBlinkLeft": 1.0}})
+    written = ExpressionMap(
+        {"mund": {"jawOpen": 1.5, "mouthClose": -1.0}, "auge": {"eyeBlinkLeft": 1.0}}
+    )
     save_expression_map(written, path)
     assert load_expression_map(path).keys == written.keys
     save_expression_map(guess_expression_map(VRM1), path)
@@ -104,7 +147,9 @@ def test_what_is_written_is_read_and_other_files_are_kept(tmp_path):
 
 
 def test_controls_are_written_and_read(tmp_path):
-    written = ExpressionMap({}, {"jaw": {"pitch": {"jawOpen": 17.5}, "up": {"jawOpen": -0.5, "mouthClose": 0.5}}})
+    written = ExpressionMap(
+        {}, {"jaw": {"pitch": {"jawOpen": 17.5}, "up": {"jawOpen": -0.5, "mouthClose": 0.5}}}
+    )
     save_expression_map(written, tmp_path / "face.json")
     read = load_expression_map(tmp_path / "face.json")
     assert (read.keys, read.controls) == ({}, written.controls)
@@ -120,13 +165,19 @@ def test_controls_are_written_and_read(tmp_path):
         ({"shape_keys": {"a": {"jawopen": 1}}}, "'jawopen', which is not an expression"),
         ({"shape_keys": {"a": {"jawOpen": 1e9}}}, "use at most 10"),
         ({"shape_keys": {"a": {"jawOpen": float("nan")}}}, "use at most 10"),
-        ({"shape_keys": {"a": {"jawOpen": 10**400}}}, "not an expression map: .* a number of 401 digits"),
+        (
+            {"shape_keys": {"a": {"jawOpen": 10**400}}},
+            "not an expression map: .* a number of 401 digits",
+        ),
         ({"shape_keys": {}}, "no shape key and no control"),
         ({"controls": ["lip.B"]}, "'controls' must be an object"),
         ({"controls": {"lip.B": {"jawOpen": 1}}}, "'controls' must be an object"),
         ({"controls": {"lip.B": {"up": {"jawOpen": "1"}}}}, "'controls' must be an object"),
         ({"controls": {"lip\0": {"up": {"jawOpen": 1}}}}, "'controls' must be an object"),
-        ({"controls": {"lip.B": {"sideways": {"jawOpen": 1}}}}, "'sideways'; use one of left, up, forward, pitch"),
+        (
+            {"controls": {"lip.B": {"sideways": {"jawOpen": 1}}}},
+            "'sideways'; use one of left, up, forward, pitch",
+        ),
         (
             {"controls": {"lip.B": {"up": {"grin": 1}}}},
             "control 'lip.B' is mapped to 'grin', which is not an expression",

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""FBX files whose arrays unpack to more than they say, or whose nodes do not fit into each other, are refused."""
+"""FBX files whose arrays unpack to more than they say, or whose nodes do not fit into each other,
+are refused.
+"""
 
 import random
 import struct
@@ -14,7 +16,11 @@ from .made_files import array, fbx
 
 
 def test_a_whole_file_passes(tmp_path):
-    arrays = array(b"d", 3, bytes(24)), array(b"i", 2, bytes(8), compressed=False), array(b"b", 0, b"")
+    arrays = (
+        array(b"d", 3, bytes(24)),
+        array(b"i", 2, bytes(8), compressed=False),
+        array(b"b", 0, b""),
+    )
     check_fbx(fbx(tmp_path / "rig.fbx", *arrays, b"C\x01", b"R" + struct.pack("<I", 2) + b"ab"))
 
 
@@ -68,7 +74,9 @@ def test_random_damage_never_gives_a_traceback(tmp_path):
         data = bytearray(whole)
         for _ in range(chance.randint(1, 4)):
             data[chance.randrange(23, len(data))] = chance.randrange(256)
-        (tmp_path / "rig.fbx").write_bytes(data[: chance.choice((None, chance.randrange(len(data))))])
+        (tmp_path / "rig.fbx").write_bytes(
+            data[: chance.choice((None, chance.randrange(len(data))))]
+        )
         try:
             check_fbx(tmp_path / "rig.fbx")
         except InputError as error:

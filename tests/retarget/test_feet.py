@@ -7,7 +7,9 @@ from scope.scope_addon.retarget.feet import pelvis_drop
 
 
 def lowered(fps, seconds=2.0):
-    """Return times, needed and computed drop for a leg that is 5 cm too short for a fifth of a second."""
+    """Return times, needed and computed drop for a leg that is 5 cm too short for a fifth of a
+    second.
+    """
     times = np.arange(round(seconds * fps)) / fps
     needed = np.where(np.abs(times - 1.0) < 0.095, 0.05, 0.0)
     hips, goals = np.zeros((len(times), 1, 3)), np.zeros((len(times), 1, 3))
@@ -21,7 +23,8 @@ def test_the_pelvis_is_lowered_equally_smoothly_at_any_frame_rate(fps):
     assert (found >= needed - 1e-9).all()
     assert np.abs(np.gradient(found, times)).max() < 0.4
     assert 0.6 < (found > 1e-6).sum() / fps < 0.8
-    np.testing.assert_allclose(found[1:], found[:0:-1], atol=1e-12)  # as what is needed: the same backwards
+    # as what is needed: the same backwards
+    np.testing.assert_allclose(found[1:], found[:0:-1], atol=1e-12)
 
 
 def test_a_single_key_gets_its_own_drop():

@@ -10,9 +10,14 @@ import pytest
 from scope.scope_addon.retarget.fingers import find_fingers
 
 FINGERS = ("thumb", "index", "middle", "ring", "pinky")
-# Names of the left hand's bones as their makers give them, of each finger and its three phalanges from the knuckle on.
+# Names of the left hand's bones as their makers give them, of each finger and its three phalanges
+# from the knuckle on.
 NAMES = {
-    "Mixamo": ("mixamorig:LeftHand{finger}{k}", ("Thumb", "Index", "Middle", "Ring", "Pinky"), "123"),
+    "Mixamo": (
+        "mixamorig:LeftHand{finger}{k}",
+        ("Thumb", "Index", "Middle", "Ring", "Pinky"),
+        "123",
+    ),
     "Unreal": ("{finger}_0{k}_l", FINGERS, "123"),
     "Unity": (
         "Left{finger}{k}",
@@ -20,29 +25,50 @@ NAMES = {
         ("Proximal", "Intermediate", "Distal"),
     ),
     "VRoid": ("J_Bip_L_{finger}{k}", ("Thumb", "Index", "Middle", "Ring", "Little"), "123"),
-    "Character Creator": ("CC_Base_L_{finger}{k}", ("Thumb", "Index", "Mid", "Ring", "Pinky"), "123"),
+    "Character Creator": (
+        "CC_Base_L_{finger}{k}",
+        ("Thumb", "Index", "Mid", "Ring", "Pinky"),
+        "123",
+    ),
     "SMPL-X": ("left_{finger}{k}", FINGERS, "123"),
 }
 # Bones that lie among them and are no phalanges.
-OTHERS = ("palm_index_l", "f_index_master_l", "hand_ik_l", "LeftHandIndex_end", "middle_metacarpal_l", "thumb_twist_l")
+OTHERS = (
+    "palm_index_l",
+    "f_index_master_l",
+    "hand_ik_l",
+    "LeftHandIndex_end",
+    "middle_metacarpal_l",
+    "thumb_twist_l",
+)
 
 
 def hand(
     pattern: str, fingers: Sequence[str], phalanges: Sequence[str] = "123"
 ) -> tuple[list[str], np.ndarray, np.ndarray]:
-    """Return names, parents and rest heads of a wrist and its fingers, the thumb forward (-y), on an arm along +x."""
+    """Return names, parents and rest heads of a wrist and its fingers, the thumb forward (-y), on
+    an arm along +x.
+    """
     names, parents, heads = ["hand_l"], [-1], [(0.6, 0.0, 1.4)]
     for f, finger in enumerate(fingers):
         for k in (1, 2, 3):
             parents.append(0 if k == 1 else len(names) - 1)
             names.append(pattern.format(finger=finger, k=phalanges[k - 1]))
             along = 0.03 * k if f == 0 else 0.06 + 0.03 * k
-            heads.append((0.6 + 0.5 * along, -0.03 - along, 1.39) if f == 0 else (0.6 + along, 0.02 * (f - 2.5), 1.4))
+            heads.append(
+                (0.6 + 0.5 * along, -0.03 - along, 1.39)
+                if f == 0
+                else (0.6 + along, 0.02 * (f - 2.5), 1.4)
+            )
     return names, np.array(parents), np.array(heads)
 
 
 def expected(names: list[str]) -> dict[str, str]:
-    return {names[1 + 3 * f + k]: f"left_{finger}{k + 1}" for f, finger in enumerate(FINGERS) for k in range(3)}
+    return {
+        names[1 + 3 * f + k]: f"left_{finger}{k + 1}"
+        for f, finger in enumerate(FINGERS)
+        for k in range(3)
+    }
 
 
 @pytest.mark.parametrize("tool", NAMES)
@@ -76,7 +102,9 @@ def test_fingers_without_names_are_found_by_their_shape_in_any_order(turn):
     order = [0, *(1 + 3 * f + k for f in (3, 0, 4, 2, 1) for k in range(3))]
     place = {old: new for new, old in enumerate(order)}
     shuffled = np.array([place.get(int(parents[old]), -1) for old in order])
-    assert find_fingers([names[old] for old in order], shuffled, heads[order], {"left": 0}) == expected(names)
+    assert find_fingers(
+        [names[old] for old in order], shuffled, heads[order], {"left": 0}
+    ) == expected(names)
 
 
 def test_a_hand_without_fingers_or_with_four_has_none():

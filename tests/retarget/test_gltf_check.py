@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""glTF files that claim more than they hold, or name other files, are refused before an importer reads them."""
+"""glTF files that claim more than they hold, or name other files, are refused before an importer
+reads them.
+"""
 
 import copy
 import json
@@ -15,7 +17,10 @@ from .made_files import glb
 GLTF = {
     "asset": {"version": "2.0"},
     "buffers": [{"byteLength": 400}],
-    "bufferViews": [{"buffer": 0, "byteOffset": 16, "byteLength": 384}, {"buffer": 0, "byteLength": 16}],
+    "bufferViews": [
+        {"buffer": 0, "byteOffset": 16, "byteLength": 384},
+        {"buffer": 0, "byteLength": 16},
+    ],
     "accessors": [
         {"bufferView": 0, "componentType": 5126, "type": "MAT4", "count": 6},
         {
@@ -74,7 +79,9 @@ def test_files_beside_the_rig_are_used(tmp_path):
     (tmp_path / "textures").mkdir()
     (tmp_path / "textures" / "my skin.png").write_bytes(b"png")
     (tmp_path / "rig.bin").write_bytes(bytes(400))
-    gltf = changed("buffers", 0, "uri", to="rig.bin") | {"images": [{"uri": "textures/my%20skin.png"}]}
+    gltf = changed("buffers", 0, "uri", to="rig.bin") | {
+        "images": [{"uri": "textures/my%20skin.png"}]
+    }
     (tmp_path / "rig.gltf").write_text(json.dumps(gltf))
     check_gltf(tmp_path / "rig.gltf")
     (tmp_path / "rig.bin").write_bytes(bytes(399))
@@ -100,7 +107,11 @@ def test_other_files_are_not_read(tmp_path, uri, says, where):
     folder.mkdir()
     (tmp_path / "other.bin").write_bytes(bytes(400))
     (folder / "link.bin").symlink_to(tmp_path / "other.bin")
-    gltf = changed("buffers", 0, "uri", to=uri) if where == "buffers" else {**GLTF, "images": [{"uri": uri}]}
+    gltf = (
+        changed("buffers", 0, "uri", to=uri)
+        if where == "buffers"
+        else {**GLTF, "images": [{"uri": uri}]}
+    )
     with pytest.raises(InputError, match=says):
         check_gltf(glb(folder / "rig.glb", gltf))
 
@@ -120,7 +131,9 @@ def test_random_damage_never_gives_a_traceback(tmp_path):
         data = bytearray(whole)
         for _ in range(chance.randint(1, 5)):
             data[chance.randrange(len(data) - 400)] = chance.randrange(256)
-        (tmp_path / "rig.glb").write_bytes(data[: chance.choice((None, chance.randrange(len(data))))])
+        (tmp_path / "rig.glb").write_bytes(
+            data[: chance.choice((None, chance.randrange(len(data))))]
+        )
         try:
             check_gltf(tmp_path / "rig.glb")
         except InputError:

@@ -20,10 +20,15 @@ def bones_of(scheme: str, size: float = 1.0, drop: float = 0.0) -> tuple[RestBon
         x, y, z = PLACES[kind or part]
         if kind in ("elbow", "wrist"):
             sx, _, sz = PLACES["shoulder"]
-            x, z = sx + (x - sx) * np.cos(drop) + (z - sz) * np.sin(drop), sz - (x - sx) * np.sin(drop)
+            x, z = (
+                sx + (x - sx) * np.cos(drop) + (z - sz) * np.sin(drop),
+                sz - (x - sx) * np.sin(drop),
+            )
         heads.append((-x if side == "right" else x, y, z))
         parent = PARENTS.get(kind or part, "")
-        parents.append(order.index(f"{side}_{parent}" if parent in SIDED else parent) if parent else -1)
+        parents.append(
+            order.index(f"{side}_{parent}" if parent in SIDED else parent) if parent else -1
+        )
     rest = RestBones([bone_of[part] for part in order], np.array(parents), size * np.array(heads))
     return rest, {bone: part for part, bone in bone_of.items()}
 
@@ -84,7 +89,9 @@ def test_confidence_is_highest_where_names_and_shape_agree() -> None:
 
 
 def test_what_is_no_person_has_no_map() -> None:
-    chain = RestBones(["a", "b", "c"], np.array([-1, 0, 1]), np.array([[0, 0, z] for z in (0.0, 1.0, 2.0)]))
+    chain = RestBones(
+        ["a", "b", "c"], np.array([-1, 0, 1]), np.array([[0, 0, z] for z in (0.0, 1.0, 2.0)])
+    )
     assert guess(chain).parts == {}
 
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Legs that are bent for the ankle to reach a goal: lengths, the plane of the knee, and goals out of reach."""
+"""Legs that are bent for the ankle to reach a goal: lengths, the plane of the knee, and goals out
+of reach.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,8 @@ FRAMES = 200
 
 
 def bent_legs(axis: int) -> tuple[np.ndarray, ...]:
-    """Return rotations of thigh and shin, and hip, knee and ankle, of legs that hang along -y of their bones.
+    """Return rotations of thigh and shin, and hip, knee and ankle, of legs that hang along -y of
+    their bones.
 
     :param axis: of the bones, about which their knees are bent.
     """
@@ -39,7 +42,9 @@ def test_the_ankle_reaches_its_goal_and_no_bone_changes_its_length(legs):
     new_thigh, new_shin = solve_leg(thigh, shin, (hip, knee, ankle), goal, sideways)
     new_knee = hip - 0.42 * new_thigh[:, :, 1]
     np.testing.assert_allclose(new_knee - 0.38 * new_shin[:, :, 1], goal, atol=1e-9)
-    np.testing.assert_allclose(np.swapaxes(new_shin, 1, 2) @ new_shin, np.tile(np.eye(3), (FRAMES, 1, 1)), atol=1e-12)
+    np.testing.assert_allclose(
+        np.swapaxes(new_shin, 1, 2) @ new_shin, np.tile(np.eye(3), (FRAMES, 1, 1)), atol=1e-12
+    )
 
 
 @pytest.mark.parametrize(("axis", "other"), [(0, (2, 1)), (2, (1, 0))])

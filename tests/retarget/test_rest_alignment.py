@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A rig's rest pose in the body's T-pose: heading, arms of an A-pose, and feet that point outwards."""
+"""A rig's rest pose in the body's T-pose: heading, arms of an A-pose, and feet that point
+outwards.
+"""
 
 from __future__ import annotations
 
@@ -52,10 +54,14 @@ def test_hands_of_any_rest_pose_are_turned_until_the_palms_are_the_bodys(turn: f
     heads = rest.copy()
     for side, sign in (("left", 1.0), ("right", -1.0)):
         wrist = rest[names.index(f"{side}_wrist")]
-        of_hand = [i for i, name in enumerate(names) if name.startswith(f"{side}_") and name[-1] in "123"]
+        of_hand = [
+            i for i, name in enumerate(names) if name.startswith(f"{side}_") and name[-1] in "123"
+        ]
         heads[of_hand] = wrist + (heads[of_hand] - wrist) @ exp(np.array([sign * turn, 0.0, 0.0])).T
     parents, tails = np.asarray(body.parents), heads + [0.0, 0.0, 0.02]
-    rig = Skeleton(names, parents, parents, heads, tails, np.tile(np.eye(3), (len(names), 1, 1)), floor=0.0)
+    rig = Skeleton(
+        names, parents, parents, heads, tails, np.tile(np.eye(3), (len(names), 1, 1)), floor=0.0
+    )
     row = {name: i for i, name in enumerate(names)}
     A = rest_alignment(rig, names, row, rest, row, np.eye(3))
     for side in ("left", "right"):
@@ -77,8 +83,14 @@ def test_feet_are_turned_about_the_vertical_alone() -> None:
     heads = rig.heads.copy()
     for side, sign in (("left", 1.0), ("right", -1.0)):
         ankle, ball = ROW[f"{side}_ankle"], ROW[f"{side}_foot"]
-        heads[ball] = heads[ankle] + exp(sign * 0.5 * VERTICAL) @ (heads[ball] - heads[ankle]) + [0.0, 0.0, 0.02]
-    splayed = Skeleton(rig.names, rig.parents, rig.carriers, heads, rig.tails, rig.rotations, rig.floor)
+        heads[ball] = (
+            heads[ankle]
+            + exp(sign * 0.5 * VERTICAL) @ (heads[ball] - heads[ankle])
+            + [0.0, 0.0, 0.02]
+        )
+    splayed = Skeleton(
+        rig.names, rig.parents, rig.carriers, heads, rig.tails, rig.rotations, rig.floor
+    )
     A, _ = aligned(splayed)
     for side, sign in (("left", 1.0), ("right", -1.0)):
         np.testing.assert_allclose(A[ROW[f"{side}_ankle"]], exp(-sign * 0.5 * VERTICAL), atol=1e-3)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Channels and heads of a rig's bones, against a chain of 4 x 4 matrices as Blender multiplies them."""
+"""Channels and heads of a rig's bones, against a chain of 4 x 4 matrices as Blender multiplies
+them.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,9 @@ def random_rig(rng: np.random.Generator, bones: int = 6) -> Skeleton:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_channels_and_heads_give_the_world_rotations_when_blender_multiplies_them(seed: int) -> None:
+def test_channels_and_heads_give_the_world_rotations_when_blender_multiplies_them(
+    seed: int,
+) -> None:
     """Pose matrix of a bone = that of its parent x (parent's rest)^-1 x own rest x channel."""
     rng = np.random.default_rng(seed)
     rig = random_rig(rng)
@@ -37,7 +41,9 @@ def test_channels_and_heads_give_the_world_rotations_when_blender_multiplies_the
             rest = rigid(rig.rotations[b], rig.heads[b])
             before = np.eye(4)
             if parent >= 0:
-                before = posed[parent] @ np.linalg.inv(rigid(rig.rotations[parent], rig.heads[parent]))
+                before = posed[parent] @ np.linalg.inv(
+                    rigid(rig.rotations[parent], rig.heads[parent])
+                )
             posed.append(before @ rest @ rigid(channels[t, b], np.zeros(3)))
             np.testing.assert_allclose(posed[b], rigid(wanted[t, b], heads[t, b]), atol=1e-12)
 
@@ -50,10 +56,14 @@ def test_a_bone_that_inherits_no_rotation_still_moves_with_what_carries_it() -> 
     free = Skeleton(rig.names, parents, rig.carriers, rig.heads, rig.tails, rig.rotations)
     wanted = exp(rng.normal(size=(FRAMES, 3, 3)))
     np.testing.assert_allclose(head_positions(free, wanted), head_positions(rig, wanted))
-    np.testing.assert_allclose(free.rotations[2] @ basis(free, wanted)[:, 2], wanted[:, 2], atol=1e-12)
+    np.testing.assert_allclose(
+        free.rotations[2] @ basis(free, wanted)[:, 2], wanted[:, 2], atol=1e-12
+    )
 
 
 def test_a_rig_at_rest_has_no_channels() -> None:
     rig = random_rig(np.random.default_rng(3))
-    np.testing.assert_allclose(basis(rig, rig.rotations[None])[0], np.tile(np.eye(3), (6, 1, 1)), atol=1e-12)
+    np.testing.assert_allclose(
+        basis(rig, rig.rotations[None])[0], np.tile(np.eye(3), (6, 1, 1)), atol=1e-12
+    )
     np.testing.assert_allclose(head_positions(rig, rig.rotations[None])[0], rig.heads, atol=1e-12)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Motion on another skeleton: the body's own as a rig, in other proportions, headings and rest poses."""
+"""Motion on another skeleton: the body's own as a rig, in other proportions, headings and rest
+poses.
+"""
 
 from __future__ import annotations
 
@@ -13,15 +15,20 @@ from scope.solver.rotations import exp
 from ..edit.walking import BETAS, BODY, NAMES, walk
 from .made_skeletons import MAPPED, VERTICAL, body_rig, direction, same_names, turn_between
 
-LIMBS = [(f"{s}_{a}", f"{s}_{b}") for s in ("left", "right") for a, b in
-         (("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist"))]  # fmt: skip
+LIMBS = [
+    (f"{s}_{a}", f"{s}_{b}")
+    for s in ("left", "right")
+    for a, b in (("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist"))
+]
 CLIP = walk(2.0, bent=0.1)  # where legs are straight, a rig's bend by a few degrees
 JOINTS = CLIP.joints(BODY, BETAS)[:, [NAMES.index(name) for name in MAPPED]]
 
 
 @pytest.mark.parametrize("feet", [False, True])
 @pytest.mark.parametrize("seed", range(3))
-def test_the_bodys_own_skeleton_moves_as_the_body_whatever_the_axes_of_its_bones(feet: bool, seed: int) -> None:
+def test_the_bodys_own_skeleton_moves_as_the_body_whatever_the_axes_of_its_bones(
+    feet: bool, seed: int
+) -> None:
     pose = Transfer(BODY, BETAS, body_rig(seed=seed), same_names(), feet=feet).pose(CLIP)
     np.testing.assert_allclose(pose.heads, JOINTS, atol=2e-3)
     assert pose.facing == pytest.approx(0.0, abs=1e-3)
@@ -63,11 +70,15 @@ def test_travel_scales_positions_on_the_floor_and_legs_scale_heights(feet: bool)
     np.testing.assert_allclose(ours, theirs * [1.1, 1.1, 1.2], atol=5e-3)
     if feet:  # they stand still where the body's do
         ankles = [MAPPED.index(f"{side}_ankle") for side in ("left", "right")]
-        np.testing.assert_allclose(pose.heads[:, ankles, :2], 1.1 * JOINTS[:, ankles, :2], atol=0.02)
+        np.testing.assert_allclose(
+            pose.heads[:, ankles, :2], 1.1 * JOINTS[:, ankles, :2], atol=0.02
+        )
 
 
 def test_feet_go_below_the_floor_only_on_uneven_ground() -> None:
-    """A walk one metre down, as at the foot of stairs: hips and ankles of the rig are lower by its own metre."""
+    """A walk one metre down, as at the foot of stairs: hips and ankles of the rig are lower by its
+    own metre.
+    """
     lower = Clip(CLIP.times, CLIP.rotations, CLIP.root - VERTICAL)
     rig, ankles = body_rig(scale=1.7), [MAPPED.index(f"{side}_ankle") for side in ("left", "right")]
     above = Transfer(BODY, BETAS, rig, same_names()).pose(CLIP).heads
@@ -87,16 +98,24 @@ def test_a_rig_that_was_built_to_face_elsewhere_faces_where_the_body_does(headin
 
 @pytest.mark.parametrize("feet", [False, True])
 def test_limbs_of_a_rig_in_an_a_pose_point_where_the_bodys_do(feet: bool) -> None:
-    pose = Transfer(BODY, BETAS, body_rig(scale=0.6, heading=1.0, arms_down=0.8), same_names(), feet=feet).pose(CLIP)
+    pose = Transfer(
+        BODY, BETAS, body_rig(scale=0.6, heading=1.0, arms_down=0.8), same_names(), feet=feet
+    ).pose(CLIP)
     for first, second in LIMBS:
-        off = turn_between(direction(pose.heads, first, second, MAPPED), direction(JOINTS, first, second, MAPPED))
-        assert off.max() < np.radians(0.01 if not feet or "shoulder" in first or "elbow" in first else 3.0)
+        off = turn_between(
+            direction(pose.heads, first, second, MAPPED), direction(JOINTS, first, second, MAPPED)
+        )
+        assert off.max() < np.radians(
+            0.01 if not feet or "shoulder" in first or "elbow" in first else 3.0
+        )
 
 
 def test_no_bone_of_the_rig_changes_its_length() -> None:
     rig = body_rig(scale=1.3, arms_down=0.5)
     pose = Transfer(BODY, BETAS, rig, same_names()).pose(CLIP)
     children = np.flatnonzero(rig.carriers >= 0)
-    lengths = np.linalg.norm(pose.heads[:, children] - pose.heads[:, rig.carriers[children]], axis=-1)
+    lengths = np.linalg.norm(
+        pose.heads[:, children] - pose.heads[:, rig.carriers[children]], axis=-1
+    )
     at_rest = np.linalg.norm(rig.heads[children] - rig.heads[rig.carriers[children]], axis=-1)
     np.testing.assert_allclose(lengths, np.broadcast_to(at_rest, lengths.shape), atol=1e-9)

@@ -102,7 +102,9 @@ def dance(
         upright = Quaternion((1, 0, 0), np.pi / 2)
         axis, angle = (heading @ upright).to_axis_angle()
         w[t, 0] = np.array(axis) * angle
-    trans = np.array(offset) + np.stack([0.3 * timestamps, -0.8 * timestamps, 1.1 + 0.05 * timestamps], axis=1)
+    trans = np.array(offset) + np.stack(
+        [0.3 * timestamps, -0.8 * timestamps, 1.1 + 0.05 * timestamps], axis=1
+    )
     world_from_camera = np.tile(np.eye(4), (count, 1, 1))
     world_from_camera[:, :3, :3] = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
     world_from_camera[:, :3, 3] = [0.1, -4.0, 1.4]
@@ -194,14 +196,16 @@ def joints_world():
 
 @pytest.fixture(scope="session")
 def rigify_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A file with Rigify's metarig and a rig generated from it without the face, whose bones take nearly all the time.
+    """A file with Rigify's metarig and a rig generated from it without the face, whose bones take
+    nearly all the time.
 
     Once for all processes.
     """
     import addon_utils  # bpy puts it on the path
 
     path = tmp_path_factory.mktemp("rigify") / "rigs.blend"
-    if "PYTEST_XDIST_WORKER" in os.environ:  # this process's folder lies in the one of the whole run
+    # this process's folder lies in the one of the whole run
+    if "PYTEST_XDIST_WORKER" in os.environ:
         path = tmp_path_factory.getbasetemp().parent / "rigify.blend"
     if path.is_file():
         return path
@@ -225,7 +229,9 @@ def rigify_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def rigify_face_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A file with a rig that Rigify has generated from spine, head and face of its metarig, in a few seconds."""
+    """A file with a rig that Rigify has generated from spine, head and face of its metarig, in a
+    few seconds.
+    """
     import addon_utils  # bpy puts it on the path
 
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
@@ -258,7 +264,9 @@ def rigify_face(rigify_face_file: Path) -> bpy.types.Object:
 
 @pytest.fixture
 def rigify_rigs(rigify_file: Path) -> list[tuple[bpy.types.Object, str]]:
-    """Rigify's metarig and the rig generated from it, each with what its deforming bones' names begin with."""
+    """Rigify's metarig and the rig generated from it, each with what its deforming bones' names
+    begin with.
+    """
     with bpy.data.libraries.load(str(rigify_file)) as (found, wanted):
         wanted.scenes = found.scenes
     (scene,) = wanted.scenes

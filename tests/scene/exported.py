@@ -14,7 +14,9 @@ JOINT_TOLERANCE, SKIN_TOLERANCE = 1e-3, 2e-3  # metres
 
 
 def read_back(path: Path, rate: float = 30.0) -> float:
-    """Open the file in an empty scene of this rate; return the scene frame of the motion's first frame."""
+    """Open the file in an empty scene of this rate; return the scene frame of the motion's first
+    frame.
+    """
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     render = bpy.context.scene.render
     render.fps, render.fps_base = round(rate), round(rate) / rate
@@ -31,7 +33,8 @@ def read_back(path: Path, rate: float = 30.0) -> float:
             bpy.ops.wm.fbx_import(filepath=str(path))
             return 1.0
         bpy.ops.import_scene.fbx(filepath=str(path), anim_offset=0.0)
-        # The older importer counts seconds in whole frame rates: it puts 29.97's keys at 30 a second.
+        # The older importer counts seconds in whole frame rates: it puts 29.97's keys at 30 a
+        # second.
         stretch = rate / round(rate)
         for curve in [c for obj in bpy.data.objects for c in actions.fcurves(obj)]:
             coordinates = actions.read_keys(curve)
@@ -45,7 +48,9 @@ def read_back(path: Path, rate: float = 30.0) -> float:
         for key in (k for block in bpy.data.shape_keys for k in block.key_blocks):
             key.slider_min, key.slider_max = -10.0, 10.0  # the importer leaves 0..1, which clamps
     elif path.suffix == ".bvh":
-        bpy.ops.import_anim.bvh(filepath=str(path), global_scale=0.01, frame_start=1, update_scene_fps=True)
+        bpy.ops.import_anim.bvh(
+            filepath=str(path), global_scale=0.01, frame_start=1, update_scene_fps=True
+        )
         keyed = actions.frame_range([next(o for o in bpy.data.objects if o.type == "ARMATURE")])
         assert keyed is not None
         return keyed[0]
@@ -61,7 +66,9 @@ def nearest_indices(points: np.ndarray, among: np.ndarray) -> np.ndarray:
 
 
 def corresponding(mesh: bpy.types.Object, body, betas: np.ndarray) -> np.ndarray:
-    """Return the body's vertex for each vertex of an imported mesh; formats may split or reorder them."""
+    """Return the body's vertex for each vertex of an imported mesh; formats may split or reorder
+    them.
+    """
     if len(mesh.data.vertices) == len(body.v_template):
         return np.arange(len(body.v_template))
     rest = np.empty(3 * len(mesh.data.vertices), np.float32)

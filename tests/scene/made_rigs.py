@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rigs with common naming schemes and other proportions, a capture to retarget, and positions of bones and joints."""
+"""Rigs with common naming schemes and other proportions, a capture to retarget, and positions of
+bones and joints.
+"""
 
 import hashlib
 import math
@@ -16,16 +18,28 @@ from ..edit.walking import BODY, RATE, motion_of, walk
 from ..retarget.naming_schemes import PARENTS, PLACES, SIDED, names_of
 
 FRAMES = range(1, 60, 6)
-FBX = Matrix.LocRotScale((0.4, -0.3, 0), Matrix.Rotation(math.radians(90), 3, "X").to_quaternion(), (0.01,) * 3)
-ARMS = [(f"{s}_{a}", f"{s}_{b}") for s in ("left", "right") for a, b in (("shoulder", "elbow"), ("elbow", "wrist"))]
-LEGS = [(f"{s}_{a}", f"{s}_{b}") for s in ("left", "right") for a, b in (("hip", "knee"), ("knee", "ankle"))]
+FBX = Matrix.LocRotScale(
+    (0.4, -0.3, 0), Matrix.Rotation(math.radians(90), 3, "X").to_quaternion(), (0.01,) * 3
+)
+ARMS = [
+    (f"{s}_{a}", f"{s}_{b}")
+    for s in ("left", "right")
+    for a, b in (("shoulder", "elbow"), ("elbow", "wrist"))
+]
+LEGS = [
+    (f"{s}_{a}", f"{s}_{b}")
+    for s in ("left", "right")
+    for a, b in (("hip", "knee"), ("knee", "ankle"))
+]
 MAX_KEPT = 8  # captures, of 5 MB each
 # By what tells their motions apart: the file, and the scene's first, last and current frame.
 _kept: dict[str, tuple[str, tuple[int, int, int]]] = {}
 
 
 def build_rig(scheme, size=1.3, drop=40.0, seed=1, matrix=None):
-    """Build a rig of other proportions in an A-pose with random rolls; every fifth bone uses Euler angles."""
+    """Build a rig of other proportions in an A-pose with random rolls; every fifth bone uses Euler
+    angles.
+    """
     rng = np.random.default_rng(seed)
     matrix = matrix or Matrix()
     bones = names_of(scheme)
@@ -46,7 +60,13 @@ def build_rig(scheme, size=1.3, drop=40.0, seed=1, matrix=None):
     for part, name in bones.items():
         side, _, kind = part.partition("_")
         head = place(part)
-        after = {"hip": "knee", "knee": "ankle", "ankle": "foot", "shoulder": "elbow", "elbow": "wrist"}.get(kind)
+        after = {
+            "hip": "knee",
+            "knee": "ankle",
+            "ankle": "foot",
+            "shoulder": "elbow",
+            "elbow": "wrist",
+        }.get(kind)
         tail = place(f"{side}_{after}") if after else head + Vector((0, 0, 0.1))
         if kind == "wrist":
             tail = head + (head - place(f"{side}_elbow")) * 0.4
@@ -69,7 +89,8 @@ def build_rig(scheme, size=1.3, drop=40.0, seed=1, matrix=None):
 def captured(motion, body=BODY):
     """Return the armature of a capture, built at the scene's frame 1 and at its own rate.
 
-    In an empty file, a capture that was built before is appended from where it was kept, in a third of the time.
+    In an empty file, a capture that was built before is appended from where it was kept, in a third
+    of the time.
     """
     scene = bpy.context.scene
     scene.render.fps, scene.render.fps_base = int(RATE), 1.0
@@ -79,7 +100,9 @@ def captured(motion, body=BODY):
         return _appended(*_kept[key])
     result = build_scene([motion], body, None, BuildOptions(start_frame=1.0))
     if is_plain and not scene.timeline_markers:
-        path = os.path.join(os.environ["BLENDER_USER_RESOURCES"], f"captured-{os.getpid()}-{key}.blend")
+        path = os.path.join(
+            os.environ["BLENDER_USER_RESOURCES"], f"captured-{os.getpid()}-{key}.blend"
+        )
         bpy.data.libraries.write(path, {result.collection})
         _kept[key] = path, (scene.frame_start, scene.frame_end, scene.frame_current)
         if len(_kept) > MAX_KEPT:
@@ -105,7 +128,9 @@ def _appended(path, frames):
 
 
 def captured_together():
-    """Return the armatures of two people whom one camera has captured, each with its motion, at frame 10."""
+    """Return the armatures of two people whom one camera has captured, each with its motion, at
+    frame 10.
+    """
     scene = bpy.context.scene
     scene.render.fps = 30
     motions = [motion_of(walk(1.0)), motion_of(walk(1.0, speed=0.8))]
@@ -154,7 +179,8 @@ def seen(rig, bones, frames=FRAMES):
     return np.array(out)
 
 
-# Where MPFB's default rig has the bones that its face is known and measured by, and the tip of each; decimetres.
+# Where MPFB's default rig has the bones that its face is known and measured by, and the tip of
+# each; decimetres.
 MPFB_FACE = {
     "jaw": ((0, 6.88, 0.64), (0, 6.16, 1.23)),
     "eye.L": ((0.31, 7.28, 1.25), (0.32, 7.29, 1.62)),

@@ -12,7 +12,17 @@ from scope.scope_addon.scene.build import NEW_SCENE, BuildOptions, build_scene
 
 
 def data_counts() -> dict[str, int]:
-    kinds = ("collections", "objects", "meshes", "armatures", "cameras", "actions", "materials", "movieclips", "images")
+    kinds = (
+        "collections",
+        "objects",
+        "meshes",
+        "armatures",
+        "cameras",
+        "actions",
+        "materials",
+        "movieclips",
+        "images",
+    )
     return {kind: len(getattr(bpy.data, kind)) for kind in kinds}
 
 
@@ -20,7 +30,9 @@ def data_counts() -> dict[str, int]:
 def test_joints_and_skin_are_the_bodys(body, make_motion, truth, joints_world, blender, shape):
     motion = make_motion(body, 40)
     expected = truth(body, motion)
-    person = build_scene([motion], body, options=dataclasses.replace(NEW_SCENE, shape=shape)).people[0]
+    person = build_scene(
+        [motion], body, options=dataclasses.replace(NEW_SCENE, shape=shape)
+    ).people[0]
     for t in (0, 13, 39):
         blender.go_to(t)
         joints = blender.joints(person.armature, body.joint_names)
@@ -37,7 +49,9 @@ def test_the_body_with_fingers(make_motion, truth, blender):
     person = build_scene([motion], hands).people[0]
     blender.go_to(person.frames[4])
     expected = truth(hands, motion)
-    np.testing.assert_allclose(blender.joints(person.armature, hands.joint_names), expected.joints[4], atol=1e-5)
+    np.testing.assert_allclose(
+        blender.joints(person.armature, hands.joint_names), expected.joints[4], atol=1e-5
+    )
     np.testing.assert_allclose(blender.vertices(person.mesh), expected.vertices(4), atol=1e-5)
 
 
@@ -72,13 +86,18 @@ def test_the_rest_pose_stands_on_the_floor(body, make_motion, blender):
 def test_root_location_is_keyed_along_the_world(body, make_motion):
     motion = make_motion(body)
     person = build_scene([motion], body).people[0]
-    curves = [c for c in actions.fcurves(person.armature) if c.data_path == actions.bone_path("pelvis", "location")]
+    curves = [
+        c
+        for c in actions.fcurves(person.armature)
+        if c.data_path == actions.bone_path("pelvis", "location")
+    ]
     keyed = np.stack([actions.read_keys(c)[:, 1] for c in curves], axis=1)
     np.testing.assert_allclose(keyed - keyed[0], motion.trans - motion.trans[0], atol=1e-5)
 
 
 def test_quaternions_stay_on_one_hemisphere_through_a_turn(body, make_motion, blender):
-    motion = make_motion(body, 60)  # its root turns through 180 degrees, where axis-angle vectors flip
+    # its root turns through 180 degrees, where axis-angle vectors flip
+    motion = make_motion(body, 60)
     person = build_scene([motion], body).people[0]
     path = actions.bone_path("pelvis", "rotation_quaternion")
     curves = [c for c in actions.fcurves(person.armature) if c.data_path == path]
@@ -89,7 +108,9 @@ def test_quaternions_stay_on_one_hemisphere_through_a_turn(body, make_motion, bl
 
 def test_keys_are_linear_and_every_joint_has_them(body, make_motion):
     person = build_scene([make_motion(body, 6)], body).people[0]
-    curves = [curve for curve in actions.fcurves(person.armature) if not curve.data_path.endswith('"]')]
+    curves = [
+        curve for curve in actions.fcurves(person.armature) if not curve.data_path.endswith('"]')
+    ]
     assert len(curves) == 4 * len(body.joint_names) + 3
     assert {key.interpolation for curve in curves for key in curve.keyframe_points} == {"LINEAR"}
     assert {len(curve.keyframe_points) for curve in curves} == {6}
@@ -103,7 +124,9 @@ def test_variable_frame_rate_keeps_its_timing(body, make_motion, truth, blender)
     expected = truth(body, motion)
     for t in range(len(stamps)):
         blender.go_to(stamps[t] * 25)
-        np.testing.assert_allclose(blender.joints(person.armature, body.joint_names), expected.joints[t], atol=1e-4)
+        np.testing.assert_allclose(
+            blender.joints(person.armature, body.joint_names), expected.joints[t], atol=1e-4
+        )
     assert (bpy.context.scene.frame_start, bpy.context.scene.frame_end) == (0, 7)
 
 
@@ -132,7 +155,11 @@ def test_a_further_capture_keeps_the_range_of_those_before(body, make_motion):
     scene = bpy.context.scene
     ranges = []
     for count, start in ((30, 5), (10, 8), (12, 30)):
-        build_scene([make_motion(body, count)], body, options=BuildOptions(frame_rate="set", start_frame=start))
+        build_scene(
+            [make_motion(body, count)],
+            body,
+            options=BuildOptions(frame_rate="set", start_frame=start),
+        )
         ranges.append((scene.frame_start, scene.frame_end))
     assert ranges == [(5, 34), (5, 34), (5, 41)]
 
@@ -145,16 +172,29 @@ def test_a_scene_in_centimetres_gives_a_warning(body, make_motion):
     assert "by 100," in warnings[0]
 
 
-def test_one_collection_and_one_camera_for_the_people_of_a_capture(body, make_motion, truth, blender):
-    motions = [make_motion(body, 6, betas=[-1.5] + [0.0] * 9), make_motion(body, 6, seed=1, offset=(1.0, 0, 0))]
+def test_one_collection_and_one_camera_for_the_people_of_a_capture(
+    body, make_motion, truth, blender
+):
+    motions = [
+        make_motion(body, 6, betas=[-1.5] + [0.0] * 9),
+        make_motion(body, 6, seed=1, offset=(1.0, 0, 0)),
+    ]
     result = build_scene(motions, body)
     names = {obj.name for obj in result.collection.objects}
-    assert names == {"walk_person1", "walk_person1_body", "walk_person2", "walk_person2_body", "walk_camera"}
+    assert names == {
+        "walk_person1",
+        "walk_person1_body",
+        "walk_person2",
+        "walk_person2_body",
+        "walk_camera",
+    }
     assert [c.name for c in bpy.context.scene.collection.children] == ["walk"]
     blender.go_to(result.people[1].frames[5])
     for motion, person in zip(motions, result.people, strict=True):
         expected = truth(body, motion)
-        np.testing.assert_allclose(blender.joints(person.armature, body.joint_names), expected.joints[5], atol=1e-4)
+        np.testing.assert_allclose(
+            blender.joints(person.armature, body.joint_names), expected.joints[5], atol=1e-4
+        )
         np.testing.assert_allclose(blender.vertices(person.mesh), expected.vertices(5), atol=1e-4)
 
 
@@ -206,9 +246,23 @@ def test_cancel_and_failure_leave_the_scene_as_it_was(body, make_motion, tmp_pat
 
     def state():
         render = scene.render
-        settings = (render.fps, render.fps_base, render.resolution_x, scene.frame_start, scene.frame_end)
+        settings = (
+            render.fps,
+            render.fps_base,
+            render.resolution_x,
+            scene.frame_start,
+            scene.frame_end,
+        )
         active = bpy.context.view_layer.objects.active
-        return data_counts(), settings, scene.frame_current, scene.camera, active.name, active.mode, cube.select_get()
+        return (
+            data_counts(),
+            settings,
+            scene.frame_current,
+            scene.camera,
+            active.name,
+            active.mode,
+            cube.select_get(),
+        )
 
     before = state()
 

@@ -56,7 +56,9 @@ def test_square_pixels_agree_with_blenders_own_helper(body, make_motion, joints_
     K = np.array([[800.0, 0, 700.0], [0, 800.0, 500.0], [0, 0, 1]])
     motion = make_motion(body, 3, image_size=(1280, 960), intrinsics=K)
     camera = build_scene([motion], body, options=NEW_SCENE).people[0].camera
-    seen = [world_to_camera_view(bpy.context.scene, camera, Vector(p)) for p in joints_world(motion)[2]]
+    seen = [
+        world_to_camera_view(bpy.context.scene, camera, Vector(p)) for p in joints_world(motion)[2]
+    ]
     pixels = np.array([[v.x * 1280, (1 - v.y) * 960] for v in seen])
     np.testing.assert_allclose(pixels, projected_by_intrinsics(motion, 2), atol=0.05)
 
@@ -106,7 +108,9 @@ def clip(film, tmp_path) -> Path:
 
 def test_footage_is_shown_in_the_background(body, make_motion, clip):
     motion = make_motion(body, 5, image_size=(64, 48))
-    result = build_scene([motion], body, footage=clip, options=BuildOptions(frame_rate="set", start_frame=1.0))
+    result = build_scene(
+        [motion], body, footage=clip, options=BuildOptions(frame_rate="set", start_frame=1.0)
+    )
     camera = result.people[0].camera
     background = camera.data.background_images[0]
     assert (background.source, background.image.source) == ("IMAGE", "MOVIE")
@@ -120,7 +124,9 @@ def test_footage_is_shown_in_the_background(body, make_motion, clip):
 
 @pytest.mark.parametrize("fy", [600.0, 750.0, 400.0])
 @pytest.mark.parametrize("moving", [False, True])
-def test_footage_fills_the_picture_also_where_pixels_are_not_square(body, make_motion, clip, tmp_path, fy, moving):
+def test_footage_fills_the_picture_also_where_pixels_are_not_square(
+    body, make_motion, clip, tmp_path, fy, moving
+):
     still = tmp_path / "still.png"
     image = bpy.data.images.new("still", 64, 48)
     image.filepath_raw, image.file_format = str(still), "PNG"
@@ -131,7 +137,9 @@ def test_footage_fills_the_picture_also_where_pixels_are_not_square(body, make_m
     shown = result.people[0].camera.data.background_images[0].image
     render = bpy.context.scene.render
     aspect = np.divide(*shown.display_aspect) * 64 / 48
-    assert aspect == pytest.approx(64 * render.pixel_aspect_x / (48 * render.pixel_aspect_y), rel=1e-5)
+    assert aspect == pytest.approx(
+        64 * render.pixel_aspect_x / (48 * render.pixel_aspect_y), rel=1e-5
+    )
 
 
 def test_footage_of_a_distorting_lens_is_shown_undistorted(body, make_motion, clip):
@@ -143,7 +151,9 @@ def test_footage_of_a_distorting_lens_is_shown_undistorted(body, make_motion, cl
     assert lens.focal_length_pixels == pytest.approx(600.0, rel=1e-4)
     np.testing.assert_allclose(lens.principal_point_pixels, [32, 24], atol=1e-3)
     assert lens.distortion_model == "BROWN"
-    np.testing.assert_allclose([lens.brown_k1, lens.brown_k2, lens.brown_k3], [-0.2, 0.05, 0.01], atol=1e-6)
+    np.testing.assert_allclose(
+        [lens.brown_k1, lens.brown_k2, lens.brown_k3], [-0.2, 0.05, 0.01], atol=1e-6
+    )
     np.testing.assert_allclose([lens.brown_p1, lens.brown_p2], [-0.03, -0.02], atol=1e-6)
     assert background.clip_user.use_render_undistorted
 
@@ -158,14 +168,20 @@ def distorted_by_opencv(points: np.ndarray, K: np.ndarray, dist: np.ndarray) -> 
 def undistorted_by_blender(clip: bpy.types.MovieClip, folder: Path) -> np.ndarray:
     """Return the clip's picture (H, W) as Blender shows it undistorted, rows from the top.
 
-    Through the sequencer, which asks for it as the viewport does. The compositor does not: it forgets the pixel aspect.
+    Through the sequencer, which asks for it as the viewport does. The compositor does not: it
+    forgets the pixel aspect.
     """
     scene, render = bpy.context.scene, bpy.context.scene.render
-    strip = strips_of(scene.sequence_editor_create()).new_clip("undistorted", clip, 1, scene.frame_current)
+    strip = strips_of(scene.sequence_editor_create()).new_clip(
+        "undistorted", clip, 1, scene.frame_current
+    )
     strip.undistort = True
     render.filepath, render.image_settings.file_format = str(folder / "undistorted.png"), "PNG"
     render.image_settings.color_depth = "16"
-    scene.view_settings.view_transform, scene.sequencer_colorspace_settings.name = "Raw", "Non-Color"
+    scene.view_settings.view_transform, scene.sequencer_colorspace_settings.name = (
+        "Raw",
+        "Non-Color",
+    )
     bpy.ops.render.render(write_still=True)
     image = bpy.data.images.load(render.filepath)
     image.colorspace_settings.name = "Non-Color"
@@ -177,12 +193,17 @@ def undistorted_by_blender(clip: bpy.types.MovieClip, folder: Path) -> np.ndarra
 @pytest.mark.parametrize("fy", [300.0, 360.0, 255.0])
 @pytest.mark.parametrize("dist", [[-0.2, 0.05, 0.0, 0.0, 0.01], [-0.1, 0.03, 0.02, -0.03, 0.0]])
 def test_blender_undistorts_as_opencv_distorts(body, make_motion, tmp_path, dist, fy):
-    """Blobs at five points distorted by OpenCV's model are undistorted to the pinhole projection."""
+    """Blobs at five points distorted by OpenCV's model are undistorted to the pinhole
+    projection.
+    """
     width, height = 320, 240
     K = np.array([[300.0, 0, 150], [0, fy, 130], [0, 0, 1]])
     points = np.array([[90.0, 70], [230, 80], [100, 170], [220, 165], [160, 60]])
     x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
-    blobs = [np.exp(-((x - u) ** 2 + (y - v) ** 2) / 18) for u, v in distorted_by_opencv(points, K, np.array(dist))]
+    blobs = [
+        np.exp(-((x - u) ** 2 + (y - v) ** 2) / 18)
+        for u, v in distorted_by_opencv(points, K, np.array(dist))
+    ]
     picture, pixels = tmp_path / "still.png", np.ones((height, width, 4), np.float32)
     pixels[..., :3] = np.sum(blobs, axis=0)[::-1, :, None].clip(0, 1)
     image = bpy.data.images.new("still", width, height)
@@ -209,7 +230,8 @@ def test_a_motion_from_the_middle_of_the_footage_stays_with_it(body, make_motion
     motion.frames[:] = [2, 3, 4]
     result = build_scene([motion], body, footage=clip, options=BuildOptions(frame_rate="set"))
     np.testing.assert_allclose(result.people[0].frames, [2, 3, 4])
-    assert [frame_shown(result.people[0].camera, f) for f in (0, 2, 4)] == [0, 2, 4]  # also what was not captured
+    # also what was not captured
+    assert [frame_shown(result.people[0].camera, f) for f in (0, 2, 4)] == [0, 2, 4]
     assert result.warnings == []
 
 
@@ -217,27 +239,40 @@ def test_captures_of_the_same_footage_do_not_disturb_each_other(body, make_motio
     motion = make_motion(body, 5, image_size=(64, 48))
     starts = (1.0, 50.0)
     results = [
-        build_scene([motion], body, footage=clip, options=BuildOptions(frame_rate="set", start_frame=start))
+        build_scene(
+            [motion], body, footage=clip, options=BuildOptions(frame_rate="set", start_frame=start)
+        )
         for start in starts
     ]
     assert [frame_shown(result.people[0].camera, 52) for result in results] == [51, 2]
 
 
 def frame_shown(camera: bpy.types.Object, scene_frame: int) -> int:
-    """Return the frame of a video that Blender shows if it is as long, counted from 0: BKE_image_user_frame_get."""
+    """Return the frame of a video that Blender shows if it is as long, counted from 0:
+    BKE_image_user_frame_get.
+    """
     bpy.context.scene.frame_set(scene_frame)
-    user = camera.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.background_images[0].image_user
+    user = (
+        camera.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        .data.background_images[0]
+        .image_user
+    )
     count = min(max(scene_frame - user.frame_start + 1, 0), user.frame_duration)
     return count + user.frame_offset - 1
 
 
 @pytest.mark.parametrize("rate", [24, 12, 60])
 @pytest.mark.parametrize("start", [1.0, -20.0])
-def test_footage_is_synchronized_at_a_rate_other_than_the_scenes(body, make_motion, clip, rate, start):
+def test_footage_is_synchronized_at_a_rate_other_than_the_scenes(
+    body, make_motion, clip, rate, start
+):
     scene = bpy.context.scene
     scene.render.fps = rate
     motion = make_motion(body, 20, rate=30.0, image_size=(64, 48))
-    for options in (BuildOptions(start_frame=start), BuildOptions(frame_rate="resample", start_frame=start)):
+    for options in (
+        BuildOptions(start_frame=start),
+        BuildOptions(frame_rate="resample", start_frame=start),
+    ):
         result = build_scene([motion], body, footage=clip, options=options)
         assert result.warnings == []
         camera, frames = result.people[0].camera, result.people[0].frames
@@ -247,11 +282,15 @@ def test_footage_is_synchronized_at_a_rate_other_than_the_scenes(body, make_moti
 
 
 @pytest.mark.parametrize(("before", "after"), [(20, 30), (30, 24)])
-def test_footage_stays_synchronized_when_the_scenes_rate_changes(body, make_motion, clip, before, after):
+def test_footage_stays_synchronized_when_the_scenes_rate_changes(
+    body, make_motion, clip, before, after
+):
     scene = bpy.context.scene
     scene.render.fps = before
     motion = make_motion(body, 20, rate=30.0, image_size=(64, 48), moving_camera=True)
-    person = build_scene([motion], body, footage=clip, options=BuildOptions(start_frame=5.0)).people[0]
+    person = build_scene(
+        [motion], body, footage=clip, options=BuildOptions(start_frame=5.0)
+    ).people[0]
     person.camera.data.background_images[0].alpha = 0.25
     assert change_rate(scene, after, {person.armature: motion}, []) == []
     (background,) = person.camera.data.background_images
@@ -262,7 +301,9 @@ def test_footage_stays_synchronized_when_the_scenes_rate_changes(body, make_moti
         assert abs(frame_shown(person.camera, f) - (f - 5) / after * 30) <= 0.5 + 1e-3
     assert not bpy.data.movieclips
     scene.frame_set(5 + round(0.5 * after))
-    np.testing.assert_allclose(person.camera.location, motion.world_from_camera[15, :3, 3], atol=1e-4)
+    np.testing.assert_allclose(
+        person.camera.location, motion.world_from_camera[15, :3, 3], atol=1e-4
+    )
 
 
 def test_footage_of_a_distorting_lens_at_another_rate_is_warned_about(body, make_motion, clip):
@@ -292,7 +333,9 @@ def test_numbered_pictures_are_shown_in_sequence(body, make_motion, tmp_path):
         image = bpy.data.images.new("picture", 64, 48)
         image.filepath_raw, image.file_format = str(tmp_path / f"walk_{number:04d}.png"), "PNG"
         image.save()
-    motion = make_motion(body, timestamps=np.array([0, 1, 3, 4]) / 24, rate=24.0, image_size=(64, 48))
+    motion = make_motion(
+        body, timestamps=np.array([0, 1, 3, 4]) / 24, rate=24.0, image_size=(64, 48)
+    )
     result = build_scene([motion], body, footage=tmp_path / "walk_0007.png", options=NEW_SCENE)
     assert result.warnings == []
     camera = result.people[0].camera

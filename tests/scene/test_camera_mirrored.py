@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a warning says about footage that its metadata mirrors, against how Blender shows that footage."""
+"""What a warning says about footage that its metadata mirrors, against how Blender shows that
+footage.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,9 @@ FLIPS = {"Y": np.flipud, "X": np.fliplr}
 
 
 def shown_by_blender(path) -> np.ndarray:
-    """Return the first image (H, W, 3) uint8 of a video as Blender shows it in a camera's background."""
+    """Return the first image (H, W, 3) uint8 of a video as Blender shows it in a camera's
+    background.
+    """
     return pixels_of(bpy.data.images.load(str(path)))
 
 
@@ -44,12 +48,17 @@ def rendered(scene, tmp_path, size) -> np.ndarray:
 
 
 def mirrored(tmp_path, matrix):
-    """Return a mirrored video, its first captured image, and the letter of the flip that its warning advises."""
+    """Return a mirrored video, its first captured image, and the letter of the flip that its
+    warning advises.
+    """
     path = write_video(tmp_path / "a.mp4", [corner_image()] * 2)
     patch_track_header(path, matrix=matrix)
     with open_video(path) as video:
         captured = next(iter(video)).image_rgb
-    advice = [re.search("mirrored by its metadata, .* switch on Flip ([XY])", text) for text in video.warnings]
+    advice = [
+        re.search("mirrored by its metadata, .* switch on Flip ([XY])", text)
+        for text in video.warnings
+    ]
     return path, captured, next(match.group(1) for match in advice if match)
 
 
@@ -72,31 +81,45 @@ def test_a_strip_with_that_flip_renders_what_was_captured(tmp_path, matrix):
 
 @pytest.mark.parametrize("dist", [0.0, 0.1], ids=["image", "movie clip"])
 @pytest.mark.parametrize("matrix", MIRRORED.values(), ids=MIRRORED)
-def test_the_picture_behind_the_camera_is_the_captured_one_with_that_flip(tmp_path, body, make_motion, matrix, dist):
-    """What Blender makes of the file, and how the background's setting turns it: its flips mirror what they name."""
+def test_the_picture_behind_the_camera_is_the_captured_one_with_that_flip(
+    tmp_path, body, make_motion, matrix, dist
+):
+    """What Blender makes of the file, and how the background's setting turns it: its flips mirror
+    what they name.
+    """
     path, captured, letter = mirrored(tmp_path, matrix)
     motion = make_motion(body, 2, source=str(path), image_size=captured.shape[1::-1])
     motion.dist = np.array([dist, 0.0, 0.0, 0.0, 0.0])
     objects = build_scene([motion], body, path, BuildOptions()).collection.all_objects
     camera = next(obj for obj in objects if obj.type == "CAMERA")
     (background,) = camera.data.background_images
-    assert [background.use_flip_x, background.use_flip_y] == [False, False]  # the warning asks for it
+    # the warning asks for it
+    assert [background.use_flip_x, background.use_flip_y] == [False, False]
     assert hasattr(background, flip_setting(letter))
-    shown = pixels_of(background.image) if dist == 0.0 else clip_rendered(background.clip, tmp_path, captured)
+    shown = (
+        pixels_of(background.image)
+        if dist == 0.0
+        else clip_rendered(background.clip, tmp_path, captured)
+    )
     assert corners(FLIPS[letter](shown)) == corners(captured)
 
 
 def pixels_of(image) -> np.ndarray:
     """Return an image as Blender shows it, (H, W, 3) uint8."""
     width, height = image.size
-    pixels = np.array(image.pixels[:]).reshape(height, width, 4)[::-1, :, :3]  # Blender's rows begin at the bottom
+    # Blender's rows begin at the bottom
+    pixels = np.array(image.pixels[:]).reshape(height, width, 4)[::-1, :, :3]
     return (255 * pixels).round().astype(np.uint8)
 
 
 def clip_rendered(clip, tmp_path, captured) -> np.ndarray:
     """Return what the compositor shows of a movie clip."""
     scene = bpy.context.scene
-    scene.render.engine, scene.render.use_sequencer, scene.render.use_compositing = "CYCLES", False, True
+    scene.render.engine, scene.render.use_sequencer, scene.render.use_compositing = (
+        "CYCLES",
+        False,
+        True,
+    )
     scene.cycles.samples = 1
     if hasattr(scene, "compositing_node_group"):
         tree = scene.compositing_node_group = bpy.data.node_groups.new("clip", "CompositorNodeTree")
@@ -113,7 +136,9 @@ def clip_rendered(clip, tmp_path, captured) -> np.ndarray:
     return rendered(scene, tmp_path, captured.shape[1::-1])
 
 
-@pytest.mark.parametrize("matrix", [None, (0, 65536, 0, -65536, 0, *END), (-65536, 0, 0, 0, -65536, *END)])
+@pytest.mark.parametrize(
+    "matrix", [None, (0, 65536, 0, -65536, 0, *END), (-65536, 0, 0, 0, -65536, *END)]
+)
 def test_rotated_footage_is_shown_as_captured_and_brings_no_warning(tmp_path, matrix):
     path = write_video(tmp_path / "a.mp4", [corner_image()] * 2)
     patch_track_header(path, matrix=matrix)

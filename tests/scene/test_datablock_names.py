@@ -21,8 +21,13 @@ def test_an_ordinary_name_stays(name):
 
 
 def test_the_objects_of_a_long_name_say_what_they_are(body, make_motion):
-    name = "2026-11-27 a long name that says all about the footage, by camera B, take 3, final version, graded and cut"
-    motions = [make_motion(body, 2, source=f"{name} {'and more of it ' * 10}.mp4") for _ in range(2)]
+    name = (
+        "2026-11-27 a long name that says all about the footage, by camera B, take 3, final "
+        "version, graded and cut"
+    )
+    motions = [
+        make_motion(body, 2, source=f"{name} {'and more of it ' * 10}.mp4") for _ in range(2)
+    ]
     collection = build_scene(motions, body, None, BuildOptions(with_camera=True)).collection
     assert name.startswith(collection.name[:39])
     found = sorted(obj.name.removeprefix(collection.name) for obj in collection.all_objects)

@@ -48,9 +48,13 @@ def effect_end(frame: int) -> dict:
     return {"length": frame} if bpy.app.version >= (5, 0, 0) else {"frame_end": frame}
 
 
-@pytest.mark.skipif(not bpy.app.build_options.audaspace, reason="this Blender was built without sound")
+@pytest.mark.skipif(
+    not bpy.app.build_options.audaspace, reason="this Blender was built without sound"
+)
 def test_sound_is_added(shared):
-    added = add_footage_strips(bpy.context.scene, shared / "data" / "clips" / "walk_side_static.mp4", 1.0)
+    added = add_footage_strips(
+        bpy.context.scene, shared / "data" / "clips" / "walk_side_static.mp4", 1.0
+    )
     assert [s.type for s in added] == ["SOUND", "MOVIE"]
     assert added[0].channel != added[1].channel
 

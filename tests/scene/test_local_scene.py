@@ -28,7 +28,9 @@ def test_a_motion_is_not_built_in_a_linked_scene(linked, body, make_motion):
     before = [len(blocks) for blocks in (bpy.data.objects, bpy.data.collections, bpy.data.actions)]
     with pytest.raises(UsageError, match=r"the scene is linked from .*other\.blend"):
         build_scene([make_motion(body, 12)], body)
-    assert [len(blocks) for blocks in (bpy.data.objects, bpy.data.collections, bpy.data.actions)] == before
+    assert [
+        len(blocks) for blocks in (bpy.data.objects, bpy.data.collections, bpy.data.actions)
+    ] == before
 
 
 def test_no_strip_is_added_to_a_linked_scene(linked):

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A .blend file that carries its motions: saved, appended, linked, duplicated, renamed, deleted, undone, hostile."""
+"""A .blend file that carries its motions: saved, appended, linked, duplicated, renamed, deleted,
+undone, hostile.
+"""
 
 import io
 import zipfile
@@ -149,7 +151,10 @@ def bomb() -> bytes:
     """An archive that claims to unpack to more than memory holds."""
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
-        header = b"\x93NUMPY\x01\x00\x76\x00" + b"{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000000,), }"
+        header = (
+            b"\x93NUMPY\x01\x00\x76\x00"
+            + b"{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000000,), }"
+        )
         archive.writestr("poses.npy", header.ljust(127) + b"\n")
     return file.getvalue()
 
@@ -161,7 +166,9 @@ def pickled() -> bytes:
 
 
 @pytest.mark.parametrize(
-    "content", [b"", b"PK\x03\x04 no zip", bomb(), pickled(), "text", 7, [1, 2], {"a": 1}], ids=range(8)
+    "content",
+    [b"", b"PK\x03\x04 no zip", bomb(), pickled(), "text", 7, [1, 2], {"a": 1}],
+    ids=range(8),
 )
 def test_hostile_content_is_an_error(people, content):
     armature = people[0][0]

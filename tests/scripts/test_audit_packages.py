@@ -18,7 +18,9 @@ BAD = {
 
 @pytest.fixture
 def auditor():
-    spec = importlib.util.spec_from_file_location("audit_packages", ROOT / "scripts" / "audit_packages.py")
+    spec = importlib.util.spec_from_file_location(
+        "audit_packages", ROOT / "scripts" / "audit_packages.py"
+    )
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -58,4 +60,6 @@ def test_a_registry_out_of_reach_is_one_sentence(auditor, capsys):
         raise OSError("no network")
 
     assert auditor.main(ask) == 2
-    assert capsys.readouterr().err == "audit: the registry could not be asked about av: no network\n"
+    assert (
+        capsys.readouterr().err == "audit: the registry could not be asked about av: no network\n"
+    )

@@ -18,13 +18,16 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 SHIPPED = ("numba", "llvmlite", "onnxruntime", "opencv-contrib-python-headless", "av")
 MADE = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
 BUILD_INFORMATION = (
-    b"General configuration for OpenCV 9\n  3rdparty dependencies:       %s\n  PNG:  build (ver 1.6.43)\n"
+    b"General configuration for OpenCV 9\n  3rdparty dependencies:       %s\n  PNG:  build (ver "
+    b"1.6.43)\n"
 )
 
 
 @pytest.fixture(scope="module")
 def bills():
-    spec = importlib.util.spec_from_file_location("bill_of_materials", ROOT / "scripts" / "bill_of_materials.py")
+    spec = importlib.util.spec_from_file_location(
+        "bill_of_materials", ROOT / "scripts" / "bill_of_materials.py"
+    )
     module = importlib.util.module_from_spec(spec)
     sys.modules["bill_of_materials"] = module  # as its dataclass needs
     spec.loader.exec_module(module)
@@ -37,8 +40,14 @@ def installed(bills):
     """The libraries in each shipped package, as pip has installed it from the wheel."""
     found = {}
     for package in SHIPPED:
-        files = [f for f in metadata.files(package) if bills.library_name(str(f)) or str(f).startswith("cv2/cv2")]
-        found[package] = bills.libraries(package, ((str(f), f.locate().read_bytes()) for f in files))
+        files = [
+            f
+            for f in metadata.files(package)
+            if bills.library_name(str(f)) or str(f).startswith("cv2/cv2")
+        ]
+        found[package] = bills.libraries(
+            package, ((str(f), f.locate().read_bytes()) for f in files)
+        )
     return found
 
 
@@ -46,7 +55,8 @@ def wheel(folder, name, version, files):
     path = folder / f"{name}-{version}-py3-none-any.whl"
     with zipfile.ZipFile(path, "w") as file:
         file.writestr(
-            f"{name}-{version}.dist-info/METADATA", f"Name: {name}\nVersion: {version}\nLicense-Expression: MIT\n"
+            f"{name}-{version}.dist-info/METADATA",
+            f"Name: {name}\nVersion: {version}\nLicense-Expression: MIT\n",
         )
         for inside, content in files.items():
             file.writestr(inside, content)
@@ -61,7 +71,9 @@ def extension(tmp_path):
     (staged / "assets" / "networks" / "pose.onnx").write_bytes(b"network")
     (staged / "blender_manifest.toml").write_text('version = "0.1.0"\n')
     (staged / "THIRD_PARTY.md").write_text("| Opus | BSD-3-Clause | made L |\n")
-    return staged, [wheel(tmp_path, "made", "1.0", {"made.libs/libopus-0123abcd.so.0.11.1": b"opus"})]
+    return staged, [
+        wheel(tmp_path, "made", "1.0", {"made.libs/libopus-0123abcd.so.0.11.1": b"opus"})
+    ]
 
 
 @pytest.mark.parametrize(
@@ -82,7 +94,14 @@ def test_a_librarys_name_is_read_from_its_file(bills, file, name, version):
 
 
 @pytest.mark.parametrize(
-    "file", ["cv2/cv2.abi3.so", "a/b.cpython-311-x86_64-linux-gnu.so", "cv2/cv2.pyd", "a/b_state.so", "a/so.py"]
+    "file",
+    [
+        "cv2/cv2.abi3.so",
+        "a/b.cpython-311-x86_64-linux-gnu.so",
+        "cv2/cv2.pyd",
+        "a/b_state.so",
+        "a/so.py",
+    ],
 )
 def test_a_packages_own_modules_are_no_libraries(bills, file):
     assert bills.library_name(file) is None
@@ -96,7 +115,10 @@ def test_third_party_states_what_the_installed_packages_contain(bills, installed
     assert len(installed["av"]) > 20
     without = text.replace("| x264 |", "| x2640 |")
     problems = bills.check_third_party("av", "linux-x64", installed["av"], without)
-    assert problems == ["av contains x264, which THIRD_PARTY.md lacks", "THIRD_PARTY.md has x2640, which av lacks"]
+    assert problems == [
+        "av contains x264, which THIRD_PARTY.md lacks",
+        "THIRD_PARTY.md has x2640, which av lacks",
+    ]
     wrong = text.replace("| x264 | GPL-2.0-or-later |", "| x264 | MIT |")
     (problem,) = bills.check_third_party("av", "linux-x64", installed["av"], wrong)
     assert problem == "THIRD_PARTY.md states MIT for x264 of av, not GPL-2.0-or-later"
@@ -104,10 +126,16 @@ def test_third_party_states_what_the_installed_packages_contain(bills, installed
 
 def test_licences_that_conflict_with_ours_are_named(bills, installed):
     found = {
-        f"{library.project} {library.version}" for every in installed.values() for library in bills.conflicts(every)
+        f"{library.project} {library.version}"
+        for every in installed.values()
+        for library in bills.conflicts(every)
     }
     assert found == {"OpenSSL 1.1.1w", "Intel IPP ICV 2021.12.0"}
-    said = (ROOT / "docs" / "publishing.md").read_text("utf-8").partition("### Licences that conflict")[2]
+    said = (
+        (ROOT / "docs" / "publishing.md")
+        .read_text("utf-8")
+        .partition("### Licences that conflict")[2]
+    )
     for name in ("OpenSSL 1.1.1w", "Intel IPP ICV", "Microsoft C++ runtime"):
         assert name in said
 
@@ -150,13 +178,21 @@ def test_a_bill_is_valid_and_has_all_parts(bills, extension):
     made, network = parts["made"], parts["assets/networks/pose.onnx"]
     assert made["purl"] == "pkg:pypi/made@1.0?file_name=made-1.0-py3-none-any.whl"
     assert made["licenses"] == [{"expression": "MIT"}]
-    assert made["hashes"] == [{"alg": "SHA-256", "content": hashlib.sha256(wheels[0].read_bytes()).hexdigest()}]
+    assert made["hashes"] == [
+        {"alg": "SHA-256", "content": hashlib.sha256(wheels[0].read_bytes()).hexdigest()}
+    ]
     (opus,) = made["components"]
-    assert (opus["name"], opus["version"], opus["licenses"]) == ("Opus", "0.11.1", [{"expression": "BSD-3-Clause"}])
+    assert (opus["name"], opus["version"], opus["licenses"]) == (
+        "Opus",
+        "0.11.1",
+        [{"expression": "BSD-3-Clause"}],
+    )
     assert opus["hashes"] == [{"alg": "SHA-256", "content": hashlib.sha256(b"opus").hexdigest()}]
     assert network["type"] == "machine-learning-model"
     assert network["licenses"] == [{"expression": "Apache-2.0"}]
-    assert network["hashes"] == [{"alg": "SHA-256", "content": hashlib.sha256(b"network").hexdigest()}]
+    assert network["hashes"] == [
+        {"alg": "SHA-256", "content": hashlib.sha256(b"network").hexdigest()}
+    ]
     (needed,) = [d["dependsOn"] for d in bill["dependencies"] if d["ref"] == "scope"]
     assert needed == sorted([made["bom-ref"], network["bom-ref"]])
 

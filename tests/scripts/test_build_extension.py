@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The built extension: one zip for each platform and Python, which Blender's own tool accepts and lists."""
+"""The built extension: one zip for each platform and Python, which Blender's own tool accepts and
+lists.
+"""
 
 import ast
 import hashlib
@@ -17,7 +19,10 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent.parent
 CP311 = "numba-0.68.1-cp311-cp311-manylinux_2_27_x86_64.manylinux_2_28_x86_64.whl"
 CP313 = CP311.replace("311", "313")
-STABLE = "opencv_contrib_python_headless-4.11.0.86-cp37-abi3-manylinux_2_17_x86_64.manylinux2014_x86_64.whl"
+STABLE = (
+    "opencv_contrib_python_headless-4.11.0.86-cp37-abi3-"
+    "manylinux_2_17_x86_64.manylinux2014_x86_64.whl"
+)
 NEWER_STABLE = "av-18.1.0-cp311-abi3-manylinux_2_28_x86_64.whl"
 
 
@@ -33,7 +38,12 @@ def small_root(tmp_path):
 
     target = tmp_path / "repository"
     for name in ("solver", "scope_addon", "assets", "scripts", "docs"):
-        shutil.copytree(ROOT / name, target / name, copy_function=copy, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(
+            ROOT / name,
+            target / name,
+            copy_function=copy,
+            ignore=shutil.ignore_patterns("__pycache__"),
+        )
     for name in ("__init__.py", "LICENSE", "THIRD_PARTY.md", "blender_manifest.toml"):
         shutil.copy2(ROOT / name, target / name)
     return target
@@ -41,7 +51,9 @@ def small_root(tmp_path):
 
 @pytest.fixture
 def builder(tmp_path, monkeypatch):
-    spec = importlib.util.spec_from_file_location("build_extension", ROOT / "scripts" / "build_extension.py")
+    spec = importlib.util.spec_from_file_location(
+        "build_extension", ROOT / "scripts" / "build_extension.py"
+    )
     module = importlib.util.module_from_spec(spec)
     monkeypatch.setitem(sys.modules, "build_extension", module)  # as its dataclass needs
     spec.loader.exec_module(module)
@@ -59,7 +71,11 @@ def with_empty_wheels(builder, small_root, tmp_path, monkeypatch):
     def wheels(target):
         tag, cp = builder.PLATFORMS[target.platform][0], "cp" + target.python.replace(".", "")
         names = [f"opencv_contrib_python_headless-4.11.0.86-cp37-abi3-{tag}.whl"]
-        names += [f"{name}-1.0-{cp}-{cp}-{tag}.whl" for name in builder.PACKAGES if not name.startswith("opencv")]
+        names += [
+            f"{name}-1.0-{cp}-{cp}-{tag}.whl"
+            for name in builder.PACKAGES
+            if not name.startswith("opencv")
+        ]
         folder = tmp_path / target.platform / target.python
         folder.mkdir(parents=True, exist_ok=True)
         for name in names:
@@ -67,7 +83,9 @@ def with_empty_wheels(builder, small_root, tmp_path, monkeypatch):
                 package, version = name.split("-")[:2]
                 stated = f"Name: {package}\nVersion: {version}\nLicense-Expression: MIT\n"
                 file.writestr(zipfile.ZipInfo(f"{package}-{version}.dist-info/METADATA"), stated)
-            lock[target.python] += f"--hash=sha256:{hashlib.sha256((folder / name).read_bytes()).hexdigest()}\n"
+            lock[target.python] += (
+                f"--hash=sha256:{hashlib.sha256((folder / name).read_bytes()).hexdigest()}\n"
+            )
         return [folder / name for name in names]
 
     (small_root / "THIRD_PARTY.md").write_text("of empty wheels")
@@ -78,7 +96,14 @@ def with_empty_wheels(builder, small_root, tmp_path, monkeypatch):
 
 
 def blenders_tool():
-    path = Path(bpy.utils.resource_path("LOCAL"), "scripts", "addons_core", "bl_pkg", "cli", "blender_ext.py")
+    path = Path(
+        bpy.utils.resource_path("LOCAL"),
+        "scripts",
+        "addons_core",
+        "bl_pkg",
+        "cli",
+        "blender_ext.py",
+    )
     spec = importlib.util.spec_from_file_location("blender_ext", path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
@@ -107,24 +132,35 @@ def test_wheels_keep_their_names_except_where_a_blender_would_skip_them(builder)
         pytest.skip(f"Blender {bpy.app.version_string} does not look at a wheel's Python")
     # Blender 4.3 installs a wheel only where one of these is its own Python, 3.11.
     for wheel, fits in ((STABLE, False), (renamed, True), (CP311, True), (NEWER_STABLE, True)):
-        versions = tool.python_versions_from_wheel_python_tag(wheel.removesuffix(".whl").split("-")[-3])
+        versions = tool.python_versions_from_wheel_python_tag(
+            wheel.removesuffix(".whl").split("-")[-3]
+        )
         assert ((3, 11) in versions) == fits, wheel
     for wheel in (renamed, CP311, CP313):
-        assert tool.blender_platform_compatible_with_wheel_platform_from_filepath("linux-x64", wheel)
-        assert not tool.blender_platform_compatible_with_wheel_platform_from_filepath("windows-x64", wheel)
+        assert tool.blender_platform_compatible_with_wheel_platform_from_filepath(
+            "linux-x64", wheel
+        )
+        assert not tool.blender_platform_compatible_with_wheel_platform_from_filepath(
+            "windows-x64", wheel
+        )
 
 
 def test_the_lock_files_list_every_wheel_with_hashes(builder):
     for python in builder.BLENDERS:
         entries = builder.locked(python)
-        assert [line.split("==")[0] for line in entries.splitlines() if "==" in line] == list(builder.PACKAGES)
+        assert [line.split("==")[0] for line in entries.splitlines() if "==" in line] == list(
+            builder.PACKAGES
+        )
         assert entries.count("--hash=sha256:") >= 3 * len(builder.PACKAGES)
 
 
 def test_every_blender_since_4_2_fits_one_zip_of_a_platform(builder):
     ranges = [builder.Target("linux-x64", python).blenders for python in sorted(builder.BLENDERS)]
     assert ranges == [("4.2.0", "5.1.0"), ("5.1.0", None)]
-    manifests = [tomllib.loads(builder.manifest(builder.Target("linux-x64", p), [])) for p in ("3.11", "3.13")]
+    manifests = [
+        tomllib.loads(builder.manifest(builder.Target("linux-x64", p), []))
+        for p in ("3.11", "3.13")
+    ]
     found = [(m["blender_version_min"], m.get("blender_version_max")) for m in manifests]
     assert found == ranges
     other = builder.Target("linux-x64", "3.13", any_blender=True)
@@ -136,7 +172,14 @@ def test_the_manifest_names_licences_and_holders_of_all_that_the_zip_contains(bu
     manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text("utf-8"))
     assert manifest["license"][0] == "SPDX:GPL-3.0-or-later"
     third_party = (ROOT / "THIRD_PARTY.md").read_text("utf-8")
-    for licence in ("Apache-2.0", "BSD-2-Clause", "BSD-3-Clause", "MIT", "LGPL-2.1-or-later", "GPL-2.0-or-later"):
+    for licence in (
+        "Apache-2.0",
+        "BSD-2-Clause",
+        "BSD-3-Clause",
+        "MIT",
+        "LGPL-2.1-or-later",
+        "GPL-2.0-or-later",
+    ):
         assert f"SPDX:{licence}" in manifest["license"]
         assert licence in third_party
     assert "SPDX:CC0-1.0" in manifest["license"]
@@ -160,33 +203,51 @@ def test_six_zips_with_empty_wheels(with_empty_wheels, monkeypatch, capsys, tmp_
     builder = with_empty_wheels
     assert run(builder, monkeypatch, "--website", "https://example.com/scope") == 0
     archives = sorted(p.name for p in builder.DIST.glob("*.zip"))
-    blenders, platforms = ("blender_4.2_before_5.1", "blender_5.1"), ("linux_x64", "macos_arm64", "windows_x64")
+    blenders, platforms = (
+        ("blender_4.2_before_5.1", "blender_5.1"),
+        ("linux_x64", "macos_arm64", "windows_x64"),
+    )
     assert archives == sorted(f"scope-0.1.0-{b}-{p}.zip" for b in blenders for p in platforms)
     assert "6 zips listed" in capsys.readouterr().out
     archive, target = builder.DIST / archives[0], builder.Target("linux-x64", "3.11")
     assert manifest_of(archive)["website"] == "https://example.com/scope"
     with zipfile.ZipFile(archive) as file:
         names = file.namelist()
-    assert not any("numpy" in n or "/tests/" in n or n.startswith(("tests/", "tools/", ".")) for n in names)
+    assert not any(
+        "numpy" in n or "/tests/" in n or n.startswith(("tests/", "tools/", ".")) for n in names
+    )
     assert set(builder.GUIDE) <= set(names)
     manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text("utf-8"))
-    for folder in (p.strip("/") for p in manifest["build"]["paths_exclude_pattern"] if p.endswith("/")):
+    for folder in (
+        p.strip("/") for p in manifest["build"]["paths_exclude_pattern"] if p.endswith("/")
+    ):
         assert not any(n.startswith(f"{folder}/") or f"/{folder}/" in n for n in names), folder
     senders = [p.strip("/") for p in manifest["build"]["paths_exclude_pattern"] if "/live/" in p]
     assert [Path(sender).name for sender in senders] == list(builder.SENDERS)
     assert not set(senders) & set(names)
-    assert {"scope_addon/live/run.py", "scope_addon/job/live/capture.py", "scope_addon/ui/live/live_job.py"} <= set(
-        names
-    )
+    assert {
+        "scope_addon/live/run.py",
+        "scope_addon/job/live/capture.py",
+        "scope_addon/ui/live/live_job.py",
+    } <= set(names)
 
     def refused(file, match, **made_for):
         with pytest.raises(SystemExit, match=match):
-            builder.check(file, builder.Target(**{"platform": "linux-x64", "python": "3.11", **made_for}))
+            builder.check(
+                file, builder.Target(**{"platform": "linux-x64", "python": "3.11", **made_for})
+            )
 
-    for name in ("assets/lifter/lifter.onnx", "assets/prior/joint_prior.npz", "THIRD_PARTY.md", "docs/guide.html"):
+    for name in (
+        "assets/lifter/lifter.onnx",
+        "assets/prior/joint_prior.npz",
+        "THIRD_PARTY.md",
+        "docs/guide.html",
+    ):
         refused(changed(tmp_path / "other.zip", archive, {name: None}), f"{name} is missing")
     wheel = next(n for n in names if n.startswith("wheels/av-"))
-    refused(changed(tmp_path / "other.zip", archive, {wheel: b"other"}), "av-.* is not the locked file")
+    refused(
+        changed(tmp_path / "other.zip", archive, {wheel: b"other"}), "av-.* is not the locked file"
+    )
     refused(changed(tmp_path / "other.zip", archive, {wheel: None}), "is listed but not there")
     refused(archive, "made for linux-x64, not for windows-x64", platform="windows-x64")
     refused(archive, "not made for Blender 5.1.0", python="3.13")
@@ -214,7 +275,9 @@ def test_a_repeated_build_gives_the_same_bytes(with_empty_wheels, monkeypatch):
     for path in builder.ROOT.rglob("*"):  # as after another checkout
         os.utime(path, (1e9, 1e9))
     unsorted_folder = Path.rglob
-    monkeypatch.setattr(Path, "rglob", lambda *arguments: reversed(list(unsorted_folder(*arguments))))
+    monkeypatch.setattr(
+        Path, "rglob", lambda *arguments: reversed(list(unsorted_folder(*arguments)))
+    )
     assert builder.build(target, builder.DIST).read_bytes() == first
     assert archive.with_suffix(".cdx.json").read_bytes() == bill
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000002")
@@ -222,7 +285,9 @@ def test_a_repeated_build_gives_the_same_bytes(with_empty_wheels, monkeypatch):
 
 
 def changed(target, archive, contents):
-    """A copy of an archive with other content in some files, or without those whose content is None."""
+    """A copy of an archive with other content in some files, or without those whose content is
+    None.
+    """
     with zipfile.ZipFile(archive) as source, zipfile.ZipFile(target, "w") as file:
         for entry in source.infolist():
             content = contents.get(entry.filename, source.read(entry))
@@ -266,8 +331,21 @@ def test_two_zips_for_one_blender_are_refused(with_empty_wheels, monkeypatch):
 
 
 def test_no_shipped_module_uses_the_network_or_has_the_metadata_of_an_old_add_on():
-    network = {"socket", "ssl", "urllib", "http", "ftplib", "smtplib", "xmlrpc", "requests", "webbrowser", "pip"}
-    left_out = tomllib.loads((ROOT / "blender_manifest.toml").read_text("utf-8"))["build"]["paths_exclude_pattern"]
+    network = {
+        "socket",
+        "ssl",
+        "urllib",
+        "http",
+        "ftplib",
+        "smtplib",
+        "xmlrpc",
+        "requests",
+        "webbrowser",
+        "pip",
+    }
+    left_out = tomllib.loads((ROOT / "blender_manifest.toml").read_text("utf-8"))["build"][
+        "paths_exclude_pattern"
+    ]
     modules = [
         path
         for name in ("solver", "scope_addon")
@@ -278,14 +356,17 @@ def test_no_shipped_module_uses_the_network_or_has_the_metadata_of_an_old_add_on
     for module in modules:
         for node in ast.walk(ast.parse(module.read_text("utf-8"))):
             names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
-            names += [node.module or ""] if isinstance(node, ast.ImportFrom) and not node.level else []
+            names += (
+                [node.module or ""] if isinstance(node, ast.ImportFrom) and not node.level else []
+            )
             assert not network & {name.split(".")[0] for name in names}, module
             if isinstance(node, ast.Name) and node.id == "bl_info":
                 raise AssertionError(f"{module} has the metadata of an old add-on")
 
 
 @pytest.mark.parametrize(
-    ("arguments", "says"), [(["amiga"], "amiga"), (["linux-x64", "--python", "2.7"], "invalid choice: '2.7'")]
+    ("arguments", "says"),
+    [(["amiga"], "amiga"), (["linux-x64", "--python", "2.7"], "invalid choice: '2.7'")],
 )
 def test_bad_arguments(builder, monkeypatch, capsys, arguments, says):
     try:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The job type for Flamenco: compiled as its manager does, and its commands run as its worker does."""
+"""The job type for Flamenco: compiled as its manager does, and its commands run as its worker
+does.
+"""
 
 import json
 import os
@@ -18,12 +20,15 @@ from ..required import missing
 
 JOB_TYPE = Path(__file__).resolve().parents[2] / "scripts" / "flamenco" / "scope_capture.js"
 
-# What Flamenco Manager gives a job compiler, as far as this one uses it: author, path (with stem), print, and the job.
+# What Flamenco Manager gives a job compiler, as far as this one uses it: author, path (with stem),
+# print, and the job.
 MANAGER = """
 const { readFileSync } = require("fs"), vm = require("vm"), posix = require("path").posix;
 const tasks = [];
 const author = {
-    Task: (name, type) => ({ name, type, commands: [], addCommand(command) { this.commands.push(command); } }),
+    Task: (name, type) => ({
+        name, type, commands: [], addCommand(command) { this.commands.push(command); }
+    }),
     Command: (name, parameters) => ({ name, parameters }),
 };
 const path = { join: posix.join, basename: posix.basename, stem: name => posix.parse(name).name };
@@ -51,7 +56,10 @@ run()
 def compiled(settings):
     node = shutil.which("node")
     if node is None:  # nothing else needs it, so set-up does not install it
-        missing("node is not installed, which runs job types of Flamenco here", allowed_by="SCOPE_WITHOUT_NODE")
+        missing(
+            "node is not installed, which runs job types of Flamenco here",
+            allowed_by="SCOPE_WITHOUT_NODE",
+        )
     command = [node, "-e", MANAGER, str(JOB_TYPE), json.dumps(settings)]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     return json.loads(done.stdout)
@@ -79,7 +87,9 @@ def folder(tmp_path):
 def test_each_clip_is_a_task_with_results_of_its_own(folder):
     for name in ("a.mp4", "A.mov", "two words.PNG", "notes.txt", ".hidden.mp4"):
         (folder / name).touch()
-    tasks = compiled(given(folder, formats="npz, glb", reports=True, options="--people all  --height 182"))["tasks"]
+    tasks = compiled(
+        given(folder, formats="npz, glb", reports=True, options="--people all  --height 182")
+    )["tasks"]
     assert [task["name"] for task in tasks] == ["A.mov", "a.mp4", "two words"]
     assert {task["type"] for task in tasks} == {"blender"}
     for task, file in zip(tasks, ("A.mov", "a.mp4", "two words.PNG"), strict=True):
@@ -123,5 +133,7 @@ def test_the_commands_capture(folder, tmp_path):
     blender.chmod(0o755)
     (task,) = compiled(given(folder, formats="npz", quality="fast", options="--end 0.3"))["tasks"]
     (command,) = (each["parameters"] for each in task["commands"])
-    subprocess.run([command["exe"].replace("{blender}", str(blender)), *command["args"]], check=True)
+    subprocess.run(
+        [command["exe"].replace("{blender}", str(blender)), *command["args"]], check=True
+    )
     assert Motion.load(folder.parent / "out" / "walk.npz").frames.size == 10

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The guide that the extension contains: every link leads somewhere inside it, and nothing that is written is lost."""
+"""The guide that the extension contains: every link leads somewhere inside it, and nothing that is
+written is lost.
+"""
 
 import importlib.util
 import re
@@ -40,7 +42,9 @@ class Page(HTMLParser):
 @pytest.fixture(scope="module")
 def extension(tmp_path_factory):
     """A folder with what the extension contains besides the pages, and the pages."""
-    spec = importlib.util.spec_from_file_location("guide_pages", ROOT / "scripts" / "guide_pages.py")
+    spec = importlib.util.spec_from_file_location(
+        "guide_pages", ROOT / "scripts" / "guide_pages.py"
+    )
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     folder = tmp_path_factory.mktemp("extension")
@@ -77,13 +81,22 @@ def test_nothing_that_is_written_is_lost(extension):
     for path in extension[1]:
         source, page = (ROOT / "docs" / f"{path.stem}.md").read_text("utf-8"), Page(path)
         prose = re.sub(r"^```.*?^```$", "", source, flags=re.M | re.S)
-        for tag, pattern in (("h1", r"^# "), ("h2", r"^## "), ("h3", r"^### "), ("li", r"^ *(?:-|\d+\.) ")):
+        for tag, pattern in (
+            ("h1", r"^# "),
+            ("h2", r"^## "),
+            ("h3", r"^### "),
+            ("li", r"^ *(?:-|\d+\.) "),
+        ):
             assert page.tags[tag] == len(re.findall(pattern, prose, re.M)), (path.name, tag)
         assert page.tags["tr"] == len(re.findall(r"^\|(?![\s:|-]+\|$)", prose, re.M)), path.name
         assert page.tags["pre"] == len(re.findall(r"^```.*?^```$", source, re.M | re.S))
         source = re.sub(r"!?\[([^]]*)\]\([^()\s]*\)", r" \1 ", source)
         source = re.sub(r"^ *\d+\. ", "", source, flags=re.M)  # the browser counts
-        shown = set(re.findall(r"\w+", page.text + " ".join(re.findall(r'alt="([^"]*)"', path.read_text("utf-8")))))
+        shown = set(
+            re.findall(
+                r"\w+", page.text + " ".join(re.findall(r'alt="([^"]*)"', path.read_text("utf-8")))
+            )
+        )
         code_languages = set(re.findall(r"^```(\w+)$", source, re.M))
         assert set(re.findall(r"\w+", source)) - shown - code_languages == set(), path.name
 

@@ -7,12 +7,17 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-WHEELS = [Path("numba-0.68.1-cp313-cp313-win_amd64.whl"), Path("numba-0.68.1-cp311-cp311-win_amd64.whl")]
+WHEELS = [
+    Path("numba-0.68.1-cp313-cp313-win_amd64.whl"),
+    Path("numba-0.68.1-cp311-cp311-win_amd64.whl"),
+]
 
 
 @pytest.fixture
 def shipped(tmp_path, monkeypatch):
-    spec = importlib.util.spec_from_file_location("shipped_kernels", ROOT / "scripts" / "shipped_kernels.py")
+    spec = importlib.util.spec_from_file_location(
+        "shipped_kernels", ROOT / "scripts" / "shipped_kernels.py"
+    )
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     monkeypatch.setattr(module, "KEPT", tmp_path / "kept")

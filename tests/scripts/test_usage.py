@@ -8,13 +8,22 @@ from pathlib import Path
 import pytest
 
 SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
-PARTS = set(re.findall(r"^    ([a-z |]+)\) ", (SCRIPTS / "real_blender" / "run.sh").read_text("utf-8"), re.M))
+PARTS = set(
+    re.findall(
+        r"^    ([a-z "
+        r"|]+)\) ",
+        (SCRIPTS / "real_blender" / "run.sh").read_text("utf-8"),
+        re.M,
+    )
+)
 
 
 def run(name, *arguments):
     """Run a script of the folder, or one at a relative path."""
     script = name if name.startswith(".") else str(SCRIPTS / name)
-    return subprocess.run(["bash", script, *arguments], capture_output=True, text=True, check=False, timeout=300)
+    return subprocess.run(
+        ["bash", script, *arguments], capture_output=True, text=True, check=False, timeout=300
+    )
 
 
 def parts():
@@ -35,7 +44,9 @@ def test_a_script_prints_its_own_usage_in_any_folder(name, option, monkeypatch):
 
 def test_the_usage_names_every_part():
     assert len(parts()) > 10
-    assert [part for part in parts() if not re.search(rf"\b{part}\b", run("blender", "--help").stdout)] == []
+    assert [
+        part for part in parts() if not re.search(rf"\b{part}\b", run("blender", "--help").stdout)
+    ] == []
 
 
 def test_an_unknown_part_is_refused_with_those_that_exist():

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Imported motions against the motion that the file was made from: positions in the world, on the floor, z up."""
+"""Imported motions against the motion that the file was made from: positions in the world, on the
+floor, z up.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -26,7 +28,9 @@ R_FILE_WORLD = {
 
 
 def in_file(axis: str, height: float = 0.0) -> dict[str, np.ndarray]:
-    """The walk as SMPL-style arrays whose world has this axis up, and the floor at another height."""
+    """The walk as SMPL-style arrays whose world has this axis up, and the floor at another
+    height.
+    """
     R = R_FILE_WORLD[axis]
     poses = MOTION.poses.reshape(len(MOTION), -1, 3).astype(float)
     poses[:, 0] = log(R @ exp(poses[:, 0]))
@@ -44,7 +48,9 @@ def joints(motion: Motion) -> np.ndarray:
 
 
 def skinned(motion: Motion, t: int) -> np.ndarray:
-    R, at = BODY.forward_kinematics(exp(motion.poses[t].reshape(-1, 3).astype(float)), motion.trans[t], motion.betas)
+    R, at = BODY.forward_kinematics(
+        exp(motion.poses[t].reshape(-1, 3).astype(float)), motion.trans[t], motion.betas
+    )
     return BODY.skin(R, at, motion.betas)
 
 
@@ -67,7 +73,12 @@ def test_the_motion_stands_upright_on_the_floor(tmp_path, axis, said):
 
 
 def test_a_motion_of_our_body_is_not_changed(tmp_path):
-    np.savez(tmp_path / "walk.npz", body_model=np.array("scope"), betas=np.zeros(BODY.P), **in_file("z", height=1.3))
+    np.savez(
+        tmp_path / "walk.npz",
+        body_model=np.array("scope"),
+        betas=np.zeros(BODY.P),
+        **in_file("z", height=1.3),
+    )
     found = import_motion(tmp_path / "walk.npz")
     np.testing.assert_allclose(joints(found.motion), joints(MOTION) + [0, 0, 1.3], atol=1e-4)
     assert found.notes == []
@@ -111,7 +122,9 @@ def test_fingers_choose_the_body_with_fingers(tmp_path):
     found = import_motion(tmp_path / "moving.npz")
     assert found.body.name == "scope_h"
     at = found.body.joint_names.index("left_index1")
-    np.testing.assert_allclose(found.motion.poses.reshape(len(MOTION), -1, 3)[:, at], 0.2, atol=1e-6)
+    np.testing.assert_allclose(
+        found.motion.poses.reshape(len(MOTION), -1, 3)[:, at], 0.2, atol=1e-6
+    )
 
 
 def test_what_is_missing_is_assumed_and_said(tmp_path):
@@ -129,8 +142,12 @@ def test_an_unclear_up_axis_is_said(tmp_path):
     lying = arrays["poses"].copy()
     lying[:, :3] = [0.0, 0.0, np.pi / 2]  # along x
     np.savez(tmp_path / "lying.npz", **arrays | {"poses": lying})
-    assert any("up axis is not clear" in note for note in import_motion(tmp_path / "lying.npz").notes)
-    assert not any("not clear" in note for note in import_motion(tmp_path / "lying.npz", up="z").notes)
+    assert any(
+        "up axis is not clear" in note for note in import_motion(tmp_path / "lying.npz").notes
+    )
+    assert not any(
+        "not clear" in note for note in import_motion(tmp_path / "lying.npz", up="z").notes
+    )
 
 
 def test_one_frame_is_enough(tmp_path):
@@ -149,20 +166,28 @@ def test_invalid_arguments(tmp_path, arguments):
 
 @pytest.mark.parametrize("axis", R_FILE_WORLD)
 def test_on_the_users_own_smpl_body_shape_and_pelvis_are_exact(axis):
-    """Its rest pelvis is not at the model's origin, unlike ours; SMPL adds it in the file's axes."""
-    smpl = replace(BODY, name="smpl", J_template=BODY.J_template + [0.01, -0.2, 0.03], gender="female")
+    """Its rest pelvis is not at the model's origin, unlike ours; SMPL adds it in the file's
+    axes.
+    """
+    smpl = replace(
+        BODY, name="smpl", J_template=BODY.J_template + [0.01, -0.2, 0.03], gender="female"
+    )
     betas = np.array([0.5, -1.0, 0.3])
     R = R_FILE_WORLD[axis]
     rotations = exp(MOTION.poses.reshape(len(MOTION), -1, 3).astype(float))
     rotations[:, 0] = R @ rotations[:, 0]
     trans = MOTION.trans @ R.T
-    source = smpl_motion({"poses": log(rotations).reshape(len(MOTION), -1), "trans": trans, "betas": betas}, FILE)
+    source = smpl_motion(
+        {"poses": log(rotations).reshape(len(MOTION), -1), "trans": trans, "betas": betas}, FILE
+    )
     full = np.pad(betas, (0, BODY.P - 3))
     expected = smpl.forward_kinematics(rotations, trans, full)[1] @ R  # in the world
     found = convert(source, smpl, FILE)
     np.testing.assert_allclose(found.motion.betas, full, atol=1e-6)
     got = smpl.forward_kinematics(
-        exp(found.motion.poses.reshape(rotations.shape[:2] + (3,)).astype(float)), found.motion.trans, full
+        exp(found.motion.poses.reshape(rotations.shape[:2] + (3,)).astype(float)),
+        found.motion.trans,
+        full,
     )[1]
     raised = got - expected
     np.testing.assert_allclose(raised, np.broadcast_to(raised[0, 0], raised.shape), atol=1e-4)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Arrays of other tools' files: names, shapes, rotation matrices, and everything that may be wrong with them."""
+"""Arrays of other tools' files: names, shapes, rotation matrices, and everything that may be wrong
+with them.
+"""
 
 from pathlib import Path
 
@@ -25,20 +27,34 @@ LAYOUTS = {
     "SMPL-X": ({"poses": flat(0, 55)}, 55),
     "body only": ({"poses": flat(0, 22)}, 22),
     "joints apart": ({"thetas": RANDOM[:, :24]}, 24),
-    "AIST++": ({"smpl_poses": flat(0, 24), "smpl_trans": np.ones((T, 3)), "smpl_scaling": np.array([2.0])}, 24),
-    "AMASS parts": ({"root_orient": flat(0, 1), "pose_body": flat(1, 22), "pose_hand": flat(22, 52)}, 52),
+    "AIST++": (
+        {"smpl_poses": flat(0, 24), "smpl_trans": np.ones((T, 3)), "smpl_scaling": np.array([2.0])},
+        24,
+    ),
+    "AMASS parts": (
+        {"root_orient": flat(0, 1), "pose_body": flat(1, 22), "pose_hand": flat(22, 52)},
+        52,
+    ),
     "SMPL parameters": ({"global_orient": flat(0, 1), "body_pose": flat(1, 24)}, 24),
     "hands apart": (
-        {"global_orient": flat(0, 1), "body_pose": flat(1, 22), "left_hand_pose": flat(22, 37),
-         "right_hand_pose": flat(37, 52)},
+        {
+            "global_orient": flat(0, 1),
+            "body_pose": flat(1, 22),
+            "left_hand_pose": flat(22, 37),
+            "right_hand_pose": flat(37, 52),
+        },
         52,
     ),
     "hand components": (
-        {"global_orient": flat(0, 1), "body_pose": flat(1, 22), "left_hand_pose": np.zeros((T, 6))}, 22
+        {"global_orient": flat(0, 1), "body_pose": flat(1, 22), "left_hand_pose": np.zeros((T, 6))},
+        22,
     ),
     "matrices": ({"global_orient": exp(RANDOM[:, :1]), "body_pose": exp(RANDOM[:, 1:24])}, 24),
-    "one root matrix": ({"global_orient": exp(RANDOM[:, 0]), "body_pose": exp(RANDOM[:, 1:22])}, 22),
-}  # fmt: skip
+    "one root matrix": (
+        {"global_orient": exp(RANDOM[:, 0]), "body_pose": exp(RANDOM[:, 1:22])},
+        22,
+    ),
+}
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
@@ -59,7 +75,12 @@ def test_every_layout_gives_the_same_rotations(tmp_path, layout):
 @pytest.mark.parametrize("key", ["mocap_framerate", "mocap_frame_rate", "fps"])
 def test_frame_rate_gender_and_shape_are_read(key):
     betas = np.arange(T * 10.0).reshape(T, 10)
-    arrays = {"poses": flat(0, 24), key: np.array(120), "gender": np.array(b"female"), "betas": betas}
+    arrays = {
+        "poses": flat(0, 24),
+        key: np.array(120),
+        "gender": np.array(b"female"),
+        "betas": betas,
+    }
     motion = smpl_motion(arrays, FILE)
     assert (motion.rate, motion.gender) == (120.0, "female")
     np.testing.assert_allclose(motion.betas, betas.mean(0))
@@ -94,11 +115,20 @@ BROKEN = {
     "complex": ({"poses": np.zeros((T, 72), complex)}, "must hold numbers"),
     "NaN": ({"poses": with_nan()}, "NaN or infinity, first in frame 3"),
     "too long": ({"poses": np.broadcast_to(np.float32(0), (10_000_000, 72))}, "at most 500000"),
-    "not rotations": ({"global_orient": 2 * exp(RANDOM[:, :1]), "body_pose": exp(RANDOM[:, 1:24])}, "not rotations"),
-    "reflections": ({"global_orient": -exp(RANDOM[:, :1]), "body_pose": exp(RANDOM[:, 1:24])}, "not rotations"),
+    "not rotations": (
+        {"global_orient": 2 * exp(RANDOM[:, :1]), "body_pose": exp(RANDOM[:, 1:24])},
+        "not rotations",
+    ),
+    "reflections": (
+        {"global_orient": -exp(RANDOM[:, :1]), "body_pose": exp(RANDOM[:, 1:24])},
+        "not rotations",
+    ),
     "short body": (PARTS | {"body_pose": flat(1, 24)[:2]}, "as many frames"),
     "wrong body": (PARTS | {"body_pose": flat(1, 20)}, "21 or 23"),
-    "wrong hand": (PARTS | {"body_pose": flat(1, 22), "left_hand_pose": flat(22, 30)}, "must have 15 joints"),
+    "wrong hand": (
+        PARTS | {"body_pose": flat(1, 22), "left_hand_pose": flat(22, 30)},
+        "must have 15 joints",
+    ),
     "short trans": (GOOD | {"trans": np.zeros((2, 3))}, "trans must have shape"),
     "scalar trans": (GOOD | {"trans": np.array(1.0)}, "trans must have shape"),
     "empty trans": (GOOD | {"trans": np.zeros((0, 3))}, "trans must have shape"),
@@ -110,7 +140,10 @@ BROKEN = {
     "rates": (GOOD | {"mocap_framerate": np.ones(2)}, "frames per second"),
     "wrong betas": (GOOD | {"betas": np.zeros((3, 4, 5))}, "betas has shape"),
     "betas of text": (GOOD | {"betas": np.array(["a"])}, "must hold numbers"),
-    "scaling of zero": (GOOD | {"trans": np.zeros((T, 3)), "smpl_scaling": np.array([0.0])}, "smpl_scaling"),
+    "scaling of zero": (
+        GOOD | {"trans": np.zeros((T, 3)), "smpl_scaling": np.array([0.0])},
+        "smpl_scaling",
+    ),
 }
 
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A dense Gauss-Newton step built from scratch: residuals from their definition, Jacobian by complex steps."""
+"""A dense Gauss-Newton step built from scratch: residuals from their definition, Jacobian by
+complex steps.
+"""
 
 import numpy as np
 from scope.solver.compiled.part import GRADIENT, SHAPE
@@ -17,19 +19,33 @@ def complex_log(R):
     """Rotation vector of a rotation matrix, analytic in its entries; not at 0 and pi."""
     c = (np.trace(R) - 1) / 2
     theta = np.arccos(c + 0j)
-    return theta / (2 * np.sin(theta)) * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    return (
+        theta
+        / (2 * np.sin(theta))
+        * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    )
 
 
 def moved(body, state, d):
-    """The state moved by d = (w, nu, u_1..K, dbeta), to first order and hence exact for a complex step."""
+    """The state moved by d = (w, nu, u_1..K, dbeta), to first order and hence exact for a complex
+    step.
+    """
     R0, t0, Omega, beta = state
     K = len(Omega)
     R, _, _ = forward(body, *state)
     u = d[6 : 6 + 3 * K].reshape(K, 3)
     Omega = np.array(
-        [R[body.parents[i + 1]].T @ (np.eye(3) + hat(u[i])) @ R[body.parents[i + 1]] @ Omega[i] for i in range(K)]
+        [
+            R[body.parents[i + 1]].T @ (np.eye(3) + hat(u[i])) @ R[body.parents[i + 1]] @ Omega[i]
+            for i in range(K)
+        ]
     )
-    return (np.eye(3) + hat(d[:3])) @ R0, t0 + d[3:6], Omega, beta + d[6 + 3 * K : 6 + 3 * K + len(beta)]
+    return (
+        (np.eye(3) + hat(d[:3])) @ R0,
+        t0 + d[3:6],
+        Omega,
+        beta + d[6 + 3 * K : 6 + 3 * K + len(beta)],
+    )
 
 
 def jacobian(body, state, residual, extra=0):
@@ -57,7 +73,9 @@ def residuals(body, data, focal=False):
         rd = bone / np.sqrt((bone**2).sum(1))[:, None] - data["directions"]
         out = [r2, r3, rd]
         if "joint_weights" in data:
-            phi = [complex_log(M.T @ Om) for M, Om in zip(data["joint_mean"], state[2], strict=True)]
+            phi = [
+                complex_log(M.T @ Om) for M, Om in zip(data["joint_mean"], state[2], strict=True)
+            ]
             out.append(np.array(phi))
             out.append(np.array([complex_log(data["R_hat"].T @ R[data["part"]])]))
             out.append((t[data["part"]] - data["t_hat"])[None])
@@ -78,7 +96,9 @@ def robust_factors(raw, sigmas, weights):
 
 
 def random_coupling(rng, tree, blocks, t, origin):
-    """Add random residuals r(T_i, Omega_i, beta) on every joint to the blocks; return their dense rows J and r."""
+    """Add random residuals r(T_i, Omega_i, beta) on every joint to the blocks; return their dense
+    rows J and r.
+    """
     n, P = len(tree.parents), tree.shape
     K = n - 1
     rows, values = [], []

@@ -21,7 +21,9 @@ class RandomBody:
 
 
 def random_body(rng, K=23, P=10, M=40, shape=0.02):
-    """Return a random tree of K joints; the M keypoints are spread evenly over the parts, every V_j non-zero."""
+    """Return a random tree of K joints; the M keypoints are spread evenly over the parts, every V_j
+    non-zero.
+    """
     parents = np.array([-1] + [rng.integers(max(0, i - 4), i) for i in range(1, K + 1)])
     part = np.sort(np.arange(M) % (K + 1))
     return RandomBody(
@@ -35,7 +37,9 @@ def random_body(rng, K=23, P=10, M=40, shape=0.02):
 
 
 def forward(body, R0, t0, Omega, beta):
-    """Return R (K+1, 3, 3), t (K+1, 3) and keypoints (M, 3), straight from the definition; complex-safe."""
+    """Return R (K+1, 3, 3), t (K+1, 3) and keypoints (M, 3), straight from the definition;
+    complex-safe.
+    """
     n = len(body.parents)
     R, t = [R0], [t0]
     for i in range(1, n):
@@ -72,15 +76,25 @@ def random_flow(rng, mean, bend=0.3):
     p = np.zeros(joint_flow.SIZE)
     p[:9] = np.ravel(mean)
     for k in range(joint_flow.LAYERS):
-        values = {name: bend * rng.standard_normal(shape) for name, shape in joint_flow.LAYER_SHAPES.items()}
+        values = {
+            name: bend * rng.standard_normal(shape)
+            for name, shape in joint_flow.LAYER_SHAPES.items()
+        }
         values["A"] = rotations.exp(rng.standard_normal(3)) @ (np.eye(3) + 0.2 * np.tri(3))
-        values |= {name: rng.standard_normal(np.shape(values[name])) for name in ("W2", "W3", "c2", "c3")}
+        values |= {
+            name: rng.standard_normal(np.shape(values[name])) for name in ("W2", "W3", "c2", "c3")
+        }
         values["beta"] = rng.uniform(-0.7, 0.7, 3)
         at = joint_flow.FIRST_LAYER + k * joint_flow.LAYER_SIZE
         p[at : at + joint_flow.LAYER_SIZE] = np.concatenate([np.ravel(v) for v in values.values()])
     p[joint_flow.LAST : joint_flow.LAST + 12] = np.append(2.0 * np.eye(3), rng.standard_normal(3))
     matrices = [p[joint_flow.LAST : joint_flow.LAST + 9]]
-    matrices += [p[joint_flow.FIRST_LAYER + k * joint_flow.LAYER_SIZE :][:9] for k in range(joint_flow.LAYERS)]
-    p[joint_flow.CONSTANT] = sum(np.log(abs(np.linalg.det(A.reshape(3, 3)))) for A in matrices) - np.log(2 / np.pi**2)
+    matrices += [
+        p[joint_flow.FIRST_LAYER + k * joint_flow.LAYER_SIZE :][:9]
+        for k in range(joint_flow.LAYERS)
+    ]
+    p[joint_flow.CONSTANT] = sum(
+        np.log(abs(np.linalg.det(A.reshape(3, 3)))) for A in matrices
+    ) - np.log(2 / np.pi**2)
     p[joint_flow.BOUND] = joint_flow.transform(p, mean)[2] + 1.0
     return p

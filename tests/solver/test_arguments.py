@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every public function of the solver, with every wrong kind of value for each of its arguments in turn.
+"""Every public function of the solver, with every wrong kind of value for each of its arguments in
+turn.
 
-What cannot be used is refused by an error of the solver's own, in a sentence; nothing fails inside of numpy or Python.
-Some values can be used: a list for an array, or True for a switch.
+What cannot be used is refused by an error of the solver's own, in a sentence; nothing fails inside
+of numpy or Python. Some values can be used: a list for an array, or True for a switch.
 """
 
 import warnings
@@ -117,7 +118,11 @@ def _posed() -> dict[str, Any]:
 
 def _chain() -> dict[str, Any]:
     parts = _built_in().K + 1
-    return {"rotations": np.tile(TURN, (parts, 1, 1)), "trans": np.zeros(3), "betas": np.zeros(_built_in().P)}
+    return {
+        "rotations": np.tile(TURN, (parts, 1, 1)),
+        "trans": np.zeros(3),
+        "betas": np.zeros(_built_in().P),
+    }
 
 
 @cache
@@ -155,30 +160,69 @@ def _checked(**arguments: Any) -> Any:
 
 
 def _calls() -> dict[str, Callable[[], tuple[Callable[..., Any], dict[str, Any]]]]:
-    """Return by name what makes a call: a function, and arguments that it takes. Nothing is loaded or fitted before."""
+    """Return by name what makes a call: a function, and arguments that it takes. Nothing is loaded
+    or fitted before.
+    """
     rest = State.rest(K, P)
-    motion = {"body": BODY, "frames": [SEEN, SEEN], "times": np.arange(2) / 30.0, "init": [rest, rest]}
-    motion |= {"priors": PRIORS, "options": SHORT, "motion": MotionPrior(), "stands": StandingPoints()}
+    motion = {
+        "body": BODY,
+        "frames": [SEEN, SEEN],
+        "times": np.arange(2) / 30.0,
+        "init": [rest, rest],
+    }
+    motion |= {
+        "priors": PRIORS,
+        "options": SHORT,
+        "motion": MotionPrior(),
+        "stands": StandingPoints(),
+    }
     motion |= {"shape": np.zeros(P), "focal": False, "focal_weight": 1.0, "covariance": False}
     motion |= {"window": 10.0, "overlap": 2.0}
-    clip = {"body": BODY, "measurements": [SEEN, SEEN], "init": [rest, rest], "priors": PRIORS, "options": SHORT}
+    clip = {
+        "body": BODY,
+        "measurements": [SEEN, SEEN],
+        "init": [rest, rest],
+        "priors": PRIORS,
+        "options": SHORT,
+    }
     clip |= {"temporal": Temporal(), "focal": False, "focal_weight": 1.0, "shape_frames": 500}
-    clips = {name: value for name, value in clip.items() if name not in ("measurements", "init", "shape_frames")}
+    clips = {
+        name: value
+        for name, value in clip.items()
+        if name not in ("measurements", "init", "shape_frames")
+    }
     pixels = {"indices": np.arange(M), "pixels": project(POINTS), "confidence": np.ones(M)}
     lines = {"starts": [M], "ends": [M + 1], "directions": [[0.0, 1.0, 0.0]], "confidence": [1.0]}
     poses = {"parts": [0], "R_camera_part": [TURN], "t_camera_part": [[0.0, 0.0, 4.0]]}
     poses |= {"weight_rotation": [1.0], "weight_translation": [1.0]}
     contacts = {"indices": [0], "points": [[0.0, 0.0, 4.0]], "probability": [1.0]}
     floor = {"indices": [0], "normal": UP, "offset": 1.0, "contact": [1.0], "below": [1.0]}
-    state = {"R_camera_root": TURN, "t_camera_root": np.ones(3), "Omega": np.tile(TURN, (K, 1, 1)), "beta": np.zeros(P)}
+    state = {
+        "R_camera_root": TURN,
+        "t_camera_root": np.ones(3),
+        "Omega": np.tile(TURN, (K, 1, 1)),
+        "beta": np.zeros(P),
+    }
     view = {"measurements": SEEN, "R_camera_world": TURN, "t_camera_world": np.zeros(3)}
     information = {"shape_mean": np.zeros(P), "shape_information": np.eye(P)}
-    joints = {"joint_mean": np.tile(TURN, (K, 1, 1)), "joint_weights": np.ones(K), "limits": None, "flow": None}
+    joints = {
+        "joint_mean": np.tile(TURN, (K, 1, 1)),
+        "joint_weights": np.ones(K),
+        "limits": None,
+        "flow": None,
+    }
     smooth = {f.name: getattr(MotionPrior(), f.name) for f in fields(MotionPrior)}
     stand = {"indices": [0], "probability": [[1.0], [1.0]]}
     arrays = {f.name: getattr(BODY, f.name) for f in fields(BODY)}
     vectors, matrices = {"phi": np.ones(3)}, {"rotation": TURN}
-    own = {"name": "test_arguments", "ints": 1, "floats": 1, "indexes": "parts", "kernel": None, "function": _evaluated}
+    own = {
+        "name": "test_arguments",
+        "ints": 1,
+        "floats": 1,
+        "indexes": "parts",
+        "kernel": None,
+        "function": _evaluated,
+    }
     return {
         "load_body": lambda: (solver.load_body, {"which": "scope"}),
         "load_joint_prior": lambda: (solver.load_joint_prior, {"path": BUILT_IN}),
@@ -186,25 +230,43 @@ def _calls() -> dict[str, Callable[[], tuple[Callable[..., Any], dict[str, Any]]
             solver.fit,
             {"body": BODY, "measurements": SEEN, "init": rest, "priors": PRIORS, "options": SHORT},
         ),
-        "fit, 2D keypoints": lambda: (lambda **a: _seen(intrinsics=INTRINSICS, keypoints2d=Keypoints2D(**a)), pixels),
+        "fit, 2D keypoints": lambda: (
+            lambda **a: _seen(intrinsics=INTRINSICS, keypoints2d=Keypoints2D(**a)),
+            pixels,
+        ),
         "fit, intrinsics": lambda: (
             lambda K: _seen(intrinsics=K, keypoints2d=Keypoints2D(**pixels)),
             {"K": INTRINSICS},
         ),
-        "fit, 3D keypoints": lambda: (lambda **a: _seen(keypoints3d=Keypoints3D(**a)), vars(KEYPOINTS)),
-        "fit, directions": lambda: (lambda **a: _seen(orientation_field=OrientationField(**a)), lines),
+        "fit, 3D keypoints": lambda: (
+            lambda **a: _seen(keypoints3d=Keypoints3D(**a)),
+            vars(KEYPOINTS),
+        ),
+        "fit, directions": lambda: (
+            lambda **a: _seen(orientation_field=OrientationField(**a)),
+            lines,
+        ),
         "fit, pose priors": lambda: (lambda **a: _seen(pose_priors=PosePriors(**a)), poses),
         "fit, contacts": lambda: (lambda **a: _seen(foot_contacts=FootContacts(**a)), contacts),
         "fit, floor": lambda: (lambda **a: _seen(floor=Floor(**a)), floor),
-        "fit, tables": lambda: (lambda rows: _seen(tables={"joint_limits": rows}), {"rows": ([[1]], np.ones((1, 8)))}),
+        "fit, tables": lambda: (
+            lambda rows: _seen(tables={"joint_limits": rows}),
+            {"rows": ([[1]], np.ones((1, 8)))},
+        ),
         "fit, shape prior": lambda: (_known, information),
         "fit, joint prior": lambda: (_known, joints),
         "fit, state": lambda: (
             lambda **a: solver.fit(BODY, SEEN, init=State(**a), priors=PRIORS, options=SHORT),
             state,
         ),
-        "fit, body": lambda: (lambda **a: solver.fit(replace(BODY, **a), SEEN, priors=PRIORS, options=SHORT), arrays),
-        "Measurements": lambda: (Measurements, {f.name: getattr(SEEN, f.name) for f in fields(Measurements)}),
+        "fit, body": lambda: (
+            lambda **a: solver.fit(replace(BODY, **a), SEEN, priors=PRIORS, options=SHORT),
+            arrays,
+        ),
+        "Measurements": lambda: (
+            Measurements,
+            {f.name: getattr(SEEN, f.name) for f in fields(Measurements)},
+        ),
         "Weights": lambda: (Weights, {f.name: getattr(Weights(), f.name) for f in fields(Weights)}),
         "Stage": lambda: (Stage, {f.name: getattr(Stage(), f.name) for f in fields(Stage)}),
         "Options": lambda: (
@@ -219,11 +281,24 @@ def _calls() -> dict[str, Callable[[], tuple[Callable[..., Any], dict[str, Any]]
         ),
         "fit_tree": lambda: (
             solver.fit_tree,
-            {"tree": _tree(), "measurements": SEEN, "init": rest, "priors": PRIORS, "options": SHORT},
+            {
+                "tree": _tree(),
+                "measurements": SEEN,
+                "init": rest,
+                "priors": PRIORS,
+                "options": SHORT,
+            },
         ),
         "fit_batch": lambda: (
             solver.fit_batch,
-            {"body": BODY, "measurements": [SEEN], "init": [rest], "priors": PRIORS, "options": SHORT, "threads": 1},
+            {
+                "body": BODY,
+                "measurements": [SEEN],
+                "init": [rest],
+                "priors": PRIORS,
+                "options": SHORT,
+                "threads": 1,
+            },
         ),
         "fit_clip": lambda: (solver.fit_clip, clip),
         "fit_clips": lambda: (solver.fit_clips, clips | {"clips": [[SEEN]], "threads": 1}),
@@ -235,8 +310,14 @@ def _calls() -> dict[str, Callable[[], tuple[Callable[..., Any], dict[str, Any]]
             solver.with_previous,
             {"measurements": SEEN, "previous": rest, "temporal": Temporal()},
         ),
-        "with_previous, state": lambda: (lambda **a: solver.with_previous(SEEN, State(**a), Temporal()), state),
-        "carry": lambda: (solver.carry, {"priors": PRIORS, "fitted": _fitted(), "shape_weight": 100.0}),
+        "with_previous, state": lambda: (
+            lambda **a: solver.with_previous(SEEN, State(**a), Temporal()),
+            state,
+        ),
+        "carry": lambda: (
+            solver.carry,
+            {"priors": PRIORS, "fitted": _fitted(), "shape_weight": 100.0},
+        ),
         "make_tree": lambda: (solver.make_tree, {"body": BODY, "focal": True}),
         "default_priors": lambda: (solver.default_priors, {"body": BODY, "log_det": 0.0}),
         "register_residual": lambda: (solver.register_residual, own),
@@ -250,7 +331,10 @@ def _calls() -> dict[str, Callable[[], tuple[Callable[..., Any], dict[str, Any]]
         ),
         "State.rest": lambda: (State.rest, {"K": K, "P": P, "distance": 3.0}),
         "State.pose": lambda: (lambda tree: rest.pose(tree), {"tree": _tree()}),
-        "JointPrior": lambda: (_used_prior, {"names": ("pelvis", "neck"), "parameters": _joint_prior().parameters[:2]}),
+        "JointPrior": lambda: (
+            _used_prior,
+            {"names": ("pelvis", "neck"), "parameters": _joint_prior().parameters[:2]},
+        ),
         "JointPrior.of": lambda: (_joint_prior().of, {"joint": "neck"}),
         "JointPrior.tables": lambda: (
             _joint_prior().tables,
@@ -260,7 +344,10 @@ def _calls() -> dict[str, Callable[[], tuple[Callable[..., Any], dict[str, Any]]
             _joint_prior().sample,
             {"joint": "neck", "count": 2, "rng": np.random.default_rng(0)},
         ),
-        "JointPrior.log_density": lambda: (_joint_prior().log_density, {"joint": "neck", "Omega": TURN}),
+        "JointPrior.log_density": lambda: (
+            _joint_prior().log_density,
+            {"joint": "neck", "Omega": TURN},
+        ),
         "Body.keypoint_set": lambda: (_built_in().keypoint_set, {"prefix": "coco"}),
         "Body.rest_joints": lambda: (_built_in().rest_joints, {"betas": None}),
         "Body.rest_vertices": lambda: (_built_in().rest_vertices, {"betas": None}),

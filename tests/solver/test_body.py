@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Body files in Scope's own format: read as written, and refused with the array that cannot be used."""
+"""Body files in Scope's own format: read as written, and refused with the array that cannot be
+used.
+"""
 
 import numpy as np
 import pytest
@@ -45,12 +47,29 @@ def test_a_whole_file_is_read_and_so_is_one_without_what_is_optional(tmp_path):
     arrays = small_body()
     body = load_body(saved(tmp_path / "whole.npz", arrays))
     assert (body.name, body.K, body.P) == ("small", N - 1, P)
-    for key in ("v_template", "J_template", "faces", "uv", "uv_faces", "face_material", "material_colors"):
+    for key in (
+        "v_template",
+        "J_template",
+        "faces",
+        "uv",
+        "uv_faces",
+        "face_material",
+        "material_colors",
+    ):
         np.testing.assert_array_equal(getattr(body, key), arrays[key])
     assert body.J_template.dtype == np.float64
-    for key in ("name", "license", "uv", "uv_faces", "face_material", "material_names", "material_colors"):
+    for key in (
+        "name",
+        "license",
+        "uv",
+        "uv_faces",
+        "face_material",
+        "material_names",
+        "material_colors",
+    ):
         del arrays[key]
-    arrays |= {"keypoint_names": np.array([]), "keypoint_part": np.zeros(0, int)}  # as numpy writes a list of no names
+    # as numpy writes a list of no names
+    arrays |= {"keypoint_names": np.array([]), "keypoint_part": np.zeros(0, int)}
     arrays |= {"keypoint_template": np.zeros((0, 3)), "keypoint_shapedirs": np.zeros((0, 3, P))}
     bare = load_body(saved(tmp_path / "bare.npz", dict(arrays, faces=arrays["faces"][:, :3])))
     assert (bare.name, bare.keypoint_names, bare.uv) == ("bare", (), None)
@@ -66,23 +85,56 @@ def test_a_body_is_shown_by_its_name_and_sizes(tmp_path):
 BROKEN = {
     "a flat tree": ("kintree_table", np.arange(N), r"must have shape \(2, any\), but has \(3,\)"),
     "no tree": ("kintree_table", np.int64(3), r"must have shape \(2, any\), but has \(\)"),
-    "a fractional tree": ("kintree_table", np.zeros((2, N)), "must hold whole numbers, but holds float64"),
-    "flat J_shapedirs": ("J_shapedirs", np.zeros((N, 3)), r"must have shape \(any, 3, any\), but has \(3, 3\)"),
+    "a fractional tree": (
+        "kintree_table",
+        np.zeros((2, N)),
+        "must hold whole numbers, but holds float64",
+    ),
+    "flat J_shapedirs": (
+        "J_shapedirs",
+        np.zeros((N, 3)),
+        r"must have shape \(any, 3, any\), but "
+        r"has \(3, 3\)",
+    ),
     "flat faces": ("faces", np.arange(4), r"must have shape \(any, any\), but has \(4,\)"),
-    "faces of five": ("faces", np.zeros((3, 5), int), "must be triangles or quads, but have 5 corners"),
+    "faces of five": (
+        "faces",
+        np.zeros((3, 5), int),
+        "must be triangles or quads, but have 5 corners",
+    ),
     "text for vertices": ("v_template", np.full((V, 3), "1"), "must hold numbers, but holds <U1"),
-    "text for indices": ("skin_joints", np.full((V, 4), "1"), "must hold whole numbers, but holds <U1"),
-    "complex joints": ("J_template", np.zeros((N, 3), complex), "must hold numbers, but holds complex128"),
+    "text for indices": (
+        "skin_joints",
+        np.full((V, 4), "1"),
+        "must hold whole numbers, but holds <U1",
+    ),
+    "complex joints": (
+        "J_template",
+        np.zeros((N, 3), complex),
+        "must hold numbers, but holds complex128",
+    ),
     "numbers for names": ("joint_names", np.arange(N), "must hold text, but holds int64"),
     "many names": ("name", np.array(["a", "b"]), r"must have shape \(\), but has \(2,\)"),
     "NaN keypoints": ("keypoint_shapedirs", np.full((M, 3, P), np.nan), "contains NaN or infinity"),
     "NaN uv": ("uv", np.full((6, 2), np.nan), "contains NaN or infinity"),
     "uv in space": ("uv", np.zeros((6, 3)), r"must have shape \(any, 2\), but has \(6, 3\)"),
     "uv outside": ("uv_faces", np.full((F, 4), 6), r"points outside 0\.\.5"),
-    "uv of other faces": ("uv_faces", np.zeros((F, 3), int), r"must have shape \(5, 4\), but has \(5, 3\)"),
+    "uv of other faces": (
+        "uv_faces",
+        np.zeros((F, 3), int),
+        r"must have shape \(5, 4\), but has \(5, 3\)",
+    ),
     "no such material": ("face_material", np.full(F, 2), r"points outside 0\.\.1"),
-    "too few materials": ("face_material", np.zeros(F - 1, int), r"must have shape \(5,\), but has \(4,\)"),
-    "too many colours": ("material_colors", np.zeros((3, 4)), r"must have shape \(2, 4\), but has \(3, 4\)"),
+    "too few materials": (
+        "face_material",
+        np.zeros(F - 1, int),
+        r"must have shape \(5,\), but has \(4,\)",
+    ),
+    "too many colours": (
+        "material_colors",
+        np.zeros((3, 4)),
+        r"must have shape \(2, 4\), but has \(3, 4\)",
+    ),
 }
 
 
@@ -107,15 +159,25 @@ def test_a_body_without_joints_is_refused(tmp_path):
 def test_a_body_that_is_flat_tiny_or_in_millimetres_is_refused(tmp_path, factors):
     arrays = small_body()
     arrays["v_template"] = arrays["v_template"] * np.array(factors)
-    with pytest.raises(ModelFileError, match=r"body\.npz: v_template measures .* m, which no body does; .* metre"):
+    with pytest.raises(
+        ModelFileError,
+        match=r"body\.npz: v_template measures .* m, which no body "
+        r"does; .* metre",
+    ):
         load_body(saved(tmp_path / "body.npz", arrays))
 
 
 def test_a_motion_is_told_from_a_body(tmp_path):
-    motion = {"poses": np.zeros((4, 72)), "trans": np.zeros((4, 3)), "betas": np.zeros(10), "gender": np.array("male")}
+    motion = {
+        "poses": np.zeros((4, 72)),
+        "trans": np.zeros((4, 3)),
+        "betas": np.zeros(10),
+        "gender": np.array("male"),
+    }
     with pytest.raises(
         ModelFileError,
-        match="walk.npz is a motion file, .* give one of scope, scope_h, scope_child, scope_child_h, or a body's",
+        match="walk.npz is a motion file, .* give one of scope, scope_h, scope_child, "
+        "scope_child_h, or a body's",
     ):
         load_body(saved(tmp_path / "walk.npz", motion))
 

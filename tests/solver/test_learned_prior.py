@@ -38,7 +38,9 @@ def test_default_priors_use_the_flow_for_known_joints_and_the_rest_pose_for_othe
 
 
 def test_a_hidden_forearm_takes_a_likely_state(body):
-    """Measured to the elbow only, the elbow joint goes to where 1/2 |z|^2 is least, not to the straight arm."""
+    """Measured to the elbow only, the elbow joint goes to where 1/2 |z|^2 is least, not to the
+    straight arm.
+    """
     rng = np.random.default_rng(0)
     prior = load_joint_prior()
     elbow = body.joint_names.index("left_elbow")

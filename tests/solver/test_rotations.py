@@ -32,7 +32,10 @@ VECTORS = np.concatenate([angle * AXES for angle in ANGLES])
 def exp_by_doubling(phi):
     """Power series of a 1/64 turn, squared six times."""
     A = rotations.hat(phi) / 64
-    E = sum((np.linalg.matrix_power(A, k) / float(np.prod(np.arange(1, k + 1))) for k in range(12)), np.zeros((3, 3)))
+    E = sum(
+        (np.linalg.matrix_power(A, k) / float(np.prod(np.arange(1, k + 1))) for k in range(12)),
+        np.zeros((3, 3)),
+    )
     for _ in range(6):
         E = E @ E
     return E
@@ -41,7 +44,9 @@ def exp_by_doubling(phi):
 def test_exp_is_the_matrix_exponential():
     expected = np.array([exp_by_doubling(v) for v in VECTORS])
     np.testing.assert_allclose(rotations.exp(VECTORS), expected, atol=2e-14, rtol=0)
-    np.testing.assert_allclose([rotations.exp3(*v) for v in VECTORS], expected.reshape(-1, 9), atol=2e-14, rtol=0)
+    np.testing.assert_allclose(
+        [rotations.exp3(*v) for v in VECTORS], expected.reshape(-1, 9), atol=2e-14, rtol=0
+    )
 
 
 def test_log_inverts_exp_up_to_pi():
@@ -91,10 +96,14 @@ def test_quaternions_go_both_ways():
 def test_nearest_rotation_repairs_and_survives_anything():
     R = rotations.exp(VECTORS)
     np.testing.assert_allclose(rotations.nearest_rotation(1.01 * R), R, atol=1e-13)
-    broken = np.stack([np.full((3, 3), np.nan), np.zeros((3, 3)), -np.eye(3), np.full((3, 3), np.inf)])
+    broken = np.stack(
+        [np.full((3, 3), np.nan), np.zeros((3, 3)), -np.eye(3), np.full((3, 3), np.inf)]
+    )
     fixed = rotations.nearest_rotation(broken)
     np.testing.assert_allclose(np.linalg.det(fixed), 1, atol=1e-12)
-    np.testing.assert_allclose(fixed @ np.swapaxes(fixed, 1, 2), np.tile(np.eye(3), (4, 1, 1)), atol=1e-12)
+    np.testing.assert_allclose(
+        fixed @ np.swapaxes(fixed, 1, 2), np.tile(np.eye(3), (4, 1, 1)), atol=1e-12
+    )
 
 
 def test_shapes_are_checked():
@@ -114,21 +123,32 @@ def test_the_shortest_turn_takes_one_direction_to_the_other_about_what_is_across
     np.testing.assert_allclose(np.linalg.norm(rotations.log(R), axis=-1), angle, atol=1e-6)
     np.testing.assert_allclose(R[1], np.eye(3), atol=1e-12)
     np.testing.assert_allclose(rotations.shortest_turn(a[7], b[7]), R[7], atol=1e-12)
-    np.testing.assert_allclose(rotations.shortest_turn(*np.reshape([a, b], (2, 5, 10, 3))), R.reshape(5, 10, 3, 3))
+    np.testing.assert_allclose(
+        rotations.shortest_turn(*np.reshape([a, b], (2, 5, 10, 3))), R.reshape(5, 10, 3, 3)
+    )
 
 
 def test_small_angles_have_all_their_digits():
-    """At 0.03 rad, where the kernel's logarithm is a series, its fourth term is 3e-11 of the angle."""
+    """At 0.03 rad, where the kernel's logarithm is a series, its fourth term is 3e-11 of the
+    angle.
+    """
     vectors = 0.03 * AXES
     rotation_matrices = np.array([exp_by_doubling(v) for v in vectors])
-    for found in (rotations.log(rotation_matrices), [rotations.log3(*r.ravel()) for r in rotation_matrices]):
+    for found in (
+        rotations.log(rotation_matrices),
+        [rotations.log3(*r.ravel()) for r in rotation_matrices],
+    ):
         np.testing.assert_allclose(found, vectors, rtol=0.0, atol=0.03 * 1e-12)
 
 
 def test_nearly_orthonormal_matrices_become_the_nearest_rotations():
-    """The nearest rotation is the polar factor, here by singular values; a step's error is that of before, squared."""
+    """The nearest rotation is the polar factor, here by singular values; a step's error is that of
+    before, squared.
+    """
     rng = np.random.default_rng(6)
-    matrices = rotations.exp(rng.uniform(-3.0, 3.0, (40, 3))) + 1e-8 * rng.standard_normal((40, 3, 3))
+    matrices = rotations.exp(rng.uniform(-3.0, 3.0, (40, 3))) + 1e-8 * rng.standard_normal(
+        (40, 3, 3)
+    )
     U, _, Vt = np.linalg.svd(matrices)
     assert rotations.orthonormalize(matrices)
     np.testing.assert_allclose(matrices, U @ Vt, atol=4e-15)
@@ -136,7 +156,9 @@ def test_nearly_orthonormal_matrices_become_the_nearest_rotations():
 
 @pytest.mark.parametrize("column", range(3))
 def test_what_is_no_rotation_is_not_made_orthonormal(column):
-    """A longer axis, two axes that are not at right angles, and a reflection, which is orthonormal as well."""
+    """A longer axis, two axes that are not at right angles, and a reflection, which is orthonormal
+    as well.
+    """
     turn = rotations.exp([0.9, -0.7, 1.3])
     longer, slanted, mirrored = turn.copy(), turn.copy(), turn.copy()
     longer[:, column] *= 1.0 + 1e-6

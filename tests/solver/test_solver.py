@@ -15,7 +15,8 @@ from scope.solver import ShapeError, load_body
 
 load_body("scope")
 assert "numba" not in sys.modules, "errors and bodies need no compiler"
-assert abs(solver.rotations.exp([[0.0, 0.0, 0.0]])[0] - [[1, 0, 0], [0, 1, 0], [0, 0, 1]]).max() == 0.0
+R = solver.rotations.exp([[0.0, 0.0, 0.0]])[0]
+assert abs(R - [[1, 0, 0], [0, 1, 0], [0, 0, 1]]).max() == 0.0
 names = {}
 exec("from scope.solver import *", names)
 assert set(solver.__all__) <= set(names), set(solver.__all__) - set(names)
@@ -25,12 +26,18 @@ assert names["ShapeError"] is ShapeError is solver.errors.ShapeError
 
 
 def test_every_name_is_there_when_it_is_first_used():
-    done = subprocess.run([sys.executable, "-c", FIRST_USES], capture_output=True, text=True, check=False, cwd="/")
+    done = subprocess.run(
+        [sys.executable, "-c", FIRST_USES], capture_output=True, text=True, check=False, cwd="/"
+    )
     assert done.returncode == 0, done.stderr[-2000:]
 
 
 def test_a_name_that_does_not_exist_is_an_error():
-    with pytest.raises(AttributeError, match=r"module 'scope\.solver' has no attribute 'fit_video'"):
+    with pytest.raises(
+        AttributeError,
+        match=r"module 'scope\.solver' has no attribute "
+        r"'fit_video'",
+    ):
         _ = solver.fit_video
     with pytest.raises(ImportError, match="fit_video"):
         from scope.solver import fit_video  # noqa: F401

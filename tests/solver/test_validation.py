@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What no fit can use is refused in one sentence that names the field; what only looks odd is not."""
+"""What no fit can use is refused in one sentence that names the field; what only looks odd is
+not.
+"""
 
 import warnings
 from dataclasses import replace
@@ -49,7 +51,9 @@ NAN, INF = np.nan, np.inf
 
 
 def untyped(value: object) -> Any:
-    """Return the value as it is, for calls that a type checker would refuse before the solver can."""
+    """Return the value as it is, for calls that a type checker would refuse before the solver
+    can.
+    """
     return value
 
 
@@ -100,8 +104,14 @@ UP = np.array([0.0, -1.0, 0.0])
 
 INTRINSICS_REFUSED = {
     "transposed": (INTRINSICS.T, "Intrinsics must be a camera matrix .* transpose it"),
-    "scaled": (2.0 * INTRINSICS, "Intrinsics must be a camera matrix .* divide it by its last entry, 2"),
-    "negated": (-INTRINSICS, "Intrinsics must be a camera matrix .* divide it by its last entry, -1"),
+    "scaled": (
+        2.0 * INTRINSICS,
+        "Intrinsics must be a camera matrix .* divide it by its last entry, 2",
+    ),
+    "negated": (
+        -INTRINSICS,
+        "Intrinsics must be a camera matrix .* divide it by its last entry, -1",
+    ),
     "last row": (moved([[0, 0, 0], [0, 0, 0], [0, 0.1, 0]]), "Intrinsics must be a camera matrix"),
     "last entry": (moved([[0, 0, 0], [0, 0, 0], [0, 0, -1]]), "Intrinsics must be a camera matrix"),
     "turned": (moved([[0, 0, 0], [300, 0, 0], [0, 0, 0]]), "Intrinsics must be a camera matrix"),
@@ -109,79 +119,160 @@ INTRINSICS_REFUSED = {
     "NaN": (moved([[0, 0, NAN], [0, 0, 0], [0, 0, 0]]), "Intrinsics must be finite"),
     "None": (None, "need the camera's intrinsics"),
     "a text": ("camera", "Intrinsics must be numbers of shape .* the text 'camera'"),
-    "ragged": ([[1000.0, 0.0, 500.0], [0.0, 1000.0], [1.0]], "Intrinsics must be numbers .* a ragged list"),
+    "ragged": (
+        [[1000.0, 0.0, 500.0], [0.0, 1000.0], [1.0]],
+        "Intrinsics must be numbers .* a ragged list",
+    ),
     "3 by 4": (np.eye(3, 4), r"Intrinsics must have shape \(3, 3\), but got shape \(3, 4\)"),
 }
 
 
-@pytest.mark.parametrize(("intrinsics", "message"), INTRINSICS_REFUSED.values(), ids=INTRINSICS_REFUSED)
+@pytest.mark.parametrize(
+    ("intrinsics", "message"), INTRINSICS_REFUSED.values(), ids=INTRINSICS_REFUSED
+)
 def test_intrinsics_that_are_no_camera_matrix_are_refused(intrinsics, message):
     with pytest.raises(InputError, match=message):
         seen_2d(intrinsics)()
 
 
 STATES_REFUSED = {
-    "root scaled": ({"R_camera_root": 2.0 * np.eye(3)}, InvalidValueError, "R_camera_root of the initial state"),
-    "root mirrored": ({"R_camera_root": MIRROR}, InvalidValueError, "R_camera_root of the initial state"),
-    "root sheared": ({"R_camera_root": np.eye(3) + 0.1 * np.eye(3, k=1)}, InvalidValueError, "R_camera_root"),
-    "root NaN": ({"R_camera_root": np.full((3, 3), NAN)}, InvalidValueError, "R_camera_root of the initial state"),
-    "root zero": ({"R_camera_root": np.zeros((3, 3))}, InvalidValueError, "R_camera_root of the initial state"),
+    "root scaled": (
+        {"R_camera_root": 2.0 * np.eye(3)},
+        InvalidValueError,
+        "R_camera_root of the initial state",
+    ),
+    "root mirrored": (
+        {"R_camera_root": MIRROR},
+        InvalidValueError,
+        "R_camera_root of the initial state",
+    ),
+    "root sheared": (
+        {"R_camera_root": np.eye(3) + 0.1 * np.eye(3, k=1)},
+        InvalidValueError,
+        "R_camera_root",
+    ),
+    "root NaN": (
+        {"R_camera_root": np.full((3, 3), NAN)},
+        InvalidValueError,
+        "R_camera_root of the initial state",
+    ),
+    "root zero": (
+        {"R_camera_root": np.zeros((3, 3))},
+        InvalidValueError,
+        "R_camera_root of the initial state",
+    ),
     "joint scaled": (
         {"Omega": np.stack([np.eye(3), np.eye(3), 3.0 * np.eye(3), np.eye(3)])},
         InvalidValueError,
         "Omega of the initial state must be rotation matrices, .* but number 2 is",
     ),
-    "root of text": ({"R_camera_root": [["a"] * 3] * 3}, ShapeError, "R_camera_root must be numbers"),
-    "root None": ({"R_camera_root": None}, ShapeError, r"R_camera_root must be numbers of shape \(3, 3\).* None"),
-    "position ragged": ({"t_camera_root": [[0.0], [1.0, 2.0]]}, ShapeError, "t_camera_root must be numbers"),
+    "root of text": (
+        {"R_camera_root": [["a"] * 3] * 3},
+        ShapeError,
+        "R_camera_root must be numbers",
+    ),
+    "root None": (
+        {"R_camera_root": None},
+        ShapeError,
+        r"R_camera_root must be numbers of shape "
+        r"\(3, 3\).* None",
+    ),
+    "position ragged": (
+        {"t_camera_root": [[0.0], [1.0, 2.0]]},
+        ShapeError,
+        "t_camera_root must be numbers",
+    ),
     "joints None": ({"Omega": None}, ShapeError, "Omega must be numbers"),
-    "shape of text": ({"beta": ["0.1", "0.2", "0.3"]}, ShapeError, r"beta must be numbers of shape \(3,\)"),
+    "shape of text": (
+        {"beta": ["0.1", "0.2", "0.3"]},
+        ShapeError,
+        r"beta must be numbers of shape \(3,\)",
+    ),
     "complex": ({"beta": np.zeros(P, complex)}, ShapeError, "beta must be numbers .* complex"),
 }
 
 
 @pytest.mark.parametrize("way", range(4), ids=["fit", "fit_clip", "fit_batch", "State.pose"])
-@pytest.mark.parametrize(("fields", "error", "message"), STATES_REFUSED.values(), ids=STATES_REFUSED)
+@pytest.mark.parametrize(
+    ("fields", "error", "message"), STATES_REFUSED.values(), ids=STATES_REFUSED
+)
 def test_initial_states_that_are_no_pose_are_refused(fields, error, message, way):
     with pytest.raises(error, match=message):
         started(state(**fields))[way]()
 
 
 MEASURED_REFUSED = {
-    "pose prior scaled": (seen(pose_priors=pose_prior(2.0 * np.eye(3))), "Rotations of pose priors must be rotation"),
+    "pose prior scaled": (
+        seen(pose_priors=pose_prior(2.0 * np.eye(3))),
+        "Rotations of pose priors must be rotation",
+    ),
     "pose prior mirrored": (seen(pose_priors=pose_prior(MIRROR)), "Rotations of pose priors"),
-    "pose prior w_R": (seen(pose_priors=pose_prior(w_R=-1.0)), "Rotation weights of pose priors .* number 0 is -1"),
-    "pose prior w_t": (seen(pose_priors=pose_prior(w_t=-2.0)), "Translation weights of pose priors .* -2"),
+    "pose prior w_R": (
+        seen(pose_priors=pose_prior(w_R=-1.0)),
+        "Rotation weights of pose priors .* number 0 is -1",
+    ),
+    "pose prior w_t": (
+        seen(pose_priors=pose_prior(w_t=-2.0)),
+        "Translation weights of pose priors .* -2",
+    ),
     "contact": (
         seen(foot_contacts=FootContacts([0, 1], np.zeros((2, 3)), [1.0, -0.5])),
         "Probability of foot contacts must not be negative, but number 1 is -0.5",
     ),
-    "floor's contact": (seen(floor=Floor([0], UP, 1.0, [-1.0])), "Contact with the floor must not be negative"),
+    "floor's contact": (
+        seen(floor=Floor([0], UP, 1.0, [-1.0])),
+        "Contact with the floor must not be negative",
+    ),
     "floor's normal": (seen(floor=Floor([0], 2.0 * UP, 1.0, [1.0])), "normal of length 2"),
-    "floor's offset": (seen(floor=Floor([0], UP, untyped("one"), [1.0])), "Offset of the floor must be a number"),
+    "floor's offset": (
+        seen(floor=Floor([0], UP, untyped("one"), [1.0])),
+        "Offset of the floor must be a number",
+    ),
     "floor's offset None": (
         seen(floor=Floor([0], UP, untyped(None), [1.0])),
         "Offset of the floor must be a number, .* None",
     ),
-    "a text of pixels": (seen_2d(INTRINSICS, "pixels"), "Pixels of 2D keypoints must be numbers .* the text 'pixels'"),
+    "a text of pixels": (
+        seen_2d(INTRINSICS, "pixels"),
+        "Pixels of 2D keypoints must be numbers .* the text 'pixels'",
+    ),
     "an array of texts": (
         seen_2d(INTRINSICS, np.array([["1", "2"]])),
         "Pixels of 2D keypoints must be numbers .* an array",
     ),
-    "texts of pixels": (seen_2d(INTRINSICS, [["1", "2"]]), "Pixels of 2D keypoints must be numbers"),
-    "pixels None": (seen_2d(INTRINSICS, None), r"Pixels of 2D keypoints must be numbers of shape \(1, 2\), .* None"),
-    "pixels of None": (seen_2d(INTRINSICS, [[None, None]]), "Pixels of 2D keypoints must be numbers"),
-    "confidence": (seen_2d(INTRINSICS, confidence=None), "Confidence of 2D keypoints must be numbers"),
+    "texts of pixels": (
+        seen_2d(INTRINSICS, [["1", "2"]]),
+        "Pixels of 2D keypoints must be numbers",
+    ),
+    "pixels None": (
+        seen_2d(INTRINSICS, None),
+        r"Pixels of 2D keypoints must be numbers of shape "
+        r"\(1, 2\), .* None",
+    ),
+    "pixels of None": (
+        seen_2d(INTRINSICS, [[None, None]]),
+        "Pixels of 2D keypoints must be numbers",
+    ),
+    "confidence": (
+        seen_2d(INTRINSICS, confidence=None),
+        "Confidence of 2D keypoints must be numbers",
+    ),
     "ragged points": (
         seen(keypoints3d=Keypoints3D([0, 1], [[0.0, 0.0, 3.0], [0.0]], [1.0, 1.0])),
         "Points of 3D keypoints must be numbers .* a ragged list",
     ),
-    "ragged indices": (seen(keypoints3d=Keypoints3D([[0], [1, 2]], POINTS, np.ones(M))), "Indices of 3D keypoints"),
+    "ragged indices": (
+        seen(keypoints3d=Keypoints3D([[0], [1, 2]], POINTS, np.ones(M))),
+        "Indices of 3D keypoints",
+    ),
     "indices None": (
         seen(keypoints3d=Keypoints3D(untyped(None), POINTS, np.ones(M))),
         "Indices of 3D keypoints .* None",
     ),
-    "indices of text": (seen(keypoints3d=Keypoints3D(["nose"], POINTS[:1], [1.0])), "Indices of 3D keypoints"),
+    "indices of text": (
+        seen(keypoints3d=Keypoints3D(["nose"], POINTS[:1], [1.0])),
+        "Indices of 3D keypoints",
+    ),
     "directions": (
         seen(orientation_field=OrientationField([M], [M + 1], "up", [1.0])),
         "Directions of the orientation field must be numbers",
@@ -194,8 +285,14 @@ MEASURED_REFUSED = {
         lambda: Measurements(keypoints2d=untyped(KEYPOINTS)),
         "Measurements.keypoints2d must be Keypoints2D",
     ),
-    "tables": (lambda: Measurements(tables=untyped([1])), "Measurements.tables must be Mapping or None, but is a list"),
-    "a table of text": (seen(tables={"joint_limits": "rows"}), "Tables of 'joint_limits' must be a pair of arrays"),
+    "tables": (
+        lambda: Measurements(tables=untyped([1])),
+        "Measurements.tables must be Mapping or None, but is a list",
+    ),
+    "a table of text": (
+        seen(tables={"joint_limits": "rows"}),
+        "Tables of 'joint_limits' must be a pair of arrays",
+    ),
     "a table's indices": (
         seen(tables={"joint_limits": ([[0.7]], np.ones((1, 6)))}),
         r"Whole numbers of 'joint_limits' must be integers of shape \(n, 1\), but got float64",
@@ -238,7 +335,8 @@ MEASURED_REFUSED = {
     ),
     "an array without axes": (
         lambda: fit_batch(BODY, untyped(np.array(SEEN))),
-        r"measurements must be a list with an entry for each frame, but is an array of object of shape \(\)",
+        r"measurements must be a list with an entry for each frame, but is an array of object of "
+        r"shape \(\)",
     ),
     "frames for the shape": (
         lambda: fit_clip(BODY, [SEEN], shape_frames=0),
@@ -256,9 +354,18 @@ MEASURED_REFUSED = {
         seen(keypoints3d=Keypoints3D(np.ma.masked_equal(np.arange(M), 0), POINTS, np.ones(M))),
         "Indices of 3D keypoints must not be masked, but some are; leave these rows out",
     ),
-    "an article": (seen(keypoints3d=untyped(Options())), "must be Keypoints3D or None, but is an Options"),
-    "threads": (lambda: fit_batch(BODY, [SEEN], threads=-2), "threads must be a whole number of at least 0, but is -2"),
-    "threads of clips": (lambda: fit_clips(BODY, [[SEEN]], threads=untyped(1.5)), "threads must be a whole number"),
+    "an article": (
+        seen(keypoints3d=untyped(Options())),
+        "must be Keypoints3D or None, but is an Options",
+    ),
+    "threads": (
+        lambda: fit_batch(BODY, [SEEN], threads=-2),
+        "threads must be a whole number of at least 0, but is -2",
+    ),
+    "threads of clips": (
+        lambda: fit_clips(BODY, [[SEEN]], threads=untyped(1.5)),
+        "threads must be a whole number",
+    ),
 }
 
 
@@ -280,24 +387,54 @@ def test_what_a_masked_array_masks_is_not_measured():
 
 
 SETTINGS_REFUSED = {
-    "indefinite": (known(shape_information=INDEFINITE), "Priors.shape_information.* has the eigenvalue -1"),
+    "indefinite": (
+        known(shape_information=INDEFINITE),
+        "Priors.shape_information.* has the eigenvalue -1",
+    ),
     "negative definite": (known(shape_information=-np.eye(P)), "must be positive semidefinite"),
     "slightly indefinite": (
         known(shape_information=np.array([[1.0, 1.1, 0.0], [1.1, 1.0, 0.0], [0.0, 0.0, 1.0]])),
         "has the eigenvalue -0.1",
     ),
-    "not symmetric": (known(shape_information=np.eye(P) + 0.1 * np.eye(P, k=1)), "must be symmetric"),
-    "NaN": (known(shape_information=np.full((P, P), NAN)), "Information of the shape prior must be finite"),
-    "information": (known(shape_information="none"), "Information of the shape prior must be numbers"),
+    "not symmetric": (
+        known(shape_information=np.eye(P) + 0.1 * np.eye(P, k=1)),
+        "must be symmetric",
+    ),
+    "NaN": (
+        known(shape_information=np.full((P, P), NAN)),
+        "Information of the shape prior must be finite",
+    ),
+    "information": (
+        known(shape_information="none"),
+        "Information of the shape prior must be numbers",
+    ),
     "mean NaN": (known(shape_mean=np.full(P, NAN)), "Mean of the shape prior must be finite"),
-    "joint weight": (known(joint_weights=[1.0, 1.0, -1.0, 1.0]), "Weights of the joint prior .* number 2 is -1"),
-    "joint weight NaN": (known(joint_weights=np.full(K, NAN)), "Weights of the joint prior must be finite"),
+    "joint weight": (
+        known(joint_weights=[1.0, 1.0, -1.0, 1.0]),
+        "Weights of the joint prior .* number 2 is -1",
+    ),
+    "joint weight NaN": (
+        known(joint_weights=np.full(K, NAN)),
+        "Weights of the joint prior must be finite",
+    ),
     "joint weights": (known(joint_weights=["a"] * K), "Weights of the joint prior must be numbers"),
-    "joint mean": (known(joint_mean=np.tile(2.0 * np.eye(3), (K, 1, 1))), "Means of the joint prior must be rotation"),
+    "joint mean": (
+        known(joint_mean=np.tile(2.0 * np.eye(3), (K, 1, 1))),
+        "Means of the joint prior must be rotation",
+    ),
     "limits": (known(limits="knees"), "Tables of 'joint_limits' must be a pair of arrays"),
-    "Temporal.joints": (lambda: Temporal(joints=-1.0), "Temporal.joints must be finite and not negative, but is -1"),
-    "Temporal.root_rotation": (lambda: Temporal(root_rotation=NAN), "Temporal.root_rotation must be finite"),
-    "Temporal.root_position": (lambda: Temporal(root_position=INF), "Temporal.root_position must be finite"),
+    "Temporal.joints": (
+        lambda: Temporal(joints=-1.0),
+        "Temporal.joints must be finite and not negative, but is -1",
+    ),
+    "Temporal.root_rotation": (
+        lambda: Temporal(root_rotation=NAN),
+        "Temporal.root_rotation must be finite",
+    ),
+    "Temporal.root_position": (
+        lambda: Temporal(root_position=INF),
+        "Temporal.root_position must be finite",
+    ),
     "Temporal text": (
         lambda: Temporal(joints=untyped("strong")),
         "Temporal.joints must be a number, but is the text 'strong'",
@@ -306,32 +443,78 @@ SETTINGS_REFUSED = {
         lambda: with_previous(SEEN, state(Omega=np.zeros((K, 3, 3))), Temporal()),
         "Omega of the previous state must be rotation matrices",
     ),
-    "weight": (lambda: Weights(keypoints3d=-1.0), "Weights.keypoints3d must be finite and not negative, but is -1"),
+    "weight": (
+        lambda: Weights(keypoints3d=-1.0),
+        "Weights.keypoints3d must be finite and not negative, but is -1",
+    ),
     "weight NaN": (lambda: Weights(shape=NAN), "Weights.shape must be finite"),
-    "weight None": (lambda: Weights(floor=untyped(None)), "Weights.floor must be a number, but is None"),
-    "weight of a table": (lambda: Weights(tables={"floor": -1.0}), r"Weights.tables\['floor'\] must be finite"),
-    "weights' tables": (lambda: Weights(tables=untyped(5.0)), "Weights.tables must be Mapping, but is a float"),
-    "tolerance": (lambda: Stage(tolerance=-1e-6), "Stage.tolerance must be a number of at least 0, but is -1e-06"),
-    "tolerance NaN": (lambda: Stage(tolerance=NAN), "Stage.tolerance must be a number of at least 0, but is nan"),
-    "tolerance text": (lambda: Stage(tolerance=untyped("1e-6")), "Stage.tolerance must be a number"),
-    "iterations": (lambda: Stage(max_iterations=-1), "Stage.max_iterations must be a whole number of at least 0"),
-    "iterations float": (lambda: Stage(max_iterations=untyped(2.5)), "Stage.max_iterations must be a whole number"),
-    "stage's weights": (lambda: Stage(untyped({"shape": 1.0})), "Stage.weights must be Weights, but is a dict"),
-    "robust": (lambda: Options(robust_keypoints2d=0.0), "Options.robust_keypoints2d must be positive"),
-    "robust NaN": (lambda: Options(robust_orientation_field=NAN), "Options.robust_orientation_field must be positive"),
+    "weight None": (
+        lambda: Weights(floor=untyped(None)),
+        "Weights.floor must be a number, but is None",
+    ),
+    "weight of a table": (
+        lambda: Weights(tables={"floor": -1.0}),
+        r"Weights.tables\['floor'\] must be finite",
+    ),
+    "weights' tables": (
+        lambda: Weights(tables=untyped(5.0)),
+        "Weights.tables must be Mapping, but is a float",
+    ),
+    "tolerance": (
+        lambda: Stage(tolerance=-1e-6),
+        "Stage.tolerance must be a number of at least 0, but is -1e-06",
+    ),
+    "tolerance NaN": (
+        lambda: Stage(tolerance=NAN),
+        "Stage.tolerance must be a number of at least 0, but is nan",
+    ),
+    "tolerance text": (
+        lambda: Stage(tolerance=untyped("1e-6")),
+        "Stage.tolerance must be a number",
+    ),
+    "iterations": (
+        lambda: Stage(max_iterations=-1),
+        "Stage.max_iterations must be a whole number of at least 0",
+    ),
+    "iterations float": (
+        lambda: Stage(max_iterations=untyped(2.5)),
+        "Stage.max_iterations must be a whole number",
+    ),
+    "stage's weights": (
+        lambda: Stage(untyped({"shape": 1.0})),
+        "Stage.weights must be Weights, but is a dict",
+    ),
+    "robust": (
+        lambda: Options(robust_keypoints2d=0.0),
+        "Options.robust_keypoints2d must be positive",
+    ),
+    "robust NaN": (
+        lambda: Options(robust_orientation_field=NAN),
+        "Options.robust_orientation_field must be positive",
+    ),
     "damping text": (lambda: Options(damping=untyped("high")), "Options.damping must be a number"),
     "triggs": (lambda: Options(triggs=untyped(None)), "Options.triggs must be a number"),
-    "stages": (lambda: Options(stages=untyped(Stage())), "Options.stages must be Sequence or None, but is a Stage"),
+    "stages": (
+        lambda: Options(stages=untyped(Stage())),
+        "Options.stages must be Sequence or None, but is a Stage",
+    ),
     "a stage": (
         lambda: fit(BODY, SEEN, options=Options(stages=[untyped(Weights())])),
         r"Options.stages\[0\] must be Stage, but is a Weights",
     ),
-    "a joint of the prior": (lambda: load_joint_prior().of("tail"), "no joint 'tail'; it has .*left_knee"),
+    "a joint of the prior": (
+        lambda: load_joint_prior().of("tail"),
+        "no joint 'tail'; it has .*left_knee",
+    ),
     "its weights": (
         lambda: load_joint_prior().tables(["pelvis", "neck"], {"neck": -1.0}),
         "weight of 'neck' must be finite and not negative",
     ),
-    "its parameters": (lambda: JointPrior(("neck",), np.zeros((2, 5))), r"must have shape \(1, 243\), .* \(2, 5\)"),
+    "its parameters": (
+        lambda: JointPrior(("neck",), np.zeros((2, 5))),
+        r"must have shape \(1, "
+        r"243\), .* \(2, 5\)",
+    ),
 }
 
 
@@ -342,9 +525,18 @@ def test_settings_that_cannot_be_used_are_refused(make, message):
 
 
 ARGUMENTS_REFUSED = {
-    "no measurements": (lambda: fit(BODY, untyped(None)), "measurements must be Measurements, but is None"),
-    "state": (lambda: fit(BODY, SEEN, init=untyped("rest")), "init must be State or None, but is the text 'rest'"),
-    "priors": (lambda: fit(BODY, SEEN, priors=untyped("weak")), "priors must be Priors, but is the text 'weak'"),
+    "no measurements": (
+        lambda: fit(BODY, untyped(None)),
+        "measurements must be Measurements, but is None",
+    ),
+    "state": (
+        lambda: fit(BODY, SEEN, init=untyped("rest")),
+        "init must be State or None, but is the text 'rest'",
+    ),
+    "priors": (
+        lambda: fit(BODY, SEEN, priors=untyped("weak")),
+        "priors must be Priors, but is the text 'weak'",
+    ),
     "options": (
         lambda: fit(BODY, SEEN, priors=Priors(), options=untyped(50)),
         "options must be Options, but is a",
@@ -357,7 +549,10 @@ ARGUMENTS_REFUSED = {
         lambda: fit_clip(BODY, [SEEN], priors=Priors(), init=[untyped(0)]),
         r"init\[0\] must be State, but is",
     ),
-    "priors of a clip": (lambda: fit_clip(BODY, [SEEN], priors=untyped("weak")), "priors must be Priors"),
+    "priors of a clip": (
+        lambda: fit_clip(BODY, [SEEN], priors=untyped("weak")),
+        "priors must be Priors",
+    ),
     "options of a clip": (
         lambda: fit_clip(BODY, [SEEN], priors=Priors(), options=untyped("fast")),
         "options must be Options, but is the text 'fast'",
@@ -366,7 +561,10 @@ ARGUMENTS_REFUSED = {
         lambda: fit_clip(BODY, [SEEN], priors=Priors(), temporal=untyped(1.0)),
         "temporal must be Temporal or None, but is a",
     ),
-    "priors of a motion": (lambda: fit_motion(BODY, [SEEN], [0.0], priors=untyped("weak")), "priors must be Priors"),
+    "priors of a motion": (
+        lambda: fit_motion(BODY, [SEEN], [0.0], priors=untyped("weak")),
+        "priors must be Priors",
+    ),
     "options of a motion": (
         lambda: fit_motion(BODY, [SEEN], [0.0], priors=Priors(), options=untyped("fast")),
         "options must be Options",
@@ -389,16 +587,36 @@ SPOILED_S = BODY.S.copy()
 SPOILED_S[2, 1, 0] = NAN
 BODIES_REFUSED = {
     "S NaN": (body(S=SPOILED_S), InvalidValueError, "The body's S must be finite"),
-    "l infinite": (body(l=np.full((K + 1, 3), INF)), InvalidValueError, "The body's l must be finite"),
-    "v_bar NaN": (body(v_bar=np.full((M, 3), NAN)), InvalidValueError, "The body's v_bar must be finite"),
+    "l infinite": (
+        body(l=np.full((K + 1, 3), INF)),
+        InvalidValueError,
+        "The body's l must be finite",
+    ),
+    "v_bar NaN": (
+        body(v_bar=np.full((M, 3), NAN)),
+        InvalidValueError,
+        "The body's v_bar must be finite",
+    ),
     "V NaN": (body(V=np.full((M, 3, P), NAN)), InvalidValueError, "The body's V must be finite"),
     "S of text": (body(S="shape"), ShapeError, "S must be numbers"),
     "S None": (body(S=None), ShapeError, "S must be numbers"),
     "l ragged": (body(l=[[0.0], [1.0, 2.0]]), ShapeError, "l must be numbers"),
-    "V of another P": (body(V=np.zeros((M, 3, P + 1))), ShapeError, r"V must have shape \(12, 3, 3\)"),
+    "V of another P": (
+        body(V=np.zeros((M, 3, P + 1))),
+        ShapeError,
+        r"V must have shape \(12, 3, 3\)",
+    ),
     "parents of text": (body(parents="root"), ShapeError, "parents must be integers"),
-    "parents fractions": (body(parents=[-1.0, 0.5, 0, 0, 0]), ShapeError, "parents must be integers"),
-    "no body": (None, ShapeError, "A body needs the arrays parents, S, l, .* but NoneType lacks parents"),
+    "parents fractions": (
+        body(parents=[-1.0, 0.5, 0, 0, 0]),
+        ShapeError,
+        "parents must be integers",
+    ),
+    "no body": (
+        None,
+        ShapeError,
+        "A body needs the arrays parents, S, l, .* but NoneType lacks parents",
+    ),
 }
 
 
@@ -408,15 +626,21 @@ def test_bodies_that_cannot_be_used_are_refused(given, error, message):
         fit(given, SEEN, priors=Priors(), options=SHORT)
 
 
-@pytest.mark.parametrize("times", [np.arange(5), np.arange(10.0, 15.0), np.array([0, 33, 67, 100, 133])])
+@pytest.mark.parametrize(
+    "times", [np.arange(5), np.arange(10.0, 15.0), np.array([0, 33, 67, 100, 133])]
+)
 def test_frame_numbers_or_milliseconds_for_seconds_bring_a_warning_and_a_motion(times):
-    with pytest.warns(UnitsWarning, match="times are whole numbers, .* divide frame numbers by the frame rate"):
+    with pytest.warns(
+        UnitsWarning, match="times are whole numbers, .* divide frame numbers by the frame rate"
+    ):
         assert len(fit_motion(BODY, [SEEN] * 5, times, priors=Priors(), options=SHORT).states) == 5
 
 
 def test_seconds_bring_no_warning():
-    usual, slow = MotionPrior(), MotionPrior(root_rotation=1 / 3600, root_position=30 / 3600)  # slow: a second apart
-    for times, motion in ((np.arange(5) / 30, usual), (np.arange(3), usual), (np.arange(5), slow)):  # three: too few
+    # slow: a second apart
+    usual, slow = MotionPrior(), MotionPrior(root_rotation=1 / 3600, root_position=30 / 3600)
+    # three: too few
+    for times, motion in ((np.arange(5) / 30, usual), (np.arange(3), usual), (np.arange(5), slow)):
         fit_motion(BODY, [SEEN] * len(times), times, motion=motion, priors=Priors(), options=SHORT)
 
 
@@ -430,7 +654,9 @@ def test_lengths_in_millimetres_bring_a_warning_and_a_fit():
 
 NOT_REFUSED = {
     "far away": seen(keypoints3d=replace(KEYPOINTS, points=POINTS + [0.0, 0.0, 2000.0])),
-    "one stray point": seen(keypoints3d=replace(KEYPOINTS, points=np.vstack([POINTS[:-1], [[0, 0, 9000.0]]]))),
+    "one stray point": seen(
+        keypoints3d=replace(KEYPOINTS, points=np.vstack([POINTS[:-1], [[0, 0, 9000.0]]]))
+    ),
     "a skewed camera": seen_2d(moved([[0, 2.0, 0], [0, 0, 0], [0, 0, 0]])),
     "lists": seen_2d(INTRINSICS.tolist(), [[1, 2]], [True]),
     "single precision": seen_2d(INTRINSICS.astype(np.float32), np.ones((1, 2), np.float32)),
@@ -446,11 +672,15 @@ NOT_REFUSED = {
     "of one direction": known(shape_information=np.outer([1.0, 2.0, 3.0], [1.0, 2.0, 3.0])),
     "rounded": known(shape_information=np.diag([1e8, 1.0, -1e-8])),
     "no robust kernel": lambda: fit(BODY, SEEN, options=replace(SHORT, robust_keypoints3d=INF)),
-    "no iterations": lambda: fit(BODY, SEEN, options=Options(stages=[Stage(max_iterations=0, tolerance=0.0)])),
+    "no iterations": lambda: fit(
+        BODY, SEEN, options=Options(stages=[Stage(max_iterations=0, tolerance=0.0)])
+    ),
     "whole numbers of numpy's": lambda: fit(
         BODY, SEEN, options=Options(stages=[Stage(max_iterations=untyped(np.int64(1)))])
     ),
-    "no pull": lambda: fit_clip(BODY, [SEEN, SEEN], options=SHORT, temporal=Temporal(0.0, 0.0, 0.0)),
+    "no pull": lambda: fit_clip(
+        BODY, [SEEN, SEEN], options=SHORT, temporal=Temporal(0.0, 0.0, 0.0)
+    ),
 }
 
 
@@ -462,7 +692,9 @@ def test_what_can_be_used_passes_without_a_warning(make):
 
 
 def test_a_state_that_is_not_finite_is_reported_by_the_status():
-    """Unlike a rotation, which has no nearest one: a position is a measured value, and those are never refused."""
+    """Unlike a rotation, which has no nearest one: a position is a measured value, and those are
+    never refused.
+    """
     found = fit(BODY, SEEN, init=state(t_camera_root=np.full(3, NAN)), options=SHORT)
     assert found.status is Status.NON_FINITE
 

@@ -44,9 +44,12 @@ def one_solver(shaped: ShapedMesh, targets: SurveyTargets) -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def grown(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> ShapedMesh:
-    """The mesh with growth, without the targets of its source, which are nine tenths of it: once for all processes."""
+    """The mesh with growth, without the targets of its source, which are nine tenths of it: once
+    for all processes.
+    """
     folder = tmp_path_factory.getbasetemp()
-    if "PYTEST_XDIST_WORKER" in os.environ:  # this process's folder lies in the one of the whole run
+    # this process's folder lies in the one of the whole run
+    if "PYTEST_XDIST_WORKER" in os.environ:
         folder = folder.parent
     path = folder / "grown.pickle"
     if path.is_file():

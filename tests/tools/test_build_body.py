@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The committed body files: rebuilt from the pinned wheel, and checked against anatomy and independent geometry."""
+"""The committed body files: rebuilt from the pinned wheel, and checked against anatomy and
+independent geometry.
+"""
 
 import zipfile
 
@@ -43,10 +45,12 @@ def random_rotations(rng, count):
 
 
 def winding_number(points, vertices, triangles):
-    """Solid angle of the surface around each point over 4π (van Oosterom and Strackee): 1 inside, 0 outside.
+    """Solid angle of the surface around each point over 4π (van Oosterom and Strackee): 1 inside, 0
+    outside.
 
-    With a, b, c the corners seen from a point p, the products are expanded by powers of p, so that (points, triangles)
-    matrices are products of small ones: a·(b×c) = A·(B×C) - p·(B×C + C×A + A×B), a·b = A·B - p·(A + B) + p·p.
+    With a, b, c the corners seen from a point p, the products are expanded by powers of p, so that
+    (points, triangles) matrices are products of small ones: a·(b×c) = A·(B×C) - p·(B×C + C×A +
+    A×B), a·b = A·B - p·(A + B) + p·p.
     """
     A, B, C = (vertices[triangles[:, k]] for k in range(3))
     BC = np.cross(B, C)
@@ -59,7 +63,8 @@ def winding_number(points, vertices, triangles):
     return 2.0 * np.arctan2(triple, below).sum(axis=1) / (4.0 * np.pi)
 
 
-# The files -----------------------------------------------------------------------------------------------------------
+# The files
+# --------------------------------------------------------------------------------------------------
 
 
 def weight_of_joint(arrays):
@@ -81,14 +86,18 @@ def test_rebuilding_gives_the_committed_file(shaped, name):
             np.testing.assert_allclose(kept[key], value, atol=5e-5, err_msg=key)
         elif key == "skin_joints":  # joints of equal weight, which rounding may sort either way
             assert kept[key].shape == value.shape
-            np.testing.assert_allclose(weight_of_joint(kept), weight_of_joint(built), atol=5e-5, err_msg=key)
+            np.testing.assert_allclose(
+                weight_of_joint(kept), weight_of_joint(built), atol=5e-5, err_msg=key
+            )
         else:
             np.testing.assert_array_equal(kept[key], value, err_msg=key)
 
 
 def test_the_expressions_are_those_of_the_source(shaped):
     """Rebuilt, and compared with the wheel's text by another reader."""
-    built = build_expressions(fetch_wheel(), shaped.mesh, committed("scope")["v_template"].astype(float))
+    built = build_expressions(
+        fetch_wheel(), shaped.mesh, committed("scope")["v_template"].astype(float)
+    )
     with np.load(BUILT_IN["scope"].with_name("expressions.npz")) as file:
         assert set(file.files) == set(built)
         for key, value in built.items():
@@ -103,7 +112,9 @@ def test_the_expressions_are_those_of_the_source(shaped):
             rows = slice(built["starts"][k], built["starts"][k + 1])
             sources = shaped.mesh.kept[built["vertices"][rows]]
             assert set(sources) == set(truth) & set(shaped.mesh.kept)
-            np.testing.assert_allclose(1e-4 * built["moves"][rows], [truth[v] for v in sources], atol=1e-7)
+            np.testing.assert_allclose(
+                1e-4 * built["moves"][rows], [truth[v] for v in sources], atol=1e-7
+            )
 
 
 def test_growth_is_that_of_the_source(shaped, targets, grown, monkeypatch):
@@ -129,13 +140,18 @@ def test_files_are_small_and_carry_their_licence(body):
     assert body.license in (BUILT_IN[body.name].parent / "LICENSE.md").read_text("utf-8")
 
 
-# People --------------------------------------------------------------------------------------------------------------
+# People
+# --------------------------------------------------------------------------------------------------
 
-BOTH_SEXES = {  # published means and deviations of all 6,068 soldiers of ANSUR II together, millimetres and kilograms
+# published means and deviations of all 6,068 soldiers of ANSUR II together, millimetres and
+# kilograms
+BOTH_SEXES = {
     "stature": (1714.41, 90.02), "sitting": (898.11, 45.30), "acromion": (1406.16, 79.09),
     "epicondyle": (483.24, 29.36),
-    "biacromial": (399.20, 30.24), "hip_breadth": (348.39, 25.30), "waist": (914.50, 114.27), "weight": (79.71, 15.65),
-    "upper_arm": (327.37, 20.72), "forearm": (259.19, 19.78), "foot": (263.03, 17.39), "tragion": (129.62, 6.66),
+    "biacromial": (399.20, 30.24), "hip_breadth": (348.39, 25.30), "waist": (914.50, 114.27),
+    "weight": (79.71, 15.65),
+    "upper_arm": (327.37, 20.72), "forearm": (259.19, 19.78), "foot": (263.03, 17.39),
+    "tragion": (129.62, 6.66),
     "head_breadth": (152.18, 6.24),
 }  # fmt: skip
 MEN, WOMEN = 4082, 1986
@@ -154,7 +170,9 @@ def test_the_survey_of_both_sexes_follows_from_the_tables(name):
 
 
 def test_drawn_adults_have_the_proportions_of_measured_ones():
-    """Sitting height over stature: 0.52 to 0.53, with a deviation of 0.013 to 0.015; heavy people are there."""
+    """Sitting height over stature: 0.52 to 0.53, with a deviation of 0.013 to 0.015; heavy people
+    are there.
+    """
     adults = draw_adults(np.random.default_rng(0), np.arange(20_000) % 2 == 0)
     share = adults["sitting"] / adults["stature"]
     assert 0.52 < share.mean() < 0.53
@@ -197,7 +215,9 @@ def test_people_measure_what_the_surveys_say(shaped, targets):
     vertices = people.base + np.tensordot(people.coefficients, people.moves, axes=1)
     np.testing.assert_allclose(vertices[:, source.cubes["pelvis"]].mean(axis=1), 0.0, atol=1e-9)
     skin = np.unique(source.faces[source.face_group == "body"])
-    np.testing.assert_allclose(np.ptp(vertices[:, skin, 1], axis=1), people.measured["stature"], atol=0.01)
+    np.testing.assert_allclose(
+        np.ptp(vertices[:, skin, 1], axis=1), people.measured["stature"], atol=0.01
+    )
 
 
 @pytest.mark.usefixtures("one_solver")
@@ -210,7 +230,8 @@ def test_few_people_are_all_adults(shaped, targets, count):
     np.testing.assert_allclose(people.measured["stature"], people.wanted["stature"], atol=0.02)
 
 
-# The mesh ------------------------------------------------------------------------------------------------------------
+# The mesh
+# --------------------------------------------------------------------------------------------------
 
 
 def test_left_and_right_are_mirror_images(body, shaped):
@@ -220,7 +241,9 @@ def test_left_and_right_are_mirror_images(body, shaped):
     np.testing.assert_array_equal(body.face_material[mirror_faces(shaped.mesh)], body.face_material)
     joint = np.array([body.joint_names.index(other_side(name)) for name in body.joint_names])
     np.testing.assert_allclose(body.J_template[joint] * MIRROR, body.J_template, atol=2e-6)
-    np.testing.assert_allclose(body.J_shapedirs[joint] * MIRROR[:, None], body.J_shapedirs, atol=2e-6)
+    np.testing.assert_allclose(
+        body.J_shapedirs[joint] * MIRROR[:, None], body.J_shapedirs, atol=2e-6
+    )
     dense = np.zeros((len(body.v_template), body.K + 1))
     np.add.at(dense, (np.arange(len(dense))[:, None], body.skin_joints), body.skin_weights)
     np.testing.assert_allclose(dense[other][:, joint], dense, atol=1e-6)
@@ -237,7 +260,10 @@ def test_faces_wind_outward_and_enclose_a_plausible_volume(body):
     a, b, c = body.v_template[body.triangles()].transpose(1, 0, 2)
     litres = 1000.0 * np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0
     assert 50.0 < litres < 75.0
-    eye = np.isin(body.face_material, [i for i, name in enumerate(body.material_names) if name.startswith("eye")])
+    eye = np.isin(
+        body.face_material,
+        [i for i, name in enumerate(body.material_names) if name.startswith("eye")],
+    )
     centre = body.v_template[body.faces].mean(axis=1)
     corners = body.v_template[body.faces]
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
@@ -257,13 +283,19 @@ def test_every_quad_has_texture_coordinates_and_a_material(body):
 
 
 def test_the_suit_covers_trunk_and_limbs(body):
-    bare = np.isin(body.face_material, [body.material_names.index("skin"), body.material_names.index("hair")])
+    bare = np.isin(
+        body.face_material, [body.material_names.index("skin"), body.material_names.index("hair")]
+    )
     centre = body.v_template[body.faces[bare]].mean(axis=1)
-    neck, wrist = body.J_template[body.joint_names.index("neck")], body.J_template[body.joint_names.index("left_wrist")]
+    neck, wrist = (
+        body.J_template[body.joint_names.index("neck")],
+        body.J_template[body.joint_names.index("left_wrist")],
+    )
     assert ((centre[:, 1] > neck[1]) | (np.abs(centre[:, 0]) > wrist[0] - 0.02)).all()
 
 
-# Anatomy -------------------------------------------------------------------------------------------------------------
+# Anatomy
+# --------------------------------------------------------------------------------------------------
 
 
 def test_stature_of_the_population(body):
@@ -276,7 +308,9 @@ def test_stature_of_the_population(body):
 
 
 def test_the_span_is_that_of_measured_people(body):
-    """Some 1.04 of the stature for men and 1.03 for women, in the mean of anthropometric surveys."""
+    """Some 1.04 of the stature for men and 1.03 for women, in the mean of anthropometric
+    surveys.
+    """
     width, stature, _ = np.ptp(body.v_template, axis=0)
     assert width / stature == pytest.approx(1.033, abs=0.007)
 
@@ -304,7 +338,9 @@ def test_people_of_one_stature_have_longer_and_shorter_limbs(body):
 @pytest.mark.parametrize("number", [0, 1, 2])
 @pytest.mark.parametrize("deviations", [-2.0, 0.0, 2.0])
 def test_the_rest_pose_stands_upright(body, number, deviations):
-    """Marker-based models of four people lean back by 4.7 to 5.2°, SMPL by 4.3 to 4.4°; standing knees are straight."""
+    """Marker-based models of four people lean back by 4.7 to 5.2°, SMPL by 4.3 to 4.4°; standing
+    knees are straight.
+    """
     J = body.rest_joints(np.eye(body.P)[number] * deviations)
     at = {name: J[i] for i, name in enumerate(body.joint_names)}
     trunk = 0.5 * (at["left_shoulder"] + at["right_shoulder"] - at["left_hip"] - at["right_hip"])
@@ -315,7 +351,9 @@ def test_the_rest_pose_stands_upright(body, number, deviations):
 
 
 def test_the_mean_body_has_the_proportions_of_measured_people(body):
-    """De Leva 1996, women to men, as shares of the stature; hips and shoulders as in models of four people."""
+    """De Leva 1996, women to men, as shares of the stature; hips and shoulders as in models of four
+    people.
+    """
     at = {name: body.J_template[i] for i, name in enumerate(body.joint_names)}
     trunk = 0.5 * (at["left_shoulder"] + at["right_shoulder"] - at["left_hip"] - at["right_hip"])
 
@@ -332,7 +370,9 @@ def test_the_mean_body_has_the_proportions_of_measured_people(body):
 
 
 def test_trunks_and_legs_vary_against_each_other_as_in_surveys(body):
-    """The ratio of trunk to leg of soldiers has a deviation of 0.046 and a correlation of −0.25 with the stature."""
+    """The ratio of trunk to leg of soldiers has a deviation of 0.046 and a correlation of −0.25
+    with the stature.
+    """
     betas = np.random.default_rng(1).normal(size=(4000, body.P))
     J = body.J_template + np.einsum("jxp,np->njx", body.J_shapedirs, betas)
     at = {name: J[:, i] for i, name in enumerate(body.joint_names)}
@@ -386,15 +426,21 @@ def test_bone_lengths_are_those_of_the_source_pose_for_every_shape(body, shaped)
     rng = np.random.default_rng(3)
     parents = body.parents[1:]
     for betas in rng.normal(size=(5, body.P)) * 2.0:
-        source = skeleton.regressor @ (shaped.basis[0] + np.tensordot(betas, shaped.basis[1:], axes=1))
+        source = skeleton.regressor @ (
+            shaped.basis[0] + np.tensordot(betas, shaped.basis[1:], axes=1)
+        )
         rest = body.rest_joints(betas)
         expected = np.linalg.norm(source[1:] - source[parents], axis=1)
-        np.testing.assert_allclose(np.linalg.norm(rest[1:] - rest[parents], axis=1), expected, atol=3e-5)
+        np.testing.assert_allclose(
+            np.linalg.norm(rest[1:] - rest[parents], axis=1), expected, atol=3e-5
+        )
 
 
 @pytest.mark.parametrize("name", CHILDREN)
 def test_growth_leads_from_the_adult_to_a_child_of_six_years(name):
-    """Against CDC growth charts (stature 1.15 m, 20 kg), Fredriks (sitting height) and Snyder 1977 (heads)."""
+    """Against CDC growth charts (stature 1.15 m, 20 kg), Fredriks (sitting height) and Snyder 1977
+    (heads).
+    """
     adult, body = load_body(CHILDREN[name]), load_body(name)
     assert (body.P, growth_of(body), growth_of(adult)) == (adult.P + 1, adult.P, None)
     for key in ("shapedirs", "J_shapedirs", "keypoint_shapedirs"):
@@ -404,17 +450,27 @@ def test_growth_leads_from_the_adult_to_a_child_of_six_years(name):
     stature, at = np.ptp(v[:, 1]), {joint: J[i] for i, joint in enumerate(body.joint_names)}
     assert stature == pytest.approx(1.15, abs=0.015)
     a, b, c = v[body.triangles()].transpose(1, 0, 2)
-    assert 1.01 * 1000.0 * np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0 == pytest.approx(20.5, abs=2.0)
+    assert 1.01 * 1000.0 * np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0 == pytest.approx(
+        20.5, abs=2.0
+    )
     assert (at["left_hip"][1] - v[:, 1].min()) / stature == pytest.approx(1.0535 - 0.548, abs=0.01)
-    assert np.linalg.norm(at["left_hip"] - at["left_knee"]) / stature == pytest.approx(0.235, abs=0.02)
-    assert np.linalg.norm(at["left_shoulder"] - at["left_elbow"]) / stature == pytest.approx(0.155, abs=0.015)
-    head = v[(body.skin_weights * (body.skin_joints == body.joint_names.index("head"))).sum(axis=1) > 0.9]
-    assert np.ptp(head[:, 0]) == pytest.approx(0.143, abs=0.015)  # as broad as the head, with parts of the ears
+    assert np.linalg.norm(at["left_hip"] - at["left_knee"]) / stature == pytest.approx(
+        0.235, abs=0.02
+    )
+    assert np.linalg.norm(at["left_shoulder"] - at["left_elbow"]) / stature == pytest.approx(
+        0.155, abs=0.015
+    )
+    head = v[
+        (body.skin_weights * (body.skin_joints == body.joint_names.index("head"))).sum(axis=1) > 0.9
+    ]
+    # as broad as the head, with parts of the ears
+    assert np.ptp(head[:, 0]) == pytest.approx(0.143, abs=0.015)
     inside = winding_number(J, v, body.triangles())
     assert inside.min() > 0.8
 
 
-# Keypoints -----------------------------------------------------------------------------------------------------------
+# Keypoints
+# --------------------------------------------------------------------------------------------------
 
 
 def test_keypoint_sets_are_complete(body):
@@ -428,7 +484,9 @@ def test_keypoint_sets_are_complete(body):
                 index, part = found[f"{side}_{joint}"], body.joint_names.index(f"{side}_{joint}")
                 assert body.keypoint_part[index] == part
                 np.testing.assert_array_equal(body.keypoint_template[index], body.J_template[part])
-                np.testing.assert_array_equal(body.keypoint_shapedirs[index], body.J_shapedirs[part])
+                np.testing.assert_array_equal(
+                    body.keypoint_shapedirs[index], body.J_shapedirs[part]
+                )
 
 
 def test_keypoints_lie_where_their_names_say(body):
@@ -438,7 +496,9 @@ def test_keypoints_lie_where_their_names_say(body):
         np.testing.assert_allclose(mirrored * MIRROR, point, atol=2e-6, err_msg=name)
         if "left" in name:
             assert point[0] > 0.0, name
-    blaze = {name.split("/")[1]: point for name, point in at.items() if name.startswith("blazepose/")}
+    blaze = {
+        name.split("/")[1]: point for name, point in at.items() if name.startswith("blazepose/")
+    }
     assert blaze["nose"][0] == pytest.approx(0.0, abs=1e-6)
     assert blaze["nose"][2] > blaze["left_eye"][2] > blaze["left_ear"][2]
     assert blaze["left_eye_outer"][0] > blaze["left_eye"][0] > blaze["left_eye_inner"][0]
@@ -452,10 +512,14 @@ def test_keypoints_lie_where_their_names_say(body):
 
 
 def test_surface_keypoints_move_with_the_skin(body, shaped):
-    """Rigid attachment (Assumption 1) against linear blend skinning of the vertices themselves, 30 random poses."""
+    """Rigid attachment (Assumption 1) against linear blend skinning of the vertices themselves, 30
+    random poses.
+    """
     rng = np.random.default_rng(11)
     found = body.keypoint_set("blazepose") | body.keypoint_set("coco")
-    sources = {name: np.searchsorted(shaped.mesh.kept, vertices) for name, (vertices, _) in SURFACE.items()}
+    sources = {
+        name: np.searchsorted(shaped.mesh.kept, vertices) for name, (vertices, _) in SURFACE.items()
+    }
     worst = 0.0
     for _ in range(30):
         betas = rng.normal(size=body.P)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The converter against a TFLite interpreter, on noise and on real pictures, and against broken files."""
+"""The converter against a TFLite interpreter, on noise and on real pictures, and against broken
+files.
+"""
 
 from __future__ import annotations
 
@@ -36,15 +38,25 @@ def model_bytes(network: Network) -> bytes:
 @cache
 def convert(network: Network) -> bytes:
     model = read_model(model_bytes(network), network.member)
-    converted = convert_model(model, network.input_shape, network.outputs, network.on_request, blocked=network.blocked)
+    converted = convert_model(
+        model, network.input_shape, network.outputs, network.on_request, blocked=network.blocked
+    )
     return converted.SerializeToString()
 
 
 def assert_same_as_tflite(network: Network, pictures: np.ndarray) -> None:
-    """``pictures``: (N, H, W, 3) in [0, 1], or points (N, 146, 2). One batch for us, one by one for the interpreter."""
+    """``pictures``: (N, H, W, 3) in [0, 1], or points (N, 146, 2). One batch for us, one by one for
+    the interpreter.
+    """
     interpreter_module = package("ai_edge_litert.interpreter")
-    images = pictures.astype(np.float32) * 2 - 1 if network.name == "pose_detection" else pictures.astype(np.float32)
-    channels_first = np.ascontiguousarray(images.transpose(0, 3, 1, 2)) if images.ndim == 4 else images
+    images = (
+        pictures.astype(np.float32) * 2 - 1
+        if network.name == "pose_detection"
+        else pictures.astype(np.float32)
+    )
+    channels_first = (
+        np.ascontiguousarray(images.transpose(0, 3, 1, 2)) if images.ndim == 4 else images
+    )
     session = onnxruntime.InferenceSession(convert(network), providers=["CPUExecutionProvider"])
     requests = {f"with_{name}": np.array(True) for _, name, _ in network.on_request}
     ours = session.run(None, {"input": channels_first, **requests})
@@ -72,7 +84,9 @@ def test_equals_tflite_on_noise(network: Network) -> None:
     assert_same_as_tflite(network, np.random.default_rng(3).random((2, *network.input_shape[1:])))
 
 
-@pytest.mark.parametrize("network", [n for n in NETWORKS if len(n.input_shape) == 4], ids=lambda n: n.name)
+@pytest.mark.parametrize(
+    "network", [n for n in NETWORKS if len(n.input_shape) == 4], ids=lambda n: n.name
+)
 def test_equals_tflite_on_real_crops(network: Network, shared: Path) -> None:
     cv2 = package("cv2")
     crops = []
@@ -81,7 +95,9 @@ def test_equals_tflite_on_real_crops(network: Network, shared: Path) -> None:
         ok, frame = video.read()
         assert ok
         crop = frame[corner[0] : corner[0] + size, corner[1] : corner[1] + size, ::-1]
-        crops.append(cv2.resize(crop, network.input_shape[1:3], interpolation=cv2.INTER_AREA) / 255.0)
+        crops.append(
+            cv2.resize(crop, network.input_shape[1:3], interpolation=cv2.INTER_AREA) / 255.0
+        )
     assert_same_as_tflite(network, np.array(crops))
 
 
@@ -96,7 +112,9 @@ def test_operators_of_the_blocked_layout_compute_the_same(network: Network) -> N
         kinds = {node.op_type for node in converted.graph.node}
         assert ("PRelu" in kinds) != blocked
         assert ("Pad" in kinds) != blocked
-        session = onnxruntime.InferenceSession(converted.SerializeToString(), providers=["CPUExecutionProvider"])
+        session = onnxruntime.InferenceSession(
+            converted.SerializeToString(), providers=["CPUExecutionProvider"]
+        )
         results.append(session.run(None, {"input": images}))
     for found, expected in zip(*results, strict=True):
         assert np.abs(found - expected).max() < 1e-5 * np.abs(expected).max()
@@ -107,7 +125,13 @@ def test_mask_is_an_output_on_request() -> None:
     images = np.random.default_rng(4).random((1, 3, 256, 256), np.float32)
     session = onnxruntime.InferenceSession(convert(network), providers=["CPUExecutionProvider"])
     assert [i.name for i in session.get_inputs()] == ["input"]
-    assert [o.name for o in session.get_outputs()] == ["landmarks", "presence", "heatmap", "world", "mask"]
+    assert [o.name for o in session.get_outputs()] == [
+        "landmarks",
+        "presence",
+        "heatmap",
+        "world",
+        "mask",
+    ]
     *without, nothing = session.run(None, {"input": images})
     *others, mask = session.run(None, {"input": images, "with_mask": np.array(True)})
     assert nothing.tolist() == [[[[0.0]]]]
@@ -125,31 +149,43 @@ def test_mask_is_not_computed_unless_requested(tmp_path: Path) -> None:
     assert _convolutions_run(convert(network), images, True, tmp_path) > fewest
 
 
-def _convolutions_run(graph: bytes, images: np.ndarray, with_mask: bool | None, folder: Path) -> int:
+def _convolutions_run(
+    graph: bytes, images: np.ndarray, with_mask: bool | None, folder: Path
+) -> int:
     """Count the convolutions in the profile of one run, which names every node that ran."""
     options = onnxruntime.SessionOptions()
     options.enable_profiling, options.profile_file_prefix = True, str(folder / "profile")
     session = onnxruntime.InferenceSession(graph, options, providers=["CPUExecutionProvider"])
-    session.run(None, {"input": images} | ({} if with_mask is None else {"with_mask": np.array(with_mask)}))
+    session.run(
+        None, {"input": images} | ({} if with_mask is None else {"with_mask": np.array(with_mask)})
+    )
     events = json.loads(Path(session.end_profiling()).read_text("utf-8"))
     return sum("Conv" in event.get("args", {}).get("op_name", "") for event in events)
 
 
 def test_densify_block_sparse_matrix_by_hand() -> None:
-    """A 4 x 4 matrix of 2 x 2 blocks: block row 0 holds the right block, block row 1 holds the left one."""
+    """A 4 x 4 matrix of 2 x 2 blocks: block row 0 holds the right block, block row 1 holds the left
+    one.
+    """
     dense = np.array([[0, 0, 1, 2], [0, 0, 3, 4], [5, 6, 0, 0], [7, 8, 0, 0]], np.float32)
     columns = DimensionMetadata(0, np.array([0, 1, 2]), np.array([1, 0]))
     sparsity = Sparsity(
-        (0, 1, 2, 3), (0, 1), (DimensionMetadata(2), columns, DimensionMetadata(2), DimensionMetadata(2))
+        (0, 1, 2, 3),
+        (0, 1),
+        (DimensionMetadata(2), columns, DimensionMetadata(2), DimensionMetadata(2)),
     )
-    np.testing.assert_array_equal(densify(np.arange(1, 9, dtype=np.float32), (4, 4), sparsity, "test"), dense)
+    np.testing.assert_array_equal(
+        densify(np.arange(1, 9, dtype=np.float32), (4, 4), sparsity, "test"), dense
+    )
 
 
 def test_densify_column_major_order() -> None:
     dense = np.array([[0, 1, 0], [2, 0, 3]], np.float32)
     rows = DimensionMetadata(0, np.array([0, 1, 2, 3]), np.array([1, 0, 1]))
     sparsity = Sparsity((1, 0), (), (DimensionMetadata(3), rows))
-    np.testing.assert_array_equal(densify(np.array([2, 1, 3], np.float32), (2, 3), sparsity, "test"), dense)
+    np.testing.assert_array_equal(
+        densify(np.array([2, 1, 3], np.float32), (2, 3), sparsity, "test"), dense
+    )
 
 
 @pytest.mark.parametrize(
@@ -157,13 +193,19 @@ def test_densify_column_major_order() -> None:
     [
         DimensionMetadata(0, np.array([0, 1, 2, 3]), np.array([1, 0, 2])),  # row 2 of 2
         DimensionMetadata(0, np.array([0, 2, 1, 3]), np.array([1, 0, 1])),  # segments run backwards
-        DimensionMetadata(0, np.array([0, 1, 2, 9]), np.array([1, 0, 1])),  # segments past the indices
+        # segments past the indices
+        DimensionMetadata(0, np.array([0, 1, 2, 9]), np.array([1, 0, 1])),
         DimensionMetadata(1 << 40),
     ],
 )
 def test_densify_rejects_hostile_layouts(rows: DimensionMetadata) -> None:
     with pytest.raises(ModelFileError):
-        densify(np.ones(3, np.float32), (2, 3), Sparsity((1, 0), (), (DimensionMetadata(3), rows)), "test")
+        densify(
+            np.ones(3, np.float32),
+            (2, 3),
+            Sparsity((1, 0), (), (DimensionMetadata(3), rows)),
+            "test",
+        )
 
 
 def test_rejects_other_files() -> None:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fitting expression maps of faces that bones move: known amounts are found again, and written for both sides."""
+"""Fitting expression maps of faces that bones move: known amounts are found again, and written for
+both sides.
+"""
 
 from __future__ import annotations
 
@@ -32,13 +34,17 @@ def problem(ridge=1e-6):
         return A @ (x * [0.02, 1, 1, 1]) + 0.05 * (A @ (x * [0.02, 1, 1, 1])) ** 2
 
     scale = np.array([30.0, 1, 1, 1])
-    return Problem(CHANNELS, show, jacobian(CHANNELS, show), scale, ridge, np.array([0.5, 0.02, 0.02, 0.02]))
+    return Problem(
+        CHANNELS, show, jacobian(CHANNELS, show), scale, ridge, np.array([0.5, 0.02, 0.02, 0.02])
+    )
 
 
 def test_known_amounts_are_found_and_small_ones_left_out():
     rig, free, base = problem(), np.ones(4, bool), np.zeros(4)
     np.testing.assert_allclose(
-        rig.fit(rig.show(np.array([15.0, -0.2, 0.1, 0])), free, base, 8), [15, -0.2, 0.1, 0], atol=1e-3
+        rig.fit(rig.show(np.array([15.0, -0.2, 0.1, 0])), free, base, 8),
+        [15, -0.2, 0.1, 0],
+        atol=1e-3,
     )
     assert rig.fit(rig.show(np.array([15.0, 0.0, 0.1, 0.01])), free, base, 8)[3] == 0
     beyond = rig.fit(rig.show(np.array([15.0, 0.3, 0.0, 0.0])), free, np.array([15.0, 0, 0, 0]), 8)
@@ -57,7 +63,10 @@ def test_the_other_side():
     assert [other(name) for name in names] == [
         *("lip.T.R.001", "lips.L", "jaw", "eyeLookInRight", "mouthLeft", "jawOpen"),
     ]
-    assert mirror({("lips.L", "left"): 0.1, ("jaw", "pitch"): 9.0}) == {("lips.R", "left"): -0.1, ("jaw", "pitch"): 9.0}
+    assert mirror({("lips.L", "left"): 0.1, ("jaw", "pitch"): 9.0}) == {
+        ("lips.R", "left"): -0.1,
+        ("jaw", "pitch"): 9.0,
+    }
 
 
 def test_a_map_has_both_sides_without_what_is_small(tmp_path):
@@ -85,7 +94,10 @@ def test_mpfbs_map_moves_its_mesh_as_the_shapes_do():
     face, amounts = SkinnedFace(shapes), built_in("mpfb").controls
 
     def moved(*names):
-        x = [sum(amounts.get(b, {}).get(c, {}).get(name, 0.0) for name in names) for b, c in OF_DEFAULT_RIG]
+        x = [
+            sum(amounts.get(b, {}).get(c, {}).get(name, 0.0) for name in names)
+            for b, c in OF_DEFAULT_RIG
+        ]
         return face.moved(np.array(x))
 
     for name, least in (("jawOpen", 0.75), ("mouthSmileRight", 0.7), ("mouthPucker", 0.7)):

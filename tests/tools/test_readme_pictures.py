@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the README's pictures are drawn with: views, sticks, animations; and that README and docs show what there is."""
+"""What the README's pictures are drawn with: views, sticks, animations; and that README and docs
+show what there is.
+"""
 
 import re
 from types import SimpleNamespace
@@ -10,13 +12,22 @@ import pytest
 from scope.scope_addon.errors import OutputError
 from scope.solver.loaders.body_file import ASSETS
 from scope.tools.readme_pictures import animation, photographs
-from scope.tools.readme_pictures.__main__ import ANIMATIONS, BY_BENCHMARKS, LARGEST_BYTES, OF_TWO_VERSIONS, PICTURES
+from scope.tools.readme_pictures.__main__ import (
+    ANIMATIONS,
+    BY_BENCHMARKS,
+    LARGEST_BYTES,
+    OF_TWO_VERSIONS,
+    PICTURES,
+)
 from scope.tools.readme_pictures.panel import FINER, GROUND, Panel
 from scope.tools.readme_pictures.shapes import stick_figure
 from scope.tools.readme_pictures.view import from_around, from_the_camera
 
-ALONG_Y = np.array([[1.0, 0, 0, 0], [0, 0, 1, -4], [0, -1, 0, 1], [0, 0, 0, 1]])  # looks along +y from y = -4, z = 1
-FILMED = SimpleNamespace(intrinsics=np.array([[800.0, 0, 320], [0, 800, 240], [0, 0, 1]]), world_from_camera=[ALONG_Y])
+# looks along +y from y = -4, z = 1
+ALONG_Y = np.array([[1.0, 0, 0, 0], [0, 0, 1, -4], [0, -1, 0, 1], [0, 0, 0, 1]])
+FILMED = SimpleNamespace(
+    intrinsics=np.array([[800.0, 0, 320], [0, 800, 240], [0, 0, 1]]), world_from_camera=[ALONG_Y]
+)
 FILMED.world_from_camera = np.array(FILMED.world_from_camera)
 
 
@@ -64,7 +75,9 @@ def test_a_photographs_panel_has_the_face_in_its_middle_and_dots_on_its_landmark
     low, high = placed.min(0), placed.max(0)
     assert np.allclose((low + high) / 2, FINER * np.array(size) / 2)
     assert 0.2 < (high - low).max() / (FINER * size[1]) < 0.6
-    drawn = photographs.with_dots(np.zeros((FINER * size[1], FINER * size[0], 3), np.uint8), points[:1], part)
+    drawn = photographs.with_dots(
+        np.zeros((FINER * size[1], FINER * size[0], 3), np.uint8), points[:1], part
+    )
     v, u = np.nonzero(drawn[..., 0] > 200)
     assert np.allclose([u.mean(), v.mean()], placed[0], atol=1.0)
     assert len(u) < 0.01 * drawn[..., 0].size
@@ -81,14 +94,21 @@ def test_the_third_party_list_names_every_photograph_with_its_package():
 
 def test_readme_and_docs_show_every_picture_and_each_is_small():
     root = ASSETS.parent
-    text = "".join(p.read_text(encoding="utf-8") for p in [root / "README.md", *sorted((root / "docs").glob("*.md"))])
+    text = "".join(
+        p.read_text(encoding="utf-8")
+        for p in [root / "README.md", *sorted((root / "docs").glob("*.md"))]
+    )
     shown = [*PICTURES, *BY_BENCHMARKS, *OF_TWO_VERSIONS]
     assert sorted(re.findall(r"assets/pictures/(\w+)\.jpg", text)) == sorted(shown)
     for name in shown:
         assert 0 < (ASSETS / "pictures" / f"{name}.jpg").stat().st_size <= LARGEST_BYTES[name]
     assert set(re.findall(r"assets/pictures/(\w+)\.webp", text)) == set(ANIMATIONS)
     for name in ANIMATIONS:
-        assert 0 < (ASSETS / "pictures" / f"{name}.webp").stat().st_size <= animation.LARGEST_BYTES[name]
+        assert (
+            0
+            < (ASSETS / "pictures" / f"{name}.webp").stat().st_size
+            <= animation.LARGEST_BYTES[name]
+        )
     assert sum(animation.LARGEST_BYTES.values()) <= 800_000
 
 

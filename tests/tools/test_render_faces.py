@@ -22,14 +22,18 @@ def clip():
 def test_glasses_are_before_the_eyes_and_touch_no_skin(body, name):
     face = body.v_template
     parts = glasses(STYLES[name], body, face)
-    pupils = np.unique(body.faces[body.face_material == list(body.material_names).index("eye_pupil")])
+    pupils = np.unique(
+        body.faces[body.face_material == list(body.material_names).index("eye_pupil")]
+    )
     lenses = parts["lenses"].vertices.reshape(2, -1, 3)
     for side, lens in zip((1, -1), lenses, strict=True):
         pupil = face[pupils[side * face[pupils, 0] > 0]].mean(axis=0)
         assert (lens[:, :2].min(0) < pupil[:2]).all()
         assert (pupil[:2] < lens[:, :2].max(0)).all()
         assert 0.008 < lens[:, 2].min() - pupil[2] < 0.035
-        within = ((face[:, :2] > lens[:, :2].min(0)) & (face[:, :2] < lens[:, :2].max(0))).all(axis=1)
+        within = ((face[:, :2] > lens[:, :2].min(0)) & (face[:, :2] < lens[:, :2].max(0))).all(
+            axis=1
+        )
         assert face[within, 2].max() < lens[:, 2].max()
     ends = parts["frame"].vertices
     assert ends[:, 2].min() == pytest.approx(0.03, abs=0.005)  # at the ears

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sample clip: a motion a person could make, a truth that agrees with itself, a video that agrees with both."""
+"""The sample clip: a motion a person could make, a truth that agrees with itself, a video that
+agrees with both.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,9 @@ def test_a_leg_reaches_its_ankle_with_the_knee_ahead():
     for _ in range(50):
         root = cv2.Rodrigues(rng.normal(size=3))[0]
         hip = rng.normal(size=3)
-        ankle = hip + root @ np.array([rng.uniform(-0.2, 0.2), rng.uniform(-0.75, -0.3), rng.uniform(-0.2, 0.3)])
+        ankle = hip + root @ np.array(
+            [rng.uniform(-0.2, 0.2), rng.uniform(-0.75, -0.3), rng.uniform(-0.2, 0.3)]
+        )
         R_hip, R_knee = solve_leg(root, hip, ankle, thigh, shank)
         np.testing.assert_allclose(hip + root @ R_hip @ (thigh + R_knee @ shank), ankle, atol=1e-9)
         bend = cv2.Rodrigues(R_knee)[0].ravel()
@@ -44,7 +48,9 @@ def test_standing_feet_stand_still_on_the_floor(body, posed):
     standing = standing_feet(np.arange(len(trans)) / FPS)
     assert 0.6 < standing.mean() < 1.0
     for side, (ankle, toe) in enumerate(((7, 10), (8, 11))):
-        runs = np.split(np.arange(len(trans)), np.nonzero(np.diff(standing[:, side].astype(int)))[0] + 1)
+        runs = np.split(
+            np.arange(len(trans)), np.nonzero(np.diff(standing[:, side].astype(int)))[0] + 1
+        )
         for run in (r for r in runs if standing[r[0], side]):
             for joint in (ankle, toe):
                 assert np.ptp(joints[run, joint], axis=0).max() < 1e-9
@@ -89,14 +95,19 @@ def check_truth(truth: dict, body: Body, tolerance: float) -> None:
         camera = np.array([(camera_from_world @ T)[:3, 3] for T in transforms])
         np.testing.assert_allclose(truth["joints_cam"][f], camera, atol=tolerance)
         knee = camera[names.index("left_knee")]
-        pixel = cv2.projectPoints(knee[None], np.zeros(3), np.zeros(3), truth["intrinsics"], truth["dist"])[0].ravel()
+        pixel = cv2.projectPoints(
+            knee[None], np.zeros(3), np.zeros(3), truth["intrinsics"], truth["dist"]
+        )[0].ravel()
         column = [str(n) for n in truth["names"]].index("LKnee")
-        np.testing.assert_allclose(truth["uv"][f, column], pixel, atol=0.5 if tolerance > 1e-3 else 1e-2)
+        np.testing.assert_allclose(
+            truth["uv"][f, column], pixel, atol=0.5 if tolerance > 1e-3 else 1e-2
+        )
 
 
 def test_the_clip_in_the_assets_fits_its_truth_and_the_body(body):
     truth = dict(np.load(ASSETS / "sample" / "sample_truth.npz"))
-    check_truth(truth, body, 0.01)  # another build of the body may move a joint a little: the clip still shows it
+    # another build of the body may move a joint a little: the clip still shows it
+    check_truth(truth, body, 0.01)
     clip = ASSETS / "sample" / "sample.mp4"
     assert clip.stat().st_size < 2_000_000
     width, height = truth["size"]
@@ -106,8 +117,11 @@ def test_the_clip_in_the_assets_fits_its_truth_and_the_body(body):
         images = [frame.image_rgb.astype(int) for frame in video]
     assert (video.width, video.height, video.fps) == (width, height, truth["fps"])
     assert len(images) == len(truth["frame_index"]) == 150
-    room = np.hstack([images[-1][:, : width // 2], images[0][:, width // 2 :]])  # walks from the left to the right half
+    # walks from the left to the right half
+    room = np.hstack([images[-1][:, : width // 2], images[0][:, width // 2 :]])
     for f in range(0, 150, 10):  # what differs from the empty room surrounds the projected limbs
-        moved = cv2.dilate((np.abs(images[f] - room).max(-1) > 30).astype(np.uint8), np.ones((5, 5)))
+        moved = cv2.dilate(
+            (np.abs(images[f] - room).max(-1) > 30).astype(np.uint8), np.ones((5, 5))
+        )
         u, v = np.round(truth["uv"][f]).astype(int).T
         assert moved[v, u].mean() > 0.8

@@ -26,7 +26,9 @@ def test_fingers_bend_into_the_right_palm_one_by_one_and_hands_stay_in_the_image
     reach = {}
     for frame in range(len(shot)):
         _, t = hands.forward_kinematics(shot.rotations[frame], shot.trans[frame])
-        pixels = shot.project(shot.to_camera(t[[joint("left_middle1"), joint("right_middle1"), joint("head")]]))
+        pixels = shot.project(
+            shot.to_camera(t[[joint("left_middle1"), joint("right_middle1"), joint("head")]])
+        )
         assert (pixels > 0).all()
         assert (pixels < SIZE).all()
         for finger in ("index", "pinky"):
@@ -50,5 +52,7 @@ def test_the_person_hides_the_room(hands, shot):
     green = picture[..., 1] - picture[..., [0, 2]].max(axis=-1) > 150
     assert green[20, 20]
     _, t = hands.forward_kinematics(shot.rotations[0], shot.trans[0])
-    column, row = shot.project(shot.to_camera(t[[hands.joint_names.index("spine3")]]))[0].round().astype(int)
+    column, row = (
+        shot.project(shot.to_camera(t[[hands.joint_names.index("spine3")]]))[0].round().astype(int)
+    )
     assert not green[row, column]

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The lifter's training data against geometry worked out by hand, its training, and its export against PyTorch."""
+"""The lifter's training data against geometry worked out by hand, its training, and its export
+against PyTorch.
+"""
 
 import json
 import math
@@ -9,7 +11,14 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.fitting.keypoint_offsets import offset
 from scope.scope_addon.capture.perception import lifter
-from scope.scope_addon.capture.perception.lifter import HIPS, MIDDLE, OFFSETS_S, SPACING_S, WINDOW, Lifter
+from scope.scope_addon.capture.perception.lifter import (
+    HIPS,
+    MIDDLE,
+    OFFSETS_S,
+    SPACING_S,
+    WINDOW,
+    Lifter,
+)
 from scope.scope_addon.capture.tracking.left_right import MIRROR_PARTNER
 from scope.solver.names import BLAZEPOSE
 from scope.solver.rotations import exp
@@ -20,11 +29,22 @@ from ..required import missing, package
 try:
     import torch
 except ImportError:
-    missing("torch is not installed, which trains the lifting network: pip install torch", "SCOPE_WITHOUT_TRAINING")
+    missing(
+        "torch is not installed, which trains the lifting network: pip install torch",
+        "SCOPE_WITHOUT_TRAINING",
+    )
 
 from scope.tools.train_lifter import augment, detector_noise, measure, network_input, train
 from scope.tools.train_lifter.augment import PoseSampler, rotation_matrices
-from scope.tools.train_lifter.dataset import HEIGHTS_M, Batch, Dataset, Variety, cameras, cut_short, lines_of_sight
+from scope.tools.train_lifter.dataset import (
+    HEIGHTS_M,
+    Batch,
+    Dataset,
+    Variety,
+    cameras,
+    cut_short,
+    lines_of_sight,
+)
 from scope.tools.train_lifter.detector_noise import Persistence
 from scope.tools.train_lifter.network import BONES, DIRECTION_WEIGHT, LiftingNetwork, loss
 
@@ -73,7 +93,9 @@ def test_the_input_is_that_of_captures():
     rays, world = rng.normal(0, 0.3, (6, 33, 2)), rng.normal(0, 0.4, (6, 33, 3))
     confidence, known = rng.uniform(0, 1, (6, 33)), np.array([1.0, 0, 1, 0, 1, 1])
     expected, R = lifter.network_input(rays, confidence, world, known)
-    x, R_ours = network_input.network_input(*(torch.tensor(a)[None] for a in (rays, confidence, world, known)))
+    x, R_ours = network_input.network_input(
+        *(torch.tensor(a)[None] for a in (rays, confidence, world, known))
+    )
     assert np.allclose(x[0], expected, atol=1e-9)
     assert np.allclose(R_ours[0], R, atol=1e-9)
 
@@ -81,7 +103,10 @@ def test_the_input_is_that_of_captures():
 def test_keypoints_are_those_of_the_body(body, plain, motions):
     at = list(body.keypoint_set("blazepose").values())
     displaced = np.random.default_rng(0).normal(0, 0.1, (1, len(at), 3))
-    given = [torch.tensor(a, dtype=torch.float32) for a in (body.l[None], body.v_bar[at][None], displaced)]
+    given = [
+        torch.tensor(a, dtype=torch.float32)
+        for a in (body.l[None], body.v_bar[at][None], displaced)
+    ]
     ours, seen = plain.keypoints(torch.tensor(motions.Omega[None, :2]), *given)
     for k in range(2):
         R, t = body.forward_kinematics(motions.Omega[k].astype(float), -body.rest_joints()[0])
@@ -125,7 +150,10 @@ def test_a_mirrored_pose_has_mirrored_keypoints(body, plain, motions):
     symmetric = body.v_bar[at].copy()
     symmetric = (symmetric + symmetric[MIRROR_PARTNER] * [-1, 1, 1]) / 2
     bones = (body.l + body.l[plain.sampler.partner] * [-1, 1, 1]) / 2
-    give = [torch.tensor(np.repeat(a[None], 5, 0), dtype=torch.float32) for a in (bones, symmetric, 0 * symmetric)]
+    give = [
+        torch.tensor(np.repeat(a[None], 5, 0), dtype=torch.float32)
+        for a in (bones, symmetric, 0 * symmetric)
+    ]
     Omega = torch.tensor(motions.Omega[:5, None])
     straight, _ = plain.keypoints(Omega, *give)
     mirrored, _ = plain.keypoints(plain.sampler.mirror(Omega), *give)
@@ -133,7 +161,9 @@ def test_a_mirrored_pose_has_mirrored_keypoints(body, plain, motions):
 
 
 def as_recorded(Omega, motions, sampler):
-    """(n,) bool: whether all joints but the root of (n, 24, 3, 3) are those of one frame or of its mirror image."""
+    """(n,) bool: whether all joints but the root of (n, 24, 3, 3) are those of one frame or of its
+    mirror image.
+    """
     frames = torch.tensor(motions.Omega)
     candidates = torch.cat([frames, sampler.mirror(frames)])[:, 1:].flatten(1)
     return (torch.cdist(Omega[:, 1:].flatten(1), candidates).amin(1) < 1e-2).numpy()
@@ -153,7 +183,9 @@ def test_natural_samples_are_the_recordings_up_to_mirroring_and_lean_less(body, 
 
 
 def test_a_window_is_a_recording_at_the_lifter_s_moments(body, monkeypatch):
-    """A root that turns by 1 rad/s, recorded 30 times a second: from moment to moment it turns by the spacing."""
+    """A root that turns by 1 rad/s, recorded 30 times a second: from moment to moment it turns by
+    the spacing.
+    """
     monkeypatch.setattr(augment, "SPEED_SPREAD", 0.0)
     pose = np.zeros((300, body.K + 1, 3))
     pose[:, 0, 1] = np.arange(300) / 30
@@ -162,7 +194,8 @@ def test_a_window_is_a_recording_at_the_lifter_s_moments(body, monkeypatch):
     steps = np.linalg.norm(Omega[:, 1:] - Omega[:, :-1], axis=(-2, -1)) / np.sqrt(2)  # 2 sin(θ/2)
     expected = 2 * np.sin(SPACING_S / 2)
     assert steps.max() < expected + 1e-3
-    assert np.isclose(steps, expected, atol=1e-3).mean() > 0.9  # the others lie at the ends of the recording
+    # the others lie at the ends of the recording
+    assert np.isclose(steps, expected, atol=1e-3).mean() > 0.9
 
 
 def test_windows_do_not_run_into_the_next_take(body):
@@ -186,12 +219,18 @@ def test_a_camera_that_looks_down_sees_the_world_s_up_tip_towards_it():
 
 
 def test_input_without_noise_is_the_projection_of_the_target(body, motions, monkeypatch):
-    """With the detector's errors off, the virtual camera at the right distance projects the target onto the input."""
+    """With the detector's errors off, the virtual camera at the right distance projects the target
+    onto the input.
+    """
     monkeypatch.setattr(detector_noise, "PLACEMENT", np.zeros(33))
     for name in ("IMAGE_NOISE", "CUT_SHARE", "SWAP_SHARE"):
         monkeypatch.setattr(detector_noise, name, 0.0)
     batch = Dataset(body, motions, Variety(focal_spread=0.0)).batch(20)
-    for x, P in zip(batch.input[:, MIDDLE].numpy().astype(float), batch.points.numpy().astype(float), strict=True):
+    for x, P in zip(
+        batch.input[:, MIDDLE].numpy().astype(float),
+        batch.points.numpy().astype(float),
+        strict=True,
+    ):
         u = x[:66].reshape(33, 2) * np.exp(x[-1])
         # u (P_z + t_z) = P_xy + t_xy, linear in t
         A = np.zeros((66, 3))
@@ -204,7 +243,9 @@ def test_input_without_noise_is_the_projection_of_the_target(body, motions, monk
         assert np.abs(P[HIPS].mean(axis=0)).max() < 1e-5
 
 
-def test_offsets_are_those_of_a_person_and_on_request_around_those_of_the_landmark_network(body, motions):
+def test_offsets_are_those_of_a_person_and_on_request_around_those_of_the_landmark_network(
+    body, motions
+):
     deviation = torch.tensor(detector_noise.PLACEMENT, dtype=torch.float32)
     expected = np.array([offset(name) for name in BLAZEPOSE])
     none = detector_noise.placements(4000, deviation).numpy()
@@ -243,7 +284,9 @@ def test_world_landmarks_are_hip_centred_and_distorted_as_much_as_landmark_netwo
 
 
 def test_errors_last_as_they_do_on_footage():
-    """Correlation with themselves 0.1, 0.2 and 0.4 s later: ρ + (1 − ρ) a^k, for constant ρ and a exactly so."""
+    """Correlation with themselves 0.1, 0.2 and 0.4 s later: ρ + (1 − ρ) a^k, for constant ρ and a
+    exactly so.
+    """
     n = 20000
     errors = Persistence(torch.full((n,), 0.5), torch.full((n,), 0.6)).normal(2)
     assert errors.shape == (n, WINDOW, 2)
@@ -280,7 +323,10 @@ def test_beyond_the_image_s_border_keypoints_are_pulled_back_with_low_confidence
         assert moved.any() == bool(share)
     assert confidence[moved].max() <= 0.3
     x, y = (rays[..., k][moved] for k in (0, 1))
-    below, above = ((y > 0) & (y > x.abs())).float().mean(), ((y < 0) & (-y > x.abs())).float().mean()
+    below, above = (
+        ((y > 0) & (y > x.abs())).float().mean(),
+        ((y < 0) & (-y > x.abs())).float().mean(),
+    )
     assert below > above > 0  # people are cut at the feet most often
 
 
@@ -297,9 +343,13 @@ def test_some_windows_are_cut_short_and_some_stand_still():
 
 
 def test_held_cameras_look_down_on_hips_below_them_and_less_so_from_afar():
-    near, far = (lines_of_sight(torch.full((4000,), 0.9), torch.full((4000,), d)).numpy() for d in (2.0, 10.0))
+    near, far = (
+        lines_of_sight(torch.full((4000,), 0.9), torch.full((4000,), d)).numpy()
+        for d in (2.0, 10.0)
+    )
     assert np.median(near) > np.median(far) > 0
-    # The middle half of cameras 10 m away, 1.3 ± 0.4 m above the floor: about 2 ± 2 degrees and some of any pitch.
+    # The middle half of cameras 10 m away, 1.3 ± 0.4 m above the floor: about 2 ± 2 degrees and
+    # some of any pitch.
     assert np.subtract(*np.degrees(np.quantile(far, [0.6, 0.1]))) < 12
 
 
@@ -309,7 +359,9 @@ def test_cameras_at_any_height_look_further_down_and_up():
     low, high = (np.arcsin((height - 0.9) / 6.0) for height in HEIGHTS_M)
     assert np.mean((wide > low) & (wide < high)) > 0.7  # those that are not held have any pitch
     beyond = np.arcsin((2.6 - 0.9) / 6.0)  # of a camera higher than people hold it
-    assert np.mean((wide > beyond) & (wide < high)) > np.mean((usual > beyond) & (usual < high)) + 0.05
+    assert (
+        np.mean((wide > beyond) & (wide < high)) > np.mean((usual > beyond) & (usual < high)) + 0.05
+    )
 
 
 def test_people_are_as_near_and_as_far_from_the_centre_as_was_asked_for(body, motions):
@@ -326,14 +378,18 @@ def test_people_are_as_near_and_as_far_from_the_centre_as_was_asked_for(body, mo
 
 
 def test_the_loss_is_the_laplace_density_s_and_the_bones_directions():
-    """All errors 0.1 in x and −0.2 in z; the bones keep their directions, until all of them are reversed."""
+    """All errors 0.1 in x and −0.2 in z; the bones keep their directions, until all of them are
+    reversed.
+    """
     truth, log_sigma = torch.randn(4, 33, 3), torch.tensor([-1.0, -2.0]).expand(4, 33, 2)
     points = truth + torch.tensor([0.1, 0.0, -0.2])
     expected = (np.sqrt(2) * (0.1 * np.e + 0.2 * np.e**2) - 1 - 1 - 2) / 3
-    assert np.isclose(loss(points, log_sigma, truth), expected, atol=1e-3)  # a direction counts at least 0.001
+    # a direction counts at least 0.001
+    assert np.isclose(loss(points, log_sigma, truth), expected, atol=1e-3)
     small = torch.full((4, 33, 2), 0.0)
     difference = loss(-truth, small, truth) - np.sqrt(2) * 2 * truth.abs().mean()
-    assert np.isclose(difference, DIRECTION_WEIGHT * 2, atol=1e-4)  # the distance of opposite unit vectors
+    # the distance of opposite unit vectors
+    assert np.isclose(difference, DIRECTION_WEIGHT * 2, atol=1e-4)
 
 
 class KnownErrors:
@@ -355,7 +411,9 @@ def test_measures_of_known_errors_are_those_worked_out_by_hand():
     x = torch.zeros(n, WINDOW, 200)
     x[: n // 2, :, -2] = 1
     angle = math.radians(30)
-    R = torch.tensor([[math.cos(angle), -math.sin(angle), 0], [math.sin(angle), math.cos(angle), 0], [0, 0, 1]])
+    R = torch.tensor(
+        [[math.cos(angle), -math.sin(angle), 0], [math.sin(angle), math.cos(angle), 0], [0, 0, 1]]
+    )
     turned = measure.measure(KnownErrors(flat @ R, log_sigma), Batch(x, flat))
     assert np.isclose(turned["limb_deg"], 30, atol=0.1)
     assert np.isclose(turned["trunk_deg"], 30, atol=0.1)
@@ -401,13 +459,16 @@ def test_training_reduces_the_error_of_held_out_windows(body, small, monkeypatch
     monkeypatch.setattr(train, "WARM_UP", 5)
     recorded = made_motions(body, 200, 20)
     held_out = measure.held_out_batches(body, recorded, "cpu", 256)["augmented"]
-    trainer = train.Trainer(body, recorded, replace(small, steps=60, batch=64, rate=1e-2), None, "cpu")
+    trainer = train.Trainer(
+        body, recorded, replace(small, steps=60, batch=64, rate=1e-2), None, "cpu"
+    )
     before = measure.measure(trainer.network, held_out)["with_world_mm"]
     for step in range(60):
         trainer.step(step)
     after = measure.measure(trainer.network, held_out)["with_world_mm"]
     assert after < 0.7 * before
-    # The exponential mean has the weights 10/(k+10)…: it lies between the first weights and the last.
+    # The exponential mean has the weights 10/(k+10)…: it lies between the first weights and the
+    # last.
     assert after <= measure.measure(trainer.mean, held_out)["with_world_mm"] < before
 
 
@@ -427,14 +488,23 @@ def test_a_training_writes_what_another_continues_from(body, small, tmp_path):
         train.train(recorded, tmp_path / "c", replace(small, rate=0.0), path, "cpu")
         kept = torch.load(tmp_path / "c" / "lifter.pt")
         for name, value in first.items():  # an exported matrix has 8 bits
-            step = value.abs().amax(dim=-1, keepdim=True) / 127 if name.endswith("weight") and value.ndim == 2 else 0.0
+            step = (
+                value.abs().amax(dim=-1, keepdim=True) / 127
+                if name.endswith("weight") and value.ndim == 2
+                else 0.0
+            )
             again = 0.01 if name == "sigma_offset" else 1e-6  # the calibration, which is made again
             assert ((kept[name] - value).abs() <= 0.501 * step + again).all(), name
 
 
 def test_the_command_line_says_what_is_wrong(monkeypatch, tmp_path, capsys):
     absent = str(tmp_path / "absent.npz")
-    for arguments in ([absent], [absent, "--natural", "2"], [absent, "--steps", "0"], [absent, "--start", absent]):
+    for arguments in (
+        [absent],
+        [absent, "--natural", "2"],
+        [absent, "--steps", "0"],
+        [absent, "--start", absent],
+    ):
         monkeypatch.setattr("sys.argv", ["train", *arguments, "-o", str(tmp_path)])
         with pytest.raises(SystemExit):
             train.main()
@@ -470,6 +540,8 @@ def test_the_exported_network_is_the_trained_one(tmp_path):
     assert np.abs(ours - points).max() < 1e-3 * np.abs(points).max()
     assert np.abs(sigma - log_sigma).max() < 1e-3
     with torch.no_grad():
-        again, sigma_again = (a.numpy() for a in read_exported(tmp_path / "lifter.onnx")(torch.from_numpy(x)))
+        again, sigma_again = (
+            a.numpy() for a in read_exported(tmp_path / "lifter.onnx")(torch.from_numpy(x))
+        )
     assert np.abs(again - points).max() < 1e-5 * np.abs(points).max()
     assert np.abs(sigma_again - log_sigma).max() < 1e-5

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The recordings of the lifter's training: which are drawn how often, and which are held out. Needs no PyTorch."""
+"""The recordings of the lifter's training: which are drawn how often, and which are held out. Needs
+no PyTorch.
+"""
 
 import numpy as np
 import pytest
@@ -39,12 +41,17 @@ def test_renders_and_scenes_show_every_tenth_take_whoever_performs():
 
 def test_takes_of_the_sets_are_held_out_by_performer_only():
     assert np.flatnonzero(is_held_out(np.arange(700))).max() == 139
-    motions = motions_of(["markers", "reactidle_reserved", "cmu_08", "cmu_12", "style100_mason"], take=range(195, 200))
+    motions = motions_of(
+        ["markers", "reactidle_reserved", "cmu_08", "cmu_12", "style100_mason"],
+        take=range(195, 200),
+    )
     assert held_out_frames(motions).take.tolist() == [195, 196, 197, 198]
 
 
 def test_rare_poses_are_drawn_more_often_than_their_number_says():
-    """Ninety frames of one pose and ten of another: shares per frame in the ratio of 1/√90 to 1/√10."""
+    """Ninety frames of one pose and ten of another: shares per frame in the ratio of 1/√90 to
+    1/√10.
+    """
     motions = motions_of(["cmu_01"] * 100)
     motions.Omega[90:, 5] = exp(np.array([1.0, 0, 0]))
     # Of a hundred identical centres, the first takes all frames of its pose.
@@ -66,8 +73,12 @@ def test_kinds_have_fixed_shares_and_sets_theirs_within_a_kind():
     motions = motions_of(["a"] * 100, kinds, sets)
     given = sum(KIND_SHARES[kind] for kind in ("stand", "walk", "sit"))
     for kind in ("stand", "walk", "sit"):
-        assert motions.share[motions.kinds == kind].sum() == pytest.approx(KIND_SHARES[kind] / given)
-    assert motions.share[55] / motions.share[0] == pytest.approx(REPEATED["style100"] / REPEATED["reactidle"])
+        assert motions.share[motions.kinds == kind].sum() == pytest.approx(
+            KIND_SHARES[kind] / given
+        )
+    assert motions.share[55] / motions.share[0] == pytest.approx(
+        REPEATED["style100"] / REPEATED["reactidle"]
+    )
 
 
 def test_every_kind_and_set_has_a_share():
@@ -97,7 +108,9 @@ def test_only_valid_frames_are_read_with_their_take_s_rate_and_performer(tmp_pat
     assert motions.performers.tolist() == ["cmu_02", "cmu_02", "expmap_soccer", "expmap_soccer"]
     assert motions.kinds.tolist() == ["walk", "walk", "other", "other"]
     assert motions.sets.tolist() == ["cmu_asf_amc", "cmu_asf_amc", "cmu_expmap", "cmu_expmap"]
-    assert np.allclose(motions.Omega[:, 1], exp(np.array([[0.1 * k, 0, 0] for k in (0, 2, 3, 4)])), atol=1e-6)
+    assert np.allclose(
+        motions.Omega[:, 1], exp(np.array([[0.1 * k, 0, 0] for k in (0, 2, 3, 4)])), atol=1e-6
+    )
     assert [end.tolist() for end in motions.ends] == [[0, 0, 2, 2], [1, 1, 3, 3]]
 
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How the lifter's training changes the legs of people who stand, against angles worked out by hand."""
+"""How the lifter's training changes the legs of people who stand, against angles worked out by
+hand.
+"""
 
 import numpy as np
 import pytest
@@ -12,7 +14,10 @@ from ..required import missing
 try:
     import torch
 except ImportError:
-    missing("torch is not installed, which trains the lifting network: pip install torch", "SCOPE_WITHOUT_TRAINING")
+    missing(
+        "torch is not installed, which trains the lifting network: pip install torch",
+        "SCOPE_WITHOUT_TRAINING",
+    )
 
 from scope.tools.train_lifter import augment
 from scope.tools.train_lifter.augment import PoseSampler
@@ -24,12 +29,16 @@ def _seed():
 
 
 def standing_sampler(body, bend_deg):
-    """Windows of people who stand with both knees bent by so much from the rest pose, as recorded."""
+    """Windows of people who stand with both knees bent by so much from the rest pose, as
+    recorded.
+    """
     pose = np.zeros((20, body.K + 1, 3))
     for side in ("left", "right"):
         pose[:, body.joint_names.index(f"{side}_knee"), 0] = np.radians(bend_deg)
     same = (np.full(20, value) for value in (30.0, "cmu_01", "stand", "cmu_asf_amc"))
-    return PoseSampler(body, Motions(exp(pose).astype(np.float32), np.zeros(20, int), *same), natural_share=1.0)
+    return PoseSampler(
+        body, Motions(exp(pose).astype(np.float32), np.zeros(20, int), *same), natural_share=1.0
+    )
 
 
 def turns_about_x(Omega, body, joint):
@@ -41,7 +50,9 @@ def turns_about_x(Omega, body, joint):
 def test_straightened_legs_lose_a_slight_flexion_and_keep_the_foot_below_the_hip(body):
     everybody = torch.ones(400, dtype=torch.bool)
     sampler = standing_sampler(body, 12.0)
-    windows = sampler._states.reshape(20, 1, -1, 3, 3).expand(20, WINDOW, -1, 3, 3)[torch.zeros(400, dtype=torch.long)]
+    windows = sampler._states.reshape(20, 1, -1, 3, 3).expand(20, WINDOW, -1, 3, 3)[
+        torch.zeros(400, dtype=torch.long)
+    ]
     Omega = sampler.straightened(windows, everybody)
     hip, knee, ankle = (turns_about_x(Omega, body, joint) for joint in ("hip", "knee", "ankle"))
     assert (knee > -0.1).all()
@@ -56,7 +67,9 @@ def test_straightened_legs_lose_a_slight_flexion_and_keep_the_foot_below_the_hip
 
 def test_who_squats_keeps_the_feet_as_they_were(body):
     sampler = standing_sampler(body, 0.0)
-    windows = sampler._states.reshape(20, 1, -1, 3, 3).expand(20, WINDOW, -1, 3, 3)[torch.zeros(400, dtype=torch.long)]
+    windows = sampler._states.reshape(20, 1, -1, 3, 3).expand(20, WINDOW, -1, 3, 3)[
+        torch.zeros(400, dtype=torch.long)
+    ]
     Omega = sampler.squats(windows, torch.ones(400, dtype=torch.bool))
     root = torch.rad2deg(torch.atan2(Omega[:, MIDDLE, 0, 2, 1], Omega[:, MIDDLE, 0, 1, 1]))
     hip, knee, ankle = (turns_about_x(Omega, body, joint) for joint in ("hip", "knee", "ankle"))
@@ -70,11 +83,16 @@ def test_who_squats_keeps_the_feet_as_they_were(body):
 
 def test_some_who_squat_stretch_their_arms_forward(body):
     sampler = standing_sampler(body, 0.0)
-    windows = sampler._states.reshape(20, 1, -1, 3, 3).expand(20, WINDOW, -1, 3, 3)[torch.zeros(400, dtype=torch.long)]
+    windows = sampler._states.reshape(20, 1, -1, 3, 3).expand(20, WINDOW, -1, 3, 3)[
+        torch.zeros(400, dtype=torch.long)
+    ]
     Omega = sampler.squats(windows, torch.ones(400, dtype=torch.bool))[:, MIDDLE]
     for sign, side in ((1.0, "left"), (-1.0, "right")):
-        shoulder, elbow = (body.joint_names.index(f"{side}_{joint}") for joint in ("shoulder", "elbow"))
-        # The recording turns no joint between root and shoulder, and upper arms at rest point to their side.
+        shoulder, elbow = (
+            body.joint_names.index(f"{side}_{joint}") for joint in ("shoulder", "elbow")
+        )
+        # The recording turns no joint between root and shoulder, and upper arms at rest point to
+        # their side.
         arm = (Omega[:, 0] @ Omega[:, shoulder])[:, :, 0] * sign
         ahead = arm[:, 2] > 0.5
         squats = turns_about_x(Omega[:, None].expand(-1, WINDOW, -1, -1, -1), body, "knee") > 0.01
@@ -82,5 +100,6 @@ def test_some_who_squat_stretch_their_arms_forward(body):
         assert ahead.sum() / squats.sum() == pytest.approx(augment.ARMS_AHEAD_SHARE, abs=0.1)
         assert arm[ahead, 1].mean().abs() < 0.1  # level
         assert arm[ahead, 0].mean().abs() < 0.1  # neither across nor to the side
-        bend = sign * Omega[ahead, elbow][:, 2, 0]  # the forearm's component to the front of the upper arm at rest
+        # the forearm's component to the front of the upper arm at rest
+        bend = sign * Omega[ahead, elbow][:, 2, 0]
         assert (bend >= -1e-4).all()  # elbows bend forwards, not backwards

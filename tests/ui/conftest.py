@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fixtures: the extension registered in a fresh Blender, with its own cache, and scripted workers."""
+"""Fixtures: the extension registered in a fresh Blender, with its own cache, and scripted
+workers.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +42,9 @@ def root() -> Path:
 
 @pytest.fixture(autouse=True)
 def registered(tmp_path, monkeypatch):
-    """Register the extension in a fresh Blender. Each test has its own cache; all share the compiled solver."""
+    """Register the extension in a fresh Blender. Each test has its own cache; all share the
+    compiled solver.
+    """
     from scope.scope_addon.ui import preferences
     from scope.scope_addon.ui.capture import capture_job
 
@@ -93,7 +97,8 @@ def standing() -> Motion:
 def fake_worker(tmp_path, monkeypatch, standing):
     """Replace the worker of the next captures by a script.
 
-    The script may use ``folder``, ``request``, ``send(event, **values)`` and ``finish()``, which sends ``standing``.
+    The script may use ``folder``, ``request``, ``send(event, **values)`` and ``finish()``, which
+    sends ``standing``.
     """
     from scope.scope_addon.ui.capture import capture_job
 
@@ -129,10 +134,23 @@ def python() -> list[str]:
 
 def inventory() -> dict:
     """Return the names of the file's data-blocks, and settings of the scene."""
-    kinds = ("objects", "meshes", "armatures", "cameras", "actions", "collections", "images", "movieclips", "materials")
+    kinds = (
+        "objects",
+        "meshes",
+        "armatures",
+        "cameras",
+        "actions",
+        "collections",
+        "images",
+        "movieclips",
+        "materials",
+    )
     scene = bpy.context.scene
     blocks = {kind: sorted(b.name for b in getattr(bpy.data, kind)) for kind in kinds}
-    return blocks | {"range": (scene.frame_start, scene.frame_end), "rate": (scene.render.fps, scene.render.fps_base)}
+    return blocks | {
+        "range": (scene.frame_start, scene.frame_end),
+        "rate": (scene.render.fps, scene.render.fps_base),
+    }
 
 
 @pytest.fixture

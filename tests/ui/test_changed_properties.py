@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Custom properties that were changed by hand give a message or nothing, in the operators and in the panel."""
+"""Custom properties that were changed by hand give a message or nothing, in the operators and in
+the panel.
+"""
 
 import json
 import math
@@ -110,7 +112,9 @@ def test_no_operator_fails_with_a_traceback(rig, value):
 def test_a_changed_start_is_that_of_a_capture_at_frame_0(rig, value):
     rig["scope_start"] = value
     bpy.ops.scope.smooth(strength=1.0)
-    keys = next(read_keys(c) for c in fcurves(rig) if c.data_path == 'pose.bones["pelvis"].location')
+    keys = next(
+        read_keys(c) for c in fcurves(rig) if c.data_path == 'pose.bones["pelvis"].location'
+    )
     assert keys[0, 0] == pytest.approx(7.0 if value == 7 else 0.0, abs=1e-3)
 
 
@@ -132,7 +136,9 @@ def test_a_person_without_a_body_is_said(rig):
     assert "does not store which body it is" in tried(bpy.ops.scope.smooth)
 
 
-@pytest.mark.parametrize("value", [*VALUES.values(), [1.0, 2.0, 3.0], [5.0, 0.0, 0.0, 0.0, 4.0, 0.0, 0.0, 0.0]])
+@pytest.mark.parametrize(
+    "value", [*VALUES.values(), [1.0, 2.0, 3.0], [5.0, 0.0, 0.0, 0.0, 4.0, 0.0, 0.0, 0.0]]
+)
 def test_a_changed_trajectory_is_said_and_smoothing_restores_the_motion(rig, value):
     before = made_rigs.seen(rig, NAMES, [5, 20])
     bpy.ops.scope.root_motion(mode="IN_PLACE")
@@ -146,7 +152,9 @@ def test_a_changed_trajectory_is_said_and_smoothing_restores_the_motion(rig, val
     np.testing.assert_allclose(made_rigs.seen(rig, NAMES, [5, 20]), before, atol=1e-4)
 
 
-@pytest.mark.parametrize("value", [*VALUES.values(), [0.0] * 16, [1.0] * 15, [3.0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]])
+@pytest.mark.parametrize(
+    "value", [*VALUES.values(), [0.0] * 16, [1.0] * 15, [3.0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]]
+)
 @pytest.mark.parametrize("name", ["scope_place", "scope_root"])
 def test_a_changed_root_object_goes_with_smoothing(rig, name, value):
     before = made_rigs.seen(rig, NAMES, [5, 20])
@@ -188,7 +196,9 @@ def test_a_changed_person_of_a_rig_is_none(rig, tmp_path, value):
     bpy.context.view_layer.objects.active = rig
     bpy.ops.scope.retarget()
     own["scope_person"] = value
-    assert bpy.ops.scope.export(filepath=str(tmp_path / "a.fbx"), format="FBX", which="RIG") == {"FINISHED"}
+    assert bpy.ops.scope.export(filepath=str(tmp_path / "a.fbx"), format="FBX", which="RIG") == {
+        "FINISHED"
+    }
     bpy.context.view_layer.objects.active = own
     assert captured_armature(bpy.context) == rig  # the only person of the scene
     assert tried(bpy.ops.scope.match_frame_rate) == ""

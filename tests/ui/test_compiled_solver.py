@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""In a process in which the extension has Blender's name for it, corrections use the package that has machine code."""
+"""In a process in which the extension has Blender's name for it, corrections use the package that
+has machine code.
+"""
 
 import subprocess
 import sys
@@ -31,7 +33,8 @@ for package in ("scope", NAME):
     assert folders.places() == [Path({kernels!r})], folders.places()
 
 body = importlib.import_module(f"{{NAME}}.solver.loaders.body_file").load_body("scope")
-refit = pose_refit.PoseRefit(body, np.zeros(body.P))  # takes a body of the package of the other name
+# Takes a body of the package of the other name.
+refit = pose_refit.PoseRefit(body, np.zeros(body.P))
 assert type(refit._tree).__module__.startswith("scope.solver."), type(refit._tree)
 
 compiled_solver.detach()
@@ -41,7 +44,9 @@ assert not [name for name in sys.modules if name == "scope" or name.startswith("
 
 def test_corrections_use_the_package_that_has_machine_code(tmp_path):
     code = CODE.format(init=str(ROOT / "__init__.py"), root=str(ROOT), kernels=str(tmp_path))
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd="/")
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd="/"
+    )
     assert done.returncode == 0, done.stderr[-2000:]
 
 

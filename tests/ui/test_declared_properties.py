@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's properties agree with the declared options, and with the values that .blend files store."""
+"""Blender's properties agree with the declared options, and with the values that .blend files
+store.
+"""
 
 from __future__ import annotations
 
@@ -12,10 +14,16 @@ from scope.scope_addon.options import OPTIONS, Option, Place, Property, option, 
 from scope.scope_addon.scene.animation_data.timing import RATE_POLICIES
 from scope.scope_addon.scene.character.shape_keys import MODES
 from scope.scope_addon.ui.capture.capture_job import capture_request
-from scope.scope_addon.ui.declared_properties import choices_of, option_values, property_name, with_options
+from scope.scope_addon.ui.declared_properties import (
+    choices_of,
+    option_values,
+    property_name,
+    with_options,
+)
 from scope.scope_addon.ui.preferences import SCOPE_AP_preferences
 
-# A .blend stores these numbers: a file that was saved with an earlier version must open with the same settings.
+# A .blend stores these numbers: a file that was saved with an earlier version must open with the
+# same settings.
 STORED = {
     "quality": {"FAST": 0, "BALANCED": 1, "BEST": 2},
     "people": {"LARGEST": 0, "ALL": 1, "COUNT": 2},
@@ -26,7 +34,8 @@ STORED = {
     "shape": {"KEYED": 0, "PER_FRAME": 1, "BAKED": 2},
     "provider": {"AUTO": 0, "CPU": 1, "CUDA": 2, "TENSORRT": 3, "DIRECTML": 4, "COREML": 5},
 }
-_TEXTS = ("footage_text", "body_file_text", "calibration_file_text")  # of paths; they store nothing themselves
+# of paths; they store nothing themselves
+_TEXTS = ("footage_text", "body_file_text", "calibration_file_text")
 _NOT_OPTIONS = ("rna_type", "name", "capture", "capture_index", "no_result", *_TEXTS)
 LABELS = {
     "footage": "Footage",
@@ -67,7 +76,9 @@ def properties(place):
 
 
 def test_the_panel_keeps_its_names_and_labels():
-    own = {p.identifier: p.name for p in properties(Place.PANEL) if p.identifier not in _NOT_OPTIONS}
+    own = {
+        p.identifier: p.name for p in properties(Place.PANEL) if p.identifier not in _NOT_OPTIONS
+    }
     assert own == LABELS
 
 

@@ -77,7 +77,9 @@ def test_what_the_view_layer_excludes_is_not_taken_for_the_other(both, which):
     shown.select_set(True)
     hide(excluded, context.view_layer)
     assert not shown.hide_get()
-    context.scene.scope.capture_index = list(bpy.data.collections).index(excluded.users_collection[0])
+    context.scene.scope.capture_index = list(bpy.data.collections).index(
+        excluded.users_collection[0]
+    )
     assert context.view_layer.objects.active == shown
     assert shown.select_get()
     context.scene.scope_retarget.rig = excluded

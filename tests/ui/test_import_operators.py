@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Importing motion files in Blender: built, listed with its assumptions, stored, or refused in one sentence."""
+"""Importing motion files in Blender: built, listed with its assumptions, stored, or refused in one
+sentence.
+"""
 
 import bpy
 import numpy as np
@@ -17,7 +19,13 @@ MOTION = motion_of(walk(1.0))
 def amass(tmp_path):
     """An AMASS-style file at 120 frames per second."""
     path = tmp_path / "walk_poses.npz"
-    np.savez(path, poses=MOTION.poses, trans=MOTION.trans, betas=np.ones(16), mocap_framerate=np.array(120.0))
+    np.savez(
+        path,
+        poses=MOTION.poses,
+        trans=MOTION.trans,
+        betas=np.ones(16),
+        mocap_framerate=np.array(120.0),
+    )
     return path
 
 
@@ -34,18 +42,24 @@ def test_a_motion_of_another_tool_is_built_and_listed(amass):
     assert "footage" not in result.warnings[1].text.lower()  # there is none
     armature = captured_armature(bpy.context)
     assert scene.render.fps == 24
-    assert armature.animation_data.action.frame_range[1] == pytest.approx(1 + 24 * (len(MOTION) - 1) / 120, abs=0.01)
+    assert armature.animation_data.action.frame_range[1] == pytest.approx(
+        1 + 24 * (len(MOTION) - 1) / 120, abs=0.01
+    )
     np.testing.assert_allclose(stored_motion(armature).poses, MOTION.poses, atol=1e-5)
     assert not any(obj.type == "CAMERA" for obj in bpy.data.objects)
     for strength in (0.0, 2.5):
         assert bpy.ops.scope.smooth(strength=strength) == {"FINISHED"}
-    assert bpy.ops.scope.export(filepath=str(amass.with_name("again.npz")), format="NPZ") == {"FINISHED"}
+    assert bpy.ops.scope.export(filepath=str(amass.with_name("again.npz")), format="NPZ") == {
+        "FINISHED"
+    }
 
 
 def test_the_scenes_frame_rate_is_set_on_request(amass):
     bpy.ops.scope.import_motion(filepath=str(amass), set_rate=True)
     assert bpy.context.scene.render.fps == 120
-    assert not any("frames/s" in warning.text for warning in bpy.context.scene.scope.result.warnings)
+    assert not any(
+        "frames/s" in warning.text for warning in bpy.context.scene.scope.result.warnings
+    )
 
 
 def test_our_own_file_has_its_camera_and_footage(footage):
@@ -78,7 +92,11 @@ def test_a_file_that_cannot_be_used_changes_nothing(amass, tmp_path, what):
     before = inventory()
     arguments = {"directory": str(tmp_path), "files": [{"name": amass.name}, {"name": "bad.npz"}]}
     if what in ("body", "folder"):
-        arguments = {"filepath": str(tmp_path)} if what == "folder" else {"filepath": str(amass), "body": "FILE"}
+        arguments = (
+            {"filepath": str(tmp_path)}
+            if what == "folder"
+            else {"filepath": str(amass), "body": "FILE"}
+        )
     with pytest.raises(RuntimeError) as caught:
         bpy.ops.scope.import_motion(**arguments)
     assert "Traceback" not in str(caught.value)

@@ -35,7 +35,9 @@ def test_labels_have_the_words_that_people_search_for():
     entry = layout.operator.call_args.kwargs["text"].lower()
     assert all(word in entry for word in ("motion capture", "mocap", "video"))
     assert "mocap" in menus.SCOPE_MT_export.bl_label.lower()
-    assert len(bpy.types.SCOPE_OT_import_video.bl_label) < 20, "the button of the file browser cuts longer labels off"
+    assert len(bpy.types.SCOPE_OT_import_video.bl_label) < 20, (
+        "the button of the file browser cuts longer labels off"
+    )
 
 
 def test_the_shortcut_exists_only_while_enabled():
@@ -45,7 +47,11 @@ def test_the_shortcut_exists_only_while_enabled():
 
     def own():
         found = keymaps.keymaps.get("3D View")
-        return [item.type for item in found.keymap_items if item.idname == "scope.look_through"] if found else []
+        return (
+            [item.type for item in found.keymap_items if item.idname == "scope.look_through"]
+            if found
+            else []
+        )
 
     assert own() == ["V"]
     scope.unregister()
@@ -64,7 +70,9 @@ def test_the_greyed_usd_button_says_why(monkeypatch, operators, says):
     tooltip = export_operators.SCOPE_OT_export.description(None, SimpleNamespace(format="USDC"))
     assert ("built without USD" in tooltip) == says
     assert "Omniverse" in tooltip
-    assert "USD" not in export_operators.SCOPE_OT_export.description(None, SimpleNamespace(format="FBX"))
+    assert "USD" not in export_operators.SCOPE_OT_export.description(
+        None, SimpleNamespace(format="FBX")
+    )
 
 
 def test_the_documentation_is_a_file_that_comes_with_scope(monkeypatch, tmp_path):
@@ -81,7 +89,10 @@ def test_the_documentation_is_a_file_that_comes_with_scope(monkeypatch, tmp_path
 
 
 def test_presets_store_settings_but_nothing_of_one_clip():
-    names = {value.removeprefix("bpy.context.scene.scope.") for value in SCOPE_OT_add_capture_preset.preset_values}
+    names = {
+        value.removeprefix("bpy.context.scene.scope.")
+        for value in SCOPE_OT_add_capture_preset.preset_values
+    }
     assert {"quality", "people", "hands", "face", "frame_rate"} <= names
     assert not names & {"take", "range_start", "range_end", "height_cm", "footage"}
     settings = bpy.context.scene.scope

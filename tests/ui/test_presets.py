@@ -12,7 +12,8 @@ from scope.scope_addon.ui import presets
 def test_a_preset_brings_the_settings_back(monkeypatch, tmp_path):
     monkeypatch.setattr(bpy.utils, "user_resource", lambda *_, **__: str(tmp_path))
     panel = presets.SCOPE_PT_capture_presets
-    monkeypatch.setattr(panel, "bl_label", panel.bl_label)  # Blender names the menu after the preset
+    # Blender names the menu after the preset
+    monkeypatch.setattr(panel, "bl_label", panel.bl_label)
     settings = bpy.context.scene.scope
     settings.quality, settings.people = "BEST", "ALL"
     assert bpy.ops.scope.add_capture_preset(name="everybody") == {"FINISHED"}
@@ -26,9 +27,15 @@ def test_a_preset_brings_the_settings_back(monkeypatch, tmp_path):
 def test_settings_of_file_windows_can_be_stored_but_not_the_file(operator):
     rna = getattr(bpy.ops.scope, operator).get_rna_type()
     assert "PRESET" in getattr(bpy.types, f"SCOPE_OT_{operator}").bl_options
-    kept = {prop.identifier for prop in rna.properties if not (prop.is_skip_save or prop.is_hidden)} - {"rna_type"}
+    kept = {
+        prop.identifier for prop in rna.properties if not (prop.is_skip_save or prop.is_hidden)
+    } - {"rna_type"}
     assert not kept & {"filepath", "directory", "files", "filter_glob", "format"}
-    assert kept >= ({"up_axis", "motion_rate", "body", "set_rate"} if operator == "import_motion" else {"camera"})
+    assert kept >= (
+        {"up_axis", "motion_rate", "body", "set_rate"}
+        if operator == "import_motion"
+        else {"camera"}
+    )
 
 
 def test_without_presets_blender_does_not_complain_of_missing_paths(monkeypatch, tmp_path):

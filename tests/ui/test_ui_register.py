@@ -65,12 +65,16 @@ def test_enabling_loads_no_heavy_library_and_collects_no_garbage():
         "textwrap",
         "gpu_extras",
     }  # 20 ms of a start, together
-    ours = {"scope.solver", "scope.scope_addon.job", "scope.scope_addon.capture"}  # not before a capture begins
+    # not before a capture begins
+    ours = {"scope.solver", "scope.scope_addon.job", "scope.scope_addon.capture"}
     code = (
-        f"import gc, sys, os, bpy, scope; [sys.modules.pop(name, None) for name in {slow}]; collected = [];"
-        "gc.callbacks.append(lambda _, about: collected.append(about['generation'])); scope.register();"
+        f"import gc, sys, os, bpy, scope; [sys.modules.pop(name, None) for name in {slow}]; "
+        "collected = [];"
+        "gc.callbacks.append(lambda _, about: collected.append(about['generation'])); "
+        "scope.register();"
         "gc.callbacks.clear(); assert gc.isenabled();"
-        f"print(sorted({heavy | slow | ours} & set(sys.modules)), max(collected, default=0), flush=True); os._exit(0)"
+        f"print(sorted({heavy | slow | ours} & set(sys.modules)), max(collected, default=0), "
+        "flush=True); os._exit(0)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip().splitlines()[-1] == "[] 0"
@@ -111,6 +115,7 @@ def test_the_command_runs_the_command_line(monkeypatch, capsys):
     from scope.scope_addon.ui import command
 
     monkeypatch.setenv("NUMBA_CACHE_DIR", "")
-    monkeypatch.delenv("NUMBA_CACHE_DIR")  # the command sets it for its process; restored after the test
+    # the command sets it for its process; restored after the test
+    monkeypatch.delenv("NUMBA_CACHE_DIR")
     assert command.run(["capture", "/nowhere/at/all.mp4", "-o", "/nowhere/a.npz"]) != 0
     assert "nowhere" in capsys.readouterr().err

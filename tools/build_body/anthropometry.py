@@ -1,18 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measurements of people, as published, and people drawn from them.
 
-Adults: Gordon et al., 2012 Anthropometric Survey of U.S. Army Personnel (ANSUR II), NATICK/TR-15/007, 2014: 4,082 men
-and 1,986 women. The figures are quoted from knowledge of the published tables, not copied cell by cell. What was
-checked: each measurement's mean and deviation over both sexes together, which follow from the values here within 1 mm
-or 1 kg. ``epicondyle`` and ``tragion`` are split by sex roughly in proportion to the stature. The correlations are
-rounded, follow those of the survey before (Cheverud et al., NATICK/TR-90/032, 1990), and are the same for both sexes;
-they could not be checked.
+Adults: Gordon et al., 2012 Anthropometric Survey of U.S. Army Personnel (ANSUR II),
+NATICK/TR-15/007, 2014: 4,082 men and 1,986 women. The figures are quoted from knowledge of the
+published tables, not copied cell by cell. What was checked: each measurement's mean and deviation
+over both sexes together, which follow from the values here within 1 mm or 1 kg. ``epicondyle`` and
+``tragion`` are split by sex roughly in proportion to the stature. The correlations are rounded,
+follow those of the survey before (Cheverud et al., NATICK/TR-90/032, 1990), and are the same for
+both sexes; they could not be checked.
 
-Soldiers must not be heavy. For two in five adults, weight, waist and hips are those of civilians (after Fryar et al.,
-Vital and Health Statistics 3(46), 2021, rounded; hip breadths and deviations are estimates).
+Soldiers must not be heavy. For two in five adults, weight, waist and hips are those of civilians
+(after Fryar et al., Vital and Health Statistics 3(46), 2021, rounded; hip breadths and deviations
+are estimates).
 
-Children: medians of the CDC growth charts of 2000 (Kuczmarski et al., Vital and Health Statistics 11(246)), and sitting
-heights over stature (Fredriks et al., Arch. Dis. Child. 90, 2005), both rounded and from knowledge.
+Children: medians of the CDC growth charts of 2000 (Kuczmarski et al., Vital and Health Statistics
+11(246)), and sitting heights over stature (Fredriks et al., Arch. Dis. Child. 90, 2005), both
+rounded and from knowledge.
 """
 
 from __future__ import annotations
@@ -82,7 +85,9 @@ def draw_adults(rng: np.random.Generator, male: NDArray[np.bool_]) -> Measured:
     for k, name in enumerate(names):
         table = np.array(ADULTS[name])[np.where(male, 0, 1)]
         if name in CIVILIANS:
-            table = np.where(civilian[:, None], np.array(CIVILIANS[name])[np.where(male, 0, 1)], table)
+            table = np.where(
+                civilian[:, None], np.array(CIVILIANS[name])[np.where(male, 0, 1)], table
+            )
         mean, deviation = table.T
         if name in LOGNORMAL:
             spread = np.sqrt(np.log1p((deviation / mean) ** 2))
@@ -93,8 +98,12 @@ def draw_adults(rng: np.random.Generator, male: NDArray[np.bool_]) -> Measured:
     return drawn
 
 
-def draw_children(rng: np.random.Generator, male: NDArray[np.bool_]) -> tuple[Measured, NDArray[np.float64]]:
-    """Draw stature, sitting height and weight of children, (n,) each, and their ages in years (n,)."""
+def draw_children(
+    rng: np.random.Generator, male: NDArray[np.bool_]
+) -> tuple[Measured, NDArray[np.float64]]:
+    """Draw stature, sitting height and weight of children, (n,) each, and their ages in years
+    (n,).
+    """
     years = list(CHILDREN)
     age = rng.uniform(years[0], years[-1], len(male))
     mean, (taller, sitting, heavier) = mean_children(age, male), rng.standard_normal((3, len(male)))
@@ -108,15 +117,25 @@ def draw_children(rng: np.random.Generator, male: NDArray[np.bool_]) -> tuple[Me
 
 
 def mean_children(age: NDArray[np.float64], male: NDArray[np.bool_]) -> Measured:
-    """Return the mean stature, sitting height and weight, (n,) each, of children of these ages in years (n,)."""
+    """Return the mean stature, sitting height and weight, (n,) each, of children of these ages in
+    years (n,).
+    """
     rows = np.array([(*boy, *girl, ratio) for boy, girl, ratio in CHILDREN.values()])
-    boy_m, boy_kg, girl_m, girl_kg, ratio = (np.interp(age, list(CHILDREN), column) for column in rows.T)
+    boy_m, boy_kg, girl_m, girl_kg, ratio = (
+        np.interp(age, list(CHILDREN), column) for column in rows.T
+    )
     stature = np.where(male, boy_m, girl_m)
-    return {"stature": stature, "sitting": stature * ratio, "weight": np.where(male, boy_kg, girl_kg)}
+    return {
+        "stature": stature,
+        "sitting": stature * ratio,
+        "weight": np.where(male, boy_kg, girl_kg),
+    }
 
 
 def correlation_matrix() -> NDArray[np.float64]:
-    """Return the nearest positive definite correlation matrix (n, n) of the measurements of adults."""
+    """Return the nearest positive definite correlation matrix (n, n) of the measurements of
+    adults.
+    """
     R = np.eye(len(ADULTS))
     for i, row in enumerate(CORRELATIONS):
         R[i, i + 1 :] = R[i + 1 :, i] = row

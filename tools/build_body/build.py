@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 
 from ..pinned_wheel import DOWNLOADS
 from .geometry.materials import MATERIALS, face_materials
-from .geometry.mesh import Mesh, body_and_eyes, keep_visible, smooth_nipples, smooth_perineum, vertex_areas
+from .geometry.mesh import (
+    Mesh,
+    body_and_eyes,
+    keep_visible,
+    smooth_nipples,
+    smooth_perineum,
+    vertex_areas,
+)
 from .geometry.weights import pack, skin_weights
 from .joints import Skeleton, make_skeleton
 from .keypoints import make_keypoints, pose_keypoints
@@ -24,7 +31,9 @@ from .write import LICENSE, lengths
 
 @dataclass(frozen=True)
 class ShapedMesh:
-    """The mesh in the source pose: ``basis`` (1 + P, N, 3), the mean and the components over all vertices."""
+    """The mesh in the source pose: ``basis`` (1 + P, N, 3), the mean and the components over all
+    vertices.
+    """
 
     source: SourceMesh
     mesh: Mesh
@@ -52,7 +61,9 @@ def shape_mesh(downloads: Path = DOWNLOADS) -> ShapedMesh:
 
 
 def rig_body(shaped: ShapedMesh, skeleton: Skeleton) -> dict[str, NDArray[Any]]:
-    """Place the joints, weight the skin, turn everything into the T-pose; the arrays of the body file."""
+    """Place the joints, weight the skin, turn everything into the T-pose; the arrays of the body
+    file.
+    """
     source, mesh, basis = shaped.source, shaped.mesh, shaped.basis
     J, posed_J, R = rest_joints(shaped, skeleton)
     W = skin_weights(source, mesh, skeleton, basis[0])
@@ -85,7 +96,9 @@ def rig_body(shaped: ShapedMesh, skeleton: Skeleton) -> dict[str, NDArray[Any]]:
 def rest_joints(
     shaped: ShapedMesh, skeleton: Skeleton
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return the joints (1 + P, K+1, 3) in the source pose and in the T-pose, and each part's rotation (K+1, 3, 3)."""
+    """Return the joints (1 + P, K+1, 3) in the source pose and in the T-pose, and each part's
+    rotation (K+1, 3, 3).
+    """
     source, basis = shaped.source, shaped.basis
     J = skeleton.regressor @ basis
     index, little = (basis[0, source.cubes[f"l-finger-{k}-1"]].mean(axis=0) for k in (2, 5))

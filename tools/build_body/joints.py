@@ -1,19 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The two skeletons, SMPL's 24 joints and SMPL+H's 52, and their joints as linear functions of the vertices.
+"""The two skeletons, SMPL's 24 joints and SMPL+H's 52, and their joints as linear functions of the
+vertices.
 
 J = A V with A (K+1, N), whose rows sum to one, so that joints follow every shape exactly.
 
-MakeHuman's cubes are places that look right when a joint bends, not centres of joints: its hips lie 4 cm behind those
-that Harrington et al. (J. Biomechanics 40, 2007) find from the pelvis's bony landmarks, so that a person who stands
-upright has bent knees and leans forward. `CENTRES` moves hips and shoulders to where anatomy has them:
+MakeHuman's cubes are places that look right when a joint bends, not centres of joints: its hips lie
+4 cm behind those that Harrington et al. (J. Biomechanics 40, 2007) find from the pelvis's bony
+landmarks, so that a person who stands upright has bent knees and leans forward. `CENTRES` moves
+hips and shoulders to where anatomy has them:
 
-    J = J_cube + a f + b u + c l,   f = mean of both feet's (ball − ankle), u = neck − pelvis, l = left hip − right hip
+    J = J_cube + a f + b u + c l,
+    f = mean of both feet's (ball − ankle), u = neck − pelvis, l = left hip − right hip
 
-with the cubes' own f, u and l. They measure the skeleton, which fat does not change, and are linear in the vertices.
+with the cubes' own f, u and l. They measure the skeleton, which fat does not change, and are linear
+in the vertices.
 
-In the mean body (stature 1.69 m, standing), hips lie 4.8 cm behind and 9 cm below the front spines of the pelvis, 19.6
-cm apart (Harrington: 4.5, 8.3, and 17 to 18; models of people: 19 to 21), and shoulders 3 cm below the acromion's skin,
-0.812 of the stature high (surveys: 0.812, de Leva: 0.827).
+In the mean body (stature 1.69 m, standing), hips lie 4.8 cm behind and 9 cm below the front spines
+of the pelvis, 19.6 cm apart (Harrington: 4.5, 8.3, and 17 to 18; models of people: 19 to 21), and
+shoulders 3 cm below the acromion's skin, 0.812 of the stature high (surveys: 0.812, de Leva:
+0.827).
 """
 
 from __future__ import annotations
@@ -26,15 +31,19 @@ from numpy.typing import NDArray
 from ...solver.names import BODY_JOINTS, BODY_PARENTS
 from .source import SourceMesh
 
-FINGERS = {"index": 2, "middle": 3, "pinky": 5, "ring": 4, "thumb": 1}  # SMPL+H's order -> MakeHuman's number
-SPINE = {"spine1": 0.27, "spine2": 0.41, "spine3": 0.675}  # place of each joint between pelvis and neck
+# SMPL+H's order -> MakeHuman's number
+FINGERS = {"index": 2, "middle": 3, "pinky": 5, "ring": 4, "thumb": 1}
+# place of each joint between pelvis and neck
+SPINE = {"spine1": 0.27, "spine2": 0.41, "spine3": 0.675}
 SPINE_CENTRE = 0.4517  # place of the mean of the three spine cubes between pelvis and neck
 CUBES = {
-    "pelvis": "pelvis", "hip": "upper-leg", "knee": "knee", "ankle": "ankle", "foot": "foot-1", "neck": "neck",
+    "pelvis": "pelvis", "hip": "upper-leg", "knee": "knee", "ankle": "ankle", "foot": "foot-1",
+    "neck": "neck",
     "head": "head", "collar": "clavicle", "shoulder": "shoulder", "elbow": "elbow", "wrist": "hand",
 }  # fmt: skip
 
-# Joint -> (a, b, c), the shares of forward, up and to the left by which its centre is displaced from its cube.
+# Joint -> (a, b, c), the shares of forward, up and to the left by which its centre is displaced
+# from its cube.
 CENTRES = {
     "hip": (0.357, 0.035, -0.041),
     "shoulder": (-0.095, 0.033, 0.019),

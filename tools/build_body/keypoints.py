@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The keypoints of the 2D detectors, as points rigidly attached to body parts (Assumption 1 of the paper).
+"""The keypoints of the 2D detectors, as points rigidly attached to body parts (Assumption 1 of the
+paper).
 
-Three sets: BlazePose-33, COCO-17 with six feet points, and 21 points per hand in MediaPipe's order. A keypoint is a
-joint, the mean of some surface vertices, or a joint cube inside the mesh; its place is linear in the shape.
+Three sets: BlazePose-33, COCO-17 with six feet points, and 21 points per hand in MediaPipe's order.
+A keypoint is a joint, the mean of some surface vertices, or a joint cube inside the mesh; its place
+is linear in the shape.
 """
 
 from __future__ import annotations
@@ -16,11 +18,13 @@ from ...solver.names import BLAZEPOSE, COCO
 from .joints import Skeleton, cube_row, other_side
 from .source import SourceMesh
 
-HAND_FINGERS = ("thumb", "index_finger", "middle_finger", "ring_finger", "pinky")  # MakeHuman's fingers 1 to 5
+# MakeHuman's fingers 1 to 5
+HAND_FINGERS = ("thumb", "index_finger", "middle_finger", "ring_finger", "pinky")
 THUMB_POINTS, FINGER_POINTS = ("cmc", "mcp", "ip", "tip"), ("mcp", "pip", "dip", "tip")
 
 BIG_TOE, FOOT_INDEX_MORE = (11551, 12756, 11560, 11569), (13133, 11628, 11624, 13084)
-# The left side of the surface keypoints: base mesh vertices and the part they lie on. The right side is the mirror.
+# The left side of the surface keypoints: base mesh vertices and the part they lie on. The right
+# side is the mirror.
 SURFACE: dict[str, tuple[tuple[int, ...], str]] = {
     "nose": ((5054,), "head"),
     "left_eye_inner": ((11511,), "head"),
@@ -38,7 +42,9 @@ CUBE_POINTS = {"left_index": "finger-2-1", "left_pinky": "finger-5-1", "left_thu
 
 @dataclass(frozen=True)
 class Keypoint:
-    """One keypoint: the regressor (N,) of its position in the source pose, and the part to which it belongs."""
+    """One keypoint: the regressor (N,) of its position in the source pose, and the part to which it
+    belongs.
+    """
 
     name: str
     regressor: NDArray[np.float64]
@@ -61,14 +67,19 @@ def pose_keypoints(
     posed_J: NDArray[np.float64],
     basis: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return T-posed keypoints (B, M, 3), k' = R_i (k − J_i) + J'_i, of source vertex sets ``basis`` (B, N, 3)."""
+    """Return T-posed keypoints (B, M, 3), k' = R_i (k − J_i) + J'_i, of source vertex sets
+    ``basis`` (B, N, 3).
+    """
     part = np.array([keypoint.part for keypoint in keypoints])
     points = np.stack([keypoint.regressor for keypoint in keypoints]) @ basis
     return np.einsum("mxy,bmy->bmx", R[part], points - J[:, part]) + posed_J[:, part]
 
 
-def _body_point(source: SourceMesh, skeleton: Skeleton, name: str) -> tuple[NDArray[np.float64], int]:
-    if name in skeleton.joint_names:  # shoulder, elbow, wrist, hip, knee and ankle are the joints themselves
+def _body_point(
+    source: SourceMesh, skeleton: Skeleton, name: str
+) -> tuple[NDArray[np.float64], int]:
+    # shoulder, elbow, wrist, hip, knee and ankle are the joints themselves
+    if name in skeleton.joint_names:
         index = skeleton.index(name)
         return skeleton.regressor[index], index
     left = other_side(name) if "right" in name else name
@@ -87,7 +98,9 @@ def _body_point(source: SourceMesh, skeleton: Skeleton, name: str) -> tuple[NDAr
     return row, skeleton.index(part)
 
 
-def _hand(source: SourceMesh, skeleton: Skeleton, side: str) -> list[tuple[str, NDArray[np.float64], int]]:
+def _hand(
+    source: SourceMesh, skeleton: Skeleton, side: str
+) -> list[tuple[str, NDArray[np.float64], int]]:
     wrist = skeleton.index(f"{side}_wrist")
     points = [(f"{side}_wrist", skeleton.regressor[wrist], wrist)]
     for k, finger in enumerate(HAND_FINGERS, start=1):

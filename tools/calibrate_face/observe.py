@@ -39,7 +39,8 @@ class SeenFaces:
 def seen_faces(name: str, scale: float = 1.0) -> SeenFaces:
     """Return a rendered set as the networks see it.
 
-    :param scale: of the pictures before the networks see them; other than 1, they are also compressed, as in videos.
+    :param scale: of the pictures before the networks see them; other than 1, they are also
+        compressed, as in videos.
     """
     folder = FOLDER / name
     with np.load(folder / "truth.npz") as data:
@@ -48,7 +49,13 @@ def seen_faces(name: str, scale: float = 1.0) -> SeenFaces:
     if not kept.is_file() or not _is_whole(kept, len(truth["weights"])):
         _observe(folder, len(truth["weights"]), scale, kept)
     with np.load(kept) as data:
-        return SeenFaces(truth, data["landmarks"].astype(float), data["presence"], data["weights"], data["eye_light"])
+        return SeenFaces(
+            truth,
+            data["landmarks"].astype(float),
+            data["presence"],
+            data["weights"],
+            data["eye_light"],
+        )
 
 
 def _is_whole(kept: Path, count: int) -> bool:
@@ -61,10 +68,15 @@ def _observe(folder: Path, count: int, scale: float, out: Path) -> None:
     for t in range(count):
         image = cv2.imread(str(folder / f"{t:04d}.png"))
         if image is None:
-            raise SystemExit(f"{folder} lacks {t:04d}.png; run python -m scope.tools.render_faces {folder.name}")
+            raise SystemExit(
+                f"{folder} lacks {t:04d}.png; run python -m scope.tools.render_faces {folder.name}"
+            )
         if scale != 1.0:
             image = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-            image = cv2.imdecode(cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1], cv2.IMREAD_COLOR)
+            image = cv2.imdecode(
+                cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1],
+                cv2.IMREAD_COLOR,
+            )
         rgb = np.ascontiguousarray(image[..., ::-1])
         region = Region((scale * SIZE / 2, scale * SIZE / 2), scale * _SIDE_PX, 0.0)
         for _ in range(_ROUNDS):
@@ -72,6 +84,13 @@ def _observe(folder: Path, count: int, scale: float, out: Path) -> None:
             region = estimate.next_region
         landmarks = estimate.landmarks / scale
         expression = expressions.estimate(estimate.landmarks[EXPRESSION_POINTS, :2])
-        rows.append((landmarks.astype(np.float32), estimate.presence, expression, eye_light(rgb, estimate.landmarks)))
+        rows.append(
+            (
+                landmarks.astype(np.float32),
+                estimate.presence,
+                expression,
+                eye_light(rgb, estimate.landmarks),
+            )
+        )
     landmarks, presence, weights, light = (np.array(column) for column in zip(*rows, strict=True))
     np.savez(out, landmarks=landmarks, presence=presence, weights=weights, eye_light=light)

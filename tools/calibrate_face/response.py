@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The response of the landmark network to expressions, from rendered faces in single poses and in motion."""
+"""The response of the landmark network to expressions, from rendered faces in single poses and in
+motion.
+"""
 
 from __future__ import annotations
 
@@ -58,7 +60,9 @@ def measure_response(poses: SeenFaces, moving: SeenFaces, degraded: SeenFaces) -
         reference = aligned(points[first], _unit(reference), shares).points.mean(axis=0)
         faces = aligned(points, reference := _unit(reference), shares)
         rest = np.array([faces.points[neutral & (person == p)].mean(axis=0) for p in people])
-        moves = ((faces.points - rest[np.searchsorted(people, person)]) ** 2).sum(axis=2).mean(axis=0)
+        moves = (
+            ((faces.points - rest[np.searchsorted(people, person)]) ** 2).sum(axis=2).mean(axis=0)
+        )
         shares = 1 / (moves + 0.1 * np.median(moves))
         shares /= shares.sum()
     faces = aligned(points, reference, shares)
@@ -68,14 +72,25 @@ def measure_response(poses: SeenFaces, moving: SeenFaces, degraded: SeenFaces) -
     E, view, mean = both[:-VIEW_TERMS], both[-VIEW_TERMS:], rest.mean(axis=0).ravel()
     covariance = _OF_POSES * np.cov((x - terms @ both).T)
     errors = [
-        _errors_in_motion(seen, aligned(seen.landmarks[:, landmarks], reference, shares), E, view, mean, share)
+        _errors_in_motion(
+            seen, aligned(seen.landmarks[:, landmarks], reference, shares), E, view, mean, share
+        )
         for seen in (moving, degraded)
     ]
     covariance += (1 - _DEGRADED) * np.cov(errors[0].T) + _DEGRADED * np.cov(errors[1].T)
     diagonal = np.diag(np.diag(covariance))
     inverse = np.linalg.inv((1 - _SHRINK) * covariance + _SHRINK * diagonal)
     found = FaceResponse(
-        landmarks, reference, shares, mean, view, E, E @ inverse, units, _gaze(poses, units, share), np.array(1.0)
+        landmarks,
+        reference,
+        shares,
+        mean,
+        view,
+        E,
+        E @ inverse,
+        units,
+        _gaze(poses, units, share),
+        np.array(1.0),
     )
     return replace(found, noise=np.array(error_size(found, errors[0])))
 
@@ -107,8 +122,12 @@ def _errors_in_motion(
     return np.concatenate(left)
 
 
-def _gaze(poses: SeenFaces, units: NDArray[np.float64], share: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the tangents (U, 2) by which the units turn the eyes of the body, mean of both eyes."""
+def _gaze(
+    poses: SeenFaces, units: NDArray[np.float64], share: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the tangents (U, 2) by which the units turn the eyes of the body, mean of both
+    eyes.
+    """
     tangents = (poses.truth["gaze"][..., :2] / poses.truth["gaze"][..., 2:]).mean(axis=1)
     turning = units.sum(axis=1) > 1
     terms = np.c_[poses.truth["weights"] @ share[turning].T, np.ones(len(tangents))]

@@ -15,13 +15,21 @@ _ROOT = Path(__file__).resolve().parents[2]
 def main(argv: list[str] | None = None) -> int:
     """Build the networks; 0 when all are there, 1 with one sentence on stderr otherwise."""
     parser = argparse.ArgumentParser(
-        prog="scope.tools.convert_networks", description="Fetch and convert the pose, hand and face networks."
+        prog="scope.tools.convert_networks",
+        description="Fetch and convert the pose, hand and face networks.",
     )
-    parser.add_argument("--out", type=Path, default=_ROOT / "assets" / "networks", help="folder for the ONNX files")
     parser.add_argument(
-        "--downloads", type=Path, default=_ROOT / "build" / "downloads", help="cache of fetched packages"
+        "--out", type=Path, default=_ROOT / "assets" / "networks", help="folder for the ONNX files"
     )
-    parser.add_argument("--force", action="store_true", help="convert again even if nothing has changed")
+    parser.add_argument(
+        "--downloads",
+        type=Path,
+        default=_ROOT / "build" / "downloads",
+        help="cache of fetched packages",
+    )
+    parser.add_argument(
+        "--force", action="store_true", help="convert again even if nothing has changed"
+    )
     arguments = parser.parse_args(argv)
     try:
         built = build_networks(arguments.out, arguments.downloads, force=arguments.force)

@@ -21,11 +21,15 @@ def _elementwise(kind: str) -> Converter:
 
 
 def _operands(graph: Graph, operator: Operator) -> list[str]:
-    """Return the values of the operands; of two computed ones, the ranks must agree, as NCHW allows no padding."""
+    """Return the values of the operands; of two computed ones, the ranks must agree, as NCHW allows
+    no padding.
+    """
     rank = len(graph.shape(operator.outputs[0]))
     for tensor in operator.inputs:
         if tensor not in graph.constants and len(graph.shape(tensor)) != rank:
-            raise graph.fail(operator, f"an operand of shape {graph.shape(tensor)} for a result of rank {rank}")
+            raise graph.fail(
+                operator, f"an operand of shape {graph.shape(tensor)} for a result of rank {rank}"
+            )
     return [graph.operand(tensor, rank) for tensor in operator.inputs]
 
 
@@ -37,13 +41,18 @@ def squared_difference(graph: Graph, operator: Operator) -> None:
 
 def reciprocal_root(graph: Graph, operator: Operator) -> None:
     """Convert 1 / √x."""
-    graph.finish(operator, graph.node("Reciprocal", [graph.node("Sqrt", _operands(graph, operator))]))
+    graph.finish(
+        operator, graph.node("Reciprocal", [graph.node("Sqrt", _operands(graph, operator))])
+    )
 
 
 def mean(graph: Graph, operator: Operator) -> None:
     """Convert the mean along axes."""
     axes, keep = _reduced(graph, operator)
-    graph.finish(operator, graph.node("ReduceMean", [graph.value(operator.inputs[0])], axes=axes, keepdims=keep))
+    graph.finish(
+        operator,
+        graph.node("ReduceMean", [graph.value(operator.inputs[0])], axes=axes, keepdims=keep),
+    )
 
 
 def total(graph: Graph, operator: Operator) -> None:
@@ -56,10 +65,13 @@ def total(graph: Graph, operator: Operator) -> None:
 def _reduced(graph: Graph, operator: Operator) -> tuple[list[int], int]:
     """Return the ONNX axes along which to reduce, and 1 if they stay as axes of length 1."""
     source = operator.inputs[0]
-    axes = sorted(graph.axis(operator, source, int(a)) for a in np.atleast_1d(graph.constant(operator, 1)))
+    axes = sorted(
+        graph.axis(operator, source, int(a)) for a in np.atleast_1d(graph.constant(operator, 1))
+    )
     keep = bool(operator.options["keep_dims"])
     rank = len(graph.shape(source))
-    if 0 in axes or (rank == 4 and not keep and axes != [2, 3]):  # others would leave the channels where they are
+    # others would leave the channels where they are
+    if 0 in axes or (rank == 4 and not keep and axes != [2, 3]):
         raise graph.fail(operator, f"axes {axes} of a rank-{rank} tensor, keep_dims {keep}")
     return axes, int(keep)
 

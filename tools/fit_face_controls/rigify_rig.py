@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rigify's faces: points of the generated rig, as Blender evaluates it, follow the same points of MakeHuman's mesh."""
+"""Rigify's faces: points of the generated rig, as Blender evaluates it, follow the same points of
+MakeHuman's mesh.
+"""
 
 from __future__ import annotations
 
@@ -18,14 +20,19 @@ from ...solver.names import EXPRESSIONS
 from .amounts import Amounts, Problem, eye_amounts, free_of, jacobian, share_shown
 from .shapes import FaceShapes
 
-# Points: those at the heads of bones named so, and the corners of the mouth. MPFB's lids run the other way.
+# Points: those at the heads of bones named so, and the corners of the mouth. MPFB's lids run the
+# other way.
 _MIDDLE = ("lip.T", "lip.B", "chin", "nose.002")
 _AT_HEADS = (
     *("lip.T.{}.001", "lip.B.{}.001", "chin.{}", "cheek.B.{}.001", "cheek.T.{}.001", "nose.{}.001"),
     *(f"lid.{row}.{{}}.00{k}" for row in "TB" for k in (1, 2, 3)),
     *(f"brow.T.{{}}.00{k}" for k in (1, 2, 3)),
 )
-_POINTS = (*_MIDDLE, *(f"lips.{s}" for s in "LR"), *(bone.format(s) for s in "LR" for bone in _AT_HEADS))
+_POINTS = (
+    *_MIDDLE,
+    *(f"lips.{s}" for s in "LR"),
+    *(bone.format(s) for s in "LR" for bone in _AT_HEADS),
+)
 _CONTROLS: tuple[str, ...] = (
     "lips.{}",
     "lip.T.{}.001",
@@ -39,7 +46,11 @@ _MIN_AMOUNTS = {"lid": 0.04, "lips": 0.02, "lip.T": 0.02, "lip.B": 0.02, "brow":
 _LID_WEIGHT = 0.3
 _BLINK: dict[bool, Amounts] = {  # by whether the face is the upgraded one: the lids meet
     False: {("lid.T.L.002", "up"): -0.9, ("lid.T.L.002", "forward"): -0.4},
-    True: {("lid.T.L.002", "up"): -0.95, ("lid.T.L.002", "forward"): -0.3, ("lid.T.L.001", "up"): 0.15},
+    True: {
+        ("lid.T.L.002", "up"): -0.95,
+        ("lid.T.L.002", "forward"): -0.3,
+        ("lid.T.L.001", "up"): 0.15,
+    },
 }
 
 
@@ -54,18 +65,26 @@ class RigifyFace:
         with bpy.data.libraries.load(str(path)) as (there, here):
             here.objects = list(there.objects)
         rigs = [obj for obj in here.objects if obj is not None and obj.type == "ARMATURE"]
-        generated = [rig for rig in rigs if "jaw_master" in rig.data.bones and "ORG-face" in rig.data.bones]
+        generated = [
+            rig for rig in rigs if "jaw_master" in rig.data.bones and "ORG-face" in rig.data.bones
+        ]
         if not generated:
             raise SetupError(f"{path} has no rig that Rigify has generated with a face")
         self.rig = generated[0]
         bpy.context.scene.collection.objects.link(self.rig)
         self.bones = {
-            bone.name: RestBone(np.array(bone.head_local, float), np.array(bone.matrix_local.to_3x3(), float))
+            bone.name: RestBone(
+                np.array(bone.head_local, float), np.array(bone.matrix_local.to_3x3(), float)
+            )
             for bone in self.rig.data.bones
         }
         self.upgraded = "lip_end.L.001" in self.bones
         corner = "lip_end.{}.001" if self.upgraded else "lips.{}"
-        controls = ["lip.T", "lip.B", *(bone.format(s) for s in "LR" for bone in (corner, *_CONTROLS[1:]))]
+        controls = [
+            "lip.T",
+            "lip.B",
+            *(bone.format(s) for s in "LR" for bone in (corner, *_CONTROLS[1:])),
+        ]
         self.channels = [(bone, way) for bone in controls for way in MOVED]
         self.channels += [("jaw_master", way) for way in (*MOVED, "pitch")]
         self.channels += [(f"eye.{side}", way) for side in "LR" for way in ("pitch", "yaw")]
@@ -81,7 +100,9 @@ class RigifyFace:
         for motion in control_motions(ExpressionMap({}, controls), weights, self.bones):
             R = np.eye(3) if motion.rotations is None else motion.rotations[0]
             basis = Matrix(R.tolist()).to_4x4()
-            basis.translation = (0.0, 0.0, 0.0) if motion.locations is None else motion.locations[0].tolist()
+            basis.translation = (
+                (0.0, 0.0, 0.0) if motion.locations is None else motion.locations[0].tolist()
+            )
             self.rig.pose.bones[motion.bone].matrix_basis = basis
         return in_lengths(self._points() - self.at_rest, self.frame)
 
@@ -92,22 +113,38 @@ class RigifyFace:
             if point.startswith("lips."):
                 found.append(posed[f"DEF-lip.T.{point[-1]}.001"].tail)
             else:
-                found.append(posed[f"DEF-{point}.L" if point in ("lip.T", "lip.B") else f"DEF-{point}"].head)
+                found.append(
+                    posed[f"DEF-{point}.L" if point in ("lip.T", "lip.B") else f"DEF-{point}"].head
+                )
         return np.array(found, float)
 
 
 def in_lengths(moves: NDArray[np.float64], frame: FaceFrame) -> NDArray[np.float64]:
-    """Return displacements of the points (P, 3) in the lengths of a face, along its axes; lids weigh less."""
-    lengths = np.array([frame.length(point) / (_LID_WEIGHT if point.startswith("lid") else 1.0) for point in _POINTS])
+    """Return displacements of the points (P, 3) in the lengths of a face, along its axes; lids
+    weigh less.
+    """
+    lengths = np.array(
+        [
+            frame.length(point) / (_LID_WEIGHT if point.startswith("lid") else 1.0)
+            for point in _POINTS
+        ]
+    )
     return (moves @ frame.axes / lengths[:, None]).ravel()
 
 
 def wanted_moves(shapes: FaceShapes, name: str) -> NDArray[np.float64]:
-    """Return how far the points of MakeHuman's mesh move (3P,) with an expression, in the lengths of its face."""
+    """Return how far the points of MakeHuman's mesh move (3P,) with an expression, in the lengths
+    of its face.
+    """
     ends = {point: _end(shapes, point) for point in _POINTS}
     rest = {point: RestBone(shapes.place(end), np.eye(3)) for point, end in ends.items()}
-    rest |= {f"eye.{side}": RestBone(shapes.place(shapes.rigify[f"eye.{side}"]["head"]), np.eye(3)) for side in "LR"}
-    moves = np.array([shapes.moves[name][shapes.vertices_at(end)].mean(axis=0) for end in ends.values()])
+    rest |= {
+        f"eye.{side}": RestBone(shapes.place(shapes.rigify[f"eye.{side}"]["head"]), np.eye(3))
+        for side in "LR"
+    }
+    moves = np.array(
+        [shapes.moves[name][shapes.vertices_at(end)].mean(axis=0) for end in ends.values()]
+    )
     return in_lengths(moves, measure_face(rest))
 
 
@@ -128,15 +165,22 @@ def by_hand(face: RigifyFace) -> dict[str, Amounts]:
 
 
 def fit_rigify(shapes: FaceShapes, face: RigifyFace) -> dict[str, Amounts]:
-    """Return the amounts of the expressions in the middle and on the left, and print which share of each is shown."""
+    """Return the amounts of the expressions in the middle and on the left, and print which share of
+    each is shown.
+    """
     moving = np.array([way in MOVED for _, way in face.channels])
-    least = [next((v for name, v in _MIN_AMOUNTS.items() if bone.startswith(name)), 0.025) for bone, _ in face.channels]
+    least = [
+        next((v for name, v in _MIN_AMOUNTS.items() if bone.startswith(name)), 0.025)
+        for bone, _ in face.channels
+    ]
     for k, (bone, _) in enumerate(face.channels):
         if bone.endswith(".001") and bone.startswith(("lip.T", "lip.B")):
             least[k] = 0.025
     scale = np.where(moving, 1.0, 30.0)
     jacobian_at_rest = jacobian(face.channels, face.shown)
-    problem = Problem(face.channels, face.shown, jacobian_at_rest, scale, 0.05, np.where(moving, least, 0.5))
+    problem = Problem(
+        face.channels, face.shown, jacobian_at_rest, scale, 0.05, np.where(moving, least, 0.5)
+    )
     found: dict[str, NDArray[np.float64]] = {}
     for name in sorted(EXPRESSIONS, key=lambda name: name == "mouthClose"):
         if name.endswith("Right"):

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shapes that the maps are fitted to, and where MPFB says that the bones of its rigs are on MakeHuman's mesh."""
+"""The shapes that the maps are fitted to, and where MPFB says that the bones of its rigs are on
+MakeHuman's mesh.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,9 @@ from ..build_body.source import DATA, parse_target, read_obj
 
 @dataclass(frozen=True)
 class FaceShapes:
-    """MakeHuman's mesh, metres, y up, x to the person's left, facing +z, and MPFB's rigs on it, by bone."""
+    """MakeHuman's mesh, metres, y up, x to the person's left, facing +z, and MPFB's rigs on it, by
+    bone.
+    """
 
     vertices: NDArray[np.float64]  # (N, 3)
     skin: NDArray[np.intp]  # the vertices of the body's faces
@@ -38,7 +42,9 @@ class FaceShapes:
         if end["strategy"] == "CUBE":
             return self.cubes[end["cube_name"]].tolist()
         if end["strategy"] not in ("VERTEX", "MEAN"):
-            raise SetupError(f"the end of a bone is given by {end['strategy']}, which this tool does not know")
+            raise SetupError(
+                f"the end of a bone is given by {end['strategy']}, which this tool does not know"
+            )
         return end["vertex_indices"] if end["strategy"] == "MEAN" else [end["vertex_index"]]
 
     def place(self, end: dict[str, Any]) -> NDArray[np.float64]:
@@ -57,6 +63,10 @@ def read_shapes(wheel: Path) -> FaceShapes:
         rigify = json.loads(archive.read(DATA + "rigs/rigify/rig.human.json"))
         default = json.loads(archive.read(DATA + "rigs/standard/rig.default.json"))
         weights = json.loads(archive.read(DATA + "rigs/standard/weights.default.json"))["weights"]
-    cubes = {str(name): np.unique(faces[groups == name]) for name in np.unique(groups) if name.startswith("joint-")}
+    cubes = {
+        str(name): np.unique(faces[groups == name])
+        for name in np.unique(groups)
+        if name.startswith("joint-")
+    }
     skin = np.unique(faces[groups == "body"])
     return FaceShapes(vertices, skin, cubes, moves, rigify["bones"], default, weights)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Motion data for training: read archives and sets of motion capture and fit the default body to them.
+"""Motion data for training: read archives and sets of motion capture and fit the default body to
+them.
 
 - ``take.py``: one recorded motion as named joints, and the coordinate frame of all sources
 - ``formats``: the archives' files and .bvh
@@ -11,5 +12,6 @@
 - ``markers.py``: joint centres from optical markers
 - ``joint_centres.py``: takes from joint positions alone
 - ``new_performers.py``: performers that nothing was trained on, for tests
-- ``fit_body.py``: poses, translations and shapes of the body for all takes; ``python -m scope.tools.mocap.fit_body``
+- ``fit_body.py``: poses, translations and shapes of the body for all takes; ``python -m
+    scope.tools.mocap.fit_body``
 """

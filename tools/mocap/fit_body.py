@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fit the default body to every take: ``python -m scope.tools.mocap.fit_body ARCHIVES -o build/mocap/motions.npz``.
+"""Fit the default body to every take: ``python -m scope.tools.mocap.fit_body ARCHIVES -o
+build/mocap/motions.npz``.
 
-``--more SETS`` straightens the legs of CMU's takes, see ``straight_legs.py``, lets the body's knees be straight, and
-appends the takes of ``position_sets.py``, so that the archives' takes keep their numbers; ``--without`` leaves out a
-set, and ``--as-recorded`` leaves CMU's legs bent.
+``--more SETS`` straightens the legs of CMU's takes, see ``straight_legs.py``, lets the body's knees
+be straight, and appends the takes of ``position_sets.py``, so that the archives' takes keep their
+numbers; ``--without`` leaves out a set, and ``--as-recorded`` leaves CMU's legs bent.
 
 For each performer, one shape from the bone lengths; then, for each frame, the solver minimizes
 
     24000 Σ_j c_j |t_j − p̂_j|² + Σ_i w_i |log(R̂_iᵀ R_i)|² + joint limits + rest-pose prior
 
-with p̂ and R̂ from ``retarget.py``. The offsets o_j are the performer's mean residual in a first pass over some frames,
-in which rotations outweigh positions. The world has y up; poses and trans follow SMPL's convention.
+with p̂ and R̂ from ``retarget.py``. The offsets o_j are the performer's mean residual in a first
+pass over some frames, in which rotations outweigh positions. The world has y up; poses and trans
+follow SMPL's convention.
 """
 
 from __future__ import annotations
@@ -25,7 +27,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scope_addon.atomic_write import atomic_path
-from ...solver import Keypoints3D, Measurements, Options, PosePriors, Priors, Stage, State, Weights, fit_tree, make_tree
+from ...solver import (
+    Keypoints3D,
+    Measurements,
+    Options,
+    PosePriors,
+    Priors,
+    Stage,
+    State,
+    Weights,
+    fit_tree,
+    make_tree,
+)
 from ...solver.body import Body
 from ...solver.loaders.body_file import load_body
 from ...solver.residuals import joint_limits
@@ -33,7 +46,15 @@ from ...solver.rotations import log
 from .kinds import kind_of
 from .library import load_library
 from .position_sets import LAYOUTS, load_sets
-from .retarget import SIDES, Correspondence, Follow, correspond, segment_rotations, shape_from_lengths, targets
+from .retarget import (
+    SIDES,
+    Correspondence,
+    Follow,
+    correspond,
+    segment_rotations,
+    shape_from_lengths,
+    targets,
+)
 from .straight_legs import flexion, knee_flexions, straightened
 from .take import Take
 
@@ -49,8 +70,17 @@ FOLLOWING_JOINT_WEIGHT = 0.5
 FLOOR_QUANTILE = 0.05  # of the frames, ordered by the height of the lowest point of the feet
 LOWER = 3  # column of a hinge's lower limit
 SOLES = ("heel", "foot_index")
-# Largest plausible angle of a joint, degrees; beyond, the recording is broken (as a reversed left foot in 01_12).
-MAX_DEGREES = {"ankle": 75.0, "foot": 70.0, "wrist": 85.0, "hand": 60.0, "head": 60.0, "neck": 75.0, "collar": 50.0}
+# Largest plausible angle of a joint, degrees; beyond, the recording is broken (as a reversed left
+# foot in 01_12).
+MAX_DEGREES = {
+    "ankle": 75.0,
+    "foot": 70.0,
+    "wrist": 85.0,
+    "hand": 60.0,
+    "head": 60.0,
+    "neck": 75.0,
+    "collar": 50.0,
+}
 MAX_DEGREES |= {"hip": 140.0, "knee": 155.0, "elbow": 160.0, "shoulder": 175.0}
 MAX_DEGREES_PER_SECOND = 1700.0  # of a joint; kicks and flips reach 1400
 
@@ -91,7 +121,9 @@ class _Fitter:
         self.priors = Priors(
             joint_weights=np.where(followed, FOLLOWING_JOINT_WEIGHT, FREE_JOINT_WEIGHT),
             shape_mean=betas,
-            limits=_straight_hinges(body, betas) if straight_knees else joint_limits.hinges_of(names),
+            limits=_straight_hinges(body, betas)
+            if straight_knees
+            else joint_limits.hinges_of(names),
         )
         weights = Weights(keypoints3d=position_weight, joint_prior=1.0, shape=1e8, pose_prior=1.0)
         stage = Stage(weights, tolerance=1e-4, max_iterations=20)
@@ -100,7 +132,9 @@ class _Fitter:
     def __call__(
         self, R_target: NDArray[np.float64], p_target: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return part poses R (T, K+1, 3, 3), t (T, K+1, 3) for targets (T, parts, 3, 3) and (T, points, 3)."""
+        """Return part poses R (T, K+1, 3, 3), t (T, K+1, 3) for targets (T, parts, 3, 3) and (T,
+        points, 3).
+        """
         T, n = len(R_target), self.body.K + 1
         R, t = np.empty((T, n, 3, 3)), np.empty((T, n, 3))
         none = np.zeros((len(self.parts), 3))
@@ -109,7 +143,9 @@ class _Fitter:
                 self.tree,
                 Measurements(
                     keypoints3d=Keypoints3D(self.indices, p_target[k], self.confidence),
-                    pose_priors=PosePriors(self.parts, R_target[k], none, self.weights, np.zeros(len(self.parts))),
+                    pose_priors=PosePriors(
+                        self.parts, R_target[k], none, self.weights, np.zeros(len(self.parts))
+                    ),
                 ),
                 self._start(R_target[k], p_target[k]),
                 self.priors,
@@ -119,7 +155,9 @@ class _Fitter:
         return R, t
 
     def _start(self, R_target: NDArray[np.float64], p_target: NDArray[np.float64]) -> State:
-        """Return the state with every part at its target's rotation and the joints' centroid at their targets'."""
+        """Return the state with every part at its target's rotation and the joints' centroid at
+        their targets'.
+        """
         R = np.empty((self.body.K + 1, 3, 3))
         Omega = np.tile(np.eye(3), (self.body.K + 1, 1, 1))
         for i, parent in enumerate(self.body.parents):
@@ -130,7 +168,9 @@ class _Fitter:
         return State(R[0], t[0] + (p_target - t[self.joints]).mean(axis=0), Omega[1:], self.betas)
 
 
-def _straight_hinges(body: Body, betas: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _straight_hinges(
+    body: Body, betas: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Return the limits of the hinges with each knee's lower limit counted from the straight leg.
 
     A body whose knees are bent at rest could not straighten its legs within the limits about rest.
@@ -140,13 +180,19 @@ def _straight_hinges(body: Body, betas: NDArray[np.float64]) -> tuple[NDArray[np
     for row, joint in enumerate(joints[:, 0]):
         side, _, name = body.joint_names[joint].rpartition("_")
         if name == "knee":
-            hip, knee, ankle = (rest[None, body.joint_names.index(f"{side}_{part}")] for part in LEG)
-            floats[row, LOWER] -= np.radians(flexion(hip, knee, ankle, np.array([[1.0, 0.0, 0.0]]))[0])
+            hip, knee, ankle = (
+                rest[None, body.joint_names.index(f"{side}_{part}")] for part in LEG
+            )
+            floats[row, LOWER] -= np.radians(
+                flexion(hip, knee, ankle, np.array([[1.0, 0.0, 0.0]]))[0]
+            )
     return joints, floats
 
 
 def fit_performer(body: Body, takes: list[Take], straight_knees: bool = False) -> list[FittedTake]:
-    """Fit all takes of one performer; ``straight_knees`` counts the lower limits of the knees from the straight leg."""
+    """Fit all takes of one performer; ``straight_knees`` counts the lower limits of the knees from
+    the straight leg.
+    """
     betas = shape_from_lengths(body, takes[0])
     found = correspond(body, betas, takes)
     calibrate_offsets(body, betas, found, takes, straight_knees)
@@ -155,15 +201,23 @@ def fit_performer(body: Body, takes: list[Take], straight_knees: bool = False) -
 
 
 def calibrate_offsets(
-    body: Body, betas: NDArray[np.float64], found: Correspondence, takes: list[Take], straight_knees: bool = False
+    body: Body,
+    betas: NDArray[np.float64],
+    found: Correspondence,
+    takes: list[Take],
+    straight_knees: bool = False,
 ) -> None:
-    """Set ``found.offset`` to the mean over frames of R_world_sᵀ (t_j − p_s), from fits on some frames of the takes.
+    """Set ``found.offset`` to the mean over frames of R_world_sᵀ (t_j − p_s), from fits on some
+    frames of the takes.
 
-    With ``straight_knees``, from frames with straight legs if there are enough: offsets decide there how far knees are
-    bent, and those of people who sit differ, because the pelvis of a source does not turn about the body's hips.
+    With ``straight_knees``, from frames with straight legs if there are enough: offsets decide
+    there how far knees are bent, and those of people who sit differ, because the pelvis of a source
+    does not turn about the body's hips.
     """
     if straight_knees:
-        extended = [_selected(take, knee_flexions(_legs(take)).max(axis=0) < EXTENDED_DEG) for take in takes]
+        extended = [
+            _selected(take, knee_flexions(_legs(take)).max(axis=0) < EXTENDED_DEG) for take in takes
+        ]
         extended = [take for take in extended if len(take) > 0]
         takes = extended if sum(map(len, extended)) >= FEWEST_EXTENDED else takes
     step = max(1, sum(map(len, takes)) // CALIBRATION_FRAMES)
@@ -177,7 +231,9 @@ def calibrate_offsets(
                 gap = t[:, body.joint_names.index(joint)] - take.joint(point.joint)
                 R = segment_rotations(take, Follow(point.segment))
                 left_over[joint].append(np.einsum("tji,tj->ti", R, gap))
-        found.offset = {joint: np.concatenate(gaps).mean(axis=0) for joint, gaps in left_over.items()}
+        found.offset = {
+            joint: np.concatenate(gaps).mean(axis=0) for joint, gaps in left_over.items()
+        }
 
 
 def _selected(take: Take, frames: slice | NDArray[np.bool_]) -> Take:
@@ -207,7 +263,9 @@ def _fitted(body: Body, betas: NDArray[np.float64], take: Take, fitter: _Fitter)
 
 
 def plausible(body: Body, Omega: NDArray[np.float64], fps: float) -> NDArray[np.bool_]:
-    """Return (T,) bool: whether all joint states (T, K+1, 3, 3) are within their ranges and speed limit."""
+    """Return (T,) bool: whether all joint states (T, K+1, 3, 3) are within their ranges and speed
+    limit.
+    """
     most = np.array([MAX_DEGREES.get(name.rpartition("_")[2], 180.0) for name in body.joint_names])
     inside = (np.degrees(np.linalg.norm(log(Omega[:, 1:]), axis=-1)) <= most[1:]).all(axis=1)
     turns = log(np.swapaxes(Omega[:-1, 1:], -1, -2) @ Omega[1:, 1:])
@@ -217,7 +275,9 @@ def plausible(body: Body, Omega: NDArray[np.float64], fps: float) -> NDArray[np.
 
 def fit_library(body: Body, takes: list[Take], straight_knees: bool = False) -> list[FittedTake]:
     """Fit every take but mirror images, performer by performer; see `fit_performer`."""
-    chosen = sorted((t for t in takes if not t.mirrored), key=lambda t: (t.source, t.subject, t.name))
+    chosen = sorted(
+        (t for t in takes if not t.mirrored), key=lambda t: (t.source, t.subject, t.name)
+    )
     performers = [list(group) for _, group in groupby(chosen, key=lambda t: t.subject)]
     return [f for group in performers for f in fit_performer(body, group, straight_knees)]
 
@@ -225,10 +285,10 @@ def fit_library(body: Body, takes: list[Take], straight_knees: bool = False) -> 
 def save(path: Path, body: Body, fitted: list[FittedTake]) -> None:
     """Write all motions into one .npz.
 
-    poses (F, 3(K+1)) f32, trans (F, 3) f32, joint_error (F, K+1) f32 metres or NaN, valid (F,) bool (False where the
-    recording is broken). Take k has the frames take_start[k]:take_start[k+1], take_name, take_source, take_subject,
-    take_fps, take_betas[k], take_set, the archive or set that it comes from, and take_kind, one of ``kinds.KINDS``;
-    up is ``y``.
+    poses (F, 3(K+1)) f32, trans (F, 3) f32, joint_error (F, K+1) f32 metres or NaN, valid (F,) bool
+    (False where the recording is broken). Take k has the frames take_start[k]:take_start[k+1],
+    take_name, take_source, take_subject, take_fps, take_betas[k], take_set, the archive or set that
+    it comes from, and take_kind, one of ``kinds.KINDS``; up is ``y``.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     with atomic_path(path) as temporary:
@@ -252,19 +312,25 @@ def save(path: Path, body: Body, fitted: list[FittedTake]) -> None:
 
 
 def report(body: Body, fitted: list[FittedTake]) -> str:
-    """Print minutes and joint errors (median / 95 %) for each source, and the errors of each joint."""
+    """Print minutes and joint errors (median / 95 %) for each source, and the errors of each
+    joint.
+    """
     lines = []
     for source, group in groupby(fitted, key=lambda f: f.take.source):
         of_source = list(group)
         error = np.concatenate([f.error for f in of_source]) * 1000
         minutes = sum(f.take.seconds for f in of_source) / 60
         known = error[np.isfinite(error)]
-        lines.append(f"{source}: {len(of_source)} takes, {minutes:.1f} min, {len(error)} frames, joint error "
+        lines.append(f"{source}: {len(of_source)} takes, {minutes:.1f} min, {len(error)} frames, "
+                     "joint error "
                      f"{np.median(known):.1f} / {np.quantile(known, 0.95):.1f} mm, "
                      f"{sum(int((~f.valid).sum()) for f in of_source)} frames broken")  # fmt: skip
         for j, name in enumerate(body.joint_names):
             if np.isfinite(error[:, j]).all():
-                lines.append(f"    {name:15s} {np.median(error[:, j]):5.1f} / {np.quantile(error[:, j], 0.95):5.1f}")
+                lines.append(
+                    f"    {name:15s} {np.median(error[:, j]):5.1f} / "
+                    f"{np.quantile(error[:, j], 0.95):5.1f}"
+                )
     return "\n".join(lines)
 
 
@@ -272,9 +338,17 @@ def main() -> None:
     """Run the command line."""
     parser = argparse.ArgumentParser(description="Fit the default body to the motion archives.")
     parser.add_argument("archives", type=Path, help="folder with the three .tar.xz")
-    parser.add_argument("--more", type=Path, help="folder with sets of joint positions, .npz; straightens CMU's legs")
-    parser.add_argument("--without", action="append", default=[], choices=sorted(LAYOUTS), help="leave out a set")
-    parser.add_argument("--as-recorded", action="store_true", help="leave CMU's legs as they are, also with --more")
+    parser.add_argument(
+        "--more",
+        type=Path,
+        help="folder with sets of joint positions, .npz; straightens CMU's legs",
+    )
+    parser.add_argument(
+        "--without", action="append", default=[], choices=sorted(LAYOUTS), help="leave out a set"
+    )
+    parser.add_argument(
+        "--as-recorded", action="store_true", help="leave CMU's legs as they are, also with --more"
+    )
     parser.add_argument("-o", "--output", type=Path, default=Path("build/mocap/motions.npz"))
     arguments = parser.parse_args()
     start = time.perf_counter()

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Takes from joint positions alone: segments get their orientation from the joints around them.
 
-Hips, shoulders and the spine turn pelvis and chest. A thigh or an upper arm lies along its bone and turns about it
-so that knee or elbow bends about the segment's x axis; a limb that is nearly straight leaves that open, and follows
-pelvis or chest. Forearms and hands have no twist of their own. Segments and joints have the names of DeepMimic's
-humanoid, whose correspondence with the body is used.
+Hips, shoulders and the spine turn pelvis and chest. A thigh or an upper arm lies along its bone and
+turns about it so that knee or elbow bends about the segment's x axis; a limb that is nearly
+straight leaves that open, and follows pelvis or chest. Forearms and hands have no twist of their
+own. Segments and joints have the names of DeepMimic's humanoid, whose correspondence with the body
+is used.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from .take import Take
 Points = NDArray[np.float64]
 FPS = 30.0
 SIDES = ("left", "right")
-STRAIGHT, BENT = np.radians(8.0), np.radians(35.0)  # of knee or elbow: below, its axis says nothing; above, all
+# of knee or elbow: below, its axis says nothing; above, all
+STRAIGHT, BENT = np.radians(8.0), np.radians(35.0)
 JOINTS = (
     "pelvis",
     "chest",
@@ -43,14 +45,16 @@ def take_from_joints(
 ) -> Take:
     """Return a take of 30 frames/s from joint positions.
 
-    :param joints: (T, 3) metres each, y up: ``pelvis``, ``chest`` (lower end of the rib cage), ``neck``, ``head_end``,
-        and for ``left_`` and ``right_`` the ``hip``, ``knee``, ``ankle``, ``foot_end`` (toes), ``collar`` (a point on
-        the shoulder girdle's line), ``shoulder``, ``elbow`` and ``wrist``; ``heel`` where it is known, and
-        ``pelvis_up`` and ``chest_up``, the directions that are up in pelvis and rib cage.
-    :param head: (T, 3) metres, from the right to the left of the head; None: the head turns as the chest does.
-    :param lefts: (T, 3) directions to the left of segments, where they are known: of ``left_`` and ``right_`` ``hip``
-        and ``shoulder``, about which a straight limb would bend, and of ``ankle``, by which a foot turns apart from the
-        shank.
+    :param joints: (T, 3) metres each, y up: ``pelvis``, ``chest`` (lower end of the rib cage),
+        ``neck``, ``head_end``, and for ``left_`` and ``right_`` the ``hip``, ``knee``, ``ankle``,
+        ``foot_end`` (toes), ``collar`` (a point on the shoulder girdle's line), ``shoulder``,
+        ``elbow`` and ``wrist``; ``heel`` where it is known, and ``pelvis_up`` and ``chest_up``, the
+        directions that are up in pelvis and rib cage.
+    :param head: (T, 3) metres, from the right to the left of the head; None: the head turns as the
+        chest does.
+    :param lefts: (T, 3) directions to the left of segments, where they are known: of ``left_`` and
+        ``right_`` ``hip`` and ``shoulder``, about which a straight limb would bend, and of
+        ``ankle``, by which a foot turns apart from the shank.
     """
     points = {key: resampled(value, fps) for key, value in joints.items()}
     turned = {key: resampled(value, fps) for key, value in (lefts or {}).items()}
@@ -70,7 +74,9 @@ def resampled(values: Points, fps: float) -> Points:
     return np.asarray((1 - share) * values[low] + share * values[low + 1])
 
 
-def _segments(points: Mapping[str, Points], head: Points | None, lefts: Mapping[str, Points]) -> dict[str, Points]:
+def _segments(
+    points: Mapping[str, Points], head: Points | None, lefts: Mapping[str, Points]
+) -> dict[str, Points]:
     """Return R_world_segment (T, 3, 3) of every joint's segment."""
     middle = 0.5 * (points["left_hip"] + points["right_hip"])
     pelvis = frame(
@@ -87,35 +93,48 @@ def _segments(points: Mapping[str, Points], head: Points | None, lefts: Mapping[
     for side in SIDES:
         hip, knee, ankle = (points[f"{side}_{joint}"] for joint in ("hip", "knee", "ankle"))
         hinge = _hinge(hip - knee, knee - ankle, lefts.get(f"{side}_hip", pelvis[..., 0]), 1.0)
-        found[f"{side}_hip"], found[f"{side}_knee"] = along(hip - knee, hinge), along(knee - ankle, hinge)
+        found[f"{side}_hip"], found[f"{side}_knee"] = (
+            along(hip - knee, hinge),
+            along(knee - ankle, hinge),
+        )
         forward = points[f"{side}_foot_end"] - points.get(f"{side}_heel", ankle)
         across = lefts.get(f"{side}_ankle", hinge)
         found[f"{side}_ankle"] = frame(across, np.cross(forward, across))  # up: forward × left
-        shoulder, elbow, wrist = (points[f"{side}_{joint}"] for joint in ("shoulder", "elbow", "wrist"))
+        shoulder, elbow, wrist = (
+            points[f"{side}_{joint}"] for joint in ("shoulder", "elbow", "wrist")
+        )
         straight = lefts.get(f"{side}_shoulder")
         straight = _carried(chest, shoulder - elbow) if straight is None else straight
         hinge = _hinge(shoulder - elbow, elbow - wrist, straight, -1.0)
-        found[f"{side}_shoulder"], found[f"{side}_elbow"] = along(shoulder - elbow, hinge), along(elbow - wrist, hinge)
+        found[f"{side}_shoulder"], found[f"{side}_elbow"] = (
+            along(shoulder - elbow, hinge),
+            along(elbow - wrist, hinge),
+        )
         found[f"{side}_wrist"] = found[f"{side}_elbow"]
     return found
 
 
 def frame(left: Points, up: Points) -> Points:
-    """Return rotations (T, 3, 3) whose x axis is ``left`` and whose y axis is ``up`` made perpendicular to it."""
+    """Return rotations (T, 3, 3) whose x axis is ``left`` and whose y axis is ``up`` made
+    perpendicular to it.
+    """
     x = unit(left)
     y = unit(up - x * dot(up, x))
     return np.stack([x, y, np.cross(x, y)], axis=-1)
 
 
 def along(up: Points, left: Points) -> Points:
-    """Return rotations (T, 3, 3) whose y axis is ``up`` and whose x axis is ``left`` made perpendicular to it."""
+    """Return rotations (T, 3, 3) whose y axis is ``up`` and whose x axis is ``left`` made
+    perpendicular to it.
+    """
     y = unit(up)
     x = unit(left - y * dot(left, y))
     return np.stack([x, y, np.cross(x, y)], axis=-1)
 
 
 def _hinge(upper: Points, lower: Points, straight: Points, sign: float) -> Points:
-    """Return the axis (T, 3), to the left, about which two bones bend, both given from their lower to their upper end.
+    """Return the axis (T, 3), to the left, about which two bones bend, both given from their lower
+    to their upper end.
 
     :param straight: the axis where the limb is straight; ``sign``: 1 for knees, -1 for elbows.
     """
@@ -125,24 +144,36 @@ def _hinge(upper: Points, lower: Points, straight: Points, sign: float) -> Point
     share = share * share * (3.0 - 2.0 * share)
     y = unit(upper)
     rest = unit(straight - y * dot(straight, y))
-    mixed = share * normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12) + (1.0 - share) * rest
+    mixed = (
+        share * normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+        + (1.0 - share) * rest
+    )
     return np.asarray(np.where(np.linalg.norm(mixed, axis=1, keepdims=True) > 1e-3, mixed, rest))
 
 
 def _carried(chest: Points, up: Points) -> Points:
-    """Return the chest's x axis (T, 3) turned as the arm is from hanging, by the smallest rotation."""
+    """Return the chest's x axis (T, 3) turned as the arm is from hanging, by the smallest
+    rotation.
+    """
     y = unit(up)
     axis = np.cross(chest[..., 1], y)
     sine = np.linalg.norm(axis, axis=1, keepdims=True)
     angle = np.arctan2(sine, dot(chest[..., 1], y))
-    turned: Points = np.einsum("tij,tj->ti", exp(axis / np.maximum(sine, 1e-9) * angle), chest[..., 0])
+    turned: Points = np.einsum(
+        "tij,tj->ti", exp(axis / np.maximum(sine, 1e-9) * angle), chest[..., 0]
+    )
     return turned
 
 
 def _looking_ahead(skull: Points) -> Points:
-    """Return head rotations (T, 3, 3) with a constant pitch of the bone from neck to head, which leans, taken out."""
-    pitch = float(np.median(np.arctan2(skull[:, 1, 2], np.abs(skull[:, 1, 1]))))  # of the forward axis, upwards
-    return skull @ exp(np.array([np.clip(HEAD_PITCH + pitch, -2 * MAX_HEAD_PITCH, 2 * MAX_HEAD_PITCH), 0.0, 0.0]))
+    """Return head rotations (T, 3, 3) with a constant pitch of the bone from neck to head, which
+    leans, taken out.
+    """
+    # of the forward axis, upwards
+    pitch = float(np.median(np.arctan2(skull[:, 1, 2], np.abs(skull[:, 1, 1]))))
+    return skull @ exp(
+        np.array([np.clip(HEAD_PITCH + pitch, -2 * MAX_HEAD_PITCH, 2 * MAX_HEAD_PITCH), 0.0, 0.0])
+    )
 
 
 def unit(v: Points) -> Points:

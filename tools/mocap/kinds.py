@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Kinds of motion: by a take's name where it says what happens in it, otherwise by how the body moves."""
+"""Kinds of motion: by a take's name where it says what happens in it, otherwise by how the body
+moves.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,8 @@ import numpy as np
 from .take import Take
 
 KINDS = ("stand", "walk", "run", "jump", "sit", "floor", "other")
-# By source: the kind of the first pattern that is found in a take's name. What no pattern names is measured.
+# By source: the kind of the first pattern that is found in a take's name. What no pattern names is
+# measured.
 NAMED = {
     "cmu_asf_amc": (
         (r"^02_0[12]$", "walk"),
@@ -73,10 +76,12 @@ NAMED = {
         (r"alk|PiG_Motion", "walk"),
     ),
 }
-# Measured, with the length of the leg as the unit of length. Median hips of people on the floor, and of those who sit:
+# Measured, with the length of the leg as the unit of length. Median hips of people on the floor,
+# and of those who sit:
 FLOOR_HEIGHT, SEAT_HEIGHT = 0.45, 0.75
 LEVEL_THIGH = 0.6  # of a thigh's length: what a sitting person's hip is above the knee, at most
-RUN_M_PER_S, WALK_M_PER_S, STAND_M_PER_S = 2.2, 0.6, 0.2  # median speed of the hips in the horizontal plane
+# median speed of the hips in the horizontal plane
+RUN_M_PER_S, WALK_M_PER_S, STAND_M_PER_S = 2.2, 0.6, 0.2
 UPRIGHT = 0.93  # hips of people who stand, most of the time
 
 
@@ -91,11 +96,17 @@ def named_kind(source: str, name: str) -> str:
 
 
 def measured_kind(take: Take) -> str:
-    """Return the kind of motion by speed and height of the hips and by the thighs; for sources whose floor is at 0."""
+    """Return the kind of motion by speed and height of the hips and by the thighs; for sources
+    whose floor is at 0.
+    """
     hips = 0.5 * (take.joint("left_hip") + take.joint("right_hip"))
     knees = 0.5 * (take.joint("left_knee") + take.joint("right_knee"))
-    thigh = float(np.median(np.linalg.norm(take.joint("left_hip") - take.joint("left_knee"), axis=1)))
-    shank = float(np.median(np.linalg.norm(take.joint("left_knee") - take.joint("left_ankle"), axis=1)))
+    thigh = float(
+        np.median(np.linalg.norm(take.joint("left_hip") - take.joint("left_knee"), axis=1))
+    )
+    shank = float(
+        np.median(np.linalg.norm(take.joint("left_knee") - take.joint("left_ankle"), axis=1))
+    )
     ankles = np.minimum(take.joint("left_ankle")[:, 1], take.joint("right_ankle")[:, 1])
     height = (hips[:, 1] - np.minimum(ankles, np.median(ankles))) / (thigh + shank)
     step = max(1, min(round(take.fps / 3), len(take) - 1))

@@ -45,29 +45,39 @@ def read_archive(path: Path) -> dict[str, str]:
             for member in archive:
                 stream = archive.extractfile(member) if member.isfile() else None
                 if stream is not None:
-                    found[str(PurePosixPath(member.name))] = stream.read().decode("utf-8", "replace")
+                    found[str(PurePosixPath(member.name))] = stream.read().decode(
+                        "utf-8", "replace"
+                    )
             return found
     except (OSError, tarfile.TarError, EOFError) as error:
         raise MotionFileError(f"{path}: cannot be read as a .tar.xz archive ({error})") from error
 
 
 def load_asf_amc(texts: dict[str, str]) -> tuple[list[Take], list[Skeleton]]:
-    """Read the takes and skeletons of the Acclaim archive; ``02/02_01.amc`` belongs to ``02/02.asf``."""
+    """Read the takes and skeletons of the Acclaim archive; ``02/02_01.amc`` belongs to
+    ``02/02.asf``.
+    """
     takes, skeletons = [], {}
     for path in sorted(p for p in texts if p.endswith(".asf")):
         skeletons[PurePosixPath(path).stem] = asf_amc.parse_asf(texts[path], path)
     for path in sorted(p for p in texts if p.endswith(".amc")):
         subject = PurePosixPath(path).parent.name
         if subject not in skeletons:
-            raise MotionFileError(f"{path}: its skeleton {subject}.asf is missing in the same folder")
+            raise MotionFileError(
+                f"{path}: its skeleton {subject}.asf is missing in the same folder"
+            )
         skeleton = skeletons[subject]
         M, root = asf_amc.parse_amc(texts[path], skeleton, path)
-        takes.append(_cmu_take(PurePosixPath(path).stem, f"cmu_{subject}", "cmu_asf_amc", skeleton, M, root))
+        takes.append(
+            _cmu_take(PurePosixPath(path).stem, f"cmu_{subject}", "cmu_asf_amc", skeleton, M, root)
+        )
     return takes, list(skeletons.values())
 
 
 def load_expmap(texts: dict[str, str], skeleton: Skeleton) -> list[Take]:
-    """Read the exponential-map archive; each take has a scaled skeleton of its own, because performers are unknown."""
+    """Read the exponential-map archive; each take has a scaled skeleton of its own, because
+    performers are unknown.
+    """
     takes = []
     for path in sorted(p for p in texts if p.endswith(".txt")):
         phi, root = expmap.parse_expmap(texts[path], path)
@@ -96,12 +106,15 @@ def load_deepmimic(texts: dict[str, str]) -> list[Take]:
 def without_doubles(takes: list[Take]) -> list[Take]:
     """Leave out each take that repeats an earlier one of the same length.
 
-    CMU's root trajectory (120 values per second, the same unit in both CMU archives) identifies a recording: two takes
-    are the same if the trajectory of one occurs in the other to within half a millimetre.
+    CMU's root trajectory (120 values per second, the same unit in both CMU archives) identifies a
+    recording: two takes are the same if the trajectory of one occurs in the other to within half a
+    millimetre.
     """
     kept: list[Take] = []
     for take in takes:
-        if not any(_same_recording(take, other) for other in kept if other.source.startswith("cmu_")):
+        if not any(
+            _same_recording(take, other) for other in kept if other.source.startswith("cmu_")
+        ):
             kept.append(take)
     return kept
 
@@ -120,7 +133,12 @@ def _same_recording(take: Take, other: Take) -> bool:
 
 
 def _cmu_take(
-    name: str, subject: str, source: str, skeleton: Skeleton, M: NDArray[np.float64], root: NDArray[np.float64]
+    name: str,
+    subject: str,
+    source: str,
+    skeleton: Skeleton,
+    M: NDArray[np.float64],
+    root: NDArray[np.float64],
 ) -> Take:
     names, positions, orientations = skeleton.named_joints(*skeleton.forward_kinematics(M, root))
     return Take(name, subject, CMU_FPS, names, positions, source, orientations=orientations)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Character Studio's marker files (.csm), and joint centres from optical markers on the skin.
 
-Markers have the names of Vicon's Plug-in Gait. Hip centres lie in the pelvis as Harrington et al. 2007 found by
-magnetic resonance (Journal of Biomechanics 40, 595-602), knees half a joint's width inside their markers, shoulders
-below theirs, elbows at theirs. Ankles lie above the foot: the right ankle's marker of the recording that this is for is
-on the calf.
+Markers have the names of Vicon's Plug-in Gait. Hip centres lie in the pelvis as Harrington et al.
+2007 found by magnetic resonance (Journal of Biomechanics 40, 595-602), knees half a joint's width
+inside their markers, shoulders below theirs, elbows at theirs. Ankles lie above the foot: the right
+ankle's marker of the recording that this is for is on the calf.
 """
 
 from __future__ import annotations
@@ -40,7 +40,8 @@ def parse_csm(text: str, name: str = "markers") -> tuple[dict[str, Points], floa
 
 
 def joint_centres(markers: Mapping[str, Points]) -> tuple[dict[str, Points], Points]:
-    """Return the joints that `take_from_joints` takes, metres, y up, and the direction to the left of the head.
+    """Return the joints that `take_from_joints` takes, metres, y up, and the direction to the left
+    of the head.
 
     :param markers: (T, 3) millimetres each, z up.
     """
@@ -51,8 +52,15 @@ def joint_centres(markers: Mapping[str, Points]) -> tuple[dict[str, Points], Poi
     left, ahead = m["LFWT"] - m["RFWT"], front - back
     R = frame(left, np.cross(ahead, left))  # x left, y up, z ahead
     ribs = 0.5 * (m["T10"] + m["STRN"])
-    joints = {"pelvis": front + R @ [0.0, -0.30 * wide - 0.0109, -0.24 * deep - 0.0099], "pelvis_up": R[..., 1]}
-    joints |= {"chest": ribs, "neck": 0.5 * (m["C7"] + m["CLAV"]), "head_end": _mean(m, "LFHD", "RFHD", "LBHD", "RBHD")}
+    joints = {
+        "pelvis": front + R @ [0.0, -0.30 * wide - 0.0109, -0.24 * deep - 0.0099],
+        "pelvis_up": R[..., 1],
+    }
+    joints |= {
+        "chest": ribs,
+        "neck": 0.5 * (m["C7"] + m["CLAV"]),
+        "head_end": _mean(m, "LFHD", "RFHD", "LBHD", "RBHD"),
+    }
     chest = frame(m["LSHO"] - m["RSHO"], joints["neck"] - ribs)
     for side in SIDES:
         s, sign = side[0].upper(), 1.0 if side == "left" else -1.0
@@ -64,13 +72,23 @@ def joint_centres(markers: Mapping[str, Points]) -> tuple[dict[str, Points], Poi
         shoulder = m[f"{s}SHO"] - SHOULDER_M * chest[..., 1]
         wrist = 0.5 * (m[f"{s}WRA"] + m[f"{s}WRB"])
         joints |= {f"{side}_hip": hip, f"{side}_knee": knee, f"{side}_ankle": ankle}
-        joints |= {f"{side}_heel": heel, f"{side}_foot_end": forefoot, f"{side}_elbow": m[f"{s}ELB"]}
-        joints |= {f"{side}_collar": m[f"{s}SHO"], f"{side}_shoulder": shoulder, f"{side}_wrist": wrist}
+        joints |= {
+            f"{side}_heel": heel,
+            f"{side}_foot_end": forefoot,
+            f"{side}_elbow": m[f"{s}ELB"],
+        }
+        joints |= {
+            f"{side}_collar": m[f"{s}SHO"],
+            f"{side}_shoulder": shoulder,
+            f"{side}_wrist": wrist,
+        }
     return joints, m["LFHD"] + m["LBHD"] - m["RFHD"] - m["RBHD"]
 
 
 def _inward(upper: Points, beside: Points, marker: Points, by_m: float) -> Points:
-    """Return a marker moved away from the side of the bone on which another marker is, at right angles to the bone."""
+    """Return a marker moved away from the side of the bone on which another marker is, at right
+    angles to the bone.
+    """
     bone = (marker - upper) / np.linalg.norm(marker - upper, axis=1, keepdims=True)
     out = beside - upper
     out = out - bone * (out * bone).sum(axis=1, keepdims=True)

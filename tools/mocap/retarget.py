@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Correspondence between a source's skeleton and the body's parts, and the shape with the source's bone lengths.
+"""Correspondence between a source's skeleton and the body's parts, and the shape with the source's
+bone lengths.
 
-Rotations: part i follows a segment s of the source, R_world_part = R_world_s · C_i, where the constant C_i takes the
-part's rest bone and hinge axis to the segment's. It fixes the twist, which joint positions alone leave open.
-Positions: joint j follows a point fixed to a segment, p_world_j = p_world_s + R_world_s · o_j; the constant o_j
-is the distance between the two skeletons' joints (CMU's hip joints are 15-18 cm apart, the body's 21 cm).
+Rotations: part i follows a segment s of the source, R_world_part = R_world_s · C_i, where the
+constant C_i takes the part's rest bone and hinge axis to the segment's. It fixes the twist, which
+joint positions alone leave open. Positions: joint j follows a point fixed to a segment, p_world_j =
+p_world_s + R_world_s · o_j; the constant o_j is the distance between the two skeletons' joints
+(CMU's hip joints are 15-18 cm apart, the body's 21 cm).
 """
 
 from __future__ import annotations
@@ -22,8 +24,10 @@ from .take import Take
 
 SIDES = ("left", "right")
 CMU_SPLAY = np.radians(20.0)  # of CMU's thighs at zero pose
-CMU_ELBOW_ROLL = np.radians(30.0)  # of CMU's elbow axis about the outstretched arm at zero pose, up at the front
-HEAD_PITCH = np.radians(5.0)  # median forward pitch to which heads are set: people look slightly down
+# of CMU's elbow axis about the outstretched arm at zero pose, up at the front
+CMU_ELBOW_ROLL = np.radians(30.0)
+# median forward pitch to which heads are set: people look slightly down
+HEAD_PITCH = np.radians(5.0)
 MAX_HEAD_PITCH = np.radians(25.0)
 STANCE_SPEED = 0.12  # m/s: a foot slower than this stands
 TRUNK = ("pelvis", "spine1", "spine2", "spine3")
@@ -31,17 +35,21 @@ LENGTHS = (  # joint, joint, source joint, source joint, standard deviation in m
     *((f"{s}_{a}", f"{s}_{b}", f"{s}_{a}", f"{s}_{b}", 0.01)
       for s in SIDES for a, b in (("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"))),
 )  # fmt: skip
-ARM_LENGTHS = {"cmu": ("hand", "knuckle"), "deepmimic": ("wrist", "wrist")}  # ends of the forearm: body, source
+# ends of the forearm: body, source
+ARM_LENGTHS = {"cmu": ("hand", "knuckle"), "deepmimic": ("wrist", "wrist")}
 
 
 @dataclass(frozen=True)
 class Follow:
-    """A part that follows a segment, or a mixture: ``share`` of the way from segment ``first`` to ``second``."""
+    """A part that follows a segment, or a mixture: ``share`` of the way from segment ``first`` to
+    ``second``.
+    """
 
     first: str
     second: str = ""
     share: float = 0.0
-    weight: float = 300.0  # per radian^2, against 24000 per metre^2 of a joint: 300 is a lever of 11 cm
+    # per radian^2, against 24000 per metre^2 of a joint: 300 is a lever of 11 cm
+    weight: float = 300.0
 
 
 @dataclass(frozen=True)
@@ -71,27 +79,38 @@ def _sided(table: dict[str, Any]) -> dict[str, Any]:
         changes = {k: v.replace("*", side) for k, v in vars(value).items() if isinstance(v, str)}
         return type(value)(**{**vars(value), **changes})
 
-    return {k.replace("*", s): put(v, s) for k, v in table.items() for s in (SIDES if "*" in k else ("",))}
+    return {
+        k.replace("*", s): put(v, s)
+        for k, v in table.items()
+        for s in (SIDES if "*" in k else ("",))
+    }
 
 
-# CMU puts the wrist 4-5 cm too far out (radius and wrist bone together are 29 cm), which exaggerates its angles: hands
-# take their twist from the forearm and 0.4 of the rest. Half of the forearm's twist goes to the elbow, half to the
-# wrist.
+# CMU puts the wrist 4-5 cm too far out (radius and wrist bone together are 29 cm), which
+# exaggerates its angles: hands take their twist from the forearm and 0.4 of the rest. Half of the
+# forearm's twist goes to the elbow, half to the wrist.
 CMU_PARTS = _sided({
-    "pelvis": Follow("pelvis", weight=500.0), "spine1": Follow("spine1"), "spine2": Follow("spine2"),
-    "spine3": Follow("spine3"), "neck": Follow("neck2", weight=200.0), "head": Follow("head", weight=200.0),
+    "pelvis": Follow("pelvis", weight=500.0), "spine1": Follow("spine1"),
+    "spine2": Follow("spine2"),
+    "spine3": Follow("spine3"), "neck": Follow("neck2", weight=200.0),
+    "head": Follow("head", weight=200.0),
     "*_collar": Follow("*_collar", weight=100.0), "*_shoulder": Follow("*_shoulder"),
-    "*_elbow": Follow("*_elbow", "*_forearm", 0.5), "*_wrist": Follow("*_forearm", "*_wrist", 0.4, weight=100.0),
-    "*_hand": Follow("*_forearm", "*_wrist", 0.6, weight=20.0), "*_hip": Follow("*_hip"), "*_knee": Follow("*_knee"),
+    "*_elbow": Follow("*_elbow", "*_forearm", 0.5),
+    "*_wrist": Follow("*_forearm", "*_wrist", 0.4, weight=100.0),
+    "*_hand": Follow("*_forearm", "*_wrist", 0.6, weight=20.0), "*_hip": Follow("*_hip"),
+    "*_knee": Follow("*_knee"),
     "*_ankle": Follow("*_ankle", weight=200.0), "*_foot": Follow("*_foot", weight=100.0),
 })  # fmt: skip
 CMU_POINTS = _sided({
-    "neck": Point("neck2", "spine3"), "head": Point("head", "neck2", 0.5), "*_hip": Point("*_hip", "pelvis"),
-    "*_knee": Point("*_knee", "*_hip"), "*_ankle": Point("*_ankle", "*_knee"), "*_foot": Point("*_foot", "*_ankle"),
+    "neck": Point("neck2", "spine3"), "head": Point("head", "neck2", 0.5),
+    "*_hip": Point("*_hip", "pelvis"),
+    "*_knee": Point("*_knee", "*_hip"), "*_ankle": Point("*_ankle", "*_knee"),
+    "*_foot": Point("*_foot", "*_ankle"),
     "*_shoulder": Point("*_shoulder", "*_collar"), "*_elbow": Point("*_elbow", "*_shoulder"),
     "*_wrist": Point("*_wrist", "*_forearm", 0.5), "*_hand": Point("*_knuckle", "*_forearm", 0.5),
 })  # fmt: skip
-# DeepMimic bends the trunk at one joint and has no hands or toes; parts without a segment stay near rest.
+# DeepMimic bends the trunk at one joint and has no hands or toes; parts without a segment stay near
+# rest.
 DEEPMIMIC_PARTS = _sided({
     "pelvis": Follow("pelvis", weight=500.0), "spine1": Follow("pelvis", "chest", 0.33),
     "spine2": Follow("pelvis", "chest", 0.67), "spine3": Follow("chest"),
@@ -100,16 +119,21 @@ DEEPMIMIC_PARTS = _sided({
     "*_knee": Follow("*_knee"), "*_ankle": Follow("*_ankle", weight=200.0),
 })  # fmt: skip
 DEEPMIMIC_POINTS = _sided({
-    "neck": Point("neck", "chest", 0.5), "*_hip": Point("*_hip", "pelvis"), "*_knee": Point("*_knee", "*_hip"),
+    "neck": Point("neck", "chest", 0.5), "*_hip": Point("*_hip", "pelvis"),
+    "*_knee": Point("*_knee", "*_hip"),
     "*_ankle": Point("*_ankle", "*_knee"), "*_shoulder": Point("*_shoulder", "chest"),
     "*_elbow": Point("*_elbow", "*_shoulder"), "*_wrist": Point("*_wrist", "*_elbow"),
 })  # fmt: skip
 
 
 def correspond(body: Body, betas: NDArray[np.float64], takes: list[Take]) -> Correspondence:
-    """Return the correspondence for one performer's takes, with level feet and upright heads, and zero offsets."""
+    """Return the correspondence for one performer's takes, with level feet and upright heads, and
+    zero offsets.
+    """
     cmu = has_cmu_skeleton(takes[0])
-    found = Correspondence(CMU_PARTS if cmu else DEEPMIMIC_PARTS, CMU_POINTS if cmu else DEEPMIMIC_POINTS)
+    found = Correspondence(
+        CMU_PARTS if cmu else DEEPMIMIC_PARTS, CMU_POINTS if cmu else DEEPMIMIC_POINTS
+    )
     rest = body.rest_joints(betas)
     for part in found.parts:
         found.C[part] = _rest_alignment(body, rest, part, cmu)
@@ -119,13 +143,17 @@ def correspond(body: Body, betas: NDArray[np.float64], takes: list[Take]) -> Cor
     if cmu:
         head = np.concatenate([segment_rotations(t, found.parts["head"]) for t in takes])
         pitch = float(np.median(np.arctan2(_forward_lean(head), head[:, 1, 1])))
-        found.C["head"] = exp([np.clip(HEAD_PITCH - pitch, -MAX_HEAD_PITCH, MAX_HEAD_PITCH), 0.0, 0.0])
+        found.C["head"] = exp(
+            [np.clip(HEAD_PITCH - pitch, -MAX_HEAD_PITCH, MAX_HEAD_PITCH), 0.0, 0.0]
+        )
     found.offset = {joint: np.zeros(3) for joint in found.points}
     return found
 
 
 def has_cmu_skeleton(take: Take) -> bool:
-    """Return whether the take has the joints of CMU's skeleton, not those of DeepMimic's humanoid."""
+    """Return whether the take has the joints of CMU's skeleton, not those of DeepMimic's
+    humanoid.
+    """
     return "left_knuckle" in take.joint_names
 
 
@@ -135,7 +163,9 @@ def segment_rotations(take: Take, follow: Follow) -> NDArray[np.float64]:
     :raises ShapeError: when the take has positions only.
     """
     if take.orientations is None:
-        raise ShapeError(f"{take.name} has no orientations: the body cannot be fitted to joint positions alone")
+        raise ShapeError(
+            f"{take.name} has no orientations: the body cannot be fitted to joint positions alone"
+        )
     R = take.orientations[:, take.index(follow.first)]
     if follow.second:
         between = np.swapaxes(R, -1, -2) @ take.orientations[:, take.index(follow.second)]
@@ -144,17 +174,33 @@ def segment_rotations(take: Take, follow: Follow) -> NDArray[np.float64]:
 
 
 def targets(take: Take, found: Correspondence) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return target rotations (T, parts, 3, 3) of parts and target positions (T, points, 3) of joints."""
-    R = np.stack([segment_rotations(take, follow) @ found.C[part] for part, follow in found.parts.items()], axis=1)
-    p = np.stack([take.joint(point.joint) + segment_rotations(take, Follow(point.segment)) @ found.offset[joint]
-                  for joint, point in found.points.items()], axis=1)  # fmt: skip
+    """Return target rotations (T, parts, 3, 3) of parts and target positions (T, points, 3) of
+    joints.
+    """
+    R = np.stack(
+        [segment_rotations(take, follow) @ found.C[part] for part, follow in found.parts.items()],
+        axis=1,
+    )
+    p = np.stack(
+        [
+            take.joint(point.joint)
+            + segment_rotations(take, Follow(point.segment)) @ found.offset[joint]
+            for joint, point in found.points.items()
+        ],
+        axis=1,
+    )
     return R, p
 
 
 def shape_from_lengths(body: Body, take: Take) -> NDArray[np.float64]:
-    """Fit the shape (P,) to bone lengths and trunk height by Gauss-Newton on (length − measured)/σ and β/1."""
+    """Fit the shape (P,) to bone lengths and trunk height by Gauss-Newton on (length − measured)/σ
+    and β/1.
+    """
     ours, theirs = ARM_LENGTHS["cmu" if has_cmu_skeleton(take) else "deepmimic"]
-    pairs = [*LENGTHS, *((f"{s}_elbow", f"{s}_{ours}", f"{s}_elbow", f"{s}_{theirs}", 0.01) for s in SIDES)]
+    pairs = [
+        *LENGTHS,
+        *((f"{s}_elbow", f"{s}_{ours}", f"{s}_elbow", f"{s}_{theirs}", 0.01) for s in SIDES),
+    ]
     index = {name: i for i, name in enumerate(body.joint_names)}
     rows = []  # (P + 1, 3) of the vector between two joints and its measured length
     measured, sigma = [], []
@@ -162,12 +208,17 @@ def shape_from_lengths(body: Body, take: Take) -> NDArray[np.float64]:
     for a, b, source_a, source_b, deviation in pairs:
         rows.append(affine[index[b]] - affine[index[a]])
         bones = np.diff([take.joint(j) for j in _chain(source_a, source_b)], axis=0)
-        measured.append(float(np.median(np.linalg.norm(bones, axis=2).sum(axis=0))))  # some sources' bones vary
+        # some sources' bones vary
+        measured.append(float(np.median(np.linalg.norm(bones, axis=2).sum(axis=0))))
         sigma.append(deviation)
-    middle = [0.5 * (affine[index[f"left_{j}"]] + affine[index[f"right_{j}"]]) for j in ("hip", "shoulder")]
+    middle = [
+        0.5 * (affine[index[f"left_{j}"]] + affine[index[f"right_{j}"]])
+        for j in ("hip", "shoulder")
+    ]
     trunk = np.mean([take.joint(f"{s}_shoulder") - take.joint(f"{s}_hip") for s in SIDES], axis=0)
     rows.append(middle[1] - middle[0])
-    measured.append(float(np.quantile(np.linalg.norm(trunk, axis=1), 0.9)))  # upright: bending shortens it
+    # upright: bending shortens it
+    measured.append(float(np.quantile(np.linalg.norm(trunk, axis=1), 0.9)))
     sigma.append(0.03)
     A, beta = np.array(rows), np.zeros(body.P)
     for _ in range(10):
@@ -187,7 +238,9 @@ def _chain(a: str, b: str) -> list[str]:
     return [a, f"{side}_forearm", f"{side}_wrist", b]
 
 
-def _rest_alignment(body: Body, rest: NDArray[np.float64], part: str, cmu: bool) -> NDArray[np.float64]:
+def _rest_alignment(
+    body: Body, rest: NDArray[np.float64], part: str, cmu: bool
+) -> NDArray[np.float64]:
     """Return C, which takes a part's rest bone and hinge axis to the source's.
 
     It is the identity for parts whose up is the source's. DeepMimic's hips, chest and neck are one
@@ -227,23 +280,37 @@ def _hanging(mirror: float) -> NDArray[np.float64]:
     return exp([0.0, 0.0, -mirror * np.pi / 2])
 
 
-def _frame(bone: NDArray[np.float64] | list[float], axis: NDArray[np.float64] | list[float]) -> NDArray[np.float64]:
-    """Return the rotation with columns (bone, the axis made perpendicular to it, their cross product)."""
+def _frame(
+    bone: NDArray[np.float64] | list[float], axis: NDArray[np.float64] | list[float]
+) -> NDArray[np.float64]:
+    """Return the rotation with columns (bone, the axis made perpendicular to it, their cross
+    product).
+    """
     b = np.asarray(bone, float) / np.linalg.norm(bone)
     a = np.asarray(axis, float) - b * (b @ axis)
     a /= np.linalg.norm(a)
     return np.stack([b, a, np.cross(b, a)], axis=1)
 
 
-def _levelled(C: NDArray[np.float64], follow: Follow, takes: list[Take], side: str) -> NDArray[np.float64]:
-    """Return C turned by the smallest rotation that makes the foot level in the median frame in which it stands."""
+def _levelled(
+    C: NDArray[np.float64], follow: Follow, takes: list[Take], side: str
+) -> NDArray[np.float64]:
+    """Return C turned by the smallest rotation that makes the foot level in the median frame in
+    which it stands.
+    """
     ups = []
     for take in takes:
         ball = f"{side}_foot" if f"{side}_foot" in take.joint_names else f"{side}_foot_end"
-        moved = [np.linalg.norm(np.gradient(take.joint(j), axis=0), axis=1) for j in (ball, f"{side}_ankle")]
+        moved = [
+            np.linalg.norm(np.gradient(take.joint(j), axis=0), axis=1)
+            for j in (ball, f"{side}_ankle")
+        ]
         height = take.joint(f"{side}_ankle")[:, 1]
-        stands = (np.maximum(*moved) * take.fps < STANCE_SPEED) & (height < np.quantile(height, 0.5))
-        ups.append(segment_rotations(take, follow)[stands][:, 1])  # world's up in the segment's axes
+        stands = (np.maximum(*moved) * take.fps < STANCE_SPEED) & (
+            height < np.quantile(height, 0.5)
+        )
+        # world's up in the segment's axes
+        ups.append(segment_rotations(take, follow)[stands][:, 1])
     up = np.concatenate(ups)
     if len(up) < 10:
         return C
@@ -256,6 +323,10 @@ def _levelled(C: NDArray[np.float64], follow: Follow, takes: list[Take], side: s
 
 
 def _forward_lean(R: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return (T,) how far a segment's up axis leans in its facing direction, in the horizontal plane."""
-    facing = R[:, [0, 2], 2] / np.maximum(np.linalg.norm(R[:, [0, 2], 2], axis=1, keepdims=True), 1e-9)
+    """Return (T,) how far a segment's up axis leans in its facing direction, in the horizontal
+    plane.
+    """
+    facing = R[:, [0, 2], 2] / np.maximum(
+        np.linalg.norm(R[:, [0, 2], 2], axis=1, keepdims=True), 1e-9
+    )
     return np.einsum("ti,ti->t", facing, R[:, [0, 2], 1])

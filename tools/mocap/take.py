@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One recorded motion.
 
-Coordinate frame of all sources, for world and segments: right-handed, metres, y up; at zero pose the person stands
-upright facing +z with +x to the left, and every segment's axes are the world's. A segment carries the name of the
-joint it turns about (the thigh is ``left_hip``), so ``positions[t, j]`` is the origin of segment j and
-``orientations[t, j]`` takes its coordinates to the world. Names that end in ``_end`` are tips: they have the
-orientation of the segment whose tip they are. The floor is near y = 0.
+Coordinate frame of all sources, for world and segments: right-handed, metres, y up; at zero pose
+the person stands upright facing +z with +x to the left, and every segment's axes are the world's. A
+segment carries the name of the joint it turns about (the thigh is ``left_hip``), so ``positions[t,
+j]`` is the origin of segment j and ``orientations[t, j]`` takes its coordinates to the world. Names
+that end in ``_end`` are tips: they have the orientation of the segment whose tip they are. The
+floor is near y = 0.
 """
 
 from __future__ import annotations
@@ -20,7 +21,9 @@ from ...solver.errors import ShapeError
 
 @dataclass(frozen=True)
 class Take:
-    """A motion as named joints, y up, metres. Sources give the joints that they have, under common names."""
+    """A motion as named joints, y up, metres. Sources give the joints that they have, under common
+    names.
+    """
 
     name: str
     subject: str  # the performer; takes of one subject have the same bone lengths
@@ -38,9 +41,14 @@ class Take:
         """
         shape = (len(self.positions), len(self.joint_names), 3)
         if self.positions.shape != shape:
-            raise ShapeError(f"{self.name}: positions must have shape {shape}, but got {self.positions.shape}")
+            raise ShapeError(
+                f"{self.name}: positions must have shape {shape}, but got {self.positions.shape}"
+            )
         if self.orientations is not None and self.orientations.shape != (*shape, 3):
-            raise ShapeError(f"{self.name}: orientations must be {(*shape, 3)}, but got {self.orientations.shape}")
+            raise ShapeError(
+                f"{self.name}: orientations must be {(*shape, 3)}, but got "
+                f"{self.orientations.shape}"
+            )
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -60,7 +68,9 @@ class Take:
         :raises ShapeError: when the take has no such joint.
         """
         if name not in self.joint_names:
-            raise ShapeError(f"{self.name} has no joint '{name}'; it has {', '.join(self.joint_names)}")
+            raise ShapeError(
+                f"{self.name} has no joint '{name}'; it has {', '.join(self.joint_names)}"
+            )
         return self.joint_names.index(name)
 
     def resampled(self, fps: float) -> Take:

@@ -25,7 +25,9 @@ LARGEST_BYTES = {"sample": 410_000, "talk": 390_000}
 
 @dataclass(frozen=True)
 class Cut:
-    """What is shown of a clip: upper left corner and height of a part of the footage, and the view from the side."""
+    """What is shown of a clip: upper left corner and height of a part of the footage, and the view
+    from the side.
+    """
 
     size: tuple[int, int]  # of a panel with footage, pixels
     side: tuple[int, int]  # of the panel with the side view
@@ -49,14 +51,18 @@ CUTS = {  # the person stays inside
 
 
 def animation_frames(name: str) -> list[NDArray[np.uint8]]:
-    """Return (H, W, 3) RGB frames of an animation: footage, overlay and side view next to each other."""
+    """Return (H, W, 3) RGB frames of an animation: footage, overlay and side view next to each
+    other.
+    """
     if name == "sample":
         return _frames(SAMPLE, captured(SAMPLE)[0], None, CUTS[name])
     return _frames(talk(), captured_in_total(talk()), body_with_face(), CUTS[name])
 
 
 def _frames(clip: Path, motion: Motion, body: Body | None, cut: Cut) -> list[NDArray[np.uint8]]:
-    """Return an animation's frames; a body that is given has eyes and mouth in their own colours."""
+    """Return an animation's frames; a body that is given has eyes and mouth in their own
+    colours.
+    """
     rows = {int(frame): row for row, frame in enumerate(motion.frames)}
     view = from_around(motion, 0, np.array(cut.middle), cut.side, cut.turn, cut.height_m)
     frames = []
@@ -69,13 +75,20 @@ def _frames(clip: Path, motion: Motion, body: Body | None, cut: Cut) -> list[NDA
             overlay = cropped(frame.image_rgb, cut.corner, cut.tall, cut.size, motion, row, body)
             side = Panel(view, joints(motion, 0)[0])
             shown = body or default_body()
-            side.body(shown, posed(motion, shown, row), OURS if body is None else colors_with_face(body, OURS))
+            side.body(
+                shown,
+                posed(motion, shown, row),
+                OURS if body is None else colors_with_face(body, OURS),
+            )
             frames.append(next_to_each_other([footage, overlay, side.finished()]))
     return frames
 
 
-def write_webp(path: Path, frames: list[NDArray[np.uint8]], frames_per_second: float, most_bytes: int) -> int:
-    """Write an endless animated WebP, at the best quality that stays below a size; returns that quality.
+def write_webp(
+    path: Path, frames: list[NDArray[np.uint8]], frames_per_second: float, most_bytes: int
+) -> int:
+    """Write an endless animated WebP, at the best quality that stays below a size; returns that
+    quality.
 
     :param frames: (H, W, 3) uint8 RGB, all of one size.
     :raises OutputError: when the file cannot be written, or is too large at every quality.
@@ -88,4 +101,6 @@ def write_webp(path: Path, frames: list[NDArray[np.uint8]], frames_per_second: f
             raise OutputError(f"cannot write {path}; check that its folder exists and is writable")
         if path.stat().st_size <= most_bytes:
             return quality
-    raise OutputError(f"{path} is larger than {most_bytes} bytes at every quality; show fewer frames")
+    raise OutputError(
+        f"{path} is larger than {most_bytes} bytes at every quality; show fewer frames"
+    )

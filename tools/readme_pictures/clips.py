@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The clips of the pictures, captured with default settings, and the error of a frame against ground truth."""
+"""The clips of the pictures, captured with default settings, and the error of a frame against
+ground truth.
+"""
 
 from __future__ import annotations
 
@@ -48,7 +50,9 @@ def body_with_face() -> Body:
 @cache
 def captured(video: Path, everybody: bool = False) -> list[Motion]:
     """Capture a clip with default settings: everyone, or the most prominent person only."""
-    return capture(video, default_body(), CaptureOptions(people="all" if everybody else "largest")).motions
+    return capture(
+        video, default_body(), CaptureOptions(people="all" if everybody else "largest")
+    ).motions
 
 
 @cache
@@ -66,17 +70,27 @@ def talk() -> Path:
 
 
 def camera(number: int) -> tuple[Motion, Path]:
-    """Return the motion captured from one of the four pose2sim cameras, and the file of its ground truth."""
+    """Return the motion captured from one of the four pose2sim cameras, and the file of its ground
+    truth.
+    """
     folder = DATA / "pose2sim"
     return captured(folder / f"cam{number}.mp4")[0], folder / f"truth_cam{number}.npz"
 
 
 def error_mm(motion: Motion, row: int, truth: Path) -> float:
-    """Return the mean distance of the twelve limb joints from ground truth, with the middle of the hips aligned."""
+    """Return the mean distance of the twelve limb joints from ground truth, with the middle of the
+    hips aligned.
+    """
     true, found = true_joints(motion, row, truth), joints(motion, row)
-    return 1000 * float(np.mean([np.linalg.norm(found[k] - true[name]) for name, k in _LIMBS.items() if name in true]))
+    return 1000 * float(
+        np.mean(
+            [np.linalg.norm(found[k] - true[name]) for name, k in _LIMBS.items() if name in true]
+        )
+    )
 
 
 def distance_cm(motion: Motion, row: int, truth: Path, name: str) -> float:
     """Return the distance of one joint from ground truth, aligned in the same way."""
-    return 100 * float(np.linalg.norm(joints(motion, row)[_LIMBS[name]] - true_joints(motion, row, truth)[name]))
+    return 100 * float(
+        np.linalg.norm(joints(motion, row)[_LIMBS[name]] - true_joints(motion, row, truth)[name])
+    )

@@ -43,12 +43,15 @@ def cropped(
     :param corner: upper left corner of the part, pixels of the frame.
     :param height: of the part, pixels of the frame.
     :param size: (width, height) of the result, pixels.
-    :param body: of the motion, whose eyes and mouth have their own colours; the default body if left out.
+    :param body: of the motion, whose eyes and mouth have their own colours; the default body if
+        left out.
     """
     scale = FINER * size[1] / height
     crop = np.array([[scale, 0, -corner[0] * scale], [0, scale, -corner[1] * scale], [0, 0, 1.0]])
     wide = (FINER * size[0], FINER * size[1])
-    enlarged = cv2.warpAffine(image, crop[:2], wide, flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+    enlarged = cv2.warpAffine(
+        image, crop[:2], wide, flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
+    )
     larger = np.asarray(enlarged, np.uint8)
     if motion is not None:
         colors = np.array(OURS) if body is None else colors_with_face(body, OURS)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One panel of a picture: background, floor grid, shadows, bodies, stick figures, measures and a heading."""
+"""One panel of a picture: background, floor grid, shadows, bodies, stick figures, measures and a
+heading.
+"""
 
 from __future__ import annotations
 
@@ -26,26 +28,38 @@ _STEP, _REACH = 0.5, 5.0  # spacing and half width of the grid, metres
 
 
 class Panel:
-    """A picture that is being drawn. Points are in metres in the view's world; the floor is z = 0."""
+    """A picture that is being drawn. Points are in metres in the view's world; the floor is z =
+    0.
+    """
 
     def __init__(self, view: View, middle: NDArray[np.float64]) -> None:
         scale = np.diag([FINER, FINER, 1.0])
         width, height = view.size
-        self.view = View(scale @ view.intrinsics, view.world_from_camera, (FINER * width, FINER * height))
+        self.view = View(
+            scale @ view.intrinsics, view.world_from_camera, (FINER * width, FINER * height)
+        )
         self.image = np.full((FINER * height, FINER * width, 3), GROUND, np.uint8)
         self._depth = np.full(self.image.shape[:2], np.inf, np.float32)
         self._grid(middle)
 
-    def body(self, body: Body, vertices: NDArray[np.float64], color: Color | NDArray[np.float64] = OURS) -> None:
-        """Draw a body, of one colour or with one (F, 3) for each face, and its shadow under a light from above."""
+    def body(
+        self, body: Body, vertices: NDArray[np.float64], color: Color | NDArray[np.float64] = OURS
+    ) -> None:
+        """Draw a body, of one colour or with one (F, 3) for each face, and its shadow under a light
+        from above.
+        """
         triangles = np.concatenate([body.faces[:, [0, 1, 2]], body.faces[:, [0, 2, 3]]])
         self._shadow(vertices, triangles)
         seen = self.view.to_camera(vertices)
         colors = np.array(color) if np.ndim(color) == 1 else np.tile(color, (2, 1))
-        self.image = draw_overlay(self.image, seen, triangles, self.view.intrinsics, colors=colors, opacity=1)
+        self.image = draw_overlay(
+            self.image, seen, triangles, self.view.intrinsics, colors=colors, opacity=1
+        )
         self._depth = np.minimum(self._depth, self._rasterized(seen, triangles, OURS).depth)
 
-    def sticks(self, points: dict[str, NDArray[np.float64]], color: Color = TRUTH, radius: float = 0.014) -> None:
+    def sticks(
+        self, points: dict[str, NDArray[np.float64]], color: Color = TRUTH, radius: float = 0.014
+    ) -> None:
         """Draw a stick figure; parts within or behind a body show through it."""
         vertices, triangles = stick_figure(points, radius)
         canvas = self._rasterized(self.view.to_camera(vertices), triangles, color)
@@ -68,8 +82,12 @@ class Panel:
         for k in range(0, count - 1, 2):
             self._stroke(points[k], points[k + 1], color, width)
 
-    def note(self, text: str, at: NDArray[np.float64], offset: tuple[float, float], size: float = 0.46) -> None:
-        """Label a point at ``offset`` pixels of the finished picture from it, with a thin leader line."""
+    def note(
+        self, text: str, at: NDArray[np.float64], offset: tuple[float, float], size: float = 0.46
+    ) -> None:
+        """Label a point at ``offset`` pixels of the finished picture from it, with a thin leader
+        line.
+        """
         point = self.view.project(at)
         place = point + FINER * np.array(offset)
         (width, _), _ = cv2.getTextSize(text, _FONT, FINER * size, FINER)
@@ -93,7 +111,9 @@ class Panel:
 
     def finished(self) -> NDArray[np.uint8]:
         """Return the picture, (H, W, 3) RGB."""
-        small = cv2.resize(self.image, None, fx=1 / FINER, fy=1 / FINER, interpolation=cv2.INTER_AREA)
+        small = cv2.resize(
+            self.image, None, fx=1 / FINER, fy=1 / FINER, interpolation=cv2.INTER_AREA
+        )
         return small.astype(np.uint8, copy=False)
 
     def _grid(self, middle: NDArray[np.float64]) -> None:
@@ -107,7 +127,9 @@ class Panel:
                 points[:, axis], points[:, 1 - axis] = along, offset
                 points[:, :2] += center
                 pixels = self.view.project(points)
-                fade = np.clip(1.3 - np.linalg.norm(points[:, :2] - middle[:2], axis=1) / _REACH * 1.3, 0, 1)
+                fade = np.clip(
+                    1.3 - np.linalg.norm(points[:, :2] - middle[:2], axis=1) / _REACH * 1.3, 0, 1
+                )
                 for k in range(len(along) - 1):
                     color = fade[k] * np.array(GRID) + (1 - fade[k]) * np.array(GROUND)
                     self._stroke(pixels[k], pixels[k + 1], tuple(color), 1.0)
@@ -120,18 +142,30 @@ class Panel:
         soft = cv2.GaussianBlur(covered.astype(np.float32), (0, 0), 3.0 * FINER)[..., None]
         self.image = (self.image * (1 - 0.28 * soft) + 0.5).astype(np.uint8)
 
-    def _rasterized(self, points_camera: NDArray[np.float64], triangles: NDArray[np.intp], color: Color) -> Canvas:
+    def _rasterized(
+        self, points_camera: NDArray[np.float64], triangles: NDArray[np.intp], color: Color
+    ) -> Canvas:
         canvas = Canvas.blank(*self.view.size)
-        rasterize(canvas, points_camera, triangles, np.array(color, np.float32), self.view.intrinsics)
+        rasterize(
+            canvas, points_camera, triangles, np.array(color, np.float32), self.view.intrinsics
+        )
         return canvas
 
-    def _stroke(self, a: NDArray[np.float64], b: NDArray[np.float64], color: Color, width: float) -> None:
+    def _stroke(
+        self, a: NDArray[np.float64], b: NDArray[np.float64], color: Color, width: float
+    ) -> None:
         if np.isfinite([a, b]).all() and np.abs([a, b]).max() < 1e5:
-            cv2.line(self.image, _pixel(a), _pixel(b), color, max(1, round(width * FINER)), cv2.LINE_AA)
+            cv2.line(
+                self.image, _pixel(a), _pixel(b), color, max(1, round(width * FINER)), cv2.LINE_AA
+            )
 
     def _write(self, text: str, at: NDArray[Any], size: float) -> None:
-        cv2.putText(self.image, text, _pixel(at), _FONT, FINER * size, GROUND, 5 * FINER, cv2.LINE_AA)
-        cv2.putText(self.image, text, _pixel(at), _FONT, FINER * size, INK, round(1.4 * FINER), cv2.LINE_AA)
+        cv2.putText(
+            self.image, text, _pixel(at), _FONT, FINER * size, GROUND, 5 * FINER, cv2.LINE_AA
+        )
+        cv2.putText(
+            self.image, text, _pixel(at), _FONT, FINER * size, INK, round(1.4 * FINER), cv2.LINE_AA
+        )
 
 
 def _pixel(at: NDArray[np.float64]) -> tuple[int, int]:

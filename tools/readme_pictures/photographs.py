@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Faces of real people: a photograph, the landmarks found in it, and the body's head with the captured expression.
+"""Faces of real people: a photograph, the landmarks found in it, and the body's head with the
+captured expression.
 
-The photographs are in the public domain and come from the pinned wheels; THIRD_PARTY.md says whose they are.
+The photographs are in the public domain and come from the pinned wheels; THIRD_PARTY.md says whose
+they are.
 """
 
 from __future__ import annotations
@@ -68,24 +70,32 @@ PHOTOGRAPHS = (
 
 
 def real_faces() -> NDArray[np.uint8]:
-    """Draw a row for each photograph: the picture, the landmarks over it, and the body's head in the same camera."""
+    """Draw a row for each photograph: the picture, the landmarks over it, and the body's head in
+    the same camera.
+    """
     return np.concatenate([_row(photograph.unpacked()) for photograph in PHOTOGRAPHS])
 
 
 def _row(path: Path) -> NDArray[np.uint8]:
     motion = captured_in_total(path)
-    image = cv2.cvtColor(cv2.imread(str(path), cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False)
+    image = cv2.cvtColor(cv2.imread(str(path), cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB).astype(
+        np.uint8, copy=False
+    )
     points = motion.face["face_points"][0].astype(float)
     part = around(points, _SIZE)
     photograph = _enlarged(image, part)
     panels = [photograph, with_dots(photograph, points, part), _head(motion, part)]
-    finished = [cv2.resize(p, _SIZE, interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False) for p in panels]
+    finished = [
+        cv2.resize(p, _SIZE, interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
+        for p in panels
+    ]
     row = next_to_each_other(finished)
     return np.concatenate([row, np.full((2, row.shape[1], 3), 255, np.uint8)])
 
 
 def around(points: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.float64]:
-    """Return the map (3, 3) from pixels of the photograph to those of an enlarged panel with the face in its middle.
+    """Return the map (3, 3) from pixels of the photograph to those of an enlarged panel with the
+    face in its middle.
 
     :param points: (F, 2) landmarks, pixels of the photograph.
     :param size: (width, height) of the finished panel, pixels.
@@ -96,7 +106,9 @@ def around(points: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.flo
     return np.array([[scale, 0, middle[0]], [0, scale, middle[1]], [0, 0, 1.0]])
 
 
-def with_dots(panel: NDArray[np.uint8], points: NDArray[np.float64], part: NDArray[np.float64]) -> NDArray[np.uint8]:
+def with_dots(
+    panel: NDArray[np.uint8], points: NDArray[np.float64], part: NDArray[np.float64]
+) -> NDArray[np.uint8]:
     """Return a panel (H, W, 3) with a dot at every landmark (F, 2); ``part``: see `around`."""
     out = panel.copy()
     for x, y in points @ part[:2, :2].T + part[:2, 2]:
@@ -108,7 +120,9 @@ def with_dots(panel: NDArray[np.uint8], points: NDArray[np.float64], part: NDArr
 
 def _enlarged(image: NDArray[np.uint8], part: NDArray[np.float64]) -> NDArray[np.uint8]:
     wide = (FINER * _SIZE[0], FINER * _SIZE[1])
-    found = cv2.warpAffine(image, part[:2], wide, flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+    found = cv2.warpAffine(
+        image, part[:2], wide, flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
+    )
     return found.astype(np.uint8, copy=False)
 
 
@@ -117,4 +131,6 @@ def _head(motion: Motion, part: NDArray[np.float64]) -> NDArray[np.uint8]:
     body = body_with_face()
     blank = np.full((FINER * _SIZE[1], FINER * _SIZE[0], 3), GROUND, np.uint8)
     vertices, colors = posed_in_camera(motion, body, 0), colors_with_face(body, OURS)
-    return draw_overlay(blank, vertices, body.faces, part @ motion.intrinsics, colors=colors, opacity=1)
+    return draw_overlay(
+        blank, vertices, body.faces, part @ motion.intrinsics, colors=colors, opacity=1
+    )

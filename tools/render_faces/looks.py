@@ -15,7 +15,8 @@ SKINS = ((0.58, 0.36, 0.27), (0.5, 0.29, 0.2), (0.3, 0.16, 0.1), (0.12, 0.06, 0.
 LIPS = np.array([0.85, 0.5, 0.5])  # times the skin's colour
 HAIR = np.array([0.03, 0.018, 0.012])
 IRISES = ((0.1, 0.055, 0.025), (0.08, 0.14, 0.2), (0.07, 0.11, 0.05))
-_BROW_ENDS, _BROW_HEIGHT, _BROW_HALF_M = (0.012, 0.052), 0.702, 0.004  # metres from the middle, in the model frame
+# metres from the middle, in the model frame
+_BROW_ENDS, _BROW_HEIGHT, _BROW_HALF_M = (0.012, 0.052), 0.702, 0.004
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,9 @@ def masks(body: Body) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray
     ):
         for name in names:
             length = np.linalg.norm(keys[name].offsets, axis=1)
-            mask[keys[name].vertices] = np.maximum(mask[keys[name].vertices], length > share * length.max())
+            mask[keys[name].vertices] = np.maximum(
+                mask[keys[name].vertices], length > share * length.max()
+            )
     x, y = abs(V[:, 0]), V[:, 1]
     inner, outer = _BROW_ENDS
     across = np.clip((x - inner) / 0.006, 0, 1) * np.clip((outer - x) / 0.006 + 1, 0, 1)

@@ -12,9 +12,11 @@ from .sequences import FaceClip, in_motion, random_poses, talk_and_grimaces, tur
 
 @dataclass(frozen=True)
 class FaceSet:
-    """``draw`` with a seed and sizes makes the clip, ``change`` what differs from another set with the same seed.
+    """``draw`` with a seed and sizes makes the clip, ``change`` what differs from another set with
+    the same seed.
 
-    ``worn``: a style of glasses, or a beard; ``blurred``: by motion; ``cycles``: rendered with light and shadows.
+    ``worn``: a style of glasses, or a beard; ``blurred``: by motion; ``cycles``: rendered with
+    light and shadows.
     """
 
     draw: Callable[..., FaceClip]
@@ -47,5 +49,7 @@ SETS: dict[str, FaceSet] = {
     "talk_reflections": _held_out(worn="thick glasses"),
     "talk_dark_glasses": _condition(worn="dark glasses"),
     "talk_beard": _condition(worn="beard"),
-    "talk_half_minute": FaceSet(talk_and_grimaces, 23, {"people": 1, "seconds": 30.0}, cycles=False),
+    "talk_half_minute": FaceSet(
+        talk_and_grimaces, 23, {"people": 1, "seconds": 30.0}, cycles=False
+    ),
 }

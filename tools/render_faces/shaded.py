@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A fast renderer of the head, without shadows, for the many pictures that something is calibrated on."""
+"""A fast renderer of the head, without shadows, for the many pictures that something is calibrated
+on.
+"""
 
 from __future__ import annotations
 
@@ -28,17 +30,24 @@ class ShadedStage:
         kept = head_faces(body)
         assert body.face_material is not None  # checked by `head_faces`
         quads = body.faces[kept]
-        self._triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]).astype(np.int32)
+        self._triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]).astype(
+            np.int32
+        )
         self._material, self._names = body.face_material[kept], list(body.material_names)
         self._palette = np.asarray(body.material_colors)[:, :3]
         self._mouth = np.isin(np.flatnonzero(kept), mouth_faces_of(body))
         self._worn: dict[str, tuple[NDArray[np.int32], NDArray[np.float32]]] = {}
-        self._quads, self._edges = quads, np.concatenate([quads[:, [k, (k + 1) % 4]] for k in range(4)])
+        self._quads, self._edges = (
+            quads,
+            np.concatenate([quads[:, [k, (k + 1) % 4]] for k in range(4)]),
+        )
 
     def dress(self, look: Look, rng: np.random.Generator) -> None:
         """Take a person's colours, and draw light and background."""
         colors = self._palette[self._material].copy()
-        skin = np.isin(self._material, [self._names.index(n) for n in ("skin", "suit", "suit_accent")])
+        skin = np.isin(
+            self._material, [self._names.index(n) for n in ("skin", "suit", "suit_accent")]
+        )
         colors[skin] = look.skin[self._quads[skin]].mean(axis=1)
         colors[self._material == self._names.index("hair")] = look.hair
         colors[self._material == self._names.index("eye_iris")] = look.iris
@@ -59,7 +68,9 @@ class ShadedStage:
             color, stopped = WORN[name][:2]
             if stopped < 1.0:
                 continue  # clear lenses: reflections are not drawn
-            triangles = np.array([(f[0], f[k], f[k + 1]) for f in faces for k in range(1, len(f) - 1)], np.int32)
+            triangles = np.array(
+                [(f[0], f[k], f[k + 1]) for f in faces for k in range(1, len(f) - 1)], np.int32
+            )
             srgb = np.clip(self._hair if name == "beard" else color, 0, 1) ** (1 / 2.2)
             both = np.concatenate([triangles, triangles[:, ::-1]])  # hairs are seen from both sides
             self._worn[name] = both, np.tile(srgb, (len(both), 1)).astype(np.float32)
@@ -83,14 +94,24 @@ class ShadedStage:
         light *= np.clip(1.0 - hollow / _CONCAVE * 3.0, 0.25, 1.1)
         shading = np.stack([np.clip(light, 0, 1.3), np.zeros(len(V))], axis=1)
         side = _OVER * SIZE
-        K = np.array([[focal_px * _OVER, 0, side / 2 - 0.5], [0, focal_px * _OVER, side / 2 - 0.5], [0, 0, 1.0]])
+        K = np.array(
+            [
+                [focal_px * _OVER, 0, side / 2 - 0.5],
+                [0, focal_px * _OVER, side / 2 - 0.5],
+                [0, 0, 1.0],
+            ]
+        )
         canvas = Canvas.blank(side, side)
         rasterize(canvas, V, self._triangles, self._colors, K, shading=shading)
         for name, (triangles, colors) in self._worn.items():
             places = np.ascontiguousarray((worn or {})[name], float)
-            rasterize(canvas, places, triangles, colors, K, shading=np.tile([0.9, 0.0], (len(places), 1)))
+            rasterize(
+                canvas, places, triangles, colors, K, shading=np.tile([0.9, 0.0], (len(places), 1))
+            )
         image = np.where(canvas.coverage[..., None], canvas.rgba[..., :3], self._background)
-        image = cv2.resize(cv2.GaussianBlur(image, (0, 0), 1.2), (SIZE, SIZE), interpolation=cv2.INTER_AREA)
+        image = cv2.resize(
+            cv2.GaussianBlur(image, (0, 0), 1.2), (SIZE, SIZE), interpolation=cv2.INTER_AREA
+        )
         noisy = image + self._noise.normal(0, 2.5, image.shape)
         cv2.imwrite(str(path), np.clip(noisy, 0, 255).astype(np.uint8)[..., ::-1])
 
@@ -107,5 +128,7 @@ def hollows(
     a, b = edges.T
     step, count = vertices[b] - vertices[a], len(vertices)
     rise = np.bincount(a, np.einsum("ex,ex->e", step, normals[a]), count)
-    out: NDArray[np.float64] = rise / np.maximum(np.bincount(a, np.linalg.norm(step, axis=1) ** 2, count), 1e-12)
+    out: NDArray[np.float64] = rise / np.maximum(
+        np.bincount(a, np.linalg.norm(step, axis=1) ** 2, count), 1e-12
+    )
     return out

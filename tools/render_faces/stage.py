@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The head, its colours, the light and the camera in Blender. The world is the camera's frame: x right, y down."""
+"""The head, its colours, the light and the camera in Blender. The world is the camera's frame: x
+right, y down.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,9 @@ class Stage:
 
     def dress(self, look: Look, rng: np.random.Generator) -> None:
         """Take a person's colours, and draw light and background."""
-        rgba = np.concatenate([look.skin[self._kept], np.ones((len(self._kept), 1))], axis=1).astype(np.float32)
+        rgba = np.concatenate(
+            [look.skin[self._kept], np.ones((len(self._kept), 1))], axis=1
+        ).astype(np.float32)
         self._mesh.color_attributes["tint"].data.foreach_set("color", rgba.ravel())
         for name, color in (("hair", look.hair), ("eye_iris", look.iris)):
             surface = self._mesh.materials[name].node_tree.nodes["Principled BSDF"]
@@ -50,14 +54,20 @@ class Stage:
         for mesh in self._worn.values():
             bpy.data.meshes.remove(mesh)  # and its object
         self._worn = {}
-        bpy.context.scene.cycles.samples = SAMPLES_OF_LENSES if "clear lenses" in things else SAMPLES
+        bpy.context.scene.cycles.samples = (
+            SAMPLES_OF_LENSES if "clear lenses" in things else SAMPLES
+        )
         for name, faces in things.items():
             mesh = bpy.data.meshes.new(name)
             count = 1 + max(max(face) for face in faces)
             mesh.from_pydata(np.zeros((count, 3)).tolist(), [], faces)
             mesh.materials.append(_worn_material(name))
             if name == "beard":
-                hair = self._mesh.materials["hair"].node_tree.nodes["Principled BSDF"].inputs["Base Color"]
+                hair = (
+                    self._mesh.materials["hair"]
+                    .node_tree.nodes["Principled BSDF"]
+                    .inputs["Base Color"]
+                )
                 surface = mesh.materials[0].node_tree.nodes["Principled BSDF"]
                 surface.inputs["Base Color"].default_value = hair.default_value
             bpy.context.scene.collection.objects.link(bpy.data.objects.new(name, mesh))
@@ -79,7 +89,9 @@ class Stage:
         self._mesh.vertices.foreach_set("co", points.ravel())
         self._mesh.update()
         for name, places in (worn or {}).items():
-            self._worn[name].vertices.foreach_set("co", np.ascontiguousarray(places, np.float32).ravel())
+            self._worn[name].vertices.foreach_set(
+                "co", np.ascontiguousarray(places, np.float32).ravel()
+            )
             self._worn[name].update()
         bpy.context.scene.camera.data.lens = focal_px / SIZE * 36.0
         for lamp in self._lights:
@@ -114,7 +126,9 @@ class Stage:
         self._kept, local = np.unique(body.faces[kept], return_inverse=True)
         material = body.face_material[kept]
         self._mesh = bpy.data.meshes.new("head")
-        self._mesh.from_pydata(body.v_template[self._kept].tolist(), [], local.reshape(-1, 4).tolist())
+        self._mesh.from_pydata(
+            body.v_template[self._kept].tolist(), [], local.reshape(-1, 4).tolist()
+        )
         for name, color in zip(body.material_names, body.material_colors, strict=True):
             self._mesh.materials.append(_material(str(name), tuple(color)))
         self._mesh.polygons.foreach_set("material_index", material.astype(np.int32))
@@ -147,7 +161,10 @@ def _worn_material(name: str) -> bpy.types.Material:
     nodes, links = material.node_tree.nodes, material.node_tree.links
     surface = nodes["Principled BSDF"]
     surface.inputs["Base Color"].default_value = (*color, 1)
-    surface.inputs["Roughness"].default_value, surface.inputs["Metallic"].default_value = roughness, float(metal)
+    surface.inputs["Roughness"].default_value, surface.inputs["Metallic"].default_value = (
+        roughness,
+        float(metal),
+    )
     mix = nodes.new("ShaderNodeMixShader")
     mix.inputs["Fac"].default_value = stopped
     links.new(nodes.new("ShaderNodeBsdfTransparent").outputs["BSDF"], mix.inputs[1])

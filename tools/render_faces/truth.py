@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the rendered faces are: the mesh in the camera's frame, and the truth of a set as a file."""
+"""Where the rendered faces are: the mesh in the camera's frame, and the truth of a set as a
+file.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,8 @@ FOLDER = Path(__file__).resolve().parents[2] / "build" / "faces"
 MIDDLE = np.array([0.0, 0.681, 0.11])  # of the face, in the model frame; the camera looks at it
 WIDTH_M = 0.27  # that the picture shows at the face
 SIZE = 256
-_NECK_M, _HALF_M = 0.08, 0.2  # below the neck joint and beside the body's middle, where the picture ends
+# below the neck joint and beside the body's middle, where the picture ends
+_NECK_M, _HALF_M = 0.08, 0.2
 
 
 def focal_px(distance: float) -> float:
@@ -39,7 +42,9 @@ def head_faces(body: Body) -> NDArray[np.bool_]:
     return near[body.faces].all(axis=1)
 
 
-def head_vertices(body: Body, weights: NDArray[np.float64], identity: NDArray[np.float64]) -> NDArray[np.float64]:
+def head_vertices(
+    body: Body, weights: NDArray[np.float64], identity: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Return the vertices (V, 3) in the model frame."""
     out = body.v_template.astype(float) + identity
     for w, expression in zip(weights, expressions_of(body), strict=True):
@@ -52,7 +57,9 @@ def with_expression(body: Body, weights: NDArray[np.floating[Any]]) -> Body:
     return replace(body, v_template=head_vertices(body, np.asarray(weights, float), np.zeros(3)))
 
 
-def camera_vertices(body: Body, clip: FaceClip, identities: NDArray[np.float64], t: int) -> NDArray[np.float64]:
+def camera_vertices(
+    body: Body, clip: FaceClip, identities: NDArray[np.float64], t: int
+) -> NDArray[np.float64]:
     """Return the vertices (V, 3) of frame t in the camera frame, metres."""
     return to_camera(clip, t, head_vertices(body, clip.weights[t], identities[clip.person[t]]))
 
@@ -64,7 +71,9 @@ def to_camera(clip: FaceClip, t: int, points: NDArray[np.float64]) -> NDArray[np
 
 
 def gaze_directions(body: Body, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the unit directions (2, 3) from the middle of the left and of the right eyeball to its pupil."""
+    """Return the unit directions (2, 3) from the middle of the left and of the right eyeball to its
+    pupil.
+    """
     material = list(body.material_names)
     eye = np.unique(body.faces[body.face_material == material.index("eye_white")])
     pupil = np.unique(body.faces[body.face_material == material.index("eye_pupil")])
@@ -80,7 +89,9 @@ def gaze_directions(body: Body, vertices: NDArray[np.float64]) -> NDArray[np.flo
 
 
 def write_truth(path: Path, body: Body, clip: FaceClip, identities: NDArray[np.float64]) -> None:
-    """Write weights (T, 52), R_camera_head, distance, person, seconds, gaze (T, 2, 3), identities (N, V, 3)."""
+    """Write weights (T, 52), R_camera_head, distance, person, seconds, gaze (T, 2, 3), identities
+    (N, V, 3).
+    """
     values: dict[str, Any] = dict(vars(clip))
     values["gaze"] = np.array(
         [

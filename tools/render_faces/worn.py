@@ -27,7 +27,9 @@ WORN: dict[str, tuple[Triple, float, float, bool]] = {
 
 @dataclass(frozen=True)
 class Worn:
-    """Meshes by their materials' names: those that keep their form, and hairs, which move with the skin."""
+    """Meshes by their materials' names: those that keep their form, and hairs, which move with the
+    skin.
+    """
 
     rigid: dict[str, Mesh]
     beard: Beard | None = None
@@ -39,7 +41,9 @@ class Worn:
         return {name: mesh.faces for name, mesh in self.rigid.items()} | hairs
 
     def vertices(self, face: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-        """Return the vertices of each mesh on a face (V, 3) with an expression; metres, model frame."""
+        """Return the vertices of each mesh on a face (V, 3) with an expression; metres, model
+        frame.
+        """
         hairs = {} if self.beard is None else {"beard": self.beard.vertices(face)}
         return {name: mesh.vertices for name, mesh in self.rigid.items()} | hairs
 
@@ -52,4 +56,6 @@ def put_on(what: str, body: Body, face: NDArray[np.float64], rng: np.random.Gene
         return Worn({}, grow_beard(body, rng))
     style, parts = STYLES[what], glasses(STYLES[what], body, face)
     frame = "thin frame" if what == "thin glasses" else "thick frame"
-    return Worn({frame: parts["frame"], "dark lenses" if style.dark else "clear lenses": parts["lenses"]})
+    return Worn(
+        {frame: parts["frame"], "dark lenses" if style.dark else "clear lenses": parts["lenses"]}
+    )

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``python -m scope.tools.render_sample``: write assets/sample/sample.mp4 and sample_truth.npz. Needs bpy."""
+"""``python -m scope.tools.render_sample``: write assets/sample/sample.mp4 and sample_truth.npz.
+Needs bpy.
+"""
 
 from __future__ import annotations
 
@@ -17,8 +19,15 @@ from .truth import BETAS, FPS, sample_shot, write_truth
 def main() -> int:
     """Render the clip, or single frames of it to look at."""
     parser = argparse.ArgumentParser(prog="render_sample", description=__doc__)
-    parser.add_argument("-o", "--out", type=Path, default=ASSETS / "sample", help="folder (default: assets/sample)")
-    parser.add_argument("--frames", type=int, nargs="*", help="render only these frames, as pictures, into the folder")
+    parser.add_argument(
+        "-o", "--out", type=Path, default=ASSETS / "sample", help="folder (default: assets/sample)"
+    )
+    parser.add_argument(
+        "--frames",
+        type=int,
+        nargs="*",
+        help="render only these frames, as pictures, into the folder",
+    )
     arguments = parser.parse_args()
     from .clip import render_clip, render_pictures
 

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The motion of the sample clip, written by hand: stand, raise both arms and wave, squat, turn and walk four steps.
+"""The motion of the sample clip, written by hand: stand, raise both arms and wave, squat, turn and
+walk four steps.
 
-Angles are degrees in the model frame (x to the person's left, y up, z ahead), times are seconds, places are metres on
-the floor of the world (z up). At zero yaw the person faces world −y, where the camera stands.
+Angles are degrees in the model frame (x to the person's left, y up, z ahead), times are seconds,
+places are metres on the floor of the world (z up). At zero yaw the person faces world −y, where the
+camera stands.
 """
 
 from __future__ import annotations
@@ -27,8 +29,12 @@ SQUAT = (2.2, 2.72, 2.86, 3.28)  # begins, is lowest from .. to, ends
 Key = tuple[float, NDArray[np.float64]]  # time, value
 
 
-def choreograph(body: Body, betas: NDArray[np.float64], fps: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the pose of every frame: rotations (T, K+1, 3, 3), row 0 the root in the world; and trans (T, 3)."""
+def choreograph(
+    body: Body, betas: NDArray[np.float64], fps: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the pose of every frame: rotations (T, K+1, 3, 3), row 0 the root in the world; and
+    trans (T, 3).
+    """
     times = np.arange(round(DURATION * fps)) / fps
     J = body.rest_joints(betas)
     index = {name: i for i, name in enumerate(body.joint_names)}
@@ -41,14 +47,22 @@ def choreograph(body: Body, betas: NDArray[np.float64], fps: float) -> tuple[NDA
         for name, keys in upper.items():
             rotations[f, index[name]] = rotation_at(keys, t)
         pelvis = np.array([*_curve(_PELVIS_XY, t), stand + _curve(_PELVIS_DROP, t)[0]])
-        R_root = exp(np.radians([0, 0, _eased(_YAW, t)])) @ R_WORLD_MODEL @ exp(np.radians([_eased(_LEAN, t), 0, 0]))
+        R_root = (
+            exp(np.radians([0, 0, _eased(_YAW, t)]))
+            @ R_WORLD_MODEL
+            @ exp(np.radians([_eased(_LEAN, t), 0, 0]))
+        )
         rotations[f, 0], trans[f] = R_root, pelvis - J[0]
         for side in ("left", "right"):
             hip, knee, ankle = (index[f"{side}_{part}"] for part in ("hip", "knee", "ankle"))
             place, R_foot = _foot_at(side, t)
             place[2] += ankle_height
             R_hip, R_knee = solve_leg(
-                R_root, pelvis + R_root @ (J[hip] - J[0]), place, J[knee] - J[hip], J[ankle] - J[knee]
+                R_root,
+                pelvis + R_root @ (J[hip] - J[0]),
+                place,
+                J[knee] - J[hip],
+                J[ankle] - J[knee],
             )
             rotations[f, hip], rotations[f, knee] = R_hip, R_knee
             rotations[f, ankle] = (R_root @ R_hip @ R_knee).T @ R_foot
@@ -56,15 +70,24 @@ def choreograph(body: Body, betas: NDArray[np.float64], fps: float) -> tuple[NDA
 
 
 def standing_feet(times: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return (T, 2) bool: whether the left and the right foot are flat and at rest at these times."""
-    return np.array([[not any(t0 < t < t1 for t0, t1, *_ in _STEPS[s]) for s in ("left", "right")] for t in times])
+    """Return (T, 2) bool: whether the left and the right foot are flat and at rest at these
+    times.
+    """
+    return np.array(
+        [
+            [not any(t0 < t < t1 for t0, t1, *_ in _STEPS[s]) for s in ("left", "right")]
+            for t in times
+        ]
+    )
 
 
 # Legs
 
 
 def _beside(along: float, side: str, yaw: float) -> NDArray[np.float64]:
-    """Return a place on the floor, ``along`` metres into the walk, half the width of the stance to one side."""
+    """Return a place on the floor, ``along`` metres into the walk, half the width of the stance to
+    one side.
+    """
     walk, facing = np.radians(TURN), np.radians(yaw)
     ahead = np.array([np.sin(walk), -np.cos(walk)])
     left = np.array([np.cos(facing), np.sin(facing)])
@@ -94,7 +117,8 @@ def _foot_at(side: str, t: float) -> tuple[NDArray[np.float64], NDArray[np.float
         elif t > begin:
             s = (t - begin) / (end - begin)
             place, yaw = place + _ease(s) * (to - place), yaw + _ease(s) * (to_yaw - yaw)
-            lift, pitch = 0.10 * np.sin(np.pi * s), 18 * np.sin(2 * np.pi * s)  # toe down first, then heel
+            # toe down first, then heel
+            lift, pitch = 0.10 * np.sin(np.pi * s), 18 * np.sin(2 * np.pi * s)
             break
     outward = TOE_OUT if side == "left" else -TOE_OUT
     R_foot = exp(np.radians([0, 0, yaw + outward])) @ R_WORLD_MODEL @ exp(np.radians([pitch, 0, 0]))
@@ -127,7 +151,15 @@ _PELVIS_DROP: list[Key] = [
     (DURATION, np.array([-0.022])),
 ]
 _YAW = [(0.0, 0.0), (SQUAT[3] - 0.1, 0.0), (_WALK[2], TURN), (DURATION, TURN)]
-_LEAN = [(0.0, 0.0), (SQUAT[0], 0.0), (SQUAT[1], 32.0), (SQUAT[2], 32.0), (SQUAT[3], 2.0), (_WALK[2], 4.0), (5.0, 0.0)]
+_LEAN = [
+    (0.0, 0.0),
+    (SQUAT[0], 0.0),
+    (SQUAT[1], 32.0),
+    (SQUAT[2], 32.0),
+    (SQUAT[3], 2.0),
+    (_WALK[2], 4.0),
+    (5.0, 0.0),
+]
 
 
 # Above the hips
@@ -136,7 +168,9 @@ _LEAN = [(0.0, 0.0), (SQUAT[0], 0.0), (SQUAT[1], 32.0), (SQUAT[2], 32.0), (SQUAT
 def arm_pose(
     raised: float, ahead: float = 0.0, pitch: float = 0.0, twist: float = 0.0, elbow: float = 10.0
 ) -> dict[str, NDArray[np.float64]]:
-    """Return rotations of left collar, shoulder and elbow; ``raised``: −90 hangs, 0 T-pose; ``pitch`` > 0: ahead."""
+    """Return rotations of left collar, shoulder and elbow; ``raised``: −90 hangs, 0 T-pose;
+    ``pitch`` > 0: ahead.
+    """
     collar = max(raised, 0) * 0.3
     axes = np.radians([[-pitch, 0, 0], [0, -ahead, 0], [0, 0, raised - collar], [twist, 0, 0]])
     shoulder = exp(axes[0]) @ exp(axes[1]) @ exp(axes[2]) @ exp(axes[3])
@@ -181,17 +215,33 @@ def _upper_body() -> dict[str, list[Key]]:
     left += [(_WALK[1], backward), (_WALK[2], forward), (_WALK[3], backward), (_WALK[4], hanging)]
     right += [(_WALK[1], forward), (_WALK[2], backward), (_WALK[3], forward), (_WALK[4], hanging)]
     keys = arm_keys(left, right)
-    lean = turns([(SQUAT[0], 0, 0), (SQUAT[1], 7, 0), (SQUAT[2], 7, 0), (SQUAT[3], 0, 0), (_WALK[1], 0, -4)])
-    keys["spine1"] = keys["spine2"] = lean + turns([(_WALK[2], 0, 4), (_WALK[3], 0, -4), (_WALK[4], 0, 0)])
+    lean = turns(
+        [(SQUAT[0], 0, 0), (SQUAT[1], 7, 0), (SQUAT[2], 7, 0), (SQUAT[3], 0, 0), (_WALK[1], 0, -4)]
+    )
+    keys["spine1"] = keys["spine2"] = lean + turns(
+        [(_WALK[2], 0, 4), (_WALK[3], 0, -4), (_WALK[4], 0, 0)]
+    )
     keys["spine3"] = turns([(0.4, 0, 0), (1.2, -4, 0), (1.7, -4, 0), (SQUAT[0], 0, 0)])
-    look = [(0.2, 0, 0), (0.8, -6, 8), (1.7, -6, 8), (SQUAT[0], 0, 0), (SQUAT[1], -12, 0), (SQUAT[3], 0, 0)]
-    keys["neck"] = keys["head"] = turns([*look, (_WALK[1], 2, 12), (_WALK[3], 2, 0), (DURATION, 0, -10)])
+    look = [
+        (0.2, 0, 0),
+        (0.8, -6, 8),
+        (1.7, -6, 8),
+        (SQUAT[0], 0, 0),
+        (SQUAT[1], -12, 0),
+        (SQUAT[3], 0, 0),
+    ]
+    keys["neck"] = keys["head"] = turns(
+        [*look, (_WALK[1], 2, 12), (_WALK[3], 2, 0), (DURATION, 0, -10)]
+    )
     return keys
 
 
 def turns(keys: list[tuple[float, float, float]]) -> list[Key]:
     """Convert (time, degrees forward, degrees to the left) to rotations."""
-    return [(t, np.matmul(exp(np.radians([0, turn, 0])), exp(np.radians([nod, 0, 0])))) for t, nod, turn in keys]
+    return [
+        (t, np.matmul(exp(np.radians([0, turn, 0])), exp(np.radians([nod, 0, 0]))))
+        for t, nod, turn in keys
+    ]
 
 
 # Between keys
@@ -231,9 +281,13 @@ def _curve(keys: list[Key], t: float) -> NDArray[np.float64]:
 
 
 def _velocity(keys: list[Key], i: int) -> NDArray[np.float64]:
-    """Return the harmonic mean of the slopes on both sides; zero at ends and turning points. Never overshoots."""
+    """Return the harmonic mean of the slopes on both sides; zero at ends and turning points. Never
+    overshoots.
+    """
     if i in (0, len(keys) - 1):
         return np.zeros_like(keys[i][1])
-    before, after = ((keys[j + 1][1] - keys[j][1]) / (keys[j + 1][0] - keys[j][0]) for j in (i - 1, i))
+    before, after = (
+        (keys[j + 1][1] - keys[j][1]) / (keys[j + 1][0] - keys[j][0]) for j in (i - 1, i)
+    )
     same = before * after > 0
     return np.where(same, 2 * before * after / np.where(same, before + after, 1.0), 0.0)

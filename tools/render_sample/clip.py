@@ -17,7 +17,8 @@ from .stage import LAMPS, build_stage, encode, pose_person, render_part, render_
 from .truth import Shot
 
 KBIT_PER_S = 2000  # 5 s: 1.2 MB
-_MARGIN, _FEATHER = 24, 16  # pixels around the person that are rendered, and over which they are blended with the room
+# pixels around the person that are rendered, and over which they are blended with the room
+_MARGIN, _FEATHER = 24, 16
 
 
 def render_clip(body: Body, shot: Shot, path: Path, scratch: Path) -> None:
@@ -39,7 +40,9 @@ def render_pictures(body: Body, shot: Shot, frames: Iterable[int], folder: Path)
         left, top, right, bottom = affected_box(shot, vertices, lamps)
         width, height = shot.size
         pictures.append(folder / f"{f:04d}.png")
-        render_part((left / width, right / width, 1 - bottom / height, 1 - top / height), pictures[-1])
+        render_part(
+            (left / width, right / width, 1 - bottom / height, 1 - top / height), pictures[-1]
+        )
         blend_into(room, pictures[-1], (left, top, right, bottom))
         print(f"{f + 1} / {len(shot)}", file=sys.stderr, flush=True)
     return pictures
@@ -48,7 +51,9 @@ def render_pictures(body: Body, shot: Shot, frames: Iterable[int], folder: Path)
 def affected_box(
     shot: Shot, vertices_world: NDArray[np.float64], lamps: NDArray[np.float64]
 ) -> tuple[int, int, int, int]:
-    """Return left, top, right and bottom, in pixels, of the area that person and shadows can change."""
+    """Return left, top, right and bottom, in pixels, of the area that person and shadows can
+    change.
+    """
     points = [vertices_world]
     for lamp in lamps:
         share = lamp[2] / (lamp[2] - vertices_world[:, 2:])
@@ -65,6 +70,8 @@ def blend_into(room: NDArray[Any], path: Path, box: tuple[int, int, int, int]) -
     weight = np.zeros(room.shape[:2], np.float32)
     weight[top:bottom, left:right] = 1
     inner = cv2.copyMakeBorder(weight, 1, 1, 1, 1, cv2.BORDER_REPLICATE).astype(np.uint8)
-    weight = np.clip(cv2.distanceTransform(inner, cv2.DIST_L2, 3)[1:-1, 1:-1, None] / _FEATHER, 0, 1)
+    weight = np.clip(
+        cv2.distanceTransform(inner, cv2.DIST_L2, 3)[1:-1, 1:-1, None] / _FEATHER, 0, 1
+    )
     part = cv2.imread(str(path))
     cv2.imwrite(str(path), np.round(part * weight + room * (1 - weight)).astype(np.uint8))

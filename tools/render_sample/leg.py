@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Two-bone inverse kinematics of a leg in closed form: planted feet stay where they are, exactly."""
+"""Two-bone inverse kinematics of a leg in closed form: planted feet stay where they are,
+exactly.
+"""
 
 from __future__ import annotations
 
@@ -20,8 +22,9 @@ def solve_leg(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the hip and knee rotations that bring the ankle to its target.
 
-    The knee is a hinge about the model's x axis, bent by θ ≥ 0 so that |thigh + Rx(θ) shank| is the distance from hip
-    to ankle. The hip then turns that vector onto the target, with the hinge as near to the root's x axis as possible.
+    The knee is a hinge about the model's x axis, bent by θ ≥ 0 so that |thigh + Rx(θ) shank| is the
+    distance from hip to ankle. The hip then turns that vector onto the target, with the hinge as
+    near to the root's x axis as possible.
 
     :param R_world_root: (3, 3); hip, ankle: (3,) world, metres.
     :param thigh, shank: (3,) bone vectors at rest, model frame.
@@ -35,7 +38,9 @@ def solve_leg(
     c = 2 * (thigh[2] * shank[1] - thigh[1] * shank[2])
     cosine = (target @ target - a) / np.hypot(b, c)
     if abs(cosine) > 1:
-        raise ValueError(f"the ankle is {np.linalg.norm(target):.3f} m from the hip: out of the leg's reach")
+        raise ValueError(
+            f"the ankle is {np.linalg.norm(target):.3f} m from the hip: out of the leg's reach"
+        )
     bend = np.arctan2(c, b) + np.arccos(cosine)
     R_knee = exp(bend * X)
     R_hip = _frame(target) @ _frame(thigh + R_knee @ shank).T
@@ -43,7 +48,9 @@ def solve_leg(
 
 
 def _frame(direction: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the rotation whose first column is the direction and whose second is as near to x as possible."""
+    """Return the rotation whose first column is the direction and whose second is as near to x as
+    possible.
+    """
     first = direction / np.linalg.norm(direction)
     second = X - first * first[0]
     second /= np.linalg.norm(second)

@@ -20,9 +20,14 @@ Triple = tuple[float, float, float]  # metres, or linear RGB
 
 
 def build_stage(
-    body: Body, intrinsics: NDArray[np.float64], size: tuple[int, int], world_from_camera: NDArray[np.float64]
+    body: Body,
+    intrinsics: NDArray[np.float64],
+    size: tuple[int, int],
+    world_from_camera: NDArray[np.float64],
 ) -> bpy.types.Object:
-    """Build the scene, ready to render; return the person's mesh object, whose vertices are in the world frame."""
+    """Build the scene, ready to render; return the person's mesh object, whose vertices are in the
+    world frame.
+    """
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     set_up_rendering(scene, size)
@@ -47,7 +52,9 @@ def render_room(person: bpy.types.Object, path: Path) -> None:
 
 
 def render_part(box: tuple[float, float, float, float], path: Path) -> None:
-    """Render only (left, right, bottom, top), shares of the picture counted from its lower left, to a .png."""
+    """Render only (left, right, bottom, top), shares of the picture counted from its lower left, to
+    a .png.
+    """
     render = bpy.context.scene.render
     render.use_border, render.use_crop_to_border = True, False
     render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y = box
@@ -60,7 +67,9 @@ def render_to(path: Path) -> None:
     bpy.ops.render.render(write_still=True)
 
 
-def encode(frames: list[Path], path: Path, size: tuple[int, int], fps: int, kbit_per_s: int) -> None:
+def encode(
+    frames: list[Path], path: Path, size: tuple[int, int], fps: int, kbit_per_s: int
+) -> None:
     """Join pictures into an H.264 .mp4 with Blender's sequencer."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
@@ -108,9 +117,14 @@ def set_up_rendering(scene: bpy.types.Scene, size: tuple[int, int]) -> None:
 
 
 def add_camera(
-    scene: bpy.types.Scene, K: NDArray[np.float64], size: tuple[int, int], world_from_camera: NDArray[np.float64]
+    scene: bpy.types.Scene,
+    K: NDArray[np.float64],
+    size: tuple[int, int],
+    world_from_camera: NDArray[np.float64],
 ) -> None:
-    """Add a camera of the given pinhole intrinsics; pixel (u, v) is the centre of a pixel, as in OpenCV."""
+    """Add a camera of the given pinhole intrinsics; pixel (u, v) is the centre of a pixel, as in
+    OpenCV.
+    """
     data = bpy.data.cameras.new("camera")
     camera = bpy.data.objects.new("camera", data)
     scene.collection.objects.link(camera)
@@ -149,7 +163,9 @@ def _aim(scene: bpy.types.Scene) -> bpy.types.Object:
 
 
 def _room() -> None:
-    boards = make_material("boards", (0.34, 0.21, 0.12), (0.24, 0.14, 0.075), stretch=(1.2, 14.0, 1.0))
+    boards = make_material(
+        "boards", (0.34, 0.21, 0.12), (0.24, 0.14, 0.075), stretch=(1.2, 14.0, 1.0)
+    )
     wall = make_material("wall", (0.62, 0.60, 0.55), (0.55, 0.54, 0.50), stretch=(3.0, 3.0, 3.0))
     dark = make_material("skirting", (0.20, 0.19, 0.18))
     add_box("floor", (0, 0, -0.05), (12, 12, 0.1), boards)
@@ -163,17 +179,29 @@ def _room() -> None:
         make_material("canvas", (0.13, 0.30, 0.38), (0.62, 0.42, 0.18)),
     )
     add_box(
-        "bench", (1.75, 2.05, 0.22), (1.1, 0.4, 0.44), make_material("bench", (0.45, 0.30, 0.16), (0.38, 0.25, 0.13))
+        "bench",
+        (1.75, 2.05, 0.22),
+        (1.1, 0.4, 0.44),
+        make_material("bench", (0.45, 0.30, 0.16), (0.38, 0.25, 0.13)),
     )
-    add_box("mat", (0.05, -0.1, 0.004), (2.4, 1.5, 0.008), make_material("mat", (0.22, 0.26, 0.30), (0.19, 0.22, 0.26)))
+    add_box(
+        "mat",
+        (0.05, -0.1, 0.004),
+        (2.4, 1.5, 0.008),
+        make_material("mat", (0.22, 0.26, 0.30), (0.19, 0.22, 0.26)),
+    )
 
 
-def add_box(name: str, center: Triple, size: Triple, material: bpy.types.Material) -> bpy.types.Object:
+def add_box(
+    name: str, center: Triple, size: Triple, material: bpy.types.Material
+) -> bpy.types.Object:
     """Add a box with edges along the axes of the world, and return it."""
     corners = [(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]
     faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     mesh = bpy.data.meshes.new(name)
-    mesh.from_pydata([[c + s * k for c, s, k in zip(center, size, q, strict=True)] for q in corners], [], faces)
+    mesh.from_pydata(
+        [[c + s * k for c, s, k in zip(center, size, q, strict=True)] for q in corners], [], faces
+    )
     mesh.materials.append(material)
     box = bpy.data.objects.new(name, mesh)
     bpy.context.scene.collection.objects.link(box)
@@ -217,7 +245,9 @@ def add_person(body: Body) -> bpy.types.Object:
     mesh.from_pydata(body.v_template.tolist(), [], body.faces.tolist())
     for name, color in zip(body.material_names, body.material_colors, strict=True):
         material = make_material(name, tuple(color[:3]))
-        material.node_tree.nodes["Principled BSDF"].inputs["Roughness"].default_value = 0.25 if "eye" in name else 0.6
+        material.node_tree.nodes["Principled BSDF"].inputs["Roughness"].default_value = (
+            0.25 if "eye" in name else 0.6
+        )
         mesh.materials.append(material)
     mesh.polygons.foreach_set("material_index", body.face_material.astype(np.int32))
     mesh.polygons.foreach_set("use_smooth", np.ones(len(body.faces), bool))

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ground truth of a rendered clip: camera, shape, pose and joints of every frame; and the sample clip's."""
+"""Ground truth of a rendered clip: camera, shape, pose and joints of every frame; and the sample
+clip's.
+"""
 
 from __future__ import annotations
 
@@ -21,11 +23,21 @@ BETAS = np.zeros(10)
 _TILT = np.radians(6.3)  # the camera looks slightly down
 _HEIGHT, _DISTANCE = 1.45, 4.9
 
-WORLD_FROM_CAMERA = world_from_level_camera(np.array([0.0, -np.cos(_TILT), -np.sin(_TILT)]), _HEIGHT)
+WORLD_FROM_CAMERA = world_from_level_camera(
+    np.array([0.0, -np.cos(_TILT), -np.sin(_TILT)]), _HEIGHT
+)
 WORLD_FROM_CAMERA[1, 3] = -_DISTANCE
 
-# The twelve limb joints by their names in keypoint data sets and in the body; and points of the feet's skin.
-LIMBS = {"Shoulder": "shoulder", "Elbow": "elbow", "Wrist": "wrist", "Hip": "hip", "Knee": "knee", "Ankle": "ankle"}
+# The twelve limb joints by their names in keypoint data sets and in the body; and points of the
+# feet's skin.
+LIMBS = {
+    "Shoulder": "shoulder",
+    "Elbow": "elbow",
+    "Wrist": "wrist",
+    "Hip": "hip",
+    "Knee": "knee",
+    "Ankle": "ankle",
+}
 FEET = {"Heel": "heel", "BigToe": "foot_index"}
 _SIDES = ("left", "right")
 
@@ -56,10 +68,15 @@ class Shot:
 
     def vertices_world(self, body: Body, frame: int) -> NDArray[np.float64]:
         """Return the skin's vertices (V, 3) in one frame, world, metres."""
-        return body.skin(*body.forward_kinematics(self.rotations[frame], self.trans[frame], self.betas), self.betas)
+        return body.skin(
+            *body.forward_kinematics(self.rotations[frame], self.trans[frame], self.betas),
+            self.betas,
+        )
 
 
-def project(points_camera: NDArray[np.float64], intrinsics: NDArray[np.float64]) -> NDArray[np.float64]:
+def project(
+    points_camera: NDArray[np.float64], intrinsics: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Project points (..., 3) to pixels (..., 2) with intrinsics (3, 3), without distortion."""
     homogeneous = points_camera @ intrinsics.T
     pixels: NDArray[np.float64] = homogeneous[..., :2] / homogeneous[..., 2:]
@@ -75,16 +92,21 @@ def sample_shot(rotations: NDArray[np.float64], trans: NDArray[np.float64]) -> S
 def write_truth(path: Path, body: Body, shot: Shot) -> None:
     """Write the ground truth as plain arrays.
 
-    Keys of the motion file: poses (T, 3(K+1)), trans, betas, joints_cam (T, K+1, 3), intrinsics, dist,
-    world_from_camera. In addition frame_index (T,), fps, size, joint_names, standing (T, 2: left, right foot flat on
-    the floor); and joints (T, 16, 3), names (16,), uv (T, 16, 2): limbs, heels and toes as in keypoint data sets.
+    Keys of the motion file: poses (T, 3(K+1)), trans, betas, joints_cam (T, K+1, 3), intrinsics,
+    dist, world_from_camera. In addition frame_index (T,), fps, size, joint_names, standing (T, 2:
+    left, right foot flat on the floor); and joints (T, 16, 3), names (16,), uv (T, 16, 2): limbs,
+    heels and toes as in keypoint data sets.
     """
     R_world, t_world = body.forward_kinematics(shot.rotations, shot.trans, shot.betas)
     joints_cam = shot.to_camera(t_world)
     skin_cam = shot.to_camera(body.keypoints(R_world, t_world, shot.betas))
     joint, point = body.joint_names.index, body.keypoint_set("blazepose")
-    named = {s[0].upper() + k: joints_cam[:, joint(f"{s}_{v}")] for k, v in LIMBS.items() for s in _SIDES}
-    named |= {s[0].upper() + k: skin_cam[:, point[f"{s}_{v}"]] for k, v in FEET.items() for s in _SIDES}
+    named = {
+        s[0].upper() + k: joints_cam[:, joint(f"{s}_{v}")] for k, v in LIMBS.items() for s in _SIDES
+    }
+    named |= {
+        s[0].upper() + k: skin_cam[:, point[f"{s}_{v}"]] for k, v in FEET.items() for s in _SIDES
+    }
     joints = np.stack(list(named.values()), axis=1)
     np.savez_compressed(
         path,

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``python -m scope.tools.render_talk``: write build/talk/talk.mp4 and talk_truth.npz. Needs bpy."""
+"""``python -m scope.tools.render_talk``: write build/talk/talk.mp4 and talk_truth.npz. Needs
+bpy.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,9 @@ from .shot import FOLDER, TRUTH, VIDEO, talk_shot, write_talk_truth
 def main() -> int:
     """Render the room, and the clip of the person in it."""
     parser = argparse.ArgumentParser(prog="render_talk", description=__doc__)
-    parser.add_argument("-o", "--out", type=Path, default=FOLDER, help="folder (default: build/talk)")
+    parser.add_argument(
+        "-o", "--out", type=Path, default=FOLDER, help="folder (default: build/talk)"
+    )
     arguments = parser.parse_args()
     from ..render_sample.stage import build_stage, render_room
 
@@ -29,8 +33,13 @@ def main() -> int:
     arguments.out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=arguments.out, prefix=".frames") as scratch:
         folder = Path(scratch)
-        render_room(build_stage(body, shot.intrinsics, shot.size, shot.world_from_camera), folder / "room.png")
-        room = cv2.cvtColor(cv2.imread(str(folder / "room.png")), cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False)
+        render_room(
+            build_stage(body, shot.intrinsics, shot.size, shot.world_from_camera),
+            folder / "room.png",
+        )
+        room = cv2.cvtColor(cv2.imread(str(folder / "room.png")), cv2.COLOR_BGR2RGB).astype(
+            np.uint8, copy=False
+        )
         draw_clip(body, shot, room, arguments.out / VIDEO, folder / VIDEO)
         write_talk_truth(folder / TRUTH, body, shot)
         for name in (VIDEO, TRUTH):

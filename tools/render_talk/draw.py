@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The clip's pictures: a person, drawn by the rasterizer of overlays, in front of the room of the sample clip."""
+"""The clip's pictures: a person, drawn by the rasterizer of overlays, in front of the room of the
+sample clip.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +43,9 @@ class PersonPainter:
         K[:2, 2] += (_OVER - 1) / 2
         canvas = Canvas.blank(_OVER * width, _OVER * height)
         rasterize(canvas, V, self._triangles, self._colors, K, shading=self._shading(V))
-        coverage = cv2.resize(canvas.coverage.astype(np.float32), (width, height), interpolation=cv2.INTER_AREA)
+        coverage = cv2.resize(
+            canvas.coverage.astype(np.float32), (width, height), interpolation=cv2.INTER_AREA
+        )
         drawn = canvas.rgba[..., :3] * canvas.coverage[..., None].astype(np.float32)
         image = cv2.resize(drawn, (width, height), interpolation=cv2.INTER_AREA)
         image = image + self._room * (1.0 - coverage[..., None])
@@ -57,7 +61,9 @@ class PersonPainter:
         return np.stack([np.clip(light, 0, 1.15), np.zeros(len(V))], axis=1)
 
 
-def draw_clip(body: Body, shot: TalkShot, room: NDArray[np.uint8], path: Path, temporary: Path) -> None:
+def draw_clip(
+    body: Body, shot: TalkShot, room: NDArray[np.uint8], path: Path, temporary: Path
+) -> None:
     """Write the shot to an .mp4 file.
 
     :param room: (H, W, 3) RGB.
@@ -81,5 +87,7 @@ def _colors(body: Body) -> NDArray[np.float32]:
     colors[body.face_material == names.index("eye_iris")] = look.iris
     colors[body.face_material == names.index("hair")] = HAIR
     colors[mouth_faces_of(body)] = 0.12 * look.skin.min(axis=0)
-    srgb: NDArray[np.float32] = np.tile(np.clip(colors, 0, 1) ** (1 / 2.2), (2, 1)).astype(np.float32)
+    srgb: NDArray[np.float32] = np.tile(np.clip(colors, 0, 1) ** (1 / 2.2), (2, 1)).astype(
+        np.float32
+    )
     return srgb

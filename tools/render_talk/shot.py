@@ -44,7 +44,9 @@ def talk_shot(body: Body) -> TalkShot:
     camera[1, 3] = -_DISTANCE
     standing = np.ones((len(times), 2), bool)
     betas = np.zeros(body.P)
-    return TalkShot(rotations, trans, betas, INTRINSICS, camera, SIZE, FPS, standing, face_motion(times))
+    return TalkShot(
+        rotations, trans, betas, INTRINSICS, camera, SIZE, FPS, standing, face_motion(times)
+    )
 
 
 def write_talk_truth(path: Path, body: Body, shot: TalkShot) -> None:

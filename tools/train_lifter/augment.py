@@ -1,20 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Augment few recordings to many motions and proportions, in PyTorch on any device.
 
-A pose is a state of each joint, Ω (24, 3, 3), and a root rotation into a world with y up; a motion is a window of poses
-at the lifter's moments. Some motions run slower, faster or backwards, and half of them are mirrored. In a share of the
-samples, the joints are as recorded, up to that. In the others, torso, arms and legs sometimes come from different
-recordings, joints are rotated at random by a constant of the window, and the body leans further.
+A pose is a state of each joint, Ω (24, 3, 3), and a root rotation into a world with y up; a motion
+is a window of poses at the lifter's moments. Some motions run slower, faster or backwards, and half
+of them are mirrored. In a share of the samples, the joints are as recorded, up to that. In the
+others, torso, arms and legs sometimes come from different recordings, joints are rotated at random
+by a constant of the window, and the body leans further.
 
-Legs of people who stand are straightened in a share of the samples, see `PoseSampler.straightened`: in recordings they
-are bent by 10 degrees at the median, in people by 0 to 5, which marker-based recordings of gait laboratories show.
+Legs of people who stand are straightened in a share of the samples, see `PoseSampler.straightened`:
+in recordings they are bent by 10 degrees at the median, in people by 0 to 5, which marker-based
+recordings of gait laboratories show.
 
-Some people who stand sink into a squat, see `PoseSampler.squats`: recordings show few half squats, and seen from the
-front, knees bent by 60 degrees only shorten the legs, which a network that never saw them takes for a tall person's
-short legs.
+Some people who stand sink into a squat, see `PoseSampler.squats`: recordings show few half squats,
+and seen from the front, knees bent by 60 degrees only shorten the legs, which a network that never
+saw them takes for a tall person's short legs.
 
-Everything here and in `dataset` and `detector_noise` is drawn by the device's default generator (`torch.manual_seed`)
-and copies nothing between host and device once the objects are made, so that a CUDA graph can record it.
+Everything here and in `dataset` and `detector_noise` is drawn by the device's default generator
+(`torch.manual_seed`) and copies nothing between host and device once the objects are made, so that
+a CUDA graph can record it.
 """
 
 from __future__ import annotations
@@ -34,7 +37,15 @@ from .motions import Motions
 # Share of samples in which a part, everything from this joint outwards, comes from another frame.
 SWAPS = {"spine1": 0.5, "left_collar": 0.4, "right_collar": 0.4, "left_hip": 0.2, "right_hip": 0.2}
 # Radians about a random axis, times a factor per sample of |N(0, 1)|.
-JOINT_NOISE = {"shoulder": 0.45, "collar": 0.1, "elbow": 0.25, "wrist": 0.3, "hand": 0.2, "hip": 0.2, "knee": 0.2}
+JOINT_NOISE = {
+    "shoulder": 0.45,
+    "collar": 0.1,
+    "elbow": 0.25,
+    "wrist": 0.3,
+    "hand": 0.2,
+    "hip": 0.2,
+    "knee": 0.2,
+}
 JOINT_NOISE |= {"ankle": 0.2, "foot": 0.1, "spine": 0.08, "neck": 0.15, "head": 0.2}
 UNTURNED_SHARE = 0.25  # of the samples that are not natural, those whose joints are not rotated
 LEAN, STRONG_LEAN, STRONG_LEAN_SHARE = math.radians(7.0), math.radians(45.0), 0.1
@@ -47,8 +58,10 @@ SQUAT_DEG = (0.0, 80.0)  # ... whose thighs pitch forward by this in the middle 
 SQUAT_SPEED_DEG_S = 40.0  # ... and turn by this per second, one standard deviation
 SHANK_PITCH, TRUNK_PITCH = (0.25, 0.75), (0.0, 0.8)  # forward, of the thigh's
 LEGS_DIFFER = 0.1  # spread of the factor between the pitches of the two legs
-ARMS_AHEAD_SHARE = 0.4  # of the squats, those in which arms are stretched forward, as people do to keep their balance
-ARMS_DEG = {"elevation": 15.0, "azimuth": 12.0, "roll": 30.0, "elbow": 25.0, "sides": 5.0}  # standard deviations
+# of the squats, those in which arms are stretched forward, as people do to keep their balance
+ARMS_AHEAD_SHARE = 0.4
+# standard deviations
+ARMS_DEG = {"elevation": 15.0, "azimuth": 12.0, "roll": 30.0, "elbow": 25.0, "sides": 5.0}
 SPEED_SPREAD = 0.2  # of the logarithm of a motion's speed
 SHAPE_LIMIT = 2.5  # in standard deviations
 BONE_SPREAD = 0.04  # of the logarithm of each bone's length, left and right alike
@@ -59,8 +72,8 @@ SEGMENTS = (("elbow", "wrist", "hand"), ("knee", "ankle", "foot"))
 class PoseSampler:
     """Draws augmented poses and shapes for one body.
 
-    ``natural_share`` of the samples are as recorded; ``segment_spread`` is the standard deviation of the logarithm by
-    which trunk, arms and legs vary in length, each as a whole.
+    ``natural_share`` of the samples are as recorded; ``segment_spread`` is the standard deviation
+    of the logarithm by which trunk, arms and legs vary in length, each as a whole.
     """
 
     def __init__(
@@ -80,27 +93,46 @@ class PoseSampler:
         self._fps = on_device(motions.fps)
         self._offsets_s = on_device(OFFSETS_S)
         self._stands = on_device(motions.kinds == "stand", dtype=torch.bool)
-        self._squatting = [[names.index(f"{s}_{j}") for j in ("hip", "knee", "ankle")] for s in ("left", "right")]
-        self._arms = [[names.index(f"{s}_{j}") for j in ("shoulder", "elbow")] for s in ("left", "right")]
-        self.partner = on_device([names.index(_other_side(name)) for name in names], dtype=torch.long)
+        self._squatting = [
+            [names.index(f"{s}_{j}") for j in ("hip", "knee", "ankle")] for s in ("left", "right")
+        ]
+        self._arms = [
+            [names.index(f"{s}_{j}") for j in ("shoulder", "elbow")] for s in ("left", "right")
+        ]
+        self.partner = on_device(
+            [names.index(_other_side(name)) for name in names], dtype=torch.long
+        )
         self._joints = torch.arange(self.joint_count, device=device)
         self._alike = torch.minimum(self._joints, self.partner)
         self._mirror_signs = on_device(np.outer([-1, 1, 1], [-1, 1, 1]))
-        self._parts = [(on_device(_from(body, root), dtype=torch.bool), share) for root, share in SWAPS.items()]
-        self._noise = on_device([next((v for k, v in JOINT_NOISE.items() if k in n), 0.0) for n in names])
-        segment = [next((1 + i for i, s in enumerate(SEGMENTS) if any(w in n for w in s)), 0) for n in names]
+        self._parts = [
+            (on_device(_from(body, root), dtype=torch.bool), share) for root, share in SWAPS.items()
+        ]
+        self._noise = on_device(
+            [next((v for k, v in JOINT_NOISE.items() if k in n), 0.0) for n in names]
+        )
+        segment = [
+            next((1 + i for i, s in enumerate(SEGMENTS) if any(w in n for w in s)), 0)
+            for n in names
+        ]
         self._segment = on_device(segment, dtype=torch.long)
         at = list(body.keypoint_set("blazepose").values())
         self._bones, self._bone_shapes = on_device(body.l), on_device(body.S)
         self._keypoints, self._keypoint_shapes = on_device(body.v_bar[at]), on_device(body.V[at])
 
     def mirror(self, Omega: Tensor) -> Tensor:
-        """Return the mirror image of poses (..., 24, 3, 3) about the body's (and the world's) x = 0."""
+        """Return the mirror image of poses (..., 24, 3, 3) about the body's (and the world's) x =
+        0.
+        """
         return (Omega * self._mirror_signs)[..., self.partner, :, :]
 
     def _windows(self, n: int) -> tuple[Tensor, Tensor]:
-        """Draw n windows of one recording each: frames (n, WINDOW), and (n,) bool: whether they are mirrored."""
-        drawn = torch.searchsorted(self._cumulative, torch.rand(n, device=self.device, dtype=torch.float64))
+        """Draw n windows of one recording each: frames (n, WINDOW), and (n,) bool: whether they are
+        mirrored.
+        """
+        drawn = torch.searchsorted(
+            self._cumulative, torch.rand(n, device=self.device, dtype=torch.float64)
+        )
         middle = drawn.clamp(max=len(self._first) - 1)
         backwards = torch.where(chance(self._fps, 0.5, n), 1.0, -1.0)
         speed = torch.exp(SPEED_SPREAD * normal(self._fps, n)) * backwards
@@ -109,7 +141,9 @@ class PoseSampler:
         return torch.minimum(frames, self._last[middle][:, None]), chance(self._fps, 0.5, n)
 
     def motion_windows(self, n: int) -> Tensor:
-        """Draw windows (n, WINDOW, 24, 3, 3); row 0 of a pose is R_world_root, y up, with a random heading."""
+        """Draw windows (n, WINDOW, 24, 3, 3); row 0 of a pose is R_world_root, y up, with a random
+        heading.
+        """
         natural = chance(self._fps, self.natural_share, n)
         frames, mirrored = self._windows(n)
         frames, mirrored = frames[:, :, None].expand(-1, -1, self.joint_count), mirrored[:, None]
@@ -131,7 +165,8 @@ class PoseSampler:
         return torch.cat([root[:, :, None], Omega[:, :, 1:]], 2)
 
     def straightened(self, Omega: Tensor, stands: Tensor) -> Tensor:
-        """Take a random part of the flexion out of the knees of some people who stand, where it is small.
+        """Take a random part of the flexion out of the knees of some people who stand, where it is
+        small.
 
         Hips and ankles turn by half of it each, so that the foot stays below the hip.
 
@@ -144,17 +179,22 @@ class PoseSampler:
             R = Omega[:, :, knee]
             bend = torch.atan2(R[..., 2, 1] - R[..., 1, 2], R[..., 1, 1] + R[..., 2, 2])
             slight = (bend > 0.0) & (bend < math.radians(STRAIGHTENED_DEG))
-            less = torch.where(slight, bend, 0.0) * uniform(self._fps, STRAIGHTENED_PART, n, 1) * taken[:, None]
+            less = (
+                torch.where(slight, bend, 0.0)
+                * uniform(self._fps, STRAIGHTENED_PART, n, 1)
+                * taken[:, None]
+            )
             Omega[:, :, hip] = about_x(0.5 * less) @ Omega[:, :, hip]
             Omega[:, :, knee] = about_x(-less) @ R
             Omega[:, :, ankle] = about_x(0.5 * less) @ Omega[:, :, ankle]
         return Omega
 
     def squats(self, Omega: Tensor, stands: Tensor) -> Tensor:
-        """Let some people who stand squat: thighs pitch backwards under the trunk, which leans forward as they do.
+        """Let some people who stand squat: thighs pitch backwards under the trunk, which leans
+        forward as they do.
 
-        With the pitches of thigh θ, shank φ and trunk τ in the world, hips flex by θ + τ, knees by θ + φ, and ankles by
-        φ, so that the feet stay as they were.
+        With the pitches of thigh θ, shank φ and trunk τ in the world, hips flex by θ + τ, knees by
+        θ + φ, and ankles by φ, so that the feet stay as they were.
 
         :param Omega: (n, WINDOW, 24, 3, 3) motions;  stands: (n,) whose recording shows standing.
         """
@@ -199,21 +239,30 @@ class PoseSampler:
         return Omega
 
     def _placement(self, natural: Tensor) -> Tensor:
-        """Draw rotations (n, 3, 3) of the world's people: a heading, then a lean, less of it where ``natural`` (n,)."""
+        """Draw rotations (n, 3, 3) of the world's people: a heading, then a lean, less of it where
+        ``natural`` (n,).
+        """
         n = len(natural)
         heading, direction = 2 * math.pi * torch.rand(2, n, device=self.device)
-        lean = normal(self._fps, n) * torch.where(chance(self._fps, STRONG_LEAN_SHARE, n), STRONG_LEAN, LEAN)
+        lean = normal(self._fps, n) * torch.where(
+            chance(self._fps, STRONG_LEAN_SHARE, n), STRONG_LEAN, LEAN
+        )
         lean = torch.where(natural, NATURAL_LEAN * lean, lean)
         zero = torch.zeros_like(lean)
-        leaning = rotation_matrices(torch.stack([lean * torch.cos(direction), zero, lean * torch.sin(direction)], 1))
+        leaning = rotation_matrices(
+            torch.stack([lean * torch.cos(direction), zero, lean * torch.sin(direction)], 1)
+        )
         return leaning @ rotation_matrices(torch.stack([zero, heading, zero], 1))
 
     def proportions(self, n: int) -> tuple[Tensor, Tensor]:
-        """Draw bodies: joints relative to parents (n, 24, 3), BlazePose keypoints relative to joints (n, 33, 3)."""
+        """Draw bodies: joints relative to parents (n, 24, 3), BlazePose keypoints relative to
+        joints (n, 33, 3).
+        """
         betas = normal(self._fps, n, self._bone_shapes.shape[-1]).clamp(-SHAPE_LIMIT, SHAPE_LIMIT)
         factor = BONE_SPREAD * normal(self._fps, n, self.joint_count)
         factor = (
-            factor[:, self._alike] + (self.segment_spread * normal(self._fps, n, 1 + len(SEGMENTS)))[:, self._segment]
+            factor[:, self._alike]
+            + (self.segment_spread * normal(self._fps, n, 1 + len(SEGMENTS)))[:, self._segment]
         )
         bones = self._bones + torch.einsum("ijp,np->nij", self._bone_shapes, betas)
         keypoints = self._keypoints + torch.einsum("ijp,np->nij", self._keypoint_shapes, betas)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Training batches: the body moving in front of a random camera, as the detector would report it, in PyTorch."""
+"""Training batches: the body moving in front of a random camera, as the detector would report it,
+in PyTorch.
+"""
 
 from __future__ import annotations
 
@@ -21,11 +23,13 @@ from .network_input import hip_center, network_input, person_size, virtual_camer
 
 FARTHEST_M = 12.0
 PITCH_LIMITS = (math.radians(-15.0), math.radians(45.0))
-# Most cameras are hand-held or on a stand: their pitch towards a person follows from height and distance.
+# Most cameras are hand-held or on a stand: their pitch towards a person follows from height and
+# distance.
 HELD_SHARE, HELD_HEIGHT_M, HELD_SPREAD_M, LOWEST_M = 0.7, 1.3, 0.4, 0.1
 HEIGHTS_M = (0.3, 3.0)  # see `Variety.any_height_share`
 ROLL_SPREAD, ROLLED_SPREAD = math.radians(3.0), math.radians(15.0)
-DRIFT_PER_S = (0.1, 0.03, 0.08)  # one standard deviation, of x/z, y/z and the logarithm of the distance
+# one standard deviation, of x/z, y/z and the logarithm of the distance
+DRIFT_PER_S = (0.1, 0.03, 0.08)
 CUT_SHORT_SHARE = 0.06  # of the windows, those truncated at a clip's start, and as many at its end
 NEAREST_DEPTH_M = 0.3  # of a keypoint, to divide by
 
@@ -34,13 +38,15 @@ NEAREST_DEPTH_M = 0.3  # of a keypoint, to divide by
 class Variety:
     """In what the people and cameras of a training may differ.
 
-    ``natural_share``: of the samples, those whose joints are as recorded, see `augment`. ``segment_spread``: standard
-    deviation of the logarithm by which trunk, arms and legs vary in length. ``random_offsets``: whether each person has
-    a share of the landmark network's keypoint offsets, see `detector_noise.placements`. ``nearest_m``: distance of the
-    nearest person. ``field``: largest |x/z| and |y/z| of the person's position in the image. ``any_height_share``: of
-    the hand-held cameras, those at any height in HEIGHTS_M instead of a person's. ``rolled_share``: of the cameras,
-    those with a roll of ROLLED_SPREAD. ``focal_spread``: standard deviation of the logarithm of assumed over true focal
-    length. ``still_share``: of the windows, those of still images.
+    ``natural_share``: of the samples, those whose joints are as recorded, see `augment`.
+    ``segment_spread``: standard deviation of the logarithm by which trunk, arms and legs vary in
+    length. ``random_offsets``: whether each person has a share of the landmark network's keypoint
+    offsets, see `detector_noise.placements`. ``nearest_m``: distance of the nearest person.
+    ``field``: largest |x/z| and |y/z| of the person's position in the image. ``any_height_share``:
+    of the hand-held cameras, those at any height in HEIGHTS_M instead of a person's.
+    ``rolled_share``: of the cameras, those with a roll of ROLLED_SPREAD. ``focal_spread``: standard
+    deviation of the logarithm of assumed over true focal length. ``still_share``: of the windows,
+    those of still images.
     """
 
     natural_share: float = 0.0
@@ -58,8 +64,8 @@ class Variety:
 class Batch:
     """Samples for training, n of them.
 
-    ``input`` (n, WINDOW, 200); ``points`` (n, 33, 3) of the middle moment: metres, mid-hip at 0, the virtual camera's
-    axes.
+    ``input`` (n, WINDOW, 200); ``points`` (n, 33, 3) of the middle moment: metres, mid-hip at 0,
+    the virtual camera's axes.
     """
 
     input: Tensor
@@ -70,8 +76,8 @@ class Batch:
 class Scene:
     """People in front of a camera, n of them.
 
-    ``points`` (n, WINDOW, 33, 3) true keypoints and ``seen`` (n, WINDOW, 33, 3) the detector's keypoints, metres,
-    camera axes; ``focal_ratio`` (n,) assumed over true focal length.
+    ``points`` (n, WINDOW, 33, 3) true keypoints and ``seen`` (n, WINDOW, 33, 3) the detector's
+    keypoints, metres, camera axes; ``focal_ratio`` (n,) assumed over true focal length.
     """
 
     points: Tensor
@@ -82,10 +88,17 @@ class Scene:
 class Dataset:
     """Draws batches for one body from motions, on one device."""
 
-    def __init__(self, body: Body, motions: Motions, variety: Variety | None = None, device: str = "cpu") -> None:
+    def __init__(
+        self, body: Body, motions: Motions, variety: Variety | None = None, device: str = "cpu"
+    ) -> None:
         self.variety, self.device = variety or Variety(), device
-        self.sampler = PoseSampler(body, motions, self.variety.natural_share, self.variety.segment_spread, device)
-        on_device, indices = partial(constant, device=device), partial(constant, device=device, dtype=torch.long)
+        self.sampler = PoseSampler(
+            body, motions, self.variety.natural_share, self.variety.segment_spread, device
+        )
+        on_device, indices = (
+            partial(constant, device=device),
+            partial(constant, device=device, dtype=torch.long),
+        )
         self._part = indices(body.keypoint_part[list(body.keypoint_set("blazepose").values())])
         parents = np.asarray(body.parents)
         depth = np.zeros(len(parents), int)
@@ -95,15 +108,20 @@ class Dataset:
         self._levels = [(indices(joints), indices(parents[joints])) for joints in levels]
         self._offsets_s = on_device(OFFSETS_S)
         self._moments = torch.arange(WINDOW, device=device)
-        self._placement, self._mean_offsets = map(on_device, (detector_noise.PLACEMENT, detector_noise.MEAN_OFFSETS))
+        self._placement, self._mean_offsets = map(
+            on_device, (detector_noise.PLACEMENT, detector_noise.MEAN_OFFSETS)
+        )
 
-    def keypoints(self, Omega: Tensor, bones: Tensor, local: Tensor, displaced: Tensor) -> tuple[Tensor, Tensor]:
-        """Return BlazePose keypoints of windows of poses, and the same displaced in the axes of their parts.
+    def keypoints(
+        self, Omega: Tensor, bones: Tensor, local: Tensor, displaced: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """Return BlazePose keypoints of windows of poses, and the same displaced in the axes of
+        their parts.
 
         R_k = R_p Ω_k, t_k = t_p + R_p l_k with p the parent, one level of the tree after another.
 
-        :param Omega: (n, W, 24, 3, 3);  bones: (n, 24, 3), local: (n, 33, 3) as of `PoseSampler.proportions`;
-            displaced: (n, 33, 3) metres.
+        :param Omega: (n, W, 24, 3, 3);  bones: (n, 24, 3), local: (n, 33, 3) as of
+            `PoseSampler.proportions`; displaced: (n, 33, 3) metres.
         :return: (n, W, 33, 3) twice, in the axes of the root's parent, root joint at 0.
         """
         R, t = torch.empty_like(Omega), torch.zeros_like(Omega[..., 0])
@@ -121,7 +139,9 @@ class Dataset:
         Omega = self.sampler.motion_windows(n)
         bones, local = self.sampler.proportions(n)
         mean = self._mean_offsets if self.variety.random_offsets else None
-        points, seen = self.keypoints(Omega, bones, local, detector_noise.placements(n, self._placement, mean))
+        points, seen = self.keypoints(
+            Omega, bones, local, detector_noise.placements(n, self._placement, mean)
+        )
         return self._before_camera(points, seen)
 
     def _before_camera(self, points: Tensor, seen: Tensor) -> Scene:
@@ -133,12 +153,18 @@ class Dataset:
         down = lines_of_sight(above_floor, distance, v.any_height_share)
         pitch = down - torch.atan2(y, torch.hypot(x, torch.ones_like(x)))
         R_world_camera = cameras(pitch, v.rolled_share).transpose(1, 2)[:, None]
-        across, up, away = (self._offsets_s * (speed * normal(points, n, 1)) for speed in DRIFT_PER_S)
+        across, up, away = (
+            self._offsets_s * (speed * normal(points, n, 1)) for speed in DRIFT_PER_S
+        )
         ray = torch.stack([x[:, None] + across, y[:, None] + up, torch.ones_like(across)], -1)
         ray = ray / ray.norm(dim=-1, keepdim=True)
         place = (ray * (distance[:, None] * torch.exp(away))[..., None])[:, :, None]
         focal_ratio = torch.exp(v.focal_spread * normal(points, n))
-        return Scene((points - middle) @ R_world_camera + place, (seen - middle) @ R_world_camera + place, focal_ratio)
+        return Scene(
+            (points - middle) @ R_world_camera + place,
+            (seen - middle) @ R_world_camera + place,
+            focal_ratio,
+        )
 
     def batch(self, n: int) -> Batch:
         """Draw n samples."""
@@ -164,14 +190,18 @@ def _turned(R: Tensor, vectors: Tensor) -> Tensor:
 
 
 def cut_short(x: Tensor, moments: Tensor, still_share: float) -> Tensor:
-    """Truncate some windows (n, WINDOW, C), so that moments repeat as at a clip's ends or in a still image.
+    """Truncate some windows (n, WINDOW, C), so that moments repeat as at a clip's ends or in a
+    still image.
 
-    :param moments: 0 to WINDOW − 1, on the device of ``x``;  still_share: of the windows, those of still images.
+    :param moments: 0 to WINDOW − 1, on the device of ``x``;  still_share: of the windows, those of
+        still images.
     """
     n = len(x)
     start, end = (uniform(x, (0.0, 1.0), n) for _ in range(2))
     first = torch.where(chance(x, CUT_SHORT_SHARE, n), (start * (MIDDLE + 1)).long(), 0)
-    last = torch.where(chance(x, CUT_SHORT_SHARE, n), MIDDLE + (end * (WINDOW - MIDDLE)).long(), WINDOW - 1)
+    last = torch.where(
+        chance(x, CUT_SHORT_SHARE, n), MIDDLE + (end * (WINDOW - MIDDLE)).long(), WINDOW - 1
+    )
     still = chance(x, still_share, n)
     first, last = torch.where(still, MIDDLE, first), torch.where(still, MIDDLE, last)
     rows = torch.minimum(torch.maximum(moments[None], first[:, None]), last[:, None])
@@ -181,24 +211,31 @@ def cut_short(x: Tensor, moments: Tensor, still_share: float) -> Tensor:
 def lines_of_sight(above_floor: Tensor, distance: Tensor, any_height_share: float = 0.0) -> Tensor:
     """Draw the angles (n,) in radians by which the line from the camera to the hips points down.
 
-    sin⁻¹((camera's height − hips' height) / distance) for hand-held cameras, any angle for the others.
+    sin⁻¹((camera's height − hips' height) / distance) for hand-held cameras, any angle for the
+    others.
 
-    :param above_floor: (n,) metres, of the hips;  distance: (n,) metres;  any_height_share: see `Variety`.
+    :param above_floor: (n,) metres, of the hips;  distance: (n,) metres;  any_height_share: see
+        `Variety`.
     """
     n = len(distance)
     height = (HELD_HEIGHT_M + HELD_SPREAD_M * normal(distance, n)).clamp(min=LOWEST_M)
-    height = torch.where(chance(distance, any_height_share, n), uniform(distance, HEIGHTS_M, n), height)
+    height = torch.where(
+        chance(distance, any_height_share, n), uniform(distance, HEIGHTS_M, n), height
+    )
     held = torch.asin(((height - above_floor) / distance).clamp(-0.7, 0.7))
     return torch.where(chance(distance, HELD_SHARE, n), held, uniform(distance, PITCH_LIMITS, n))
 
 
 def cameras(pitch: Tensor, rolled_share: float = 0.0) -> Tensor:
-    """Draw R_camera_world (n, 3, 3): looking along −z of a world with y up, pitched (positive: down) and rolled.
+    """Draw R_camera_world (n, 3, 3): looking along −z of a world with y up, pitched (positive:
+    down) and rolled.
 
     :param pitch: (n,) radians;  rolled_share: see `Variety`.
     """
     n, zero = len(pitch), torch.zeros_like(pitch)
-    roll = torch.where(chance(pitch, rolled_share, n), ROLLED_SPREAD, ROLL_SPREAD) * normal(pitch, n)
+    roll = torch.where(chance(pitch, rolled_share, n), ROLLED_SPREAD, ROLL_SPREAD) * normal(
+        pitch, n
+    )
     turned = rotation_matrices(torch.stack([zero, zero, roll], 1)) @ rotation_matrices(
         torch.stack([pitch, zero, zero], 1)
     )

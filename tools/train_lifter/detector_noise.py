@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Simulated detector errors: displaced and uncertain 2D keypoints, distorted world landmarks.
 
-The detector's keypoints differ from the body's: each has a constant offset in its body part, specific to the person
-(people differ in build and clothes), on request around a share of that of `keypoint_offsets`. Image errors are added
-and, in the world landmarks, a tilt, scale and flattening of the whole, errors in the depth of limbs, and sometimes a
-limb mirrored in depth.
+The detector's keypoints differ from the body's: each has a constant offset in its body part,
+specific to the person (people differ in build and clothes), on request around a share of that of
+`keypoint_offsets`. Image errors are added and, in the world landmarks, a tilt, scale and flattening
+of the whole, errors in the depth of limbs, and sometimes a limb mirrored in depth.
 
-Errors are correlated in time. The autocorrelation of errors in the depth of bones, of `pose_landmark_heavy` on footage
-and renders with ground truth, is 0.8, 0.65, 0.5 and 0.5 after 0.1, 0.2, 0.4 and 0.8 seconds: half of the variance is
-constant within the window, most of the rest changes within a few tenths of a second, see `Persistence`.
+Errors are correlated in time. The autocorrelation of errors in the depth of bones, of
+`pose_landmark_heavy` on footage and renders with ground truth, is 0.8, 0.65, 0.5 and 0.5 after 0.1,
+0.2, 0.4 and 0.8 seconds: half of the variance is constant within the window, most of the rest
+changes within a few tenths of a second, see `Persistence`.
 """
 
 from __future__ import annotations
@@ -31,15 +32,18 @@ PLACEMENT = np.full(33, 0.012)
 PLACEMENT[[11, 12]], PLACEMENT[[23, 24]], PLACEMENT[25:33] = 0.02, 0.025, 0.015
 MEAN_OFFSETS = np.array([offset(name) for name in KEYPOINT_NAMES])
 OFFSETS_FACTOR = (-0.5, 1.5)  # per person, on MEAN_OFFSETS, where they are used
-IMAGE_NOISE = 0.03  # of the person's size s (see lifter.py), times a factor per sample of exp(N(0, 0.5))
+# of the person's size s (see lifter.py), times a factor per sample of exp(N(0, 0.5))
+IMAGE_NOISE = 0.03
 CONFIDENT_SHARE = 0.8
 UNSURE_FACTOR = 3.5  # on the image noise of a keypoint with no confidence
 SWAP_SHARE = 0.01  # samples in which the arms, or the legs, have left and right swapped
 CUT_SHARE = 0.12  # samples in which part of the body is outside the image
-CUT_UP_TO = (0.5, 0.6, 0.8)  # sums of their shares: cut below, at the right, above, and the rest at the left
+# sums of their shares: cut below, at the right, above, and the rest at the left
+CUT_UP_TO = (0.5, 0.6, 0.8)
 SWAP_LASTS = 0.7  # of the window's moments
 CONFIDENCE_LASTS = 0.7  # of the keypoints keep their confidence through the window
-# World landmarks. Depth is mostly too small: on renders by a factor of 0.3 for arms, 0.6 for trunk and legs.
+# World landmarks. Depth is mostly too small: on renders by a factor of 0.3 for arms, 0.6 for trunk
+# and legs.
 UNKNOWN_SHARE = 0.3
 TILT, TURN = math.radians(10.0), math.radians(9.0)
 SCALE_SPREAD = 0.07
@@ -63,7 +67,8 @@ _ARMS, _LEGS = (11, 23), (23, 33)  # first keypoint and one past the last, left 
 
 @dataclass(frozen=True)
 class Persistence:
-    """Correlation in time of the errors of n people in a window of WINDOW moments, each standard normal.
+    """Correlation in time of the errors of n people in a window of WINDOW moments, each standard
+    normal.
 
         e_t = √ρ c + √(1 − ρ) z_t,   z_t = a z_{t−1} + √(1 − a²) w_t
 
@@ -75,7 +80,9 @@ class Persistence:
 
     @staticmethod
     def draw(n: int, device: str) -> Persistence:
-        """Draw, for n people, the constant share of errors and the correlation from one moment to the next."""
+        """Draw, for n people, the constant share of errors and the correlation from one moment to
+        the next.
+        """
         like = torch.empty(n, device=device)
         return Persistence(uniform(like, CONSTANT_SHARE, n), uniform(like, KEPT, n))
 
@@ -92,21 +99,26 @@ class Persistence:
     def normal(self, *shape: int) -> Tensor:
         """Draw e_t, (n, WINDOW, *shape)."""
         n = len(self.constant)
-        return self.mix(normal(self.constant, n, 1, *shape), normal(self.constant, n, WINDOW, *shape))
+        return self.mix(
+            normal(self.constant, n, 1, *shape), normal(self.constant, n, WINDOW, *shape)
+        )
 
 
 def placements(n: int, deviation: Tensor, mean: Tensor | None = None) -> Tensor:
     """Draw keypoint offsets (n, 33, 3), metres, of n people, in the axes of their parts.
 
-    :param deviation: (33,) metres, `PLACEMENT` on the device;  mean: (33, 3) metres, `MEAN_OFFSETS` on the device, of
-        which each person has a share of `OFFSETS_FACTOR`; None: offsets around zero.
+    :param deviation: (33,) metres, `PLACEMENT` on the device;  mean: (33, 3) metres, `MEAN_OFFSETS`
+        on the device, of which each person has a share of `OFFSETS_FACTOR`; None: offsets around
+        zero.
     """
     own = deviation[:, None] * normal(deviation, n, 33, 3)
     return own if mean is None else own + mean * uniform(deviation, OFFSETS_FACTOR, n, 1, 1)
 
 
 def image_errors(persistence: Persistence) -> tuple[Tensor, Tensor]:
-    """Draw errors (n, WINDOW, 33, 2) of 2D keypoints, in units of the person's size s, and confidences."""
+    """Draw errors (n, WINDOW, 33, 2) of 2D keypoints, in units of the person's size s, and
+    confidences.
+    """
     like, n = persistence.constant, len(persistence.constant)
     (constant, lasting), (white, passing) = moment_errors(like, n), moment_errors(like, n, WINDOW)
     keeps = chance(like, CONFIDENCE_LASTS, n, 1, 33)
@@ -114,7 +126,9 @@ def image_errors(persistence: Persistence) -> tuple[Tensor, Tensor]:
 
 
 def moment_errors(like: Tensor, *n: int) -> tuple[Tensor, Tensor]:
-    """Draw errors of 2D keypoints (*n, 33, 2) in units of the person's size s, and confidences (*n, 33)."""
+    """Draw errors of 2D keypoints (*n, 33, 2) in units of the person's size s, and confidences (*n,
+    33).
+    """
     one = (0.0, 1.0)
     unsure = uniform(like, one, *n, 33) > CONFIDENT_SHARE + 0.18 * uniform(like, one, *n, 1)
     doubtful, sure = uniform(like, one, *n, 33) ** 0.7, 1 - 0.1 * uniform(like, one, *n, 33) ** 2
@@ -130,8 +144,11 @@ def moment_errors(like: Tensor, *n: int) -> tuple[Tensor, Tensor]:
     return own * level * (1 + (UNSURE_FACTOR - 1) * (1 - confidence[..., None])), confidence
 
 
-def cut_by_edge(rays: Tensor, confidence: Tensor, persistence: Persistence) -> tuple[Tensor, Tensor]:
-    """Cut some people (n, WINDOW, 33, 2) at the image border: beyond it, the network guesses with low confidence.
+def cut_by_edge(
+    rays: Tensor, confidence: Tensor, persistence: Persistence
+) -> tuple[Tensor, Tensor]:
+    """Cut some people (n, WINDOW, 33, 2) at the image border: beyond it, the network guesses with
+    low confidence.
 
     :return: the same, and confidences (n, WINDOW, 33).
     """
@@ -161,30 +178,40 @@ def swap_sides(rays: Tensor) -> Tensor:
 
 
 def world_landmarks(points: Tensor, persistence: Persistence) -> Tensor:
-    """Distort true keypoints (n, WINDOW, 33, 3), metres, in the axes of a camera that points at the person."""
+    """Distort true keypoints (n, WINDOW, 33, 3), metres, in the axes of a camera that points at the
+    person.
+    """
     n = len(points)
     strength = torch.exp(0.4 * normal(points, n, 1, 1))
     out = _flattened_trunk(points, persistence)
     bend = persistence.normal(sum(map(len, LIMBS)), 3)
-    bend = strength[..., None] * torch.cat([LIMB_ACROSS * bend[..., :2], LIMB_DEPTH * bend[..., 2:]], -1)
+    bend = strength[..., None] * torch.cat(
+        [LIMB_ACROSS * bend[..., :2], LIMB_DEPTH * bend[..., 2:]], -1
+    )
     bends = iter(bend.unbind(2))
     for number, limb in enumerate(LIMBS):
         flipped = chance(points, FLIP_SHARE, n, 1) & chance(points, FLIP_LASTS, n, WINDOW)
-        gain = uniform(points, ARM_GAIN if number < 2 else LEG_GAIN, n, 1) * torch.where(flipped, -1.0, 1.0)
+        gain = uniform(points, ARM_GAIN if number < 2 else LEG_GAIN, n, 1) * torch.where(
+            flipped, -1.0, 1.0
+        )
         scale = torch.stack([torch.ones_like(gain), torch.ones_like(gain), gain], -1)
         for parent, child in limb:
             bone = points[:, :, child] - points[:, :, parent]
             error = next(bends) * bone.norm(dim=-1, keepdim=True)
             out[child] = out[parent] + bone * scale + error
     tilt, turn, roll = persistence.normal(3).unbind(-1)
-    turned = torch.stack(out, 2) @ rotation_matrices(torch.stack([TILT * tilt, TURN * turn, 0.3 * TURN * roll], -1))
+    turned = torch.stack(out, 2) @ rotation_matrices(
+        torch.stack([TILT * tilt, TURN * turn, 0.3 * TURN * roll], -1)
+    )
     scaled = turned * torch.exp(SCALE_SPREAD * normal(points, n, 1, 1, 1))
     found = scaled + WORLD_NOISE_M * persistence.normal(33, 3)
     return found - hip_center(found)
 
 
 def _flattened_trunk(points: Tensor, persistence: Persistence) -> list[Tensor]:
-    """Return each keypoint (n, WINDOW, 3) after the trunk has tilted in depth as one; shoulders turn too little."""
+    """Return each keypoint (n, WINDOW, 3) after the trunk has tilted in depth as one; shoulders
+    turn too little.
+    """
     n, hips = len(points), hip_center(points)
     upper = points[:, :, :23] - hips
     middle = upper[:, :, 11:13, 2].mean(2, keepdim=True)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Write the network as ONNX, and read it again.
 
-Matrices are 8-bit integers times a scale per row, W ≈ s q with s = max |W| / 127, multiplied once, when the network is
-opened; the rest is in single precision.
+Matrices are 8-bit integers times a scale per row, W ≈ s q with s = max |W| / 127, multiplied once,
+when the network is opened; the rest is in single precision.
 """
 
 from __future__ import annotations
@@ -37,17 +37,29 @@ class _Graph:
         self.nodes.append(helper.make_node(kind, inputs, [output], **attributes))
         return output
 
-    def linear(self, x: str, name: str, weight: NDArray[np.float32], bias: NDArray[np.float32]) -> str:
+    def linear(
+        self, x: str, name: str, weight: NDArray[np.float32], bias: NDArray[np.float32]
+    ) -> str:
         rounded, scale = quantized(weight)
-        whole = self.add("Cast", [self.constant(f"{name}.weight", rounded)], f"{name}.whole", to=TensorProto.FLOAT)
+        whole = self.add(
+            "Cast",
+            [self.constant(f"{name}.weight", rounded)],
+            f"{name}.whole",
+            to=TensorProto.FLOAT,
+        )
         single = self.add("Mul", [whole, self.constant(f"{name}.scale", scale)], f"{name}.weight32")
         return self.add("Gemm", [x, single, self.constant(f"{name}.bias", bias)], name, transB=1)
 
     def reshape(self, x: str, name: str, *shape: int) -> str:
-        return self.add("Reshape", [x, self.constant(f"{name}.shape", np.array(shape, np.int64))], name)
+        return self.add(
+            "Reshape", [x, self.constant(f"{name}.shape", np.array(shape, np.int64))], name
+        )
 
     def norm(self, x: str, name: str, layer: torch.nn.LayerNorm) -> str:
-        scale, bias = (self.constant(f"{name}.{k}", getattr(layer, k).detach().numpy()) for k in ("weight", "bias"))
+        scale, bias = (
+            self.constant(f"{name}.{k}", getattr(layer, k).detach().numpy())
+            for k in ("weight", "bias")
+        )
         return self.add("LayerNormalization", [x, scale, bias], name, axis=-1, epsilon=layer.eps)
 
 
@@ -88,10 +100,19 @@ def export(network: LiftingNetwork, path: Path) -> None:
     x = g.norm(x, "norm", network.norm)
     weight, bias, n = array(network.leave.weight), array(network.leave.bias), KEYPOINT_COUNT * 3
     points = g.linear(x, "flat_points", weight[:n], bias[:n])
-    g.add("Reshape", [points, g.constant("points_shape", np.array([-1, KEYPOINT_COUNT, 3]))], "points")
+    g.add(
+        "Reshape", [points, g.constant("points_shape", np.array([-1, KEYPOINT_COUNT, 3]))], "points"
+    )
     sigma = g.linear(x, "flat_sigma", weight[n:], bias[n:] - SIGMA_BIAS)
-    sigma = g.add("Reshape", [sigma, g.constant("sigma_shape", np.array([-1, KEYPOINT_COUNT, 2]))], "sigma_raw")
-    low, high = (g.constant(f"sigma_limit{k}", np.array(v, np.float32)) for k, v in enumerate(LOG_SIGMA_RANGE))
+    sigma = g.add(
+        "Reshape",
+        [sigma, g.constant("sigma_shape", np.array([-1, KEYPOINT_COUNT, 2]))],
+        "sigma_raw",
+    )
+    low, high = (
+        g.constant(f"sigma_limit{k}", np.array(v, np.float32))
+        for k, v in enumerate(LOG_SIGMA_RANGE)
+    )
     sigma = g.add("Clip", [sigma, low, high], "sigma_clipped")
     g.add("Add", [sigma, g.constant("sigma_offset", array(network.sigma_offset))], "log_sigma")
     graph = helper.make_graph(
@@ -117,7 +138,9 @@ def read_exported(path: Path) -> LiftingNetwork:
 
     :raises KeyError: it is not such a network.
     """
-    found = {w.name: np.array(numpy_helper.to_array(w)) for w in onnx.load(str(path)).graph.initializer}
+    found = {
+        w.name: np.array(numpy_helper.to_array(w)) for w in onnx.load(str(path)).graph.initializer
+    }
     found |= {
         name: found[name] * found[name.removesuffix("weight") + "scale"]
         for name in found
@@ -125,12 +148,26 @@ def read_exported(path: Path) -> LiftingNetwork:
     }
     blocks = sum(name.startswith("first") and name.endswith(".weight") for name in found)
     network = LiftingNetwork(len(found["enter.bias"]), blocks)
-    names = {f"merges.{k}.{part}": f"merge_{part}{k}" for k in range(MERGES) for part in ("norm", "first", "second")}
-    names |= {f"blocks.{k}.{part}": f"{part}{k}" for k in range(blocks) for part in ("norm", "first", "second")}
+    names = {
+        f"merges.{k}.{part}": f"merge_{part}{k}"
+        for k in range(MERGES)
+        for part in ("norm", "first", "second")
+    }
+    names |= {
+        f"blocks.{k}.{part}": f"{part}{k}"
+        for k in range(blocks)
+        for part in ("norm", "first", "second")
+    }
     state = {name: found[name] for name in ("mean", "spread", "sigma_offset")}
     for ours, theirs in (names | {"enter": "enter", "norm": "norm"}).items():
         state |= {f"{ours}.{kind}": found[f"{theirs}.{kind}"] for kind in ("weight", "bias")}
-    state["leave.weight"] = np.concatenate([found["flat_points.weight"], found["flat_sigma.weight"]])
-    state["leave.bias"] = np.concatenate([found["flat_points.bias"], found["flat_sigma.bias"] + SIGMA_BIAS])
-    network.load_state_dict({name: torch.from_numpy(array.astype(np.float32)) for name, array in state.items()})
+    state["leave.weight"] = np.concatenate(
+        [found["flat_points.weight"], found["flat_sigma.weight"]]
+    )
+    state["leave.bias"] = np.concatenate(
+        [found["flat_points.bias"], found["flat_sigma.bias"] + SIGMA_BIAS]
+    )
+    network.load_state_dict(
+        {name: torch.from_numpy(array.astype(np.float32)) for name, array in state.items()}
+    )
     return network

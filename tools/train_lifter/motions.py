@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The recordings that move the body in training, and how often each of their frames is drawn. Needs no PyTorch."""
+"""The recordings that move the body in training, and how often each of their frames is drawn. Needs
+no PyTorch.
+"""
 
 from __future__ import annotations
 
@@ -18,14 +20,23 @@ from ...solver.rotations import exp
 from ..train_prior.data import group_of
 
 CLUSTERS = 256
-# Share of all draws by kind of motion, as ``tools.mocap.kinds`` names them. Footage shows people who stand or walk most
-# of the time, and a network that seldom sees straight legs bends those that it cannot see well.
-KIND_SHARES = {"stand": 0.30, "walk": 0.25, "run": 0.08, "jump": 0.05, "sit": 0.12, "floor": 0.05, "other": 0.15}
-# How often a second of each set is drawn, relative to the other sets that show the same kind of motion. Knees are those
-# of people in style100, the shortest set; nearly so in accad and rocketbox, whose walks are 5 to 7 degrees too bent;
-# and CMU's, straightened, are still 6 to 9 degrees too bent at mid-stance. The legs of reactidle were adjusted to
-# nearly straight ones, so they are no evidence, and the set is as long as all else of people who stand: it adds arms
-# and swaying.
+# Share of all draws by kind of motion, as ``tools.mocap.kinds`` names them. Footage shows people
+# who stand or walk most of the time, and a network that seldom sees straight legs bends those that
+# it cannot see well.
+KIND_SHARES = {
+    "stand": 0.30,
+    "walk": 0.25,
+    "run": 0.08,
+    "jump": 0.05,
+    "sit": 0.12,
+    "floor": 0.05,
+    "other": 0.15,
+}
+# How often a second of each set is drawn, relative to the other sets that show the same kind of
+# motion. Knees are those of people in style100, the shortest set; nearly so in accad and rocketbox,
+# whose walks are 5 to 7 degrees too bent; and CMU's, straightened, are still 6 to 9 degrees too
+# bent at mid-stance. The legs of reactidle were adjusted to nearly straight ones, so they are no
+# evidence, and the set is as long as all else of people who stand: it adds arms and swaying.
 REPEATED = {
     "style100": 15.0,
     "accad": 3.0,
@@ -38,8 +49,8 @@ REPEATED = {
     "markers": 1.0,
     "reactidle": 0.2,
 }
-# Kinds whose common poses are what they look like: their frames are drawn equally often. In the others, rare poses are
-# drawn more often than their number says.
+# Kinds whose common poses are what they look like: their frames are drawn equally often. In the
+# others, rare poses are drawn more often than their number says.
 EVEN_KINDS = ("stand", "walk", "run")
 
 
@@ -47,9 +58,9 @@ EVEN_KINDS = ("stand", "walk", "run")
 class Motions:
     """Frames of all takes.
 
-    ``Omega`` (F, 24, 3, 3) f32, row 0 the root into a world with y up; (F,) ``take``, ``fps``, ``performers`` as named
-    by ``train_prior.data.group_of``, ``kinds`` of motion as named by ``tools.mocap.kinds``, and ``sets``, the archive
-    or set of each frame.
+    ``Omega`` (F, 24, 3, 3) f32, row 0 the root into a world with y up; (F,) ``take``, ``fps``,
+    ``performers`` as named by ``train_prior.data.group_of``, ``kinds`` of motion as named by
+    ``tools.mocap.kinds``, and ``sets``, the archive or set of each frame.
     """
 
     Omega: NDArray[np.float32]
@@ -78,10 +89,11 @@ class Motions:
     def share(self) -> NDArray[np.float64]:
         """Return (F,) the probability of drawing a frame.
 
-        `KIND_SHARES` divides the draws among the kinds of motion that there are. Within a kind, each set has a share
-        proportional to its length times `REPEATED`. Within the set, frames are drawn equally often in time, but those
-        of kinds not in `EVEN_KINDS` in proportion to 1/√(frames of the kind in the same cluster of joint states), so
-        that common poses do not dominate.
+        `KIND_SHARES` divides the draws among the kinds of motion that there are. Within a kind,
+        each set has a share proportional to its length times `REPEATED`. Within the set, frames are
+        drawn equally often in time, but those of kinds not in `EVEN_KINDS` in proportion to
+        1/√(frames of the kind in the same cluster of joint states), so that common poses do not
+        dominate.
         """
         share = 1 / self.fps
         for kind in np.unique(self.kinds):
@@ -98,32 +110,45 @@ class Motions:
 
 
 def _cluster_sizes(states: NDArray[np.float32]) -> NDArray[np.intp]:
-    """Return (n,) how many joint states (n, 23, 3, 3) are in the same cluster as each, by k-means on Ω."""
+    """Return (n,) how many joint states (n, 23, 3, 3) are in the same cluster as each, by k-means
+    on Ω.
+    """
     x = states.reshape(len(states), -1)
     rng = np.random.default_rng(0)
     centers = x[rng.choice(len(x), min(CLUSTERS, len(x)), replace=False)]
     for _ in range(5):
         label = np.argmin(np.square(centers).sum(1) - 2 * x @ centers.T, axis=1)
         count = np.bincount(label, minlength=len(centers))
-        total = np.stack([np.bincount(label, x[:, d], len(centers)) for d in range(x.shape[1])], axis=1)
-        centers = np.where(count[:, None] > 0, total / np.maximum(count, 1)[:, None], centers).astype(x.dtype)
+        total = np.stack(
+            [np.bincount(label, x[:, d], len(centers)) for d in range(x.shape[1])], axis=1
+        )
+        centers = np.where(
+            count[:, None] > 0, total / np.maximum(count, 1)[:, None], centers
+        ).astype(x.dtype)
     return count[label]
 
 
 def load_motions(path: Path) -> Motions:
     """Read the valid frames of a file written by ``tools.mocap.fit_body``.
 
-    :raises MotionFileError: the file is missing, or has no kinds of motion, or kinds or sets with no share.
+    :raises MotionFileError: the file is missing, or has no kinds of motion, or kinds or sets with
+        no share.
     """
     data = read_npz(path, MotionFileError, "motion library")
     if "take_kind" not in data:
-        raise MotionFileError(f"{path}: has no kinds of motion; python -m scope.tools.mocap.fit_body makes a new file")
+        raise MotionFileError(
+            f"{path}: has no kinds of motion; python -m scope.tools.mocap.fit_body makes a new file"
+        )
     poses, valid, start = data["poses"], data["valid"], data["take_start"]
     take = np.repeat(np.arange(len(start) - 1), np.diff(start))[valid]
-    performers = np.array([group_of(*names) for names in zip(data["take_source"], data["take_subject"], strict=True)])
+    performers = np.array(
+        [group_of(*names) for names in zip(data["take_source"], data["take_subject"], strict=True)]
+    )
     kinds, sets = data["take_kind"], data["take_set"]
     unknown = sorted({*kinds} - {*KIND_SHARES} | {*sets} - {*REPEATED})
     if unknown:
-        raise MotionFileError(f"{path}: no share for {', '.join(unknown)}; add them to KIND_SHARES or REPEATED")
+        raise MotionFileError(
+            f"{path}: no share for {', '.join(unknown)}; add them to KIND_SHARES or REPEATED"
+        )
     Omega = exp(poses[valid].reshape(len(take), -1, 3).astype(float)).astype(np.float32)
     return Motions(Omega, take, data["take_fps"][take], performers[take], kinds[take], sets[take])

@@ -11,7 +11,8 @@ from ...scope_addon.capture.perception.lifter import INPUT_SIZE, KEYPOINT_COUNT,
 WIDTH, BLOCKS = 512, 6
 MERGES = 2  # 9 moments, 3, 1
 assert 3**MERGES == WINDOW
-# The loss of a bone of 0.14 rad error, the mean over all bones, has the same gradient as 2 (1 − cos).
+# The loss of a bone of 0.14 rad error, the mean over all bones, has the same gradient as 2 (1 −
+# cos).
 DIRECTION_WEIGHT = 0.3
 LOG_SIGMA_RANGE = (-5.5, 0.5)  # 4 mm .. 1.6 m
 _ARMS, _LEGS = [(11, 13), (13, 15), (12, 14), (14, 16)], [(23, 25), (25, 27), (24, 26), (26, 28)]
@@ -24,7 +25,11 @@ class Block(nn.Module):
 
     def __init__(self, width: int) -> None:
         super().__init__()
-        self.norm, self.first, self.second = nn.LayerNorm(width), nn.Linear(width, width), nn.Linear(width, width)
+        self.norm, self.first, self.second = (
+            nn.LayerNorm(width),
+            nn.Linear(width, width),
+            nn.Linear(width, width),
+        )
         nn.init.zeros_(self.second.weight)
 
     def forward(self, x: Tensor) -> Tensor:
@@ -33,11 +38,17 @@ class Block(nn.Module):
 
 
 class Merge(nn.Module):
-    """Three moments into one: x_middle + W₂ relu(W₁ [norm(x_before), norm(x_middle), norm(x_after)])."""
+    """Three moments into one: x_middle + W₂ relu(W₁ [norm(x_before), norm(x_middle),
+    norm(x_after)]).
+    """
 
     def __init__(self, width: int) -> None:
         super().__init__()
-        self.norm, self.first, self.second = nn.LayerNorm(width), nn.Linear(3 * width, width), nn.Linear(width, width)
+        self.norm, self.first, self.second = (
+            nn.LayerNorm(width),
+            nn.Linear(3 * width, width),
+            nn.Linear(width, width),
+        )
         nn.init.zeros_(self.second.weight)
 
     def forward(self, x: Tensor) -> Tensor:
@@ -48,12 +59,14 @@ class Merge(nn.Module):
 
 
 class LiftingNetwork(nn.Module):
-    """(n, 9, 200) -> points (n, 33, 3) metres and log σ (n, 33, 2), across and along the line of sight.
+    """(n, 9, 200) -> points (n, 33, 3) metres and log σ (n, 33, 2), across and along the line of
+    sight.
 
-    After VideoPose3D (Pavllo et al., CVPR 2019): a residual network whose convolutions over time, three moments wide,
-    shrink the window to its middle; the strided form, since windows do not share moments. Differences: layer
-    normalization before each layer instead of batch normalization after it, further residual blocks once the window
-    is one moment, and deviations in addition to the points.
+    After VideoPose3D (Pavllo et al., CVPR 2019): a residual network whose convolutions over time,
+    three moments wide, shrink the window to its middle; the strided form, since windows do not
+    share moments. Differences: layer normalization before each layer instead of batch normalization
+    after it, further residual blocks once the window is one moment, and deviations in addition to
+    the points.
     """
 
     def __init__(self, width: int = WIDTH, blocks: int = BLOCKS) -> None:
@@ -73,27 +86,35 @@ class LiftingNetwork(nn.Module):
         out = self.leave(self.norm(self.blocks(moments[:, 0]))).float()
         points, log_sigma = out[:, : KEYPOINT_COUNT * 3], out[:, KEYPOINT_COUNT * 3 :]
         log_sigma = log_sigma.reshape(-1, KEYPOINT_COUNT, 2) - 3.0
-        return points.reshape(-1, KEYPOINT_COUNT, 3), log_sigma.clamp(*LOG_SIGMA_RANGE) + self.sigma_offset
+        return points.reshape(-1, KEYPOINT_COUNT, 3), log_sigma.clamp(
+            *LOG_SIGMA_RANGE
+        ) + self.sigma_offset
 
 
 def loss(points: Tensor, log_sigma: Tensor, truth: Tensor) -> Tensor:
-    """Return the mean −log of the Laplace density of the error e of a coordinate, and that of bones' directions.
+    """Return the mean −log of the Laplace density of the error e of a coordinate, and that of
+    bones' directions.
 
-    −log p(e) = √2 |e| / σ + log σ (+ const), with one σ for both coordinates across the line of sight. The error of a
-    direction is the distance |d − d̂| of two unit vectors, with the weight DIRECTION_WEIGHT.
+    −log p(e) = √2 |e| / σ + log σ (+ const), with one σ for both coordinates across the line of
+    sight. The error of a direction is the distance |d − d̂| of two unit vectors, with the weight
+    DIRECTION_WEIGHT.
 
-    Both are linear in large errors, so that what the image leaves open is answered by the median of what was seen in
-    training, and not by the mean: the mean of many straight knees and a few bent ones is a knee that nobody has.
+    Both are linear in large errors, so that what the image leaves open is answered by the median of
+    what was seen in training, and not by the mean: the mean of many straight knees and a few bent
+    ones is a knee that nobody has.
     """
     log_sigma = torch.cat([log_sigma[..., :1], log_sigma], -1)
     likelihood = (2**0.5 * (points - truth).abs() * torch.exp(-log_sigma) + log_sigma).mean()
-    between = nn.functional.normalize(bones(points), dim=-1) - nn.functional.normalize(bones(truth), dim=-1)
+    between = nn.functional.normalize(bones(points), dim=-1) - nn.functional.normalize(
+        bones(truth), dim=-1
+    )
     return likelihood + DIRECTION_WEIGHT * between.square().sum(-1).add(1e-6).sqrt().mean()
 
 
 def bones(points: Tensor) -> Tensor:
     """Return the vectors (n, 12, 3) of bones from start to end, of points (n, 33, 3).
 
-    Slices, since an index tensor would have to be copied to the device, which a CUDA graph cannot record.
+    Slices, since an index tensor would have to be copied to the device, which a CUDA graph cannot
+    record.
     """
     return torch.stack([points[:, end] - points[:, start] for start, end in BONES], 1)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The lifting network's input, as `capture.perception.lifter` defines it, in PyTorch, for windows of moments."""
+"""The lifting network's input, as `capture.perception.lifter` defines it, in PyTorch, for windows
+of moments.
+"""
 
 from __future__ import annotations
 
@@ -26,20 +28,31 @@ def virtual_camera(rays: Tensor) -> Tensor:
 
 def person_size(image_points: Tensor) -> Tensor:
     """Return the person's size s (...,) of points (..., 33, 2), in the points' unit."""
-    limbs = torch.cat([image_points[..., :1, :], image_points[..., 11:17, :], image_points[..., 23:29, :]], -2)
+    limbs = torch.cat(
+        [image_points[..., :1, :], image_points[..., 11:17, :], image_points[..., 23:29, :]], -2
+    )
     square = (limbs - limbs.mean(-2, keepdim=True)).square().sum(-1).mean(-1)
     return square.sqrt().clamp(min=1e-4)
 
 
-def network_input(rays: Tensor, confidence: Tensor, world: Tensor, known: Tensor) -> tuple[Tensor, Tensor]:
+def network_input(
+    rays: Tensor, confidence: Tensor, world: Tensor, known: Tensor
+) -> tuple[Tensor, Tensor]:
     """Return the network's input (..., 200) and R_virtual_camera (..., 3, 3).
 
-    :param rays: (..., 33, 2) normalized image coordinates;  confidence: (..., 33), 0..1;  world: (..., 33, 3) metres,
-        camera axes, hip centre at 0;  known: (...,) 1 where the world landmarks are used, else 0.
+    :param rays: (..., 33, 2) normalized image coordinates;  confidence: (..., 33), 0..1;  world:
+        (..., 33, 3) metres, camera axes, hip centre at 0;  known: (...,) 1 where the world
+        landmarks are used, else 0.
     """
     R = virtual_camera(rays)
     view = rays @ R[..., :2].transpose(-1, -2) + R[..., None, :, 2]
     u = view[..., :2] / view[..., 2:].clamp(min=0.1)
     s, known = person_size(u)[..., None], known[..., None]
-    parts = [(u.flatten(-2) / s).clamp(-6.0, 6.0), confidence, world.flatten(-2) / WORLD_UNIT_M * known, known, s.log()]
+    parts = [
+        (u.flatten(-2) / s).clamp(-6.0, 6.0),
+        confidence,
+        world.flatten(-2) / WORLD_UNIT_M * known,
+        known,
+        s.log(),
+    ]
     return torch.cat(parts, -1), R

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Estimate the landmark network's keypoint offsets: ``python -m scope.tools.train_lifter.place_keypoints FOLDER``.
+"""Estimate the landmark network's keypoint offsets: ``python -m
+scope.tools.train_lifter.place_keypoints FOLDER``.
 
-FOLDER holds the clips (../shared/data/clips). Prints, for each person and for all, the least-squares offsets found in
-captures without keypoint offsets; the last column belongs in `keypoint_offsets`.
+FOLDER holds the clips (../shared/data/clips). Prints, for each person and for all, the
+least-squares offsets found in captures without keypoint offsets; the last column belongs in
+`keypoint_offsets`.
 """
 
 from __future__ import annotations
@@ -22,7 +24,13 @@ from ...scope_addon.motion import Motion
 from ...solver import Body, load_body
 from ...solver.rotations import exp
 
-CLIPS = ("walk_side_static", "run_moving_camera", "squats_5fps", "gesture_square", "two_people_portrait")
+CLIPS = (
+    "walk_side_static",
+    "run_moving_camera",
+    "squats_5fps",
+    "gesture_square",
+    "two_people_portrait",
+)
 MIN_FRAMES = 20  # of a person who is included
 REGULARIZATION = 0.3
 FARTHEST_M = 0.12  # larger errors are outliers
@@ -36,7 +44,9 @@ def normal_equations(body: Body, motion: Motion) -> tuple[NDArray[np.float64], N
     part, betas = body.keypoint_part[indices], motion.betas.astype(float)
     rotations = exp(motion.poses.reshape(len(motion), -1, 3).astype(float))
     rotations[:, 0] = np.swapaxes(motion.world_from_camera[:, :3, :3], 1, 2) @ rotations[:, 0]
-    R, t = body.forward_kinematics(rotations, motion.joints_cam[:, 0] - body.rest_joints(betas)[0], betas)
+    R, t = body.forward_kinematics(
+        rotations, motion.joints_cam[:, 0] - body.rest_joints(betas)[0], betas
+    )
     points = body.keypoints(R, t, betas, indices)
     order = [motion.keypoints2d_names.tolist().index(name) for name in KEYPOINT_NAMES]
     pixels, confidence = motion.keypoints2d[:, order, :2], motion.keypoints2d[:, order, 2]
@@ -63,8 +73,12 @@ def main() -> None:
     body, ablation = load_body("scope"), Ablation(keypoint_offsets=False)
     everybody = []
     for clip in CLIPS:
-        found = capture(folder / f"{clip}.mp4", body, CaptureOptions(people="all", ablation=ablation))
-        everybody += [normal_equations(body, m) for m in found.motions if m.valid.sum() >= MIN_FRAMES]
+        found = capture(
+            folder / f"{clip}.mp4", body, CaptureOptions(people="all", ablation=ablation)
+        )
+        everybody += [
+            normal_equations(body, m) for m in found.motions if m.valid.sum() >= MIN_FRAMES
+        ]
     columns = [offsets(*each) for each in everybody]
     columns.append(offsets(*(np.sum(each, axis=0) for each in zip(*everybody, strict=True))))
     for k, name in enumerate(KEYPOINT_NAMES):

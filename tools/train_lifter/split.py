@@ -11,12 +11,15 @@ from .motions import Motions
 
 HELD_OUT_EVERY = 10
 ARCHIVED = (
-    149  # takes of the archives, whose numbers come first; those of the sets after them are held out by performer
+    # takes of the archives, whose numbers come first; those of the sets after them are held out by
+    # performer
+    149
 )
 
 
 def is_held_out(take: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Return whether the takes with these numbers are held out regardless of who performs: every tenth of the archives.
+    """Return whether the takes with these numbers are held out regardless of who performs: every
+    tenth of the archives.
 
     The renders and scenes with held-out motions show these.
     """
@@ -24,12 +27,16 @@ def is_held_out(take: NDArray[np.intp]) -> NDArray[np.bool_]:
 
 
 def training_frames(motions: Motions) -> Motions:
-    """Return the frames of all takes except every tenth and those of performers kept from all training."""
+    """Return the frames of all takes except every tenth and those of performers kept from all
+    training.
+    """
     return motions.select(~_held_out(motions))
 
 
 def held_out_frames(motions: Motions) -> Motions:
-    """Return the frames of every tenth take and of all takes of performers kept from all training."""
+    """Return the frames of every tenth take and of all takes of performers kept from all
+    training.
+    """
     return motions.select(_held_out(motions))
 
 

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Train the lifting network: ``python -m scope.tools.train_lifter.train MOTIONS -o assets/lifter``.
 
-AdamW with a cosine schedule; the exponential mean of the weights is exported. Batches are drawn on the device of the
-training. On a GPU, products are in bfloat16, and drawing and training run as two CUDA graphs; on a CPU, products are in
-single precision, which is as fast there or faster. Every tenth take and all takes of the
-joint prior's test performers are held out, to evaluate and to calibrate the uncertainties. The weights are kept next to
-the exported network, from which another training can continue (``--start``), as from an exported network itself.
+AdamW with a cosine schedule; the exponential mean of the weights is exported. Batches are drawn on
+the device of the training. On a GPU, products are in bfloat16, and drawing and training run as two
+CUDA graphs; on a CPU, products are in single precision, which is as fast there or faster. Every
+tenth take and all takes of the joint prior's test performers are held out, to evaluate and to
+calibrate the uncertainties. The weights are kept next to the exported network, from which another
+training can continue (``--start``), as from an exported network itself.
 
 On the same kind of device, the same arguments give the same batches.
 """
@@ -48,7 +49,9 @@ GRAPH_WARM_UP = 3  # runs before a CUDA graph is recorded, in which libraries al
 
 @dataclass(frozen=True)
 class Settings:
-    """A training: ``steps`` batches of ``batch`` windows of ``variety``, drawn from ``seed``; highest rate ``rate``."""
+    """A training: ``steps`` batches of ``batch`` windows of ``variety``, drawn from ``seed``;
+    highest rate ``rate``.
+    """
 
     variety: Variety
     steps: int
@@ -60,11 +63,13 @@ class Settings:
 class Trainer:
     """A network in training, and its batches.
 
-    Everything that a step reads or writes is an attribute: CUDA graphs work on fixed addresses, so these tensors must
-    live as long as the graphs.
+    Everything that a step reads or writes is an attribute: CUDA graphs work on fixed addresses, so
+    these tensors must live as long as the graphs.
     """
 
-    def __init__(self, body: Body, motions: Motions, settings: Settings, start: Path | None, device: str) -> None:
+    def __init__(
+        self, body: Body, motions: Motions, settings: Settings, start: Path | None, device: str
+    ) -> None:
         torch.manual_seed(settings.seed)
         self.settings, self.device = settings, device
         self.dataset = Dataset(body, training_frames(motions), settings.variety, device)
@@ -76,12 +81,20 @@ class Trainer:
             self.network.spread.copy_(x.std(0) + 1e-3)
         self.network.sigma_offset.zero_()
         self.mean = copy.deepcopy(self.network)
-        self.parameters, self.mean_parameters = list(self.network.parameters()), list(self.mean.parameters())
-        self.rate, self.mean_share, self.total_loss = (torch.zeros((), device=device) for _ in range(3))
+        self.parameters, self.mean_parameters = (
+            list(self.network.parameters()),
+            list(self.mean.parameters()),
+        )
+        self.rate, self.mean_share, self.total_loss = (
+            torch.zeros((), device=device) for _ in range(3)
+        )
         self.optimizer = self._optimizer()
         batch = self.dataset.batch(settings.batch)
         self.input, self.points = batch.input, batch.points
-        self._draw, self._step = graphed(self._draw_batch, device), graphed(self._train_batch, device)
+        self._draw, self._step = (
+            graphed(self._draw_batch, device),
+            graphed(self._train_batch, device),
+        )
         self._forget_warm_up()
         # On a CPU, the next batch is drawn beside the training, which keeps a second core busy.
         self._drawing = None if device == "cuda" else ThreadPoolExecutor(1)
@@ -104,7 +117,9 @@ class Trainer:
         return optimizer
 
     def _forget_warm_up(self) -> None:
-        """Set back what `graphed` changed; with the rate and the mean's share at 0, the weights have not changed."""
+        """Set back what `graphed` changed; with the rate and the mean's share at 0, the weights
+        have not changed.
+        """
         for state in self.optimizer.state.values():
             for value in state.values():
                 value.zero_()
@@ -116,8 +131,11 @@ class Trainer:
         self.points.copy_(batch.points)
 
     def _train_batch(self) -> None:
-        # Without the cache, whose casts of the weights would not be repeated when a graph is replayed.
-        with torch.autocast(self.device, torch.bfloat16, enabled=self.device == "cuda", cache_enabled=False):
+        # Without the cache, whose casts of the weights would not be repeated when a graph is
+        # replayed.
+        with torch.autocast(
+            self.device, torch.bfloat16, enabled=self.device == "cuda", cache_enabled=False
+        ):
             points, log_sigma = self.network(self.input)
         value = loss(points, log_sigma, self.points)
         value.backward()
@@ -149,7 +167,9 @@ class Trainer:
 
 
 def schedule(step: int, steps: int) -> float:
-    """Return the factor on the highest rate: it rises over `WARM_UP` steps, and falls as ½ + ½ cos(π step / steps)."""
+    """Return the factor on the highest rate: it rises over `WARM_UP` steps, and falls as ½ + ½
+    cos(π step / steps).
+    """
     return min((step + 1) / WARM_UP, 0.5 + 0.5 * math.cos(math.pi * step / steps))
 
 
@@ -184,12 +204,17 @@ def read_weights(path: Path) -> LiftingNetwork:
 
 
 def train(
-    motions: Motions, folder: Path, settings: Settings, start: Path | None, device: str, report_every: int = 500
+    motions: Motions,
+    folder: Path,
+    settings: Settings,
+    start: Path | None,
+    device: str,
+    report_every: int = 500,
 ) -> None:
     """Train, and write weights, network and log into the folder.
 
-    :param start: weights of an earlier training to go on from, or its export;  report_every: steps between two rows of
-        the log.
+    :param start: weights of an earlier training to go on from, or its export;  report_every: steps
+        between two rows of the log.
     """
     torch.backends.cuda.matmul.allow_tf32 = True
     body = load_body("scope")
@@ -214,7 +239,9 @@ def train(
     export(trainer.mean.cpu(), folder / NETWORK)
     summary = {**asdict(settings), "start": str(start) if start else None, "device": device}
     with atomic_path(folder / LOG) as temporary:
-        temporary.write_text(json.dumps(summary | {"held_out": measured, "log": log}, indent=1) + "\n")
+        temporary.write_text(
+            json.dumps(summary | {"held_out": measured, "log": log}, indent=1) + "\n"
+        )
 
 
 def _save(network: LiftingNetwork, folder: Path) -> None:
@@ -231,11 +258,21 @@ def _arguments() -> argparse.ArgumentParser:
     parser.add_argument("--steps", type=int, default=20_800)
     parser.add_argument("--batch", type=int, default=BATCH, help="windows of a step")
     parser.add_argument("--rate", type=float, default=PEAK_RATE, help="the highest learning rate")
-    parser.add_argument("--start", type=Path, help="weights of an earlier training to go on from: .pt or .onnx")
-    parser.add_argument("--natural", type=float, default=0.6, help="share of samples whose joints are as recorded")
-    parser.add_argument("--segments", type=float, default=0.0, help="spread of the lengths of trunk, arms and legs")
-    parser.add_argument("--offsets", choices=("none", "random"), default="none", help="the landmark network's")
-    parser.add_argument("--device", choices=("cuda", "cpu"), default="cuda" if torch.cuda.is_available() else "cpu")
+    parser.add_argument(
+        "--start", type=Path, help="weights of an earlier training to go on from: .pt or .onnx"
+    )
+    parser.add_argument(
+        "--natural", type=float, default=0.6, help="share of samples whose joints are as recorded"
+    )
+    parser.add_argument(
+        "--segments", type=float, default=0.0, help="spread of the lengths of trunk, arms and legs"
+    )
+    parser.add_argument(
+        "--offsets", choices=("none", "random"), default="none", help="the landmark network's"
+    )
+    parser.add_argument(
+        "--device", choices=("cuda", "cpu"), default="cuda" if torch.cuda.is_available() else "cpu"
+    )
     return parser
 
 
@@ -248,7 +285,10 @@ def main() -> None:
     if not 0 <= a.natural <= 1:
         parser.error(f"--natural is a share from 0 to 1, but is {a.natural}")
     if a.start and not a.start.is_file():
-        parser.error(f"{a.start} does not exist; --start expects the weights or the export of an earlier training")
+        parser.error(
+            f"{a.start} does not exist; --start expects the weights or the export of an "
+            "earlier training"
+        )
     try:
         motions = load_motions(a.motions)
     except MotionFileError as error:

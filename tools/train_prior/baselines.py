@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Baselines for the flow, fitted by maximum likelihood: log densities against the normalized Haar measure.
+"""Baselines for the flow, fitted by maximum likelihood: log densities against the normalized Haar
+measure.
 
-Gaussian in the tangent space of the mean M, phi = log(MᵀOmega) ~ N(m, C), with the volume factor of the chart:
+Gaussian in the tangent space of the mean M, phi = log(MᵀOmega) ~ N(m, C), with the volume factor of
+the chart:
     dmu = (1 - cos|phi|) / (4 pi^2 |phi|^2) d^3phi
-and divided by its mass within the ball |phi| < pi, by samples.
-Matrix Fisher, which is Bingham's distribution of the unit quaternion: p = exp(tr FᵀOmega) / c(s), F = U diag(s) Vᵀ,
+and divided by its mass within the ball |phi| < pi, by samples. Matrix Fisher, which is Bingham's
+distribution of the unit quaternion: p = exp(tr FᵀOmega) / c(s), F = U diag(s) Vᵀ,
     c(s) = int_-1^1 1/2 I_0[(s_i - s_j)(1 - u)/2] I_0[(s_i + s_j)(1 + u)/2] exp(s_k u) du
-for any order i, j, k of the proper singular values; found from E[Omega] = U diag(d) Vᵀ by d log c / ds = d.
-Source: T. Lee, "Bayesian attitude estimation with the matrix Fisher distribution on SO(3)" (2018), for c as a 1-D
-integral.
+for any order i, j, k of the proper singular values; found from E[Omega] = U diag(d) Vᵀ by d log c /
+ds = d. Source: T. Lee, "Bayesian attitude estimation with the matrix Fisher distribution on SO(3)"
+(2018), for c as a 1-D integral.
 """
 
 from __future__ import annotations
@@ -20,11 +22,16 @@ from numpy.typing import NDArray
 
 from ...solver.rotations import log
 
-Density = Callable[[NDArray[np.float64]], NDArray[np.float64]]  # rotations (n, 3, 3) -> log densities (n,)
+# rotations (n, 3, 3) -> log densities (n,)
+Density = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 
-def gaussian(rotations: NDArray[np.float64], weights: NDArray[np.float64], mean: NDArray[np.float64]) -> Density:
-    """Fit a Gaussian in the tangent space of ``mean`` (3, 3) to rotations (n, 3, 3) with probabilities (n,)."""
+def gaussian(
+    rotations: NDArray[np.float64], weights: NDArray[np.float64], mean: NDArray[np.float64]
+) -> Density:
+    """Fit a Gaussian in the tangent space of ``mean`` (3, 3) to rotations (n, 3, 3) with
+    probabilities (n,).
+    """
     phi = log(mean.T @ rotations)
     m = weights @ phi
     C = np.einsum("n,ni,nj->ij", weights, phi - m, phi - m)
@@ -37,7 +44,9 @@ def gaussian(rotations: NDArray[np.float64], weights: NDArray[np.float64], mean:
     def density(omega: NDArray[np.float64]) -> NDArray[np.float64]:
         x = log(mean.T @ omega)
         squared = (x * x).sum(-1)
-        volume = np.where(squared < 1e-6, 0.5, (1.0 - np.cos(np.sqrt(squared))) / np.maximum(squared, 1e-12))
+        volume = np.where(
+            squared < 1e-6, 0.5, (1.0 - np.cos(np.sqrt(squared))) / np.maximum(squared, 1e-12)
+        )
         d = (x - m) @ inverse.T
         return -0.5 * (d * d).sum(-1) + constant - np.log(mass) - np.log(volume / (4.0 * np.pi**2))
 
@@ -54,10 +63,14 @@ def log_i0e(x: NDArray[np.float64]) -> NDArray[np.float64]:
     far = np.maximum(a, 100.0)
     series = 1.0 + (1.0 + (9.0 + 75.0 / (8.0 * far)) / (16.0 * far)) / (8.0 * far)
     near = np.minimum(a, 100.0)
-    return np.where(a > 100.0, np.log(series) - 0.5 * np.log(2.0 * np.pi * far), np.log(np.i0(near)) - near)
+    return np.where(
+        a > 100.0, np.log(series) - 0.5 * np.log(2.0 * np.pi * far), np.log(np.i0(near)) - near
+    )
 
 
-_NODES = tuple(0.5 * (a + b) for a, b in zip(np.polynomial.legendre.leggauss(200), (1.0, 0.0), strict=True))
+_NODES = tuple(
+    0.5 * (a + b) for a, b in zip(np.polynomial.legendre.leggauss(200), (1.0, 0.0), strict=True)
+)
 
 
 def log_fisher_constant(s: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
@@ -103,7 +116,8 @@ def matrix_fisher(rotations: NDArray[np.float64], weights: NDArray[np.float64]) 
 
 
 def _from_moments(d: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Solve d log c / ds = d by damped Newton steps on the convex log c(s) - s d, from the concentrated limit.
+    """Solve d log c / ds = d by damped Newton steps on the convex log c(s) - s d, from the
+    concentrated limit.
 
     There 1 - d_k = (1/(s_k + s_i) + 1/(s_k + s_j)) / 2.
     """
@@ -115,8 +129,16 @@ def _from_moments(d: NDArray[np.float64]) -> NDArray[np.float64]:
     for _ in range(200):
         g = np.array([_slope(s, k) for k in range(3)]) - d
         h = 1e-3 * np.maximum(1.0, np.abs(s))
-        H = np.array([[(_slope(s + h[j] * np.eye(3)[j], k) - _slope(s - h[j] * np.eye(3)[j], k)) / (2 * h[j])
-                       for j in range(3)] for k in range(3)])  # fmt: skip
+        H = np.array(
+            [
+                [
+                    (_slope(s + h[j] * np.eye(3)[j], k) - _slope(s - h[j] * np.eye(3)[j], k))
+                    / (2 * h[j])
+                    for j in range(3)
+                ]
+                for k in range(3)
+            ]
+        )
         step = np.linalg.solve(0.5 * (H + H.T) + 1e-12 * np.eye(3), g)
         size = 1.0
         while size > 1e-6:

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rotations of each joint from build/mocap/motions.npz, without joints for which a source has constants only.
+"""Rotations of each joint from build/mocap/motions.npz, without joints for which a source has
+constants only.
 
-Left and right are one joint: a right joint's state is mirrored, Omega -> S Omega S with S = diag(-1, 1, 1), and counts
-as the left one's; joints of the trunk get every sample and its mirror image.
+Left and right are one joint: a right joint's state is mirrored, Omega -> S Omega S with S =
+diag(-1, 1, 1), and counts as the left one's; joints of the trunk get every sample and its mirror
+image.
 """
 
 from __future__ import annotations
@@ -21,12 +23,15 @@ from ...solver.rotations import exp
 STEP = 3  # every third frame: 10 a second, neighbours are nearly the same
 MIRROR = np.diag([-1.0, 1.0, 1.0])  # x points to the person's left
 TRUNK = ("spine1", "spine2", "spine3", "neck", "head")
-PAIRED = ("hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist")  # left_ and right_
+# left_ and right_
+PAIRED = ("hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist")
 MODELS = TRUNK + PAIRED  # one flow for each
-WITHOUT_DATA = ("hand",)  # for the knuckles, sources have no data or a fixed share of the wrist's angle
-# DeepMimic's character has one joint each for trunk and neck, whose rotation the fit divides by fixed shares, and no
-# collars, wrists or toes. The sets of joint positions are fitted in the same way. Where they have no orientations, a
-# foot turns with its shank, so that its ankle only bends; the legs of reactidle were adjusted.
+# for the knuckles, sources have no data or a fixed share of the wrist's angle
+WITHOUT_DATA = ("hand",)
+# DeepMimic's character has one joint each for trunk and neck, whose rotation the fit divides by
+# fixed shares, and no collars, wrists or toes. The sets of joint positions are fitted in the same
+# way. Where they have no orientations, a foot turns with its shank, so that its ankle only bends;
+# the legs of reactidle were adjusted.
 LIMBS = ("hip", "knee", "ankle", "shoulder", "elbow")
 UNTURNED_FEET = ("hip", "knee", "shoulder", "elbow")
 MEASURED = {
@@ -45,7 +50,8 @@ MEASURED = {
 
 # Test performers, not used in training or in model selection.
 TEST = ("cmu_02", "expmap_soccer")
-# Kept from every training and from the prior's test: legs and joint centres are judged by them elsewhere.
+# Kept from every training and from the prior's test: legs and joint centres are judged by them
+# elsewhere.
 RESERVED = ("markers", "reactidle_reserved", "cmu_08", "cmu_12")
 # Left out in turn for model selection.
 FOLDS = (
@@ -82,9 +88,10 @@ class Samples:
 def group_of(source: str, subject: str) -> str:
     """Return the name of the group of performers of a take.
 
-    The exponential-map archive does not name its performers, so takes of one activity stay together: walking and
-    running overlap, and so may jumping, washing windows and directing traffic. Performers of ``cmu_more`` whom that
-    archive has too are in the group of their activity. Sets of many performers with little of each are one group.
+    The exponential-map archive does not name its performers, so takes of one activity stay
+    together: walking and running overlap, and so may jumping, washing windows and directing
+    traffic. Performers of ``cmu_more`` whom that archive has too are in the group of their
+    activity. Sets of many performers with little of each are one group.
     """
     if source == "markers":
         return "markers"
@@ -94,7 +101,9 @@ def group_of(source: str, subject: str) -> str:
         return f"expmap_{CMU_ACTIVITIES[subject]}" if subject in CMU_ACTIVITIES else subject
     activity = subject.removeprefix("expmap_").split("_", 1)[1].rstrip("0123456789").strip("_")
     together = {"basketball_signal": "basketball", "running": "walking", "washwindow": "jumping"}
-    return "expmap_" + together.get(activity, "jumping" if activity == "directing_traffic" else activity)
+    return "expmap_" + together.get(
+        activity, "jumping" if activity == "directing_traffic" else activity
+    )
 
 
 def mirrored(rotations: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -109,11 +118,15 @@ def load_samples(path: Path, joint_names: tuple[str, ...]) -> dict[str, Samples]
     :raises MotionFileError: when the file is missing, or has takes of an unknown performer.
     """
     motions = read_npz(path, MotionFileError, "motion library")
-    groups = [group_of(*pair) for pair in zip(motions["take_source"], motions["take_subject"], strict=True)]
+    groups = [
+        group_of(*pair)
+        for pair in zip(motions["take_source"], motions["take_subject"], strict=True)
+    ]
     unknown = sorted(set(groups) - {*ALWAYS, *TEST, *RESERVED, *itertools.chain(*FOLDS)})
     if unknown:
         raise MotionFileError(
-            f"{path}: {', '.join(unknown)} belong to no split; add them to TEST, RESERVED, FOLDS or ALWAYS"
+            f"{path}: {', '.join(unknown)} belong to no split; add them to TEST, RESERVED, FOLDS "
+            "or ALWAYS"
         )
     lengths = np.diff(motions["take_start"])
     group, source = np.repeat(groups, lengths), np.repeat(motions["take_source"], lengths)
@@ -122,9 +135,14 @@ def load_samples(path: Path, joint_names: tuple[str, ...]) -> dict[str, Samples]
     phi = motions["poses"].reshape(len(group), -1, 3).astype(np.float64)
     out = {}
     for model in MODELS:
-        keep = chosen & np.isin(source, [name for name, models in MEASURED.items() if model in models])
+        keep = chosen & np.isin(
+            source, [name for name, models in MEASURED.items() if model in models]
+        )
         joints = [model] if model in TRUNK else [f"left_{model}", f"right_{model}"]
-        first, second = exp(phi[keep, joint_names.index(joints[0])]), exp(phi[keep, joint_names.index(joints[-1])])
+        first, second = (
+            exp(phi[keep, joint_names.index(joints[0])]),
+            exp(phi[keep, joint_names.index(joints[-1])]),
+        )
         rotations = np.concatenate([first, mirrored(second)])
         out[model] = Samples(rotations, np.tile(group[keep], 2))
     return out

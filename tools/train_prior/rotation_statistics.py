@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 from ...solver.rotations import exp, log
 
 
-def mean_rotation(rotations: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
+def mean_rotation(
+    rotations: NDArray[np.float64], weights: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Return the weighted Karcher mean (3, 3) of rotations (n, 3, 3)."""
     mean = rotations[0]
     for _ in range(100):
@@ -30,6 +32,8 @@ def balanced(group: NDArray[np.str_], balance: float) -> NDArray[np.float64]:
 def blurred(
     rotations: NDArray[np.float64], degrees: NDArray[np.float64], rng: np.random.Generator
 ) -> NDArray[np.float64]:
-    """Return rotations (..., 3, 3) with isotropic noise of standard deviations (...) about each axis."""
+    """Return rotations (..., 3, 3) with isotropic noise of standard deviations (...) about each
+    axis.
+    """
     noise = np.radians(degrees)[..., None] * rng.standard_normal(rotations.shape[:-1])
     return rotations @ exp(noise)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One reader for each data set: from the folders that its publisher hands out to clips with ground truth."""
+"""One reader for each data set: from the folders that its publisher hands out to clips with ground
+truth.
+"""
 
 from __future__ import annotations
 

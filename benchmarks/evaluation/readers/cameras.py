@@ -7,8 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def intrinsics_of_projection(joints: NDArray[np.float64], pixels: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """Return K (3, 3) that minimizes Σ (f_x x + c_x z − u z)² + Σ (f_y y + c_y z − v z)², without distortion.
+def intrinsics_of_projection(
+    joints: NDArray[np.float64], pixels: NDArray[np.float64]
+) -> NDArray[np.float64] | None:
+    """Return K (3, 3) that minimizes Σ (f_x x + c_x z − u z)² + Σ (f_y y + c_y z − v z)², without
+    distortion.
 
     :param joints: (..., 3) in the camera, metres; those behind it are not used.
     :param pixels: (..., 2), u and v.

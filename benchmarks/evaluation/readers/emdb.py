@@ -7,7 +7,8 @@
         smpl: poses_root (T, 3), poses_body (T, 69), trans (T, 3), betas (10,)
     P0/00_mvs_a/images/00000.jpg     30 frames per second
 
-EMDB 1 is evaluated in the camera, EMDB 2 in the world. The ground truth needs SMPL of each person's gender.
+EMDB 1 is evaluated in the camera, EMDB 2 in the world. The ground truth needs SMPL of each person's
+gender.
 """
 
 from __future__ import annotations
@@ -41,7 +42,9 @@ def clips(folder: Path, models: Models) -> list[Clip]:
             truth = partial(_truth, path, len(pictures), models)
             found.append(Clip(name, pictures, RATE, protocols, truth, alone=False))
     if not found:
-        raise DatasetError(f"{folder} holds no sequence of EMDB 1 or EMDB 2; download the archives of both")
+        raise DatasetError(
+            f"{folder} holds no sequence of EMDB 1 or EMDB 2; download the archives of both"
+        )
     return found
 
 
@@ -51,15 +54,23 @@ def _truth(path: Path, frames: int, models: Models) -> Truth:
     T_camera_world = array(path, camera, "extrinsics", (None, 4, 4))
     count = len(T_camera_world)
     if count > frames:
-        raise DatasetError(f"{path} is about {count} frames, but {path.parent / 'images'} holds {frames}")
+        raise DatasetError(
+            f"{path} is about {count} frames, but {path.parent / 'images'} holds {frames}"
+        )
     gender = table.get("gender")
     gender = gender.decode("latin1") if isinstance(gender, bytes) else gender
     if gender not in GENDERS:
-        raise DatasetError(f"{path}: gender must be one of {', '.join(GENDERS)}, but is {gender!r:.20}")
+        raise DatasetError(
+            f"{path}: gender must be one of {', '.join(GENDERS)}, but is {gender!r:.20}"
+        )
     body = models.body("smpl", gender, "EMDB")
-    parts = [array(path, smpl, key, (count, n)) for key, n in (("poses_root", 3), ("poses_body", 69))]
+    parts = [
+        array(path, smpl, key, (count, n)) for key, n in (("poses_root", 3), ("poses_body", 69))
+    ]
     trans = metres(path, "trans", array(path, smpl, "trans", (count, 3)))
-    world = pose_body(body, np.concatenate(parts, axis=1), array(path, smpl, "betas", (None,)), trans)
+    world = pose_body(
+        body, np.concatenate(parts, axis=1), array(path, smpl, "betas", (None,)), trans
+    )
     rows = np.flatnonzero(array(path, table, "good_frames_mask", (count,)) > 0)
     if not len(rows):
         raise DatasetError(f"{path}: good_frames_mask marks no frame; download it again")

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The test split of RICH (Huang et al., CVPR 2022), in the layout of its toolkit:
 
-    bodies/test/Gym_011_pushup1/00045/011.pkl        SMPL-X in the world: global_orient (1, 3), body_pose (1, 63),
+    bodies/test/Gym_011_pushup1/00045/011.pkl        SMPL-X in the world: global_orient (1, 3),
+                                                     body_pose (1, 63),
                                                      transl (1, 3), betas (1, 10)
     images/test/Gym_011_pushup1/cam_02/00045_02.jpeg (or .png, .bmp), 30 frames per second
-    scan_calibration/Gym/calibration/002.xml         CameraMatrix (3 × 4, camera from world), Intrinsics (3 × 3)
+    scan_calibration/Gym/calibration/002.xml         CameraMatrix (3 × 4, camera from world),
+                                                     Intrinsics (3 × 3)
 
-As in the publications, sequences of two people are left out. Every camera in the folder is a clip. The world is the
-calibration's.
+As in the publications, sequences of two people are left out. Every camera in the folder is a clip.
+The world is the calibration's.
 """
 
 from __future__ import annotations
@@ -19,7 +21,16 @@ from pathlib import Path
 import numpy as np
 
 from ..clips import Clip, Person, Truth
-from ..files import DatasetError, array, checked, existing_files, existing_folder, frames_in, metres, read_table
+from ..files import (
+    DatasetError,
+    array,
+    checked,
+    existing_files,
+    existing_folder,
+    frames_in,
+    metres,
+    read_table,
+)
 from ..models import Models, pose_body
 
 RATE = 30.0
@@ -55,12 +66,17 @@ def _truth(folder: Path, sequence: str, camera: str, pictures: list[Path], model
     names = [picture.name.split("_")[0] for picture in pictures]
     rows = [row for row, name in enumerate(names) if name in by_frame]
     if not rows:
-        raise DatasetError(f"{bodies} and {pictures[0].parent} have no frame in common; extract both again")
+        raise DatasetError(
+            f"{bodies} and {pictures[0].parent} have no frame in common; extract both again"
+        )
     poses, trans, betas = [], [], []
     for row in rows:
         path = by_frame[names[row]]
         table = read_table(path)
-        orient, posed = array(path, table, "global_orient", (1, 3)), array(path, table, "body_pose", (1, 63))
+        orient, posed = (
+            array(path, table, "global_orient", (1, 3)),
+            array(path, table, "body_pose", (1, 63)),
+        )
         poses.append(np.concatenate([orient, posed], axis=1)[0])
         trans.append(metres(path, "transl", array(path, table, "transl", (1, 3)))[0])
         betas.append(array(path, table, "betas", (1, None))[0][:10])
@@ -70,7 +86,8 @@ def _truth(folder: Path, sequence: str, camera: str, pictures: list[Path], model
 
 
 def read_calibration(folder: Path, place: str, camera: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return camera from world (4, 4) and the intrinsics (3, 3) of a camera, whose folder is named ``cam_02``.
+    """Return camera from world (4, 4) and the intrinsics (3, 3) of a camera, whose folder is named
+    ``cam_02``.
 
     :raises DatasetError: missing or damaged.
     """
@@ -88,7 +105,9 @@ def read_calibration(folder: Path, place: str, camera: str) -> tuple[np.ndarray,
             for key, shape in (("CameraMatrix", (3, 4)), ("Intrinsics", (3, 3)))
         ]
     except (ET.ParseError, ValueError) as error:
-        raise DatasetError(f"{path} is not a calibration of RICH ({error}); download scan_calibration again") from error
+        raise DatasetError(
+            f"{path} is not a calibration of RICH ({error}); download scan_calibration again"
+        ) from error
     T = np.eye(4)
     T[:3] = checked(path, "CameraMatrix", values[0], (3, 4))
     return T, checked(path, "Intrinsics", values[1], (3, 3))

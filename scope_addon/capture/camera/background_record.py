@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What is known of the background of a clip, or of a window of it, once its frames were followed.
 
-Windows that were followed apart overlap: the frames before a window's first one are also the last ones of the window
-before. Let R_k(t) be the camera's rotation at time t in the axes of window k's first frame. In the common frames,
+Windows that were followed apart overlap: the frames before a window's first one are also the last
+ones of the window before. Let R_k(t) be the camera's rotation at time t in the axes of window k's
+first frame. In the common frames,
 
     G_k = G_{k−1} R_{k−1}(t) R_k(t)ᵀ
 
-takes the axes of window k to those of the clip's first frame; the mean of the common frames is used. In these frames
-the rotation goes over evenly from one window to the other, because what is left of their difference would be a jump.
+takes the axes of window k to those of the clip's first frame; the mean of the common frames is
+used. In these frames the rotation goes over evenly from one window to the other, because what is
+left of their difference would be a jump.
 """
 
 from __future__ import annotations
@@ -51,9 +53,11 @@ class CameraMotion:
 
 @dataclass(frozen=True)
 class BackgroundRecord:
-    """The background of T frames; its edges were found in a few of them, first in one in which somebody is seen.
+    """The background of T frames; its edges were found in a few of them, first in one in which
+    somebody is seen.
 
-    As long as the camera has not rotated, the other ones have only edges that people hid in all of those before.
+    As long as the camera has not rotated, the other ones have only edges that people hid in all of
+    those before.
     """
 
     times: NDArray[np.float64]  # (T,) seconds
@@ -63,12 +67,15 @@ class BackgroundRecord:
     edge_frames: list[FrameEdges] = field(default_factory=list)
     bars: list[NDArray[np.float64]] = field(default_factory=list)  # in the first of the edge frames
 
-    def motion(self, followed_with: Camera, camera: Camera, image_size: tuple[int, int]) -> CameraMotion:
+    def motion(
+        self, followed_with: Camera, camera: Camera, image_size: tuple[int, int]
+    ) -> CameraMotion:
         """Return the rotation in all frames; frames that were skipped are interpolated on an arc.
 
         :param followed_with: the intrinsics that were assumed while the background was followed.
-        :param camera: the intrinsics as they are known now. A small rotation moves the image by f times its angle, so
-            the angles shrink as the focal length grows; rotations about the optical axis do not change.
+        :param camera: the intrinsics as they are known now. A small rotation moves the image by f
+            times its angle, so the angles shrink as the focal length grows; rotations about the
+            optical axis do not change.
         :param image_size: (width, height) in pixels.
         """
         known, R, times = self.known, self.R_first_camera.copy(), self.times
@@ -82,7 +89,8 @@ class BackgroundRecord:
         filled = fill_rotation_gaps(R[:, None], known, times)[:, 0]
         a, b = np.flatnonzero(known)[-2:]
         after = np.arange(b + 1, len(R))
-        if len(after) and times[-1] - times[b] < 1.5 / SAMPLES_HZ:  # extrapolate at constant angular velocity
+        # extrapolate at constant angular velocity
+        if len(after) and times[-1] - times[b] < 1.5 / SAMPLES_HZ:
             rate = log(R[a].T @ R[b]) / (times[b] - times[a])
             filled[after] = R[b] @ exp((times[after] - times[b])[:, None] * rate)
         R = filled[0].T @ filled
@@ -98,7 +106,9 @@ class BackgroundRecord:
         if not self.edge_frames:
             return Lines.none()
         if motion.is_static:
-            return Segments.of_all([edge.segments for edge in self.edge_frames if self._is_new(edge)]).lines(camera)
+            return Segments.of_all(
+                [edge.segments for edge in self.edge_frames if self._is_new(edge)]
+            ).lines(camera)
         first = self.edge_frames[0]
         return first.segments.lines(camera).rotated(motion.R_first_camera[first.row])
 
@@ -119,11 +129,14 @@ def is_rotated(R: NDArray[np.float64]) -> bool:
     return bool(np.degrees(np.linalg.norm(log(R))) >= STATIC_DEG)
 
 
-def joined_backgrounds(parts: Sequence[BackgroundRecord], firsts: Sequence[int]) -> BackgroundRecord:
+def joined_backgrounds(
+    parts: Sequence[BackgroundRecord], firsts: Sequence[int]
+) -> BackgroundRecord:
     """Join the backgrounds of a clip's windows, in order.
 
     :param parts: at least one.
-    :param firsts: of each window, how many of its frames are also the last ones of the window before.
+    :param firsts: of each window, how many of its frames are also the last ones of the window
+        before.
     """
     whole, G = parts[0], np.eye(3)
     rotations, known = [whole.R_first_camera], [whole.known]
@@ -131,10 +144,14 @@ def joined_backgrounds(parts: Sequence[BackgroundRecord], firsts: Sequence[int])
     edges, bars, rows = list(whole.edge_frames), whole.bars, len(whole.times)
     for before, part, first in zip(parts, parts[1:], firsts[1:], strict=False):
         G = G @ _link(before, part, first)
-        rotations[-1] = _faded(rotations[-1], known[-1], G @ part.R_first_camera[:first], part.known[:first])
+        rotations[-1] = _faded(
+            rotations[-1], known[-1], G @ part.R_first_camera[:first], part.known[:first]
+        )
         times.append(part.times[first:])
         known.append(part.known[first:])
-        rotations.append(np.where(part.known[first:, None, None], G @ part.R_first_camera[first:], np.eye(3)))
+        rotations.append(
+            np.where(part.known[first:, None, None], G @ part.R_first_camera[first:], np.eye(3))
+        )
         shares += part.inlier_shares
         if not edges:
             bars = part.bars
@@ -147,7 +164,10 @@ def joined_backgrounds(parts: Sequence[BackgroundRecord], firsts: Sequence[int])
 
 
 def _faded(
-    R: NDArray[np.float64], known: NDArray[np.bool_], R_after: NDArray[np.float64], known_after: NDArray[np.bool_]
+    R: NDArray[np.float64],
+    known: NDArray[np.bool_],
+    R_after: NDArray[np.float64],
+    known_after: NDArray[np.bool_],
 ) -> NDArray[np.float64]:
     """Return rotations (T, 3, 3) whose last n frames go over to those of the next window.
 
@@ -168,12 +188,15 @@ def _faded(
 def _link(before: BackgroundRecord, part: BackgroundRecord, first: int) -> NDArray[np.float64]:
     """Return the rotation (3, 3) from the axes of one window to those of the window before.
 
-    Where no frame is known in both, the camera is taken to have kept the last direction that is known.
+    Where no frame is known in both, the camera is taken to have kept the last direction that is
+    known.
     """
     start = len(before.times) - first
     both = np.flatnonzero(before.known[start:] & part.known[:first])
     if len(both):
-        total = np.einsum("kij,klj->il", before.R_first_camera[start + both], part.R_first_camera[both])
+        total = np.einsum(
+            "kij,klj->il", before.R_first_camera[start + both], part.R_first_camera[both]
+        )
     else:
         seen = np.flatnonzero(before.known)
         total = before.R_first_camera[seen[-1]] if len(seen) else np.eye(3)

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Letterbox bars beside or above a picture: a portrait clip in a wide video, a film on a portrait screen.
+"""Letterbox bars beside or above a picture: a portrait clip in a wide video, a film on a portrait
+screen.
 
-They are black, of another colour, or a blurred copy of the picture. They are not part of what the camera saw: its
-image, and its field of view, end at the bars. Their edges are straight, but carry no information.
+They are black, of another colour, or a blurred copy of the picture. They are not part of what the
+camera saw: its image, and its field of view, end at the bars. Their edges are straight, but carry
+no information.
 """
 
 from __future__ import annotations
@@ -18,7 +20,8 @@ MIN_WIDTH = 0.03  # of the side
 MAX_DIFFERENCE = 0.01  # of the side, between the widths of opposite bars
 DARK = 24  # of 255, in every channel: black, after compression
 MAX_BRIGHT_SHARE = 0.01  # of a line of a black bar
-MIN_EDGE_SHARE = 0.25  # of bright pixels in the picture's outermost lines; less is a dark scene that fades out
+# of bright pixels in the picture's outermost lines; less is a dark scene that fades out
+MIN_EDGE_SHARE = 0.25
 EDGE_PX = 6  # width of a black bar's edge
 # Any other bar ends in a step along one line of pixels, and has little detail.
 MIN_STEP, MIN_STEP_SHARE = 8, 0.7  # of 255; and the share of the line
@@ -36,11 +39,19 @@ def find_bars(image_rgb: NDArray[np.uint8]) -> list[NDArray[np.float64]]:
     bars = []
     left, right = _black_bars(bright.mean(axis=0)) or _other_bars(grey) or (0, 0)
     if left:
-        bars += [np.array([0.0, 0.0, left, height]), np.array([width - right, 0.0, width, height], float)]
+        bars += [
+            np.array([0.0, 0.0, left, height]),
+            np.array([width - right, 0.0, width, height], float),
+        ]
     inner = slice(left, width - right)
-    top, bottom = _black_bars(bright[:, inner].mean(axis=1)) or _other_bars(grey[:, inner].T) or (0, 0)
+    top, bottom = (
+        _black_bars(bright[:, inner].mean(axis=1)) or _other_bars(grey[:, inner].T) or (0, 0)
+    )
     if top:
-        bars += [np.array([0.0, 0.0, width, top]), np.array([0.0, height - bottom, width, height], float)]
+        bars += [
+            np.array([0.0, 0.0, width, top]),
+            np.array([0.0, height - bottom, width, height], float),
+        ]
     return bars
 
 
@@ -56,14 +67,23 @@ def longer_content_side(bars: Sequence[NDArray[np.float64]], width: int, height:
 
 
 def _black_bars(bright: NDArray[np.floating[Any]]) -> tuple[int, int] | None:
-    """Return the widths of black bars at both ends of n lines, from the share (n,) of bright pixels in each."""
+    """Return the widths of black bars at both ends of n lines, from the share (n,) of bright pixels
+    in each.
+    """
     n, picture = len(bright), np.flatnonzero(bright > MAX_BRIGHT_SHARE)
     if not len(picture):
         return None
     first, last = int(picture[0]), int(picture[-1])
     begin, end = first, n - 1 - last
-    edges = bright[first : first + EDGE_PX].max(), bright[max(0, last - EDGE_PX + 1) : last + 1].max()
-    if min(edges) < MIN_EDGE_SHARE or min(begin, end) < MIN_WIDTH * n or abs(begin - end) > _tolerance(n):
+    edges = (
+        bright[first : first + EDGE_PX].max(),
+        bright[max(0, last - EDGE_PX + 1) : last + 1].max(),
+    )
+    if (
+        min(edges) < MIN_EDGE_SHARE
+        or min(begin, end) < MIN_WIDTH * n
+        or abs(begin - end) > _tolerance(n)
+    ):
         return None
     return begin, end
 
@@ -85,7 +105,8 @@ def _other_bars(grey: NDArray[Any]) -> tuple[int, int] | None:
     def mean(first: int, end: int) -> float:
         return float(detail[end] - detail[first]) / (end - first)
 
-    for begin, end in sorted(pairs, reverse=True):  # each edge is two lines wide, which belong to neither side
+    # each edge is two lines wide, which belong to neither side
+    for begin, end in sorted(pairs, reverse=True):
         outside = max(mean(0, begin - 2), mean(n - end + 2, n))
         if outside <= MAX_DETAIL * mean(begin + 2, n - end - 2):
             return begin, end

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A user's camera calibration: a JSON file with OpenCV's camera matrix and distortion, for footage of any size.
+"""A user's camera calibration: a JSON file with OpenCV's camera matrix and distortion, for footage
+of any size.
 
-    {"intrinsics": [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], "dist": [k1, k2, p1, p2, k3], "size": [width, height]}
+    {"intrinsics": [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], "dist": [k1, k2, p1, p2, k3],
+     "size": [width, height]}
 
-Keys that describe the lens are never ignored, and impossible values are refused, because a wrong lens gives a wrong
-person. Other keys, such as a name or a date, are allowed.
+Keys that describe the lens are never ignored, and impossible values are refused, because a wrong
+lens gives a wrong person. Other keys, such as a name or a date, are allowed.
 """
 
 from __future__ import annotations
@@ -22,7 +24,10 @@ from numpy.typing import NDArray
 from ....solver.errors import InputError
 from ...json_file import read_json_object
 
-_FORMAT = 'write {"intrinsics": [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], "dist": [k1, k2, p1, p2, k3], "size": [w, h]}'
+_FORMAT = (
+    'write {"intrinsics": [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], '
+    '"dist": [k1, k2, p1, p2, k3], "size": [w, h]}'
+)
 # The name in our files, and the names that OpenCV's examples and other programs use.
 _NAMES = {
     "intrinsics": ("intrinsics", "camera_matrix", "K"),
@@ -36,9 +41,11 @@ _LENS_KEY = re.compile(
 )
 _OPENCV_COUNTS = (0, 4, 5, 8, 12, 14)
 _BROWN_COUNT = 5  # k1, k2, p1, p2, k3, as in a motion file
-_FOCAL_RANGE = (0.01, 100.0)  # in longer sides of the picture: fields of view of 178 and 0.6 degrees
+# in longer sides of the picture: fields of view of 178 and 0.6 degrees
+_FOCAL_RANGE = (0.01, 100.0)
 _LARGEST_PIXEL_ASPECT = 4.0
-_LARGEST_OFFSET = 10.0  # tangent of the angle, 84 degrees, between the picture's middle and the optical axis
+# tangent of the angle, 84 degrees, between the picture's middle and the optical axis
+_LARGEST_OFFSET = 10.0
 _LARGEST_TANGENTIAL = 0.5
 _LARGEST_MAGNIFICATION = 3.0  # by distortion, at half the shorter side
 _LARGEST_SKEW = 1e-3  # of the focal length; less than a pixel at the picture's edge
@@ -48,7 +55,9 @@ _SIZE_TOLERANCE_PX = 1.0  # for sizes that were rounded
 
 @dataclass(frozen=True)
 class Calibration:
-    """The contents of the file. ``size`` is (width, height) of the calibration pictures; None: unknown."""
+    """The contents of the file. ``size`` is (width, height) of the calibration pictures; None:
+    unknown.
+    """
 
     path: Path
     intrinsics: NDArray[np.float64]  # (3, 3)
@@ -58,43 +67,52 @@ class Calibration:
     def intrinsics_for(self, width: int, height: int) -> NDArray[np.float64]:
         """Return the intrinsics (3, 3) in pixels of footage of this size.
 
-        :raises InputError: the footage has other proportions than the calibration pictures, or the values are
-            impossible for pictures of their size.
+        :raises InputError: the footage has other proportions than the calibration pictures, or the
+            values are impossible for pictures of their size.
         """
         K = self.intrinsics
         if self.size is None:
             if not (0 <= K[0, 2] <= width and 0 <= K[1, 2] <= height):
                 raise InputError(
-                    f"{self.path}: the principal point ({K[0, 2]:g}, {K[1, 2]:g}) lies outside of the footage, which "
-                    f'has {width} x {height} pixels; add "size": [width, height] of the images it was calibrated with'
+                    f"{self.path}: the principal point ({K[0, 2]:g}, {K[1, 2]:g}) lies outside of "
+                    "the footage, which "
+                    f'has {width} x {height} pixels; add "size": [width, height] of the images it '
+                    "was calibrated with"
                 )
             known_width, known_height = float(width), float(height)
         else:
             known_width, known_height = self.size
         if not _same_proportions((known_width, known_height), (width, height)):
             raise InputError(
-                f"{self.path} is for images of {known_width:g} x {known_height:g}, the footage has {width} x {height}"
-                f" pixels, which is a different aspect ratio; {_advice(known_width, known_height, width, height)}"
+                f"{self.path} is for images of {known_width:g} x {known_height:g}, the footage has "
+                f"{width} x {height}"
+                " pixels, which is a different aspect ratio; "
+                f"{_advice(known_width, known_height, width, height)}"
             )
         longer = max(known_width, known_height)
         if not all(_FOCAL_RANGE[0] * longer <= K[i, i] <= _FOCAL_RANGE[1] * longer for i in (0, 1)):
             raise InputError(
-                f"{self.path}: no lens has focal lengths of {K[0, 0]:g} and {K[1, 1]:g} pixels in images of "
-                f"{known_width:g} x {known_height:g}; give them in pixels, with the size of the calibration images"
+                f"{self.path}: no lens has focal lengths of {K[0, 0]:g} and {K[1, 1]:g} pixels in "
+                "images of "
+                f"{known_width:g} x {known_height:g}; give them in pixels, with the size of the "
+                "calibration images"
             )
         if not 1 / _LARGEST_PIXEL_ASPECT <= K[0, 0] / K[1, 1] <= _LARGEST_PIXEL_ASPECT:
             raise InputError(
-                f"{self.path}: focal lengths of {K[0, 0]:g} and {K[1, 1]:g} pixels differ too much; calibrate again"
+                f"{self.path}: focal lengths of {K[0, 0]:g} and {K[1, 1]:g} pixels differ too "
+                "much; calibrate again"
             )
         off_axis = (np.array([known_width, known_height]) / 2 - K[:2, 2]) / K[[0, 1], [0, 1]]
         if np.abs(off_axis).max() > _LARGEST_OFFSET:
             raise InputError(
-                f"{self.path}: the principal point ({K[0, 2]:g}, {K[1, 2]:g}) is too far from images of "
+                f"{self.path}: the principal point ({K[0, 2]:g}, {K[1, 2]:g}) is too far from "
+                "images of "
                 f"{known_width:g} x {known_height:g}; give it in pixels from their top left corner"
             )
         if not _can_be_undistorted(self.dist, min(known_width, known_height) / (K[0, 0] + K[1, 1])):
             raise InputError(
-                f"{self.path}: dist {self.dist.tolist()} folds or tears the image; give OpenCV's k1, k2, p1, p2, k3, "
+                f"{self.path}: dist {self.dist.tolist()} folds or tears the image; give OpenCV's "
+                "k1, k2, p1, p2, k3, "
                 "in this order, from the same calibration as the intrinsics"
             )
         return np.diag([width / known_width, height / known_height, 1.0]) @ K
@@ -109,7 +127,9 @@ def read_calibration(path: Path) -> Calibration:
     if "intrinsics" not in values:
         raise InputError(f'{path} is not a calibration: it has no "intrinsics"; {_FORMAT}')
     intrinsics = _intrinsics(path, values["intrinsics"])
-    return Calibration(path, intrinsics, _distortion(path, values.get("dist")), _size(path, values.get("size")))
+    return Calibration(
+        path, intrinsics, _distortion(path, values.get("dist")), _size(path, values.get("size"))
+    )
 
 
 def _by_our_names(path: Path, data: dict[str, Any]) -> dict[str, Any]:
@@ -119,7 +139,9 @@ def _by_our_names(path: Path, data: dict[str, Any]) -> dict[str, Any]:
         if name not in ours:
             if _LENS_KEY.fullmatch(name):
                 known = ", ".join(name for names in _NAMES.values() for name in names)
-                raise InputError(f"{path}: {name[:80]!r} is unknown; use one of {known}, or remove it")
+                raise InputError(
+                    f"{path}: {name[:80]!r} is unknown; use one of {known}, or remove it"
+                )
             continue
         if ours[name] in values:
             twice = " and ".join(n for n in data if n in _NAMES[ours[name]])
@@ -142,13 +164,23 @@ def _intrinsics(path: Path, value: Any) -> NDArray[np.float64]:
     if K is None or K.shape != (3, 3):
         raise InputError(f"{path}: intrinsics must be three rows of three numbers; {_FORMAT}")
     if K[0, 0] <= 0 or K[1, 1] <= 0:
-        raise InputError(f"{path}: intrinsics have focal lengths {K[0, 0]:g} and {K[1, 1]:g}, which must be above 0")
+        raise InputError(
+            f"{path}: intrinsics have focal lengths {K[0, 0]:g} and {K[1, 1]:g}, "
+            "which must be above 0"
+        )
     if np.array_equal(K[:, 2], [0, 0, 1]) and K[2, :2].any():
-        raise InputError(f"{path}: intrinsics are transposed; write rows, [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]")
+        raise InputError(
+            f"{path}: intrinsics are transposed; write rows, [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]"
+        )
     if K[1, 0] != 0 or not np.array_equal(K[2], [0, 0, 1]):
-        raise InputError(f"{path}: intrinsics must be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], but are {K.tolist()}")
+        raise InputError(
+            f"{path}: intrinsics must be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], but "
+            f"are {K.tolist()}"
+        )
     if abs(K[0, 1]) > _LARGEST_SKEW * K[0, 0]:
-        raise InputError(f"{path}: intrinsics have a skew of {K[0, 1]:g}; calibrate without one, as OpenCV does")
+        raise InputError(
+            f"{path}: intrinsics have a skew of {K[0, 1]:g}; calibrate without one, as OpenCV does"
+        )
     K[0, 1] = 0.0
     return K
 
@@ -157,15 +189,18 @@ def _distortion(path: Path, value: Any) -> NDArray[np.float64]:
     if value is None:
         return np.zeros(_BROWN_COUNT)
     dist = _numbers(value)
-    if dist is None or max(dist.shape, default=0) != dist.size:  # a row or a column, as OpenCV writes it
+    # a row or a column, as OpenCV writes it
+    if dist is None or max(dist.shape, default=0) != dist.size:
         raise InputError(f"{path}: dist must be a list of numbers, OpenCV's k1, k2, p1, p2, k3")
     dist = dist.ravel()
     if dist.size > _BROWN_COUNT and dist.size in _OPENCV_COUNTS and not dist[_BROWN_COUNT:].any():
         dist = dist[:_BROWN_COUNT]
     if dist.size > _BROWN_COUNT:
         raise InputError(
-            f"{path}: dist has {dist.size} numbers, but motion files and Blender's lens support only k1, k2, p1, p2, "
-            "k3; calibrate again with these five (OpenCV's calibrateCamera without flags), or undistort the video first"
+            f"{path}: dist has {dist.size} numbers, but motion files and Blender's lens support "
+            "only k1, k2, p1, p2, "
+            "k3; calibrate again with these five (OpenCV's calibrateCamera without flags), or "
+            "undistort the video first"
         )
     return np.concatenate([dist, np.zeros(_BROWN_COUNT - dist.size)])
 
@@ -175,14 +210,17 @@ def _size(path: Path, value: Any) -> tuple[float, float] | None:
         return None
     size = _numbers(value)
     if size is None or size.shape != (2,) or not ((size >= 1) & (size <= _LARGEST_SIDE)).all():
-        raise InputError(f"{path}: size must be [width, height] in pixels, but is {json.dumps(value)[:80]}")
+        raise InputError(
+            f"{path}: size must be [width, height] in pixels, but is {json.dumps(value)[:80]}"
+        )
     return float(size[0]), float(size[1])
 
 
 def _can_be_undistorted(dist: NDArray[np.float64], radius: float) -> bool:
     """Return whether each point of the picture up to a radius corresponds to one direction nearby.
 
-    A point at r is imaged at r (1 + k1 r² + k2 r⁴ + k3 r⁶), which has to grow with r and to reach the radius.
+    A point at r is imaged at r (1 + k1 r² + k2 r⁴ + k3 r⁶), which has to grow with r and to reach
+    the radius.
 
     :param dist: (5,)
     :param radius: tangent of the angle to the optical axis.
@@ -202,7 +240,9 @@ def _can_be_undistorted(dist: NDArray[np.float64], radius: float) -> bool:
 
 
 def _same_proportions(a: tuple[float, float], b: tuple[float, float]) -> bool:
-    """Return whether one size is the other one scaled, up to rounding to whole pixels of the smaller one."""
+    """Return whether one size is the other one scaled, up to rounding to whole pixels of the
+    smaller one.
+    """
     (width, height), (larger_width, larger_height) = sorted((a, b), key=math.prod)
     return (
         abs(larger_height * width / larger_width - height) <= _SIZE_TOLERANCE_PX
@@ -212,5 +252,8 @@ def _same_proportions(a: tuple[float, float], b: tuple[float, float]) -> bool:
 
 def _advice(known_width: float, known_height: float, width: int, height: int) -> str:
     if _same_proportions((known_height, known_width), (width, height)):
-        return "the clip is rotated relative to them: calibrate with images in the orientation of the clip"
+        return (
+            "the clip is rotated relative to them: calibrate with images in the orientation of the "
+            "clip"
+        )
     return "calibrate with images from the same camera mode, because another one crops them"

@@ -1,18 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The camera's rotation during a clip, estimated from the background.
 
-Corners of the background, those outside the people's regions, are followed from frame to frame (Lucas-Kanade). For a
-camera that only rotates, their directions b in the current camera and a in an earlier key frame satisfy b = R a at any
-distance. R is the least-squares rotation of the directions that agree with it: two directions make a hypothesis, and
-the one with most support is refined. Rotations are chained over key frames only, and a new key frame begins only where
-too few corners are left, so that errors accumulate over few links. If the camera also travels, near corners disagree,
-and the far ones decide, which are many; `heading_drift` removes the remaining error with the edges of buildings.
+Corners of the background, those outside the people's regions, are followed from frame to frame
+(Lucas-Kanade). For a camera that only rotates, their directions b in the current camera and a in an
+earlier key frame satisfy b = R a at any distance. R is the least-squares rotation of the directions
+that agree with it: two directions make a hypothesis, and the one with most support is refined.
+Rotations are chained over key frames only, and a new key frame begins only where too few corners
+are left, so that errors accumulate over few links. If the camera also travels, near corners
+disagree, and the far ones decide, which are many; `heading_drift` removes the remaining error with
+the edges of buildings.
 
-Edges are detected in the first frame in which somebody is seen. Where the camera rotates, they are detected anew; where
-it does not, only those are added that people hid so far: a door behind somebody may be the only thing that tells which
-way is up.
+Edges are detected in the first frame in which somebody is seen. Where the camera rotates, they are
+detected anew; where it does not, only those are added that people hid so far: a door behind
+somebody may be the only thing that tells which way is up.
 
-Sources: Fischler and Bolles 1981 (random sample consensus), Kabsch 1976 (rotation between two sets of directions).
+Sources: Fischler and Bolles 1981 (random sample consensus), Kabsch 1976 (rotation between two sets
+of directions).
 """
 
 from __future__ import annotations
@@ -43,7 +46,8 @@ CELLS = 40  # of the grid of hidden background, along either side of the image
 
 
 class BackgroundTracker:
-    """Follows the background through a clip; frames come in order, each with the people's positions.
+    """Follows the background through a clip; frames come in order, each with the people's
+    positions.
 
     :param camera: the intrinsics of the full image.
     :param width, height: of the full image in pixels.
@@ -66,7 +70,8 @@ class BackgroundTracker:
         self._R_first_key = np.eye(3)
         self._R_key_last = np.eye(3)
         self._inlier_shares: list[float] = []
-        self.edge_frames: list[FrameEdges] = []  # the first one is the first frame in which somebody is seen
+        # the first one is the first frame in which somebody is seen
+        self.edge_frames: list[FrameEdges] = []
         self._hidden = HiddenBackground((width, height))
         self.bars: list[NDArray[np.float64]] = []  # in that frame
 
@@ -81,28 +86,36 @@ class BackgroundTracker:
         """Process the next frame.
 
         :param image_rgb: (H, W, 3).
-        :param people: (n, 2) points of each person in pixels: the background is outside their bounding boxes.
-        :param is_cut: whether another scene begins, for which the camera's rotation is assumed unchanged.
-        :param is_sampled: whether the rotation is to be estimated in this frame even if the last estimate is recent.
+        :param people: (n, 2) points of each person in pixels: the background is outside their
+            bounding boxes.
+        :param is_cut: whether another scene begins, for which the camera's rotation is assumed
+            unchanged.
+        :param is_sampled: whether the rotation is to be estimated in this frame even if the last
+            estimate is recent.
         """
         self._times.append(time_s)
         row = len(self._times) - 1
         if people and not self.edge_frames:
             self.bars = find_bars(image_rgb)
-            self.edge_frames.append(FrameEdges(row, find_segments(image_rgb, people, bars=self.bars)))
+            self.edge_frames.append(
+                FrameEdges(row, find_segments(image_rgb, people, bars=self.bars))
+            )
             self._hidden.reveal(people)
         if time_s - self._last_used < 0.98 / SAMPLES_HZ and not (is_cut or is_sampled):
             self._rotations.append(None)
             return
         self._last_used = time_s
         image = self._shrink(image_rgb)
-        boxes = [self._box(surroundings(points)) for points in people] + [self._box(bar) for bar in self.bars]
+        boxes = [self._box(surroundings(points)) for points in people] + [
+            self._box(bar) for bar in self.bars
+        ]
         if self._image is None:
             self._begin_key(image, boxes)
             self._rotations.append(np.eye(3))
             return
         R_camera_key = None if is_cut else self._follow(image, boxes)
-        if R_camera_key is None:  # a cut, or too few corners: start again at the last known rotation
+        # a cut, or too few corners: start again at the last known rotation
+        if R_camera_key is None:
             if self.edge_frames:  # what is seen from now on may be something else
                 self._hidden.reveal([])
             self._R_first_key = self._R_first_key @ self._R_key_last
@@ -113,10 +126,14 @@ class BackgroundTracker:
         R_first_camera = self._R_first_key @ self._R_key_last
         self._rotations.append(R_first_camera)
         if self._is_edge_frame(R_first_camera):
-            self.edge_frames.append(FrameEdges(row, find_segments(image_rgb, people, EDGE_SIDE_PX, self.bars)))
+            self.edge_frames.append(
+                FrameEdges(row, find_segments(image_rgb, people, EDGE_SIDE_PX, self.bars))
+            )
         elif self._may_reveal_edges(R_first_camera, people):
             segments = find_segments(image_rgb, people, bars=self.bars)
-            self.edge_frames.append(FrameEdges(row, segments.where(self._hidden.hides(segments.ends_px.mean(axis=1)))))
+            self.edge_frames.append(
+                FrameEdges(row, segments.where(self._hidden.hides(segments.ends_px.mean(axis=1))))
+            )
             self._hidden.reveal(people)
         self._image = image
         if len(self._points) < max(KEY_SHARE * self._key_count, MIN_CORNERS):
@@ -128,19 +145,27 @@ class BackgroundTracker:
         known = np.array([R is not None for R in self._rotations], bool)
         R = np.array([np.eye(3) if R is None else R for R in self._rotations]).reshape(-1, 3, 3)
         times = np.array(self._times)
-        return BackgroundRecord(times, R, known, list(self._inlier_shares), list(self.edge_frames), self.bars)
+        return BackgroundRecord(
+            times, R, known, list(self._inlier_shares), list(self.edge_frames), self.bars
+        )
 
     def _is_edge_frame(self, R_first_camera: NDArray[np.float64]) -> bool:
-        """Return whether to detect edges in the last frame: at intervals, once the camera (3, 3) has rotated."""
+        """Return whether to detect edges in the last frame: at intervals, once the camera (3, 3)
+        has rotated.
+        """
         if not self.edge_frames:
             return False
         elapsed_s = self._times[-1] - self._times[self.edge_frames[-1].row]
         return elapsed_s >= EDGE_INTERVAL_S and is_rotated(R_first_camera)
 
-    def _may_reveal_edges(self, R_first_camera: NDArray[np.float64], people: Sequence[NDArray[Any]]) -> bool:
-        """Return whether people of the first edge frame have moved away from background that they hid in it.
+    def _may_reveal_edges(
+        self, R_first_camera: NDArray[np.float64], people: Sequence[NDArray[Any]]
+    ) -> bool:
+        """Return whether people of the first edge frame have moved away from background that they
+        hid in it.
 
-        The camera (3, 3) must not have rotated. Without anybody in the frame, somebody may have been missed.
+        The camera (3, 3) must not have rotated. Without anybody in the frame, somebody may have
+        been missed.
         """
         if not self.edge_frames or not people or is_rotated(R_first_camera):
             return False
@@ -149,8 +174,12 @@ class BackgroundTracker:
         is_due = elapsed_s >= EDGE_INTERVAL_S and since_first_s <= REVEALING_S
         return is_due and self._hidden.share_in_view(people) >= REVEALED_SHARE
 
-    def _follow(self, image: NDArray[np.uint8], boxes: Sequence[NDArray[np.float64]]) -> NDArray[np.float64] | None:
-        """Return the rotation (3, 3) from the key frame's axes to the current camera's, or None if it is unknown."""
+    def _follow(
+        self, image: NDArray[np.uint8], boxes: Sequence[NDArray[np.float64]]
+    ) -> NDArray[np.float64] | None:
+        """Return the rotation (3, 3) from the key frame's axes to the current camera's, or None if
+        it is unknown.
+        """
         if len(self._points) < MIN_CORNERS:
             return None
         assert self._image is not None
@@ -169,11 +198,15 @@ class BackgroundTracker:
         return R
 
     def _shrink(self, image_rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Return the working image, grey; pixels are skipped before areas are averaged, which saves time."""
+        """Return the working image, grey; pixels are skipped before areas are averaged, which saves
+        time.
+        """
         columns, rows = image_rgb.shape[1] // self._step, image_rgb.shape[0] // self._step
         whole = image_rgb[: rows * self._step, : columns * self._step]
         coarse = cv2.resize(whole, (columns, rows), interpolation=cv2.INTER_NEAREST)
-        grey = cv2.cvtColor(cv2.resize(coarse, self._size, interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2GRAY)
+        grey = cv2.cvtColor(
+            cv2.resize(coarse, self._size, interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2GRAY
+        )
         return cast(NDArray[np.uint8], grey)
 
     def _begin_key(self, image: NDArray[np.uint8], boxes: Sequence[NDArray[np.float64]]) -> None:
@@ -187,7 +220,9 @@ class BackgroundTracker:
         self._R_key_last = np.eye(3)
 
     def _rays(self, points: NDArray[np.float32]) -> NDArray[np.float64]:
-        """Return the (n, 3) unit directions, in camera axes, of points (n, 2) in the working image."""
+        """Return the (n, 3) unit directions, in camera axes, of points (n, 2) in the working
+        image.
+        """
         # A working pixel's centre in the full image: OpenCV scales areas, not their centres.
         full = ((points + 0.5) / (self._scale * self._step) - 0.5) * self._step
         rays = self._camera.rays(full)
@@ -216,7 +251,9 @@ def consensus_rotation(
     pairs = pairs[pairs[:, 0] != pairs[:, 1]]
     R = _kabsch(a[pairs], b[pairs])
     # |R a − b|² = 2 − 2 bᵀ R a, for all hypotheses and directions in one matrix product
-    near = R.reshape(-1, 9) @ (b[:, :, None] * a[:, None]).reshape(-1, 9).T > 1.0 - 0.5 * tolerance**2
+    near = (
+        R.reshape(-1, 9) @ (b[:, :, None] * a[:, None]).reshape(-1, 9).T > 1.0 - 0.5 * tolerance**2
+    )
     best = R[int(near.sum(1).argmax())]
     agree = np.linalg.norm(a @ best.T - b, axis=1) < tolerance
     for _ in range(3):
@@ -248,7 +285,11 @@ def _flow(
     :return: positions (n, 2), and (n,) whether each was found.
     """
     start = points.astype(np.float32)
-    guess, levels, flags = (start, 3, 0) if near is None else (near.astype(np.float32), 0, cv2.OPTFLOW_USE_INITIAL_FLOW)
+    guess, levels, flags = (
+        (start, 3, 0)
+        if near is None
+        else (near.astype(np.float32), 0, cv2.OPTFLOW_USE_INITIAL_FLOW)
+    )
     moved, found, _ = cv2.calcOpticalFlowPyrLK(
         before, after, start, guess.copy(), winSize=(15, 15), maxLevel=levels, flags=flags
     )
@@ -256,7 +297,8 @@ def _flow(
 
 
 class HiddenBackground:
-    """Which part of a static camera's background people have hidden in all frames so far: a grid, at first all hidden.
+    """Which part of a static camera's background people have hidden in all frames so far: a grid,
+    at first all hidden.
 
     :param size: of the image, width and height in pixels.
     """
@@ -268,16 +310,22 @@ class HiddenBackground:
         self._hidden = np.ones(CELLS * CELLS, bool)
 
     def reveal(self, people: Sequence[NDArray[Any]]) -> None:
-        """Add a frame with people at these points (n, 2) each, in pixels: what they do not hide has been seen."""
+        """Add a frame with people at these points (n, 2) each, in pixels: what they do not hide has
+        been seen.
+        """
         self._hidden &= self._covered(people)
 
     def share_in_view(self, people: Sequence[NDArray[Any]]) -> float:
-        """Return the share of the image that was hidden so far and is not hidden by people at these points (n, 2)."""
+        """Return the share of the image that was hidden so far and is not hidden by people at these
+        points (n, 2).
+        """
         return float((self._hidden & ~self._covered(people)).mean())
 
     def hides(self, points: NDArray[np.floating[Any]]) -> NDArray[np.bool_]:
         """Return (n,) whether each point (n, 2) of the image, in pixels, was hidden so far."""
-        column, row = np.clip((points + 0.5) / self._cell_px, 0, CELLS - 1).astype(int).reshape(-1, 2).T
+        column, row = (
+            np.clip((points + 0.5) / self._cell_px, 0, CELLS - 1).astype(int).reshape(-1, 2).T
+        )
         hidden: NDArray[np.bool_] = self._hidden[row * CELLS + column]
         return hidden
 

@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Heading drift: removes the slowly growing error of the camera's rotation with the edges of buildings.
+"""Heading drift: removes the slowly growing error of the camera's rotation with the edges of
+buildings.
 
-A camera that travels along a wall sees it pass by, which looks like a rotation, however many corners are followed. The
-directions of the wall's edges do not depend on the camera's position: where three orthogonal ones are visible
-(`manhattan`), they give the camera's rotation at any time. Let n_i be the normals of the edges' planes in the axes
-that drift, δ the drift that rotates these axes into the first frame's, and d the three directions. Then
+A camera that travels along a wall sees it pass by, which looks like a rotation, however many
+corners are followed. The directions of the wall's edges do not depend on the camera's position:
+where three orthogonal ones are visible (`manhattan`), they give the camera's rotation at any time.
+Let n_i be the normals of the edges' planes in the axes that drift, δ the drift that rotates these
+axes into the first frame's, and d the three directions. Then
 
     min over δ of Σ_i w_i ρ(min_d |n_i · δᵀ d|)
 
-is solved from the drift half a second before, by Gauss-Newton steps with a narrowing robust kernel ρ. The drift is
-smooth, unlike the errors in single frames.
+is solved from the drift half a second before, by Gauss-Newton steps with a narrowing robust kernel
+ρ. The drift is smooth, unlike the errors in single frames.
 """
 
 from __future__ import annotations
@@ -27,12 +29,15 @@ from .line_segments import Lines, Segments
 from .manhattan import Edges, line_normal_equations
 
 EDGE_INTERVAL_S = 0.5  # between two frames in which edges are detected
-EDGE_SIDE_PX = 640  # the longer side of the image after the first of these frames: half the time, equally accurate
+# the longer side of the image after the first of these frames: half the time, equally accurate
+EDGE_SIDE_PX = 640
 KERNEL_WIDTHS = np.radians([4.0, 3.0, 2.0, 1.2, 1.0, 1.0])  # of ρ, one per step
 MIN_SUPPORT = 1.5  # sides of the picture that the three directions must explain in the first frame
-MIN_SUPPORT_SHARE = 0.5  # of the edges' length, likewise: three directions explain a third by chance
+# of the edges' length, likewise: three directions explain a third by chance
+MIN_SUPPORT_SHARE = 0.5
 KEPT_SUPPORT = 0.4  # of that, in a later frame
-MIN_SECOND_SUPPORT = 0.25  # sides along the second best direction: one alone leaves the rotation about itself open
+# sides along the second best direction: one alone leaves the rotation about itself open
+MIN_SECOND_SUPPORT = 0.25
 MIN_FRAMES = 3
 DRIFT_CUTOFF_HZ = 1.0
 
@@ -82,7 +87,9 @@ def remove_heading_drift(
     rows = np.array([first.row, *(row for row, _ in known)])
     vectors = np.array([np.zeros(3), *(vector for _, vector in known)])
     drifts = np.stack([np.interp(times, times[rows], vectors[:, k]) for k in range(3)], axis=1)
-    corrected: NDArray[np.float64] = exp(gaussian_smooth(drifts, times, DRIFT_CUTOFF_HZ)) @ R_first_camera
+    corrected: NDArray[np.float64] = (
+        exp(gaussian_smooth(drifts, times, DRIFT_CUTOFF_HZ)) @ R_first_camera
+    )
     aligned: NDArray[np.float64] = corrected[0].T @ corrected
     return aligned
 
@@ -90,7 +97,9 @@ def remove_heading_drift(
 def _drift(
     lines: Lines, axes: NDArray[np.float64], start: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return δ (3, 3) from ``start``, and how much each of the directions ``axes`` (3, 3) explains, in sides."""
+    """Return δ (3, 3) from ``start``, and how much each of the directions ``axes`` (3, 3) explains,
+    in sides.
+    """
     E = start.T
     supports: NDArray[np.float64] = np.zeros(3)
     for sigma in KERNEL_WIDTHS:

@@ -14,13 +14,15 @@ from numpy.typing import NDArray
 from ...errors import UsageError
 from .calibration import read_calibration
 
-# The default is a field of view of 60 degrees along the longer side, between a phone's main camera (65-70 degrees, less
-# the crop of its video stabilization) and a camera's standard lens (40-54 degrees). Edges of the background give a
-# better estimate, and the body adds little (focal_length.py), because it depends on the lifted points, and
-# these on the assumed focal length. In 19 clips of known focal length (four calibrated cameras of 59.4 to 60.1 degrees,
-# fifteen renders) the root mean square error of its logarithm is 0.33 by default, and 0.30 with both estimates: for the
-# renders 0.33 instead of 0.37, for the cameras 0.06 instead of 0.01. Assuming 50 or 70 degrees for the cameras moved
-# the person by 0.6 to 0.8 m in camera axes, but changed the error relative to the pelvis by 7 mm at most.
+# The default is a field of view of 60 degrees along the longer side, between a phone's main camera
+# (65-70 degrees, less the crop of its video stabilization) and a camera's standard lens (40-54
+# degrees). Edges of the background give a better estimate, and the body adds little
+# (focal_length.py), because it depends on the lifted points, and these on the assumed focal length.
+# In 19 clips of known focal length (four calibrated cameras of 59.4 to 60.1 degrees, fifteen
+# renders) the root mean square error of its logarithm is 0.33 by default, and 0.30 with both
+# estimates: for the renders 0.33 instead of 0.37, for the cameras 0.06 instead of 0.01. Assuming 50
+# or 70 degrees for the cameras moved the person by 0.6 to 0.8 m in camera axes, but changed the
+# error relative to the pelvis by 7 mm at most.
 DEFAULT_FOV_DEG = 60.0
 ASSUMED_DEVIATION = 0.25  # relative error of the default, one standard deviation: 48 to 74 degrees
 FILM_WIDTH_MM = 36.0  # "35 mm equivalent" focal lengths refer to this width along the longer side
@@ -28,15 +30,20 @@ FILM_WIDTH_MM = 36.0  # "35 mm equivalent" focal lengths refer to this width alo
 
 @dataclass(frozen=True)
 class Camera:
-    """Pinhole intrinsics (pixels of the decoded, upright frame) and OpenCV distortion, and their source."""
+    """Pinhole intrinsics (pixels of the decoded, upright frame) and OpenCV distortion, and their
+    source.
+    """
 
     intrinsics: NDArray[np.float64]  # (3, 3)
     dist: NDArray[np.float64]  # (5,)
     source: str  # as the report gives it
-    focal_deviation: float = 0.0  # relative error of the focal length, one standard deviation; 0: given
+    # relative error of the focal length, one standard deviation; 0: given
+    focal_deviation: float = 0.0
 
     def undistort(self, points_px: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
-        """Return pixels (..., 2) as an ideal pinhole camera with the same intrinsics would see them."""
+        """Return pixels (..., 2) as an ideal pinhole camera with the same intrinsics would see
+        them.
+        """
         if not self.dist.any() or not points_px.size:  # OpenCV raises an error for no points
             return points_px
         import cv2
@@ -54,12 +61,16 @@ class Camera:
 
 
 def pinhole(width: int, height: int, focal_px: float) -> NDArray[np.float64]:
-    """Return (3, 3) intrinsics with square pixels and the principal point in the middle of the image."""
+    """Return (3, 3) intrinsics with square pixels and the principal point in the middle of the
+    image.
+    """
     return np.array([[focal_px, 0.0, width / 2], [0.0, focal_px, height / 2], [0.0, 0.0, 1.0]])
 
 
 def scaled_intrinsics(intrinsics: NDArray[np.float64], scale: float) -> NDArray[np.float64]:
-    """Return the intrinsics (3, 3) of a scaled image; pixel centres have integer coordinates, the corner is at -1/2."""
+    """Return the intrinsics (3, 3) of a scaled image; pixel centres have integer coordinates, the
+    corner is at -1/2.
+    """
     scaling = np.array([[scale, 0, (scale - 1) / 2], [0, scale, (scale - 1) / 2], [0, 0, 1]])
     return scaling @ intrinsics
 
@@ -73,11 +84,14 @@ def choose_camera(
     calibration: str | Path | None = None,
     metadata_focal_mm: float | None = None,
 ) -> Camera:
-    """Choose the camera for footage of this size: from the user, otherwise the metadata, otherwise the default.
+    """Choose the camera for footage of this size: from the user, otherwise the metadata, otherwise
+    the default.
 
     :param width, height: of the footage in pixels.
-    :param focal_mm: 35 mm equivalent focal length along the longer side, f_px = f_mm / 36 · max(width, height).
-    :param fov_deg: field of view along the longer side, f_px = max(width, height) / (2 tan(fov / 2)).
+    :param focal_mm: 35 mm equivalent focal length along the longer side, f_px = f_mm / 36 ·
+        max(width, height).
+    :param fov_deg: field of view along the longer side, f_px = max(width, height) / (2 tan(fov /
+        2)).
     :param metadata_focal_mm: as ``focal_mm``, from the file's own metadata.
     :raises UsageError: the user's values contradict each other, or one is impossible.
     :raises InputError: the calibration cannot be used for footage of this size.
@@ -89,15 +103,21 @@ def choose_camera(
     longer = max(width, height)
     if calibration is not None:
         known = read_calibration(Path(calibration))
-        return Camera(known.intrinsics_for(width, height), known.dist, f"calibration {known.path.name}")
+        return Camera(
+            known.intrinsics_for(width, height), known.dist, f"calibration {known.path.name}"
+        )
     if focal_mm is not None:
         if not 1.0 <= focal_mm <= 2000.0:
-            raise UsageError(f"--focal-mm {focal_mm:g} is not a focal length: give 35 mm equivalent ones, such as 26")
+            raise UsageError(
+                f"--focal-mm {focal_mm:g} is not a focal length: give 35 mm "
+                "equivalent ones, such as 26"
+            )
         focal_px, source = focal_mm / FILM_WIDTH_MM * longer, f"given, {focal_mm:g} mm"
     elif fov_deg is not None:
         if not 1.0 <= fov_deg <= 175.0:
             raise UsageError(
-                f"--fov {fov_deg:g} is not a field of view: give degrees along the longer side, such as 60"
+                f"--fov {fov_deg:g} is not a field of view: give degrees along the longer side, "
+                "such as 60"
             )
         focal_px, source = _focal_from_fov(longer, fov_deg), f"given, {fov_deg:g} degrees"
     elif metadata_focal_mm:
@@ -112,7 +132,8 @@ def assumed_camera(width: int, height: int, longer_px: float) -> Camera:
     """Return the camera with the default field of view.
 
     :param width, height: of the footage in pixels.
-    :param longer_px: the longer side of the camera's image, which is smaller than the footage's between bars.
+    :param longer_px: the longer side of the camera's image, which is smaller than the footage's
+        between bars.
     """
     source = f"assumed, {DEFAULT_FOV_DEG:g} degrees"
     if longer_px < max(width, height):
@@ -121,7 +142,9 @@ def assumed_camera(width: int, height: int, longer_px: float) -> Camera:
     return Camera(pinhole(width, height, focal_px), np.zeros(5), source, ASSUMED_DEVIATION)
 
 
-def estimated_camera(width: int, height: int, focal_px: float, deviation: float, longer_px: float) -> Camera:
+def estimated_camera(
+    width: int, height: int, focal_px: float, deviation: float, longer_px: float
+) -> Camera:
     """Return the camera with an estimated focal length.
 
     :param width, height: of the footage in pixels.

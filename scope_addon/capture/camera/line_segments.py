@@ -55,7 +55,10 @@ class Segments:
     @classmethod
     def of_all(cls, parts: Sequence[Segments]) -> Segments:
         """Return the segments of several pictures of one background."""
-        ends, lengths = (np.concatenate(each) for each in zip(*((p.ends_px, p.lengths) for p in parts), strict=True))
+        ends, lengths = (
+            np.concatenate(each)
+            for each in zip(*((p.ends_px, p.lengths) for p in parts), strict=True)
+        )
         order = np.argsort(-lengths, kind="stable")
         return cls(ends[order], lengths[order])
 
@@ -87,8 +90,10 @@ def find_segments(
     """Find the straight edges of a picture's background.
 
     :param image_rgb: (H, W, 3).
-    :param people: (n, 2) points of each person in pixels; edges inside their bounding boxes are left out.
-    :param working_side_px: the longer side to which the picture is reduced; the time grows with its square.
+    :param people: (n, 2) points of each person in pixels; edges inside their bounding boxes are
+        left out.
+    :param working_side_px: the longer side to which the picture is reduced; the time grows with its
+        square.
     :param bars: (4,) each, see `bars`; their edges are left out.
     """
     height, width = image_rgb.shape[:2]
@@ -104,7 +109,9 @@ def find_segments(
     keep = lengths > MIN_LENGTH
     middle = ends.mean(axis=1)
     margin = max(BAR_MARGIN_PX, 1.5 / scale) * np.array([-1, -1, 1, 1])
-    keep &= ~inside(middle, [*(surroundings(points) for points in people), *(bar + margin for bar in bars)])
+    keep &= ~inside(
+        middle, [*(surroundings(points) for points in people), *(bar + margin for bar in bars)]
+    )
     chosen = np.flatnonzero(keep)
     chosen = chosen[np.argsort(-lengths[chosen])[:MAX_SEGMENTS]]
     return Segments(ends[chosen].astype(float), lengths[chosen].astype(float))

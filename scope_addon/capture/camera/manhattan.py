@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Manhattan directions, the three orthogonal directions of buildings: up u, and two horizontal ones h and u × h.
+"""Manhattan directions, the three orthogonal directions of buildings: up u, and two horizontal ones
+h and u × h.
 
-In the picture, edges along a direction d of space point at d's vanishing point f d_xy / d_z (relative to the middle).
-Three directions explain an edge i if it points at one of the three vanishing points, within an angle ∠_i at the edge's
-middle:
+In the picture, edges along a direction d of space point at d's vanishing point f d_xy / d_z
+(relative to the middle). Three directions explain an edge i if it points at one of the three
+vanishing points, within an angle ∠_i at the edge's middle:
 
     score(f) = max over u, h of Σ_i w_i max_d exp(−sin² ∠_i / 2 s²)
 
-with w_i the edge's length in sides of the picture. Angles are measured in the picture, because those between planes
-through the camera's centre shrink when f grows. If f is known, such planes are simpler (`line_normal_equations`): with
-unit normals n_i, edges along d satisfy n_i·d = 0.
+with w_i the edge's length in sides of the picture. Angles are measured in the picture, because
+those between planes through the camera's centre shrink when f grows. If f is known, such planes are
+simpler (`line_normal_equations`): with unit normals n_i, edges along d satisfy n_i·d = 0.
 
 Source: Coughlan and Yuille 2003.
 """
@@ -34,7 +35,8 @@ UP_CANDIDATES = 16  # directions that may be up, those with most support
 MIN_CANDIDATE_ANGLE = np.radians(0.7)  # between two of them
 _BLOCK = 64  # directions that are tried at once
 _TILTS = np.arange(-MAX_TILT, MAX_TILT + 1e-9, np.radians(1.0))
-_TILTED = np.stack([np.zeros_like(_TILTS), -np.cos(_TILTS), np.sin(_TILTS)], axis=1)  # up, for a camera without roll
+# up, for a camera without roll
+_TILTED = np.stack([np.zeros_like(_TILTS), -np.cos(_TILTS), np.sin(_TILTS)], axis=1)
 
 
 @dataclass(frozen=True)
@@ -57,30 +59,43 @@ class Edges:
     def axes(self, focal_px: float) -> tuple[float, NDArray[np.float64]]:
         """Find the three directions that explain most of the edges.
 
-        :return: the sides of the picture that they explain; their (3, 3) rows u, h, u × h, in camera axes.
+        :return: the sides of the picture that they explain; their (3, 3) rows u, h, u × h, in
+            camera axes.
         """
         normals, equations = self._normals(focal_px), self._equations(focal_px)
         return self._best(self._up_candidates(normals, equations), normals, equations)
 
     def support(self, focal_px: float) -> float:
-        """Return the sides of the picture that the best three directions explain, with or without vertical edges.
+        """Return the sides of the picture that the best three directions explain, with or without
+        vertical edges.
 
-        At a focal length for which no two vertical edges intersect, the horizontal ones alone may be explained as well
-        as at another focal length for which two happen to: by a camera with tilt and no roll.
+        At a focal length for which no two vertical edges intersect, the horizontal ones alone may
+        be explained as well as at another focal length for which two happen to: by a camera with
+        tilt and no roll.
         """
         normals, equations = self._normals(focal_px), self._equations(focal_px)
-        return self._best(self._up_candidates(normals, equations) or list(_TILTED), normals, equations)[0]
+        return self._best(
+            self._up_candidates(normals, equations) or list(_TILTED), normals, equations
+        )[0]
 
     def _normals(self, focal_px: float) -> NDArray[Any]:
         """Return the (N, 3) normals of the planes through the camera's centre and the edges."""
-        return plane_normals(np.concatenate([self.ends, np.full((*self.ends.shape[:2], 1), focal_px, np.float32)], -1))
+        return plane_normals(
+            np.concatenate(
+                [self.ends, np.full((*self.ends.shape[:2], 1), focal_px, np.float32)], -1
+            )
+        )
 
     def _best(
-        self, candidates: Sequence[NDArray[Any]], normals: NDArray[Any], equations: NDArray[np.float32]
+        self,
+        candidates: Sequence[NDArray[Any]],
+        normals: NDArray[Any],
+        equations: NDArray[np.float32],
     ) -> tuple[float, NDArray[np.float64]]:
         """Return what `axes` does, where one of the candidates is up."""
         ups = np.asarray(candidates).reshape(-1, 3)
-        level = np.cross(normals[None, :HORIZONTAL_CANDIDATES], ups[:, None])  # along the edges, if they are horizontal
+        # along the edges, if they are horizontal
+        level = np.cross(normals[None, :HORIZONTAL_CANDIDATES], ups[:, None])
         size = np.linalg.norm(level, axis=2)
         which, _ = np.nonzero(size > 0.1)
         if not len(which):
@@ -97,15 +112,21 @@ class Edges:
         best = int(score.argmax())
         return float(score[best]), np.array([ups[which[best]], level[best], across[best]], float)
 
-    def _up_candidates(self, normals: NDArray[Any], equations: NDArray[np.float32]) -> list[NDArray[Any]]:
-        """Return distinct directions near the picture's vertical in which pairs of edges intersect, the best first."""
+    def _up_candidates(
+        self, normals: NDArray[Any], equations: NDArray[np.float32]
+    ) -> list[NDArray[Any]]:
+        """Return distinct directions near the picture's vertical in which pairs of edges intersect,
+        the best first.
+        """
         up = np.array([0.0, -1.0, 0.0])
         may_be_vertical = np.abs(normals @ up) < np.sin(MAX_TILT + PLANE_SIGMA)
         found = intersection_directions(normals[may_be_vertical], up)
         if not len(found):
             return []
         blocks = np.array_split(found, len(found) // _BLOCK + 1)
-        score = np.concatenate([_explained(_sine2(block, equations)) @ self.weight for block in blocks])
+        score = np.concatenate(
+            [_explained(_sine2(block, equations)) @ self.weight for block in blocks]
+        )
         rest, chosen = found[np.argsort(-score)], list[NDArray[Any]]()
         while len(rest) and len(chosen) < UP_CANDIDATES:
             chosen.append(rest[0])
@@ -113,17 +134,26 @@ class Edges:
         return chosen
 
     def _equations(self, focal_px: float) -> NDArray[np.float32]:
-        """Return (3, 3 N): a direction d times it is, for each edge, f d_xy − d_z m and its component across the edge.
+        """Return (3, 3 N): a direction d times it is, for each edge, f d_xy − d_z m and its
+        component across the edge.
 
-        With m the edge's middle, that is the vector from there to the vanishing point, times d_z: x, y, and across.
+        With m the edge's middle, that is the vector from there to the vanishing point, times d_z:
+        x, y, and across.
         """
         f, zero = np.full_like(self.weight, focal_px), np.zeros_like(self.weight)
-        to_x, to_y = np.stack([f, zero, -self.middle[:, 0]]), np.stack([zero, f, -self.middle[:, 1]])
-        return np.concatenate([to_x, to_y, to_x * self.along[:, 1] - to_y * self.along[:, 0]], axis=1)
+        to_x, to_y = (
+            np.stack([f, zero, -self.middle[:, 0]]),
+            np.stack([zero, f, -self.middle[:, 1]]),
+        )
+        return np.concatenate(
+            [to_x, to_y, to_x * self.along[:, 1] - to_y * self.along[:, 0]], axis=1
+        )
 
 
 def _sine2(directions: NDArray[Any], equations: NDArray[np.float32]) -> NDArray[Any]:
-    """Return (n, N) sin² of the angles between each edge and the vanishing points of directions (n, 3)."""
+    """Return (n, N) sin² of the angles between each edge and the vanishing points of directions (n,
+    3).
+    """
     squares = directions.astype(np.float32) @ equations
     squares *= squares
     x2, y2, across2 = np.split(squares, 3, axis=1)
@@ -133,14 +163,18 @@ def _sine2(directions: NDArray[Any], equations: NDArray[np.float32]) -> NDArray[
 
 
 def _explained(sine2: NDArray[Any]) -> NDArray[Any]:
-    """Turn sin² of angles between edges and vanishing points into how well the edges point at them; 1: exactly."""
+    """Turn sin² of angles between edges and vanishing points into how well the edges point at them;
+    1: exactly.
+    """
     sine2 *= np.float32(-0.5 / EDGE_SIGMA**2)
     explained: NDArray[Any] = np.exp(sine2, out=sine2)
     return explained
 
 
 def intersection_directions(normals: NDArray[Any], up: NDArray[np.float64]) -> NDArray[Any]:
-    """Return the (n, 3) directions near ``up`` (3,) in which pairs of lines with these normals (N, 3) intersect."""
+    """Return the (n, 3) directions near ``up`` (3,) in which pairs of lines with these normals (N,
+    3) intersect.
+    """
     i, j = np.triu_indices(len(normals), 1)
     v = np.cross(normals[i], normals[j])
     size = np.linalg.norm(v, axis=1)
@@ -151,17 +185,23 @@ def intersection_directions(normals: NDArray[Any], up: NDArray[np.float64]) -> N
 
 
 def line_normal_equations(
-    lines: Lines, directions: NDArray[np.float64], sigma: float, value: NDArray[np.float64] | float = 1.0
+    lines: Lines,
+    directions: NDArray[np.float64],
+    sigma: float,
+    value: NDArray[np.float64] | float = 1.0,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Compute the normal equations of a small rotation ω of three directions, each line assigned to the nearest one.
+    """Compute the normal equations of a small rotation ω of three directions, each line assigned to
+    the nearest one.
 
-    With r_i = min_d n_i·d and J_i = d × n_i, the Gauss-Newton step of max Σ_i v_d w_i exp(−r_i² / 2σ²) is ω = H⁻¹ g:
-    H = Σ_i ρ_i J_i J_iᵀ and g = −Σ_i ρ_i r_i J_i with ρ_i = v_d w_i exp(−r_i² / 2σ²).
+    With r_i = min_d n_i·d and J_i = d × n_i, the Gauss-Newton step of max Σ_i v_d w_i exp(−r_i² /
+    2σ²) is ω = H⁻¹ g: H = Σ_i ρ_i J_i J_iᵀ and g = −Σ_i ρ_i r_i J_i with ρ_i = v_d w_i exp(−r_i² /
+    2σ²).
 
     :param directions: (..., 3, 3) unit rows, in the lines' axes.
     :param sigma: σ in radians.
     :param value: v of each direction (3,), or of all.
-    :return: H (..., 3, 3), g (..., 3), and (..., 3) how much each direction explains, Σ w_i exp(−r_i² / 2σ²), in sides.
+    :return: H (..., 3, 3), g (..., 3), and (..., 3) how much each direction explains, Σ w_i
+        exp(−r_i² / 2σ²), in sides.
     """
     off = lines.normals @ directions.swapaxes(-1, -2)
     nearest = np.abs(off).argmin(axis=-1)

@@ -1,21 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The up direction from the edges of buildings: walls, doors and posts are vertical, most other edges horizontal.
+"""The up direction from the edges of buildings: walls, doors and posts are vertical, most other
+edges horizontal.
 
-A line in the picture and the camera's centre span a plane with unit normal n; an edge along direction d satisfies
-n·d = 0. Given the body's up direction u_0, find up u and two horizontal directions h and u × h, all orthogonal, that
-maximize
+A line in the picture and the camera's centre span a plane with unit normal n; an edge along
+direction d satisfies n·d = 0. Given the body's up direction u_0, find up u and two horizontal
+directions h and u × h, all orthogonal, that maximize
 
-    −∠(u, u_0)² / 2σ² + κ Σ_i w_i max(2 c_i(u), c_i(h), c_i(u × h)),   c_i(d) = exp(−(n_i·d)² / 2s²),
+    −∠(u, u_0)² / 2σ² + κ Σ_i w_i max(2 c_i(u), c_i(h), c_i(u × h)),
+    c_i(d) = exp(−(n_i·d)² / 2s²),
 
-with w_i the line's length in sides of the picture. Vertical lines count twice, because lines agree with one of two
-horizontal directions by chance more often. A grid of directions around u_0 is evaluated, and the best ones are refined
-with each line assigned to the nearest direction (`line_normal_equations`).
+with w_i the line's length in sides of the picture. Vertical lines count twice, because lines agree
+with one of two horizontal directions by chance more often. A grid of directions around u_0 is
+evaluated, and the best ones are refined with each line assigned to the nearest direction
+(`line_normal_equations`).
 
-The result is rejected if three directions would explain as much of random lines. It is also rejected if little of it is
-vertical, unless both horizontal directions are supported and no other solution is nearly as good: then up is what is
-orthogonal to both.
+The result is rejected if three directions would explain as much of random lines. It is also
+rejected if little of it is vertical, unless both horizontal directions are supported and no other
+solution is nearly as good: then up is what is orthogonal to both.
 
-A single horizontal direction is reported wherever long lines agree on it, because up may be ambiguous only about it.
+A single horizontal direction is reported wherever long lines agree on it, because up may be
+ambiguous only about it.
 
 Source: Coughlan and Yuille 2003.
 """
@@ -42,20 +46,25 @@ GRID_STEP = np.radians(3.0)
 GRID_SIGMA = np.radians(2.2)  # s on the grid; PLANE_SIGMA in the refinement
 MAX_REFINED = 16
 REFINEMENT_STEPS = 8
-CHANCE_SHARE, CHANCE_SIGMAS = 0.25, 1.5  # of the lines, explained by chance; standard deviations above it
+# of the lines, explained by chance; standard deviations above it
+CHANCE_SHARE, CHANCE_SIGMAS = 0.25, 1.5
 MIN_VERTICAL = 0.25  # sides of the picture, all vertical lines together
 MIN_HORIZONTAL = 1.0  # likewise, along each horizontal direction, where less is vertical
 MIN_MARGIN = 3.0  # in score, to any other solution
 MIN_ANGLE_TO_OTHER = np.radians(4.0)  # of that solution's up direction
-MAX_SLOPE = np.radians(15.0)  # of horizontal edges against the body's up direction: steeper ones may be stairs
+# of horizontal edges against the body's up direction: steeper ones may be stairs
+MAX_SLOPE = np.radians(15.0)
 
 
 @dataclass(frozen=True)
 class UpEstimate:
-    """Directions estimated from lines. Where ``up`` is ambiguous, it may be so only about ``level``."""
+    """Directions estimated from lines. Where ``up`` is ambiguous, it may be so only about
+    ``level``.
+    """
 
     up: NDArray[np.float64] | None = None  # (3,)
-    level: NDArray[np.float64] | None = None  # (3,) the horizontal direction of most lines, such as a fence's
+    # (3,) the horizontal direction of most lines, such as a fence's
+    level: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True)
@@ -66,20 +75,26 @@ class _Axes:
 
 
 def estimate_up_from_lines(lines: Lines, up: NDArray[np.float64]) -> UpEstimate:
-    """Estimate the up direction and a horizontal direction; None for what the lines do not determine.
+    """Estimate the up direction and a horizontal direction; None for what the lines do not
+    determine.
 
     :param up: (3,) unit vector, the body's up direction, in the lines' axes.
     """
     if not len(lines.lengths):
         return UpEstimate()
     lines = Lines(lines.normals[:MAX_LINES], lines.lengths[:MAX_LINES])
-    best, *others = sorted(_refined(_best_on_grid(lines, up), lines, up), key=lambda axes: -axes.score)
+    best, *others = sorted(
+        _refined(_best_on_grid(lines, up), lines, up), key=lambda axes: -axes.score
+    )
     share = best.supports.sum() / lines.lengths.sum()
     count = np.square(lines.lengths.sum()) / np.square(lines.lengths).sum()
     found = best.directions[0]
     if share < CHANCE_SHARE + CHANCE_SIGMAS / np.sqrt(count) or found @ up < np.cos(MAX_LEAN):
         return UpEstimate()
-    second = max((o.score for o in others if o.directions[0] @ found < np.cos(MIN_ANGLE_TO_OTHER)), default=-np.inf)
+    second = max(
+        (o.score for o in others if o.directions[0] @ found < np.cos(MIN_ANGLE_TO_OTHER)),
+        default=-np.inf,
+    )
     is_clear = best.supports[1:].min() >= MIN_HORIZONTAL and best.score - second > MIN_MARGIN
     which = 1 + int(best.supports[1:].argmax())
     level = best.directions[which]
@@ -99,27 +114,39 @@ def _grid(up: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _best_on_grid(lines: Lines, up: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the axes (n, 3, 3) of the best up directions around one, each with its best horizontal directions."""
+    """Return the axes (n, 3, 3) of the best up directions around one, each with its best horizontal
+    directions.
+    """
     ups = _grid(up)
     found = [_best_with_ups(ups[k : k + _BLOCK], lines) for k in range(0, len(ups), _BLOCK)]
     support, axes = (np.concatenate(each) for each in zip(*found, strict=True))
-    best: NDArray[np.float64] = axes[np.argsort(-_score(support, ups, up), kind="stable")[:MAX_REFINED]]
+    best: NDArray[np.float64] = axes[
+        np.argsort(-_score(support, ups, up), kind="stable")[:MAX_REFINED]
+    ]
     return best
 
 
-def _best_with_ups(ups: NDArray[np.float64], lines: Lines) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the support and the axes (n, 3, 3) of the best horizontal directions for each of the up directions (n, 3).
+def _best_with_ups(
+    ups: NDArray[np.float64], lines: Lines
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the support and the axes (n, 3, 3) of the best horizontal directions for each of the
+    up directions (n, 3).
 
-    Of several weighted exponentials, the largest is that of the least exponent, which needs one call instead of three.
+    Of several weighted exponentials, the largest is that of the least exponent, which needs one
+    call instead of three.
     """
-    level = np.cross(np.concatenate([lines.normals[:HORIZONTAL_CANDIDATES], np.eye(3)]), ups[:, None])
+    level = np.cross(
+        np.concatenate([lines.normals[:HORIZONTAL_CANDIDATES], np.eye(3)]), ups[:, None]
+    )
     size = np.linalg.norm(level, axis=2, keepdims=True)  # level: along a horizontal line
     level /= np.maximum(size, 0.1)
     across = np.cross(ups[:, None], level)
     off2 = np.square(level @ lines.normals.T)
     np.minimum(off2, np.square(across @ lines.normals.T), out=off2)
     scale = -0.5 / GRID_SIGMA**2
-    np.minimum(off2, (np.square(ups @ lines.normals.T) + np.log(VALUE[0]) / scale)[:, None], out=off2)
+    np.minimum(
+        off2, (np.square(ups @ lines.normals.T) + np.log(VALUE[0]) / scale)[:, None], out=off2
+    )
     off2 *= scale
     support = np.where(size[..., 0] > 0.1, np.exp(off2, out=off2) @ lines.lengths, -np.inf)
     rows, best = np.arange(len(ups)), support.argmax(axis=1)
@@ -131,7 +158,11 @@ def _refined(directions: NDArray[np.float64], lines: Lines, up: NDArray[np.float
     for _ in range(REFINEMENT_STEPS):
         H, g, _ = line_normal_equations(lines, directions, PLANE_SIGMA, VALUE)
         u = directions[:, 0]
-        H = KAPPA / PLANE_SIGMA**2 * H + (np.eye(3) - u[:, :, None] * u[:, None]) / BODY_SIGMA**2 + 1e-9 * np.eye(3)
+        H = (
+            KAPPA / PLANE_SIGMA**2 * H
+            + (np.eye(3) - u[:, :, None] * u[:, None]) / BODY_SIGMA**2
+            + 1e-9 * np.eye(3)
+        )
         g = KAPPA / PLANE_SIGMA**2 * g + np.cross(u, up) / BODY_SIGMA**2
         directions = directions @ exp(np.linalg.solve(H, g[..., None])[..., 0]).swapaxes(1, 2)
     supports = line_normal_equations(lines, directions, PLANE_SIGMA)[2]
@@ -139,7 +170,11 @@ def _refined(directions: NDArray[np.float64], lines: Lines, up: NDArray[np.float
     return [_Axes(*each) for each in zip(directions, supports, scores.tolist(), strict=True)]
 
 
-def _score(support: NDArray[np.float64], u: NDArray[np.float64], up: NDArray[np.float64]) -> NDArray[np.float64]:
+def _score(
+    support: NDArray[np.float64], u: NDArray[np.float64], up: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Return the scores (n,) of up directions (n, 3) that explain so much."""
-    scores: NDArray[np.float64] = KAPPA * support - 0.5 * np.square(np.arccos(np.clip(u @ up, -1.0, 1.0)) / BODY_SIGMA)
+    scores: NDArray[np.float64] = KAPPA * support - 0.5 * np.square(
+        np.arccos(np.clip(u @ up, -1.0, 1.0)) / BODY_SIGMA
+    )
     return scores

@@ -12,20 +12,23 @@ from .stature import FIXED
 
 @dataclass(frozen=True)
 class Ablation:
-    """Which parts run; all by default. At least one source of depth is needed: ``lifter`` or ``world_landmarks``.
+    """Which parts run; all by default. At least one source of depth is needed: ``lifter`` or
+    ``world_landmarks``.
 
     :raises UsageError: both sources of depth are left out.
     """
 
     lifter: bool = True  # False: the landmark network's world landmarks replace its output
     world_landmarks: bool = True  # as input of the lifter
-    keypoint_offsets: bool = True  # False: keypoints lie at the body's joints, not where the networks place them
+    # False: keypoints lie at the body's joints, not where the networks place them
+    keypoint_offsets: bool = True
     keypoints3d: bool = True
     orientation_field: bool = True
     joint_prior: bool = True
     shape: bool = True  # False: everybody has the mean shape
     outline: bool = True  # in the shape: the body's silhouette against person masks
-    stature: bool = True  # False: proportions move an unknown stature as far as they do in the population
+    # False: proportions move an unknown stature as far as they do in the population
+    stature: bool = True
     left_right: bool = True  # repair of left-right swaps and limb swaps
     keypoint_jumps: bool = True  # repair of keypoint jumps
     stance: bool = True  # distance and lean that follow from floor, feet and balance
@@ -38,7 +41,9 @@ class Ablation:
     def __post_init__(self) -> None:
         """Require a source of depth."""
         if not (self.lifter or self.world_landmarks):
-            raise UsageError("lifter and world_landmarks cannot both be left out: nothing else provides depth")
+            raise UsageError(
+                "lifter and world_landmarks cannot both be left out: nothing else provides depth"
+            )
 
     def weights(self, weights: Weights) -> Weights:
         """Return the solver's weights with zeros for the terms that are left out."""

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The focal length, from the background's edges and the largest people, in threads that run in parallel with tracking.
+"""The focal length, from the background's edges and the largest people, in threads that run in
+parallel with tracking.
 
-First, everything that the solver needs is loaded: its kernels (compiled on first use) and the lifting network. Once a
-person has been seen, the focal length is estimated from the edges of that frame, and by fitting the body in some of
-those that follow. The result depends on the frames, not on the speed of the threads.
+First, everything that the solver needs is loaded: its kernels (compiled on first use) and the
+lifting network. Once a person has been seen, the focal length is estimated from the edges of that
+frame, and by fitting the body in some of those that follow. The result depends on the frames, not
+on the speed of the threads.
 """
 
 from __future__ import annotations
@@ -28,21 +30,25 @@ from .live_body import LiveBody
 
 KERNELS = 85  # that fitting a clip compiles
 _POLLING_INTERVAL_S = 0.2
-_THREADS = 2  # background and edges; the solver has its own thread, because compiling it must not delay either
+# background and edges; the solver has its own thread, because compiling it must not delay either
+_THREADS = 2
 
 
 class BackgroundEstimators:
     """A context that estimates the focal length from the largest people, which are added in order.
 
-    Leaving it with an error, such as a cancel, drops work not yet begun. Others may follow the background in its
-    ``pool``.
+    Leaving it with an error, such as a cancel, drops work not yet begun. Others may follow the
+    background in its ``pool``.
     """
 
-    def __init__(self, camera: Camera, width: int, height: int, live: LiveBody, fits: FocalFits) -> None:
+    def __init__(
+        self, camera: Camera, width: int, height: int, live: LiveBody, fits: FocalFits
+    ) -> None:
         self._given_camera, self._size, self._fits = camera, (width, height), fits
         self.pool = ThreadPoolExecutor(_THREADS, "scope-background")
         self._solver = ThreadPoolExecutor(1, "scope-solver")
-        self._largest: tuple[float, Observation] | None = None  # time and largest person of the last frame
+        # time and largest person of the last frame
+        self._largest: tuple[float, Observation] | None = None
         self._longer_px = float(max(width, height))
         self._assumed = assumed_camera(width, height, self._longer_px)
         self._by_edges: Future[Camera] | None = None
@@ -52,18 +58,31 @@ class BackgroundEstimators:
     def __enter__(self) -> BackgroundEstimators:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        # Do not wait: the solver may be compiling, and only those who need it then should wait for it.
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        at: TracebackType | None,
+    ) -> None:
+        # Do not wait: the solver may be compiling, and only those who need it then should wait for
+        # it.
         for pool in (self.pool, self._solver):
             pool.shutdown(wait=False, cancel_futures=kind is not None)
 
-    def add(self, time_s: float, largest: Observation | None, followed: BackgroundTracker | BackgroundRecord) -> None:
-        """Use the frame before this one for the focal length, once a background was searched for edges.
+    def add(
+        self,
+        time_s: float,
+        largest: Observation | None,
+        followed: BackgroundTracker | BackgroundRecord,
+    ) -> None:
+        """Use the frame before this one for the focal length, once a background was searched for
+        edges.
 
         :param followed: the background, at least of all frames before.
         """
-        # The background of this very frame may be followed meanwhile. If it finds the first edges, it has set the bars
-        # before, and nobody was seen in the frame before, so they are merely used one frame earlier or later.
+        # The background of this very frame may be followed meanwhile. If it finds the first edges,
+        # it has set the bars before, and nobody was seen in the frame before, so they are merely
+        # used one frame earlier or later.
         before, self._largest = self._largest, None if largest is None else (time_s, largest)
         if self._given_camera.focal_deviation == 0.0 or not followed.edge_frames:
             return
@@ -71,15 +90,20 @@ class BackgroundEstimators:
             self._longer_px = longer_content_side(followed.bars, *self._size)
             self._assumed = assumed_camera(*self._size, self._longer_px)
             segments = followed.edge_frames[0].segments
-            self._by_edges = self.pool.submit(camera_by_edges, segments, *self._size, self._longer_px)
+            self._by_edges = self.pool.submit(
+                camera_by_edges, segments, *self._size, self._longer_px
+            )
         if before is not None and self._fits.is_due(before[0]):
             self._costs.append(self._solver.submit(self._fits.costs, before[1], self._assumed))
 
-    def camera(self, record: BackgroundRecord, people: Iterable[tuple[float, Observation]]) -> Camera:
-        """Return the clip's camera; an assumed focal length is replaced by the estimate from edges and fits.
+    def camera(
+        self, record: BackgroundRecord, people: Iterable[tuple[float, Observation]]
+    ) -> Camera:
+        """Return the clip's camera; an assumed focal length is replaced by the estimate from edges
+        and fits.
 
-        :param people: time and largest person of the frames from the first of the record's ``edge_frames`` on; those
-            that have been added count once.
+        :param people: time and largest person of the frames from the first of the record's
+            ``edge_frames`` on; those that have been added count once.
         """
         if self._given_camera.focal_deviation == 0.0:
             return self._given_camera
@@ -94,7 +118,8 @@ class BackgroundEstimators:
     def wait_for_solver(self, progress: Callable[[int], None]) -> None:
         """Wait until the solver is loaded.
 
-        :param progress: called several times a second with the number of kernels compiled so far, unless there is none.
+        :param progress: called several times a second with the number of kernels compiled so far,
+            unless there is none.
         """
         while wait_for([self._loading], timeout=_POLLING_INTERVAL_S).not_done:
             if compiled := compiled_kernels():

@@ -1,24 +1,26 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The focal length from the edges of buildings and rooms, and from fits of the body.
 
-Most edges follow three orthogonal directions. How many of them the best Manhattan directions explain (`manhattan`)
-depends on the focal length f:
+Most edges follow three orthogonal directions. How many of them the best Manhattan directions
+explain (`manhattan`) depends on the focal length f:
 
     p(f) ∝ exp(κ score(f)) N(log f; log f_0, σ²)
 
-with the assumed f_0 and σ. A wall seen frontally fits every f; p is then as wide as the assumption, and the assumed
-focal length is kept.
+with the assumed f_0 and σ. A wall seen frontally fits every f; p is then as wide as the assumption,
+and the assumed focal length is kept.
 
-The perspective of a body depends on its distance, and so on f. A few frames are fitted at several focal lengths each,
-with a shape of their own, while the next frames are tracked. Keypoint errors are in pixels, independent of f, so the
-weight of the normalized residuals grows with f². With the mean cost c(f) of the frames,
+The perspective of a body depends on its distance, and so on f. A few frames are fitted at several
+focal lengths each, with a shape of their own, while the next frames are tracked. Keypoint errors
+are in pixels, independent of f, so the weight of the normalized residuals grows with f². With the
+mean cost c(f) of the frames,
 
     p(f) ∝ exp(−a c(f)) N(log f; log f_0, σ²),
 
-where f_0 and σ are known without the fit: assumed, or estimated from edges. All frames together count as a < 1 of them
-(`SHARE`), since the errors of keypoints and depths are correlated over all frames of a person. This estimate is weak.
-People of known stature do not improve it: with preset fast, the mean ratio to the true focal length over fourteen
-renders falls from 0.78 to 0.68 when statures are given, because these also imply proportions.
+where f_0 and σ are known without the fit: assumed, or estimated from edges. All frames together
+count as a < 1 of them (`SHARE`), since the errors of keypoints and depths are correlated over all
+frames of a person. This estimate is weak. People of known stature do not improve it: with preset
+fast, the mean ratio to the true focal length over fourteen renders falls from 0.78 to 0.68 when
+statures are given, because these also imply proportions.
 
 Source: Caprile and Torre 1990 (f from vanishing points).
 """
@@ -45,14 +47,18 @@ KAPPA = 4.0
 LOG_RANGE, COARSE_STEP, FINE_STEP = 0.7, 0.05, 0.0125  # of log(f / f_0)
 FITTED_STEP = 0.0025  # finer, since evaluating the fits' likelihood costs nothing
 MAX_DEVIATION = 0.1  # of log f; a less certain estimate is no better than the assumption
-LOG_RATIOS = np.array([-0.7, -0.35, 0.0, 0.35, 0.7])  # logarithms of the tried focal lengths, relative to the camera's
+# logarithms of the tried focal lengths, relative to the camera's
+LOG_RATIOS = np.array([-0.7, -0.35, 0.0, 0.35, 0.7])
 SHARE = 0.2  # a; of 0 to 1.2, 0.2 to 0.3 is best for preset best, and 0.1 to 0.2 for fast
-SHAPE_WEIGHT = 10.0  # a body that follows keypoints further than that imitates the perspective of another focal length
-FIRST_GAP_S = 0.2  # between fitted frames; each further gap is twice as long: an hour has some fifteen frames
+# a body that follows keypoints further than that imitates the perspective of another focal length
+SHAPE_WEIGHT = 10.0
+# between fitted frames; each further gap is twice as long: an hour has some fifteen frames
+FIRST_GAP_S = 0.2
 
 
 def camera_by_edges(segments: Segments, width: int, height: int, longer_px: float) -> Camera:
-    """Return the camera with the focal length estimated from edges or, if that fails, the assumed one.
+    """Return the camera with the focal length estimated from edges or, if that fails, the assumed
+    one.
 
     :param longer_px: longer side of the image without letterbox bars, see `bars`.
     """
@@ -61,7 +67,9 @@ def camera_by_edges(segments: Segments, width: int, height: int, longer_px: floa
     return estimated_camera(width, height, *found, longer_px) if found else camera
 
 
-def camera_by_fits(camera: Camera, assumed: Camera, costs: list[NDArray[np.float64]], longer_px: float) -> Camera:
+def camera_by_fits(
+    camera: Camera, assumed: Camera, costs: list[NDArray[np.float64]], longer_px: float
+) -> Camera:
     """Combine the camera's focal length with the likelihood from fits of the body.
 
     :param assumed: the camera of the fits.
@@ -78,8 +86,12 @@ def camera_by_fits(camera: Camera, assumed: Camera, costs: list[NDArray[np.float
     return estimated_camera(width, height, assumed_px * float(np.exp(mean)), deviation, longer_px)
 
 
-def focal_from_edges(segments: Segments, width: int, height: int, assumed_px: float) -> tuple[float, float] | None:
-    """Estimate the focal length in pixels and its relative error from an image's edges; None if it is uncertain."""
+def focal_from_edges(
+    segments: Segments, width: int, height: int, assumed_px: float
+) -> tuple[float, float] | None:
+    """Estimate the focal length in pixels and its relative error from an image's edges; None if it
+    is uncertain.
+    """
     edges = Edges.of(segments, width, height)
     coarse = np.arange(-LOG_RANGE, LOG_RANGE + 1e-9, COARSE_STEP)
     scores = [edges.support(assumed_px * np.exp(x)) for x in coarse]
@@ -93,12 +105,16 @@ def focal_from_edges(segments: Segments, width: int, height: int, assumed_px: fl
 
 
 def _log_posterior(log_ratio: NDArray[np.float64], scores: list[float]) -> NDArray[np.float64]:
-    log_p: NDArray[np.float64] = KAPPA * np.array(scores) - 0.5 * np.square(log_ratio / ASSUMED_DEVIATION)
+    log_p: NDArray[np.float64] = KAPPA * np.array(scores) - 0.5 * np.square(
+        log_ratio / ASSUMED_DEVIATION
+    )
     return log_p
 
 
 def _moments(log_ratio: NDArray[np.float64], log_p: NDArray[np.float64]) -> tuple[float, float]:
-    """Return mean and standard deviation of log(f / f_0), integrated over unevenly spaced values."""
+    """Return mean and standard deviation of log(f / f_0), integrated over unevenly spaced
+    values.
+    """
     order = np.argsort(log_ratio)
     x, log_p = log_ratio[order], log_p[order]
     p = np.exp(log_p - log_p.max()) * np.gradient(x)
@@ -122,16 +138,20 @@ class FocalFits:
         return True
 
     def costs(self, observation: Observation, camera: Camera) -> NDArray[np.float64] | None:
-        """Return the (5,) costs of fits at the camera's focal length times e^`LOG_RATIOS`; None if a fit fails.
+        """Return the (5,) costs of fits at the camera's focal length times e^`LOG_RATIOS`; None if
+        a fit fails.
 
-        Assumes square pixels and a central principal point, as for any camera that is not calibrated.
+        Assumes square pixels and a central principal point, as for any camera that is not
+        calibrated.
         """
         track = single_frame_track(observation)
         if not track.seen[0]:
             return None
         K, costs = camera.intrinsics, []
         for ratio in np.exp(LOG_RATIOS):
-            candidate = replace(camera, intrinsics=pinhole(2 * K[0, 2], 2 * K[1, 2], ratio * K[0, 0]))
+            candidate = replace(
+                camera, intrinsics=pinhole(2 * K[0, 2], 2 * K[1, 2], ratio * K[0, 0])
+            )
             prepared = prepare_track(self._body, track, candidate, self._ablation)
             keypoints2d = prepared.weights.keypoints2d * ratio**2
             weights = replace(prepared.weights, keypoints2d=keypoints2d, shape=SHAPE_WEIGHT)
@@ -143,7 +163,9 @@ class FocalFits:
         return np.array(costs)
 
 
-def log_likelihood(costs: list[NDArray[np.float64]], log_ratio: NDArray[np.float64]) -> NDArray[np.float64]:
+def log_likelihood(
+    costs: list[NDArray[np.float64]], log_ratio: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Return the (n,) log likelihood of focal lengths, up to a constant.
 
     :param costs: (5,) of each fitted frame, from `FocalFits.costs`.

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The frames of a track, fitted one after another with the clip's shape.
 
-A limb bent towards the camera looks in the image like one bent away from it. A warm start from the previous frame stays
-with one of the two poses, however certain the lifting network becomes of the other. When a fit contradicts the lifted
-directions, the frame is therefore fitted again with the stages of a cold start. If this lowers the cost, the previous
-frames are refitted backwards from there, for as long as the refit of a frame costs less than was gained.
+A limb bent towards the camera looks in the image like one bent away from it. A warm start from the
+previous frame stays with one of the two poses, however certain the lifting network becomes of the
+other. When a fit contradicts the lifted directions, the frame is therefore fitted again with the
+stages of a cold start. If this lowers the cost, the previous frames are refitted backwards from
+there, for as long as the refit of a frame costs less than was gained.
 """
 
 from __future__ import annotations
@@ -27,7 +28,9 @@ _SAME_POSE_RAD = np.radians(10.0)  # by which no joint differs between two poses
 
 @dataclass
 class FittedTrack:
-    """Body states of T frames in the camera frame; rows that are not ``valid`` repeat the last valid state."""
+    """Body states of T frames in the camera frame; rows that are not ``valid`` repeat the last
+    valid state.
+    """
 
     rotations: NDArray[np.floating[Any]]  # (T, K+1, 3, 3); row 0 R_camera_root, the others Ω
     t_camera_root: NDArray[np.floating[Any]]  # (T, 3) the pelvis, metres
@@ -35,13 +38,15 @@ class FittedTrack:
     valid: NDArray[np.bool_]  # (T,)
     joint_confidence: NDArray[np.floating[Any]]  # (T, K+1) 0..1
     iterations: float  # mean per frame
-    joint_sigma_m: NDArray[np.floating[Any]] | None = None  # (T, K+1, 2) of `joint_sigma`, NaN where not valid
+    # (T, K+1, 2) of `joint_sigma`, NaN where not valid
+    joint_sigma_m: NDArray[np.floating[Any]] | None = None
     height_sigma_m: float = float("nan")  # standard deviation of the stature of `betas`
 
     def with_fingers_at_rest(self, prepared: PreparedTrack) -> FittedTrack:
         """Return the motion of the whole body; fingers that were not fitted are at rest.
 
-        To the wrist's deviation, theirs adds what wrist and fingers may rotate under the joint prior alone.
+        To the wrist's deviation, theirs adds what wrist and fingers may rotate under the joint
+        prior alone.
         """
         own, whole = prepared.body, prepared.whole_body
         if own is whole:
@@ -79,11 +84,15 @@ class FrameSequence:
         self._tree = with_fixed_shape(make_tree(body), betas)
         self._priors = replace(prepared.priors, shape_mean=None, shape_information=None)
         self._cold, self._warm = (
-            replace(ROBUST, stages=stages(prepared.weights)) for stages in (cold_stages, warm_stages)
+            replace(ROBUST, stages=stages(prepared.weights))
+            for stages in (cold_stages, warm_stages)
         )
-        # The fingers of hands that are not seen are smoothed before they are stored in single precision.
+        # The fingers of hands that are not seen are smoothed before they are stored in single
+        # precision.
         precision = np.float32 if prepared.hands is None else np.float64
-        self._rotations: NDArray[np.floating[Any]] = np.tile(np.eye(3).astype(precision), (T, body.K + 1, 1, 1))
+        self._rotations: NDArray[np.floating[Any]] = np.tile(
+            np.eye(3).astype(precision), (T, body.K + 1, 1, 1)
+        )
         self._root, self._valid, self._cost = np.zeros((T, 3)), np.zeros(T, bool), np.zeros(T)
         self._iterations = 0
         self._last: Fit | None = None
@@ -94,7 +103,9 @@ class FrameSequence:
 
         If a cold start improves on the warm one, refit the frames before it as well.
         """
-        gain = self._fit(k, self._last.state if self._last is not None and self._is_continued(k) else None)
+        gain = self._fit(
+            k, self._last.state if self._last is not None and self._is_continued(k) else None
+        )
         if gain > 0.0 and self._last is not None:
             self._refit_backwards(k, self._last.state, gain)
 
@@ -114,9 +125,13 @@ class FrameSequence:
         prepared, rotations, valid = self._prepared, self._rotations, self._valid
         confidence = prepared.measurer.joint_confidence(prepared.track.confidence)
         if prepared.hand_measurer is not None and prepared.hands is not None:
-            confidence = np.maximum(confidence, prepared.hand_measurer.joint_confidence(prepared.hands))
+            confidence = np.maximum(
+                confidence, prepared.hand_measurer.joint_confidence(prepared.hands)
+            )
             seen = (prepared.hands[:, :, 0, 2] > 0) & valid[:, None]
-            rotations = smooth_fingers(rotations, prepared.hand_measurer.fingers, seen, prepared.track.times)
+            rotations = smooth_fingers(
+                rotations, prepared.hand_measurer.fingers, seen, prepared.track.times
+            )
         return FittedTrack(
             rotations=rotations,
             t_camera_root=self._root,
@@ -134,7 +149,8 @@ class FrameSequence:
     def _fit(self, k: int, initial: State | None) -> float:
         """Fit frame ``k`` from an initial state, or from a cold start if there is none.
 
-        :return: by how much the stages of a cold start lowered the cost of a warm start that contradicted the lifter.
+        :return: by how much the stages of a cold start lowered the cost of a warm start that
+            contradicted the lifter.
         """
         prepared = self._prepared
         measurements = prepared.measure_all(k)
@@ -151,13 +167,16 @@ class FrameSequence:
         return 0.0
 
     def _refit_backwards(self, k: int, later: State, gain: float) -> None:
-        """Refit the frames before ``k``, each from the frame after it, while a refit costs less than was gained."""
+        """Refit the frames before ``k``, each from the frame after it, while a refit costs less
+        than was gained.
+        """
         track = self._prepared.track
         while k > 0 and self._valid[k - 1] and not track.acquired[k]:
             k -= 1
             found = self._solve(self._prepared.measure_all(k), later, self._warm)
             is_worth_it = is_usable(found) and found.cost - self._cost[k] <= gain
-            traces = np.einsum("kij,kij->k", found.state.Omega, self._rotations[k, 1:])  # of what is between the poses
+            # of what is between the poses
+            traces = np.einsum("kij,kij->k", found.state.Omega, self._rotations[k, 1:])
             if not is_worth_it or (traces > 1 + 2 * np.cos(_SAME_POSE_RAD)).all():
                 return
             self._store(k, found)

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From the hands' keypoints to the solver's measurements, and the motion of fingers that are not seen.
+"""From the hands' keypoints to the solver's measurements, and the motion of fingers that are not
+seen.
 
-The keypoints are 2D keypoints. The world landmarks give directions: along every bone of the fingers, and across the
-palm, which determines the wrist's rotation. Their axes are aligned with the line of sight to the hand, so directions
-are rotated to camera axes. `smooth_fingers` moves the fingers while a hand is not seen.
+The keypoints are 2D keypoints. The world landmarks give directions: along every bone of the
+fingers, and across the palm, which determines the wrist's rotation. Their axes are aligned with the
+line of sight to the hand, so directions are rotated to camera axes. `smooth_fingers` moves the
+fingers while a hand is not seen.
 """
 
 from __future__ import annotations
@@ -24,26 +26,38 @@ from ..perception.lifter import camera_towards
 
 FINGERS = ("index", "middle", "ring", "pinky", "thumb")
 HAND_KEYPOINT_NAMES = tuple(f"hand/{side}_{name}" for side in SIDES for name in HAND_NAMES)
-# Weights of keypoints relative to the body's wrist: 21 lie close together, with correlated errors. The hand network
-# places the wrist further into the palm than the body has its joint.
+# Weights of keypoints relative to the body's wrist: 21 lie close together, with correlated errors.
+# The hand network places the wrist further into the palm than the body has its joint.
 PIXEL_WEIGHT, WRIST_PIXEL_WEIGHT = 0.3, 0.05
-DIRECTION_WEIGHT = 0.25  # of a bone in a hand of presence 1: twice the standard deviation of a bone of the body
-# The smaller a hand is in the image, the less is seen of which way its palm faces, and the weight falls with the square
-# of the distance from wrist to middle knuckle. In hands of 15 pixels, wrong palms turned the whole arm.
+# of a bone in a hand of presence 1: twice the standard deviation of a bone of the body
+DIRECTION_WEIGHT = 0.25
+# The smaller a hand is in the image, the less is seen of which way its palm faces, and the weight
+# falls with the square of the distance from wrist to middle knuckle. In hands of 15 pixels, wrong
+# palms turned the whole arm.
 FULL_SIZE_PX = 100.0
-RELIABLE = 0.8  # presence below which directions count by its cube: of a blurred hand, the place is right, not the pose
-# Flexion of a finger joint towards the palm, at least and at most, and largest deviation from this axis; radians.
+# presence below which directions count by its cube: of a blurred hand, the place is right, not the
+# pose
+RELIABLE = 0.8
+# Flexion of a finger joint towards the palm, at least and at most, and largest deviation from this
+# axis; radians.
 _KNUCKLE, _HINGE = (-0.5, 1.7, 0.4), (-0.2, 2.0, 0.2)
 _THUMB = (-0.4, 0.4, 1.2)  # rotation of a thumb joint about its own bone, and deviation from it
-# The keypoints that are joints, in the keypoints' order: the wrist, then three per finger, the thumb first.
+# The keypoints that are joints, in the keypoints' order: the wrist, then three per finger, the
+# thumb first.
 _JOINTS = np.array([0, *(4 * finger + k for finger in range(5) for k in (1, 2, 3))])
 # Pairs of keypoints with a known direction: those of the palm, then three per finger.
 _PALM_BONES = [(0, 5), (0, 9), (0, 13), (0, 17), (5, 17)]
-_BONES = np.array([*_PALM_BONES, *((4 * finger + k, 4 * finger + k + 1) for finger in range(5) for k in (1, 2, 3))])
+_BONES = np.array(
+    [
+        *_PALM_BONES,
+        *((4 * finger + k, 4 * finger + k + 1) for finger in range(5) for k in (1, 2, 3)),
+    ]
+)
 _PIXEL_WEIGHTS = np.array([WRIST_PIXEL_WEIGHT, *[PIXEL_WEIGHT] * (HAND_POINTS - 1)])
 _TIP = {f: f"{f}_tip" if f in ("pinky", "thumb") else f"{f}_finger_tip" for f in FINGERS}
 _MIDDLE_KNUCKLE = HAND_NAMES.index("middle_finger_mcp")
-SHORT_GAP_S, LONG_GAP_S = 0.3, 1.0  # unseen fingers begin to return to rest after the first, and rest after the second
+# unseen fingers begin to return to rest after the first, and rest after the second
+SHORT_GAP_S, LONG_GAP_S = 0.3, 1.0
 
 
 def finger_names(side: str) -> list[str]:
@@ -60,7 +74,8 @@ def finger_joints(body: Body, side: str) -> list[int]:
     keypoints = {f"hand/{side}_{name}" for name in HAND_NAMES}
     if not set(names) <= set(body.joint_names) or not keypoints <= set(body.keypoint_names):
         raise UsageError(
-            f"body '{body.name}' has no finger joints, which capturing hands needs: use scope_h or an SMPL+H file"
+            f"body '{body.name}' has no finger joints, which capturing hands needs: use scope_h or "
+            "an SMPL+H file"
         )
     return [body.joint_names.index(name) for name in names]
 
@@ -83,17 +98,23 @@ class HandMeasurer:
 
     def __init__(self, body: Body, intrinsics: NDArray[np.float64]) -> None:
         self._body, self._unproject = body, np.linalg.inv(intrinsics)
-        self.indices = np.array([body.keypoint_names.index(name) for name in HAND_KEYPOINT_NAMES]).reshape(2, -1)
+        self.indices = np.array(
+            [body.keypoint_names.index(name) for name in HAND_KEYPOINT_NAMES]
+        ).reshape(2, -1)
         self.fingers = [finger_joints(body, side) for side in SIDES]
         self.wrists = [body.joint_names.index(f"{side}_wrist") for side in SIDES]
-        # Bones as (from, to): pairs of the hand's keypoints, and the solver's indices of the same points.
+        # Bones as (from, to): pairs of the hand's keypoints, and the solver's indices of the same
+        # points.
         self._from, self._to = _BONES.T
         self._starts, self._ends = (
-            np.array([self._points(side)[pairs] for side in range(len(SIDES))]) for pairs in (self._from, self._to)
+            np.array([self._points(side)[pairs] for side in range(len(SIDES))])
+            for pairs in (self._from, self._to)
         )
 
     def _points(self, side: int) -> NDArray[np.intp]:
-        """Return the solver's (21,) indices of a hand's keypoints; joints where possible, so that bones share parts."""
+        """Return the solver's (21,) indices of a hand's keypoints; joints where possible, so that
+        bones share parts.
+        """
         points: NDArray[np.intp] = self.indices[side].copy()
         joints = [self.wrists[side], *(self.fingers[side][k] for k in (12, 13, 14, *range(12)))]
         points[_JOINTS] = len(self._body.keypoint_names) + np.array(joints)
@@ -102,7 +123,8 @@ class HandMeasurer:
     def add(self, measured: Measurements, hands: NDArray[np.floating[Any]]) -> Measurements:
         """Add the hands to the measurements of a frame.
 
-        :param hands: (2, 21, 6) undistorted pixels, confidence and world landmarks; confidence 0 where not seen.
+        :param hands: (2, 21, 6) undistorted pixels, confidence and world landmarks; confidence 0
+            where not seen.
         """
         first, bones = measured.keypoints2d, measured.orientation_field
         assert first is not None
@@ -126,7 +148,9 @@ class HandMeasurer:
                 np.concatenate([bones.starts, self._starts[seen].ravel()]),
                 np.concatenate([bones.ends, self._ends[seen].ravel()]),
                 np.concatenate([bones.directions, directions.reshape(-1, 3)]),
-                np.concatenate([bones.confidence, DIRECTION_WEIGHT * reliable[:, self._to].ravel()]),
+                np.concatenate(
+                    [bones.confidence, DIRECTION_WEIGHT * reliable[:, self._to].ravel()]
+                ),
             ),
         )
 
@@ -134,11 +158,15 @@ class HandMeasurer:
         """Return the (n, bones, 3) vectors along the bones of n hands (n, 21, 6), camera axes."""
         rays = hands[..., :2].mean(axis=1) @ self._unproject[:2, :2].T + self._unproject[:2, 2]
         R_virtual_camera = camera_towards(rays)
-        bones: NDArray[np.floating[Any]] = (hands[:, self._to, 3:] - hands[:, self._from, 3:]) @ R_virtual_camera
+        bones: NDArray[np.floating[Any]] = (
+            hands[:, self._to, 3:] - hands[:, self._from, 3:]
+        ) @ R_virtual_camera
         return bones
 
     def joint_confidence(self, hands: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
-        """Return (T, K+1), the confidence of the hand of each wrist and finger joint, of hands (T, 2, 21, 6)."""
+        """Return (T, K+1), the confidence of the hand of each wrist and finger joint, of hands (T,
+        2, 21, 6).
+        """
         out = np.zeros((len(hands), self._body.K + 1))
         for side, joints in enumerate(self.fingers):
             for joint in (self.wrists[side], *joints):
@@ -149,9 +177,10 @@ class HandMeasurer:
 def with_finger_limits(priors: Priors, body: Body) -> Priors:
     """Add joint limits of the fingers to the priors.
 
-    Fingers bend towards the palm, about the axis perpendicular to bone and palm normal in the rest pose. The normal is
-    (index − wrist) × (little finger − wrist) on the right hand, and its opposite on the left. The thumb's joints have
-    other axes: only their twist about the bone and their deviation from it are limited.
+    Fingers bend towards the palm, about the axis perpendicular to bone and palm normal in the rest
+    pose. The normal is (index − wrist) × (little finger − wrist) on the right hand, and its
+    opposite on the left. The thumb's joints have other axes: only their twist about the bone and
+    their deviation from it are limited.
 
     :raises UsageError: the body has no finger joints.
     """
@@ -172,19 +201,24 @@ def with_finger_limits(priors: Priors, body: Body) -> Priors:
                 ranges.append(_THUMB if finger == "thumb" else _KNUCKLE if k == 0 else _HINGE)
     lower, upper, swing = np.array(ranges).T
     ones = np.ones(len(joints))
-    ints, floats = joint_limits.pack(np.array(joints), np.array(axes), lower, upper, swing, ones, ones)
+    ints, floats = joint_limits.pack(
+        np.array(joints), np.array(axes), lower, upper, swing, ones, ones
+    )
     if priors.limits is not None:
         ints, floats = np.vstack([priors.limits[0], ints]), np.vstack([priors.limits[1], floats])
     return replace(priors, limits=(ints, floats))
 
 
 def smooth_fingers(
-    rotations: NDArray[np.floating[Any]], fingers: list[list[int]], seen: NDArray[np.bool_], times: NDArray[np.float64]
+    rotations: NDArray[np.floating[Any]],
+    fingers: list[list[int]],
+    seen: NDArray[np.bool_],
+    times: NDArray[np.float64],
 ) -> NDArray[np.floating[Any]]:
     """Fill in the fingers of hands that are not seen with smooth motion.
 
-    Rotations are interpolated between the frames in which the hand was seen. The farther these are away in time, the
-    closer the fingers are to the rest pose, which they reach after `LONG_GAP_S`.
+    Rotations are interpolated between the frames in which the hand was seen. The farther these are
+    away in time, the closer the fingers are to the rest pose, which they reach after `LONG_GAP_S`.
 
     :param rotations: (T, K+1, 3, 3) of all joints.
     :param fingers: joint indices of each hand's fingers.
@@ -210,17 +244,19 @@ def smooth_fingers(
 
 
 def without_fingers(body: Body) -> Body:
-    """Return a body whose fingers are rigid parts of its palms, in the rest pose; the body itself if it has none.
+    """Return a body whose fingers are rigid parts of its palms, in the rest pose; the body itself
+    if it has none.
 
-    For people of whom no hand is seen: what a clip costs to fit grows with the cube of the number of joints that are
-    fitted together, and 30 of the 51 joints of a body with fingers are theirs. Keypoints, vertices and their numbers
-    stay as they are.
+    For people of whom no hand is seen: what a clip costs to fit grows with the cube of the number
+    of joints that are fitted together, and 30 of the 51 joints of a body with fingers are theirs.
+    Keypoints, vertices and their numbers stay as they are.
     """
     fingers = {name for side in SIDES for name in finger_names(side)}
     kept = [k for k, name in enumerate(body.joint_names) if name not in fingers]
     if len(kept) == len(body.joint_names):
         return body
-    part = np.zeros(len(body.joint_names), np.intp)  # of the body without fingers that carries each part
+    # of the body without fingers that carries each part
+    part = np.zeros(len(body.joint_names), np.intp)
     for k, parent in enumerate(body.parents):
         part[k] = kept.index(k) if k in kept else part[parent]
     return replace(

@@ -1,20 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keypoint offsets: where the landmark network places each keypoint, relative to where our body model has it.
+"""Keypoint offsets: where the landmark network places each keypoint, relative to where our body
+model has it.
 
     p_placed = R_i (v̄_j + V_j β + d_j) + t_i
 
-On everybody, BlazePose's hips lie 1 cm below and beside the default body's hip joints, and its ankles 1 cm above the
-ankle joints.
-The offsets of other networks are unknown. The d_j minimize the remaining reprojection errors of fits without offsets,
-with left and right as mirror images:
+On everybody, BlazePose's hips lie 1 cm below and beside the default body's hip joints, and its
+ankles 1 cm above the ankle joints. The offsets of other networks are unknown. The d_j minimize the
+remaining reprojection errors of fits without offsets, with left and right as mirror images:
 
     min Σ_people mean_t Σ_j c_jt |Π (R_i(t) d_j) − r_jt|² + 0.3 |d|²
 
-where Π takes the camera's x and y, and r_jt is the distance between keypoint and body in metres. Estimated from seven
-people in five clips, none of which accuracy is measured on (`python -m scope.tools.train_lifter.place_keypoints`), with
-hip joints 4 cm farther back. That of the hips is between the place on the body that it had, (7, -16, -39) from today's
-joints, and the mean over four clips of three people whose anatomical joints are known, (8, 0, 11): with 0 instead of
--12 upwards, these people are better by 1.2 mm, and Pose2Sim's, whose true hips are keypoints, worse by 1.7 mm.
+where Π takes the camera's x and y, and r_jt is the distance between keypoint and body in metres.
+Estimated from seven people in five clips, none of which accuracy is measured on (`python -m
+scope.tools.train_lifter.place_keypoints`), with hip joints 4 cm farther back. That of the hips is
+between the place on the body that it had, (7, -16, -39) from today's joints, and the mean over four
+clips of three people whose anatomical joints are known, (8, 0, 11): with 0 instead of -12 upwards,
+these people are better by 1.2 mm, and Pose2Sim's, whose true hips are keypoints, worse by 1.7 mm.
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ from numpy.typing import NDArray
 from ....solver import Body
 from ..perception.landmark_network import KEYPOINT_NAMES
 
-# Millimetres in the axes of the rest pose: to the person's left, up, forwards. The right side is mirrored.
+# Millimetres in the axes of the rest pose: to the person's left, up, forwards. The right side is
+# mirrored.
 OFFSETS_MM = {
     "nose": (0, 3, -9),
     "left_eye_inner": (1, -2, -2),
@@ -50,7 +52,9 @@ OFFSETS_MM = {
 
 
 def with_keypoint_offsets(body: Body) -> Body:
-    """Move BlazePose's keypoints of a body to where the landmark networks place them; joints do not move."""
+    """Move BlazePose's keypoints of a body to where the landmark networks place them; joints do not
+    move.
+    """
     template = body.keypoint_template.copy()
     at = body.keypoint_set("blazepose")
     for name in KEYPOINT_NAMES:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The body in single frames of a clip that is still being tracked, for the preview over the footage.
+"""The body in single frames of a clip that is still being tracked, for the preview over the
+footage.
 
-Each frame is fitted like a still image, with its own shape and independently of its neighbours. Only frames that are
-shown cost time, and the motion does not depend on which frames these are.
+Each frame is fitted like a still image, with its own shape and independently of its neighbours.
+Only frames that are shown cost time, and the motion does not depend on which frames these are.
 """
 
 from __future__ import annotations
@@ -28,7 +29,9 @@ from .weights import ROBUST
 
 @dataclass(frozen=True)
 class LivePose:
-    """A body in one frame: ``vertices_cam`` (V, 3) metres, camera frame, and the camera that it was fitted with."""
+    """A body in one frame: ``vertices_cam`` (V, 3) metres, camera frame, and the camera that it was
+    fitted with.
+    """
 
     vertices_cam: NDArray[np.floating[Any]]
     body: Body
@@ -39,7 +42,11 @@ class LiveBody:
     """Fits one body to single observations, in the calling thread."""
 
     def __init__(
-        self, body: Body, camera: Camera, ablation: Ablation = NO_ABLATION, height_m: float | None = None
+        self,
+        body: Body,
+        camera: Camera,
+        ablation: Ablation = NO_ABLATION,
+        height_m: float | None = None,
     ) -> None:
         self._body, self._camera, self._ablation, self._height_m = body, camera, ablation, height_m
         self.is_ready = False  # whether everything is loaded, so that a fit takes some milliseconds
@@ -57,13 +64,23 @@ class LiveBody:
         track = single_frame_track(observation)
         prepared = prepare_track(self._body, track, self._camera, self._ablation, self._height_m)
         measured = prepared.measure_all(0)
-        frames: list[Measurements | list[View]] = [measured, [View(measured, np.diag([-1.0, -1.0, 1.0]))], measured]
+        frames: list[Measurements | list[View]] = [
+            measured,
+            [View(measured, np.diag([-1.0, -1.0, 1.0]))],
+            measured,
+        ]
         times, stands = np.arange(3) / 30.0, StandingPoints([0], np.ones((3, 1)))
         options = replace(ROBUST, stages=(Stage(prepared.weights, 1e-4, 1),))
         fit_motion(
-            self._body, frames, times, init=[state] * 3, priors=prepared.priors, options=options, stands=stands,
+            self._body,
+            frames,
+            times,
+            init=[state] * 3,
+            priors=prepared.priors,
+            options=options,
+            stands=stands,
             shape=state.beta,
-        )  # fmt: skip
+        )
 
     def fit(self, observation: Observation) -> LivePose | None:
         """Fit the body to an observation; None if the observation does not suffice."""
@@ -77,14 +94,20 @@ class LiveBody:
         track = single_frame_track(observation)
         if not track.seen[0]:
             return None
-        found = fit_single_frame(prepare_track(self._body, track, self._camera, self._ablation, self._height_m))
+        found = fit_single_frame(
+            prepare_track(self._body, track, self._camera, self._ablation, self._height_m)
+        )
         return None if found is None else found.state
 
 
-def _part_poses(body: Body, state: State) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
+def _part_poses(
+    body: Body, state: State
+) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
     """Return part poses (K+1, 3, 3) and (K+1, 3), camera frame."""
     rotations = np.concatenate([state.R_camera_root[None], state.Omega])
-    return body.forward_kinematics(rotations, state.t_camera_root - body.rest_joints(state.beta)[0], state.beta)
+    return body.forward_kinematics(
+        rotations, state.t_camera_root - body.rest_joints(state.beta)[0], state.beta
+    )
 
 
 def _rest_observation(body: Body, camera: Camera) -> Observation:
@@ -95,4 +118,6 @@ def _rest_observation(body: Body, camera: Camera) -> Observation:
     pixels = points @ camera.intrinsics.T
     world = points - points[HIPS].mean(axis=0)
     region = Region((0.0, 0.0), 1.0, 0.0)
-    return Observation(pixels[:, :2] / pixels[:, 2:], np.ones(len(points)), world, 1.0, region, acquired=True)
+    return Observation(
+        pixels[:, :2] / pixels[:, 2:], np.ones(len(points)), world, 1.0, region, acquired=True
+    )

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shape of a person from masks: rim points of a posed body, and the contour points that belong to them.
+"""The shape of a person from masks: rim points of a posed body, and the contour points that belong
+to them.
 
-The keypoints say how long limbs are, and little about breadth. The rim are points of the skin whose normal is at right
-angles to the view, and beside which the body's silhouette ends. From each, the mask is searched along the projected
-normal for the nearest place where its probability crosses one half; there the contour's own normal is taken from the
-mask's gradient. A crossing counts if it lies within the image, near enough, and if both normals agree. Hands and feet
-are left out: they are small, and what they hold or stand on is not.
+The keypoints say how long limbs are, and little about breadth. The rim are points of the skin whose
+normal is at right angles to the view, and beside which the body's silhouette ends. From each, the
+mask is searched along the projected normal for the nearest place where its probability crosses one
+half; there the contour's own normal is taken from the mask's gradient. A crossing counts if it lies
+within the image, near enough, and if both normals agree. Hands and feet are left out: they are
+small, and what they hold or stand on is not.
 """
 
 from __future__ import annotations
@@ -46,12 +48,14 @@ OUTSIDE_SIGMA_M = 0.05
 SIZE = 256  # of the mask
 _NO_MAP = np.zeros(0, np.float32)  # the places are all in the first map
 _NOTHING = np.zeros((0, INTS), np.int64), np.zeros((0, FLOATS))
-MIN_MASKS, MAX_MASKS = 4, 32  # fewer, such as that of a still image, can mislead, and more add little
+# fewer, such as that of a still image, can mislead, and more add little
+MIN_MASKS, MAX_MASKS = 4, 32
 ROUNDS = 3
 THREADS = 2
-# A rim point's inverse variance: 0.0018 in normalized coordinates, 7 mm at 4 m. The outline says more of the shape than
-# keypoints do, so the prior may weigh less. MPJPE-root on the four pose2sim cameras with other weights of outline and
-# prior: 72.7 mm with 0 and 10, 72.5 with 0 and 2, 72.1 with 5e4 and 10, 68.7 with 3e5 and 2, which are today's.
+# A rim point's inverse variance: 0.0018 in normalized coordinates, 7 mm at 4 m. The outline says
+# more of the shape than keypoints do, so the prior may weigh less. MPJPE-root on the four pose2sim
+# cameras with other weights of outline and prior: 72.7 mm with 0 and 10, 72.5 with 0 and 2, 72.1
+# with 5e4 and 10, 68.7 with 3e5 and 2, which are today's.
 OUTLINE_WEIGHT = 3e5
 PRIOR_SHARE = 2 / 3
 
@@ -74,7 +78,9 @@ class OutlineMeasurer:
         self.part = part[self.vertices]
         joints = [body.joint_names[i] for i in self.part]
         widths_m = _WIDTHS_M.items()
-        self._width = np.array([next((w for key, w in widths_m if key in joint), _WIDTH_M) for joint in joints])
+        self._width = np.array(
+            [next((w for key, w in widths_m if key in joint), _WIDTH_M) for joint in joints]
+        )
         self._triangles = np.ascontiguousarray(body.triangles(), np.int32)
         self._around = self._triangles[np.isin(self._triangles, self.vertices).any(axis=1)]
         self.first = len(body.keypoint_names)
@@ -83,7 +89,9 @@ class OutlineMeasurer:
         self.body = with_keypoints(body, added, self.part, places, shapedirs)
 
     def measure(self, fit: Fit, mask: PersonMask) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Return the residual's rows for the pose and shape of a fit: int64 (n, 1) and float64 (n, 11)."""
+        """Return the residual's rows for the pose and shape of a fit: int64 (n, 1) and float64 (n,
+        11).
+        """
         body, v = self._with_shape(fit.state.beta), self.vertices
         R, t = fit.R_camera_part, fit.t_camera_part
         skin = np.ascontiguousarray(body.skin(R, t))
@@ -91,7 +99,11 @@ class OutlineMeasurer:
         local = body.v_template[v] - body.J_template[self.part]
         delta = np.einsum("nji,nj->ni", R[self.part], points - t[self.part]) - local
         facing = (normals * points).sum(axis=1) / np.linalg.norm(points, axis=1)
-        near = (np.abs(facing) < RIM_COS) & (points[:, 2] > NEAR_M) & (np.linalg.norm(delta, axis=1) < MAX_BLENDING_M)
+        near = (
+            (np.abs(facing) < RIM_COS)
+            & (points[:, 2] > NEAR_M)
+            & (np.linalg.norm(delta, axis=1) < MAX_BLENDING_M)
+        )
         rows = np.flatnonzero(near)
         at = self._crop(mask.region, points[rows])
         ahead = self._crop(mask.region, points[rows] + 0.01 * normals[rows]) - at
@@ -106,12 +118,22 @@ class OutlineMeasurer:
         found, contour, outward = _crossings(mask.probability, at, normal)
         rows = rows[found]
         m_px = mask.region.image_from_crop((contour + 0.5) / SIZE)
-        visible = ((m_px > BORDER_PX) & (m_px < np.subtract(mask.image_size, 1 + BORDER_PX))).all(axis=1)
-        rows, contour, outward, m_px = rows[visible], contour[visible], outward[visible], m_px[visible]
+        visible = ((m_px > BORDER_PX) & (m_px < np.subtract(mask.image_size, 1 + BORDER_PX))).all(
+            axis=1
+        )
+        rows, contour, outward, m_px = (
+            rows[visible],
+            contour[visible],
+            outward[visible],
+            m_px[visible],
+        )
         if not len(rows):
             return _NOTHING
         m = self._camera.rays(m_px)[:, :2]
-        n = self._camera.rays(mask.region.image_from_crop((contour + outward + 0.5) / SIZE))[:, :2] - m
+        n = (
+            self._camera.rays(mask.region.image_from_crop((contour + outward + 0.5) / SIZE))[:, :2]
+            - m
+        )
         n /= np.linalg.norm(n, axis=1)[:, None]
         depth = points[rows, 2]
         sigmas = (OUTSIDE_SIGMA_M / depth) ** 2, (self._width[rows] / depth) ** 2
@@ -123,7 +145,9 @@ class OutlineMeasurer:
         known, shaped = self._shaped
         if not np.array_equal(known, betas):
             body = self._source
-            shaped = replace(body, v_template=body.rest_vertices(betas), J_template=body.rest_joints(betas))
+            shaped = replace(
+                body, v_template=body.rest_vertices(betas), J_template=body.rest_joints(betas)
+            )
             self._shaped = betas.copy(), shaped
         return shaped
 
@@ -132,7 +156,9 @@ class OutlineMeasurer:
         if not len(points_cam):
             return np.zeros((0, 2))
         camera = self._camera
-        pixels = cv2.projectPoints(points_cam, np.zeros(3), np.zeros(3), camera.intrinsics, camera.dist)[0][:, 0]
+        pixels = cv2.projectPoints(
+            points_cam, np.zeros(3), np.zeros(3), camera.intrinsics, camera.dist
+        )[0][:, 0]
         return region.crop_from_image(pixels.astype(np.float64)) * SIZE - 0.5
 
     def _coverage(self, skin: NDArray[np.float64], region: Region) -> NDArray[np.bool_]:
@@ -148,7 +174,9 @@ class OutlineMeasurer:
 def _crossings(
     probability: NDArray[np.floating[Any]], at: NDArray[np.float64], normal: NDArray[np.float64]
 ) -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.float64]]:
-    """Find the nearest crossing of one half along each normal, outwards: rows (n,), places (n, 2), normals (n, 2)."""
+    """Find the nearest crossing of one half along each normal, outwards: rows (n,), places (n, 2),
+    normals (n, 2).
+    """
     picture = np.ascontiguousarray(probability, np.float32)
     steps = np.arange(-REACH, REACH + 1.0)
     path = (at[:, None] + steps[:, None] * normal[:, None]).astype(np.float32)
@@ -172,7 +200,9 @@ def _crossings(
 
 
 def usable_masks(prepared: PreparedTrack) -> list[tuple[int, PersonMask]]:
-    """Return masks of the track, evenly spread over it, each with its row; none where there are too few."""
+    """Return masks of the track, evenly spread over it, each with its row; none where there are too
+    few.
+    """
     if prepared.camera is None:
         return []
     seen = [(row, mask) for row, mask in prepared.track.masks if prepared.track.seen[row]]
@@ -183,13 +213,15 @@ def usable_masks(prepared: PreparedTrack) -> list[tuple[int, PersonMask]]:
 
 
 def fit_shape_to_outline(
-    prepared: PreparedTrack, masks: list[tuple[int, PersonMask]], root_cam: NDArray[np.floating[Any]] | None
+    prepared: PreparedTrack,
+    masks: list[tuple[int, PersonMask]],
+    root_cam: NDArray[np.floating[Any]] | None,
 ) -> ClipFit:
     """Estimate one shape from the frames of some masks, as `usable_masks` returns them.
 
-    A larger weight of few masks among many other frames moves the poses of their frames rather than the shape, so the
-    frames of the masks decide alone. A first fit without the outline places the body; then rim and contour are matched
-    and everything is fitted again, a few times.
+    A larger weight of few masks among many other frames moves the poses of their frames rather than
+    the shape, so the frames of the masks decide alone. A first fit without the outline places the
+    body; then rim and contour are matched and everything is fitted again, a few times.
 
     :param masks: each with its row.
     :param root_cam: (T, 3) known positions of the pelvis, camera frame, metres.
@@ -198,7 +230,9 @@ def fit_shape_to_outline(
     outline = OutlineMeasurer(prepared.body, prepared.camera)
     measurer = Measurer(outline.body, prepared.measurer.intrinsics)
     extended = replace(prepared, body=outline.body, measurer=measurer)
-    measured = [extended.measure(row, None if root_cam is None else root_cam[row]) for row, _ in masks]
+    measured = [
+        extended.measure(row, None if root_cam is None else root_cam[row]) for row, _ in masks
+    ]
     base = prepared.weights
     shape = PRIOR_SHARE * base.shape * len(masks)
     weights = replace(base, shape=shape, tables={**base.tables, "outline": OUTLINE_WEIGHT})
@@ -207,7 +241,12 @@ def fit_shape_to_outline(
     with ThreadPoolExecutor(THREADS, "scope-outline") as pool:
         for _ in range(ROUNDS):
             tables = pool.map(outline.measure, found.frames, [mask for _, mask in masks])
-            matched = [replace(frame, tables={"outline": rows}) for frame, rows in zip(measured, tables, strict=True)]
+            matched = [
+                replace(frame, tables={"outline": rows})
+                for frame, rows in zip(measured, tables, strict=True)
+            ]
             states = [fit.state for fit in found.frames]
-            found = fit_clip(outline.body, matched, init=states, priors=prepared.priors, options=warm)
+            found = fit_clip(
+                outline.body, matched, init=states, priors=prepared.priors, options=warm
+            )
     return found

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A track prepared for fitting: undistorted and lifted keypoints, the measurers and priors of the body."""
+"""A track prepared for fitting: undistorted and lifted keypoints, the measurers and priors of the
+body.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +40,8 @@ class Stance:
     turn: NDArray[np.floating[Any]]  # (T, 3, 3) rotations to apply to the whole body
     floor_normal: NDArray[np.floating[Any]]  # (T, 3) unit, upwards
     floor_offset: NDArray[np.floating[Any]]  # (T,) normal . p on the floor
-    contact: NDArray[np.floating[Any]]  # (T, 6) probability that each contact point rests on the floor
+    # (T, 6) probability that each contact point rests on the floor
+    contact: NDArray[np.floating[Any]]
     resting: NDArray[np.floating[Any]]  # (T, 6) probability that it rests on anything
 
     def floor(self, k: int, indices: NDArray[np.intp]) -> Floor:
@@ -49,12 +52,16 @@ class Stance:
         :param indices: (6,) keypoint indices of the contact points.
         """
         contact = self.contact[k]
-        return Floor(indices, self.floor_normal[k], float(self.floor_offset[k]), contact, below=contact)
+        return Floor(
+            indices, self.floor_normal[k], float(self.floor_offset[k]), contact, below=contact
+        )
 
 
 @dataclass(frozen=True)
 class PreparedTrack:
-    """What every pass over a track needs, computed once: undistorted keypoints, the lifter's points, priors."""
+    """What every pass over a track needs, computed once: undistorted keypoints, the lifter's
+    points, priors.
+    """
 
     body: Body  # that is fitted, with keypoints where the network places them
     whole_body: Body  # the same with fingers, also where no hand is seen and they are not fitted
@@ -65,11 +72,14 @@ class PreparedTrack:
     priors: Priors  # with unknown shape
     weights: Weights
     hand_measurer: HandMeasurer | None = None
-    hands: NDArray[np.floating[Any]] | None = None  # (T, 2, 21, 6) as in the track, undistorted; None: not fitted
-    head: NDArray[np.floating[Any]] | None = None  # (T, 4) direction across it, certainty; None: no face looked for
+    # (T, 2, 21, 6) as in the track, undistorted; None: not fitted
+    hands: NDArray[np.floating[Any]] | None = None
+    # (T, 4) direction across it, certainty; None: no face looked for
+    head: NDArray[np.floating[Any]] | None = None
     camera: Camera | None = None  # of the masks; None where the track has none
     is_stature_given: bool = False  # by the user
-    stance: Stance | None = None  # in each frame's camera; the body's last keypoints are then its contact points
+    # in each frame's camera; the body's last keypoints are then its contact points
+    stance: Stance | None = None
 
     def measure(self, k: int, root_cam: NDArray[np.floating[Any]] | None = None) -> Measurements:
         """Return the measurements of the body in frame ``k``.
@@ -77,10 +87,13 @@ class PreparedTrack:
         :param root_cam: (3,) known position of the pelvis, camera frame, metres.
         """
         points, sigma = self.lifted.points[k], self.lifted.sigma_along[k]
-        return self.measurer.measure(self.pixels[k], self.track.confidence[k], points, sigma, root_cam)
+        return self.measurer.measure(
+            self.pixels[k], self.track.confidence[k], points, sigma, root_cam
+        )
 
     def measure_all(self, k: int) -> Measurements:
-        """Return the measurements of frame ``k`` with pelvis, floor, head and hands, where these are known.
+        """Return the measurements of frame ``k`` with pelvis, floor, head and hands, where these
+        are known.
 
         The shape is estimated without floor, head and hands, because it hardly depends on them.
         """
@@ -95,7 +108,9 @@ class PreparedTrack:
 
     @property
     def contact_point_indices(self) -> NDArray[np.intp]:
-        """The (6,) keypoint indices of the contact points, which the body has if there is a stance."""
+        """The (6,) keypoint indices of the contact points, which the body has if there is a
+        stance.
+        """
         return np.arange(len(CONTACT_POINTS)) + len(self.body.keypoint_names) - len(CONTACT_POINTS)
 
     def rotated(self, R: NDArray[np.floating[Any]]) -> PreparedTrack:
@@ -108,24 +123,34 @@ class PreparedTrack:
         return replace(self, lifted=replace(self.lifted, points=rotated))
 
     def with_stance(self, stance: Stance, betas: NDArray[np.floating[Any]]) -> PreparedTrack:
-        """Add the pelvis and the floor, and to the body points on the arms and the contact points of this shape.
+        """Add the pelvis and the floor, and to the body points on the arms and the contact points
+        of this shape.
 
         :param stance: in each frame's camera.
         :param betas: (P,) shape coefficients.
         """
-        whole, K = with_contact_points(with_arm_points(self.whole_body), betas), self.measurer.intrinsics
+        whole, K = (
+            with_contact_points(with_arm_points(self.whole_body), betas),
+            self.measurer.intrinsics,
+        )
         body = whole if self.body is self.whole_body else without_fingers(whole)
         hands = None if self.hand_measurer is None else HandMeasurer(body, K)
         measurer = Measurer(body, K)
-        return replace(self, body=body, whole_body=whole, measurer=measurer, hand_measurer=hands, stance=stance)
+        return replace(
+            self, body=body, whole_body=whole, measurer=measurer, hand_measurer=hands, stance=stance
+        )
 
     def with_height(self, height_m: float, sigma_m: float) -> PreparedTrack:
-        """Return the track of an adult of that stature with that standard deviation, both in metres."""
+        """Return the track of an adult of that stature with that standard deviation, both in
+        metres.
+        """
         return replace(self, priors=with_stature(self.priors, self.body, height_m, sigma_m))
 
     def priors_with_shape(self, betas: NDArray[np.floating[Any]]) -> Priors:
         """Return the priors for a known shape (P,)."""
-        return replace(self.priors, shape_mean=betas, shape_information=np.eye(self.body.P) * SHAPE_CERTAINTY)
+        return replace(
+            self.priors, shape_mean=betas, shape_information=np.eye(self.body.P) * SHAPE_CERTAINTY
+        )
 
 
 def prepare_track(
@@ -140,9 +165,11 @@ def prepare_track(
 
     :param height_m: the person's stature, if it is known, metres.
     :param fingers: False: they are not fitted, because no hand is seen.
-    :raises UsageError: the track has hands that are to be fitted, but the body has no finger joints.
+    :raises UsageError: the track has hands that are to be fitted, but the body has no finger
+        joints.
     """
-    if ablation.keypoint_offsets and track.has_depth:  # only BlazePose estimates depth, and the offsets are BlazePose's
+    # only BlazePose estimates depth, and the offsets are BlazePose's
+    if ablation.keypoint_offsets and track.has_depth:
         body = with_keypoint_offsets(body)
     whole_body = body
     if not fingers:
@@ -158,19 +185,37 @@ def prepare_track(
         priors = (with_unknown_stature if ablation.stature else with_population)(priors, body)
     weights, is_given = ablation.weights(WEIGHTS), height_m is not None
     prepared = PreparedTrack(
-        body, whole_body, track, measurer, pixels, lifted, priors, weights, camera=camera, is_stature_given=is_given
+        body,
+        whole_body,
+        track,
+        measurer,
+        pixels,
+        lifted,
+        priors,
+        weights,
+        camera=camera,
+        is_stature_given=is_given,
     )
     if track.face is not None:
-        across, ears = across_head(track.face, camera), lifted.points[:, EARS[1]] - lifted.points[:, EARS[0]]
-        prepared = replace(prepared, head=np.column_stack([across, certainty(track.face, across, ears)]))
+        across, ears = (
+            across_head(track.face, camera),
+            lifted.points[:, EARS[1]] - lifted.points[:, EARS[0]],
+        )
+        prepared = replace(
+            prepared, head=np.column_stack([across, certainty(track.face, across, ears)])
+        )
     if track.hands is None or not fingers:
         return prepared
     hands = np.concatenate([camera.undistort(track.hands[..., :2]), track.hands[..., 2:]], axis=-1)
     hand_measurer = HandMeasurer(body, camera.intrinsics)
-    return replace(prepared, hand_measurer=hand_measurer, hands=hands, priors=with_finger_limits(priors, body))
+    return replace(
+        prepared, hand_measurer=hand_measurer, hands=hands, priors=with_finger_limits(priors, body)
+    )
 
 
-def _lift(measurer: Measurer, track: Track, pixels: NDArray[np.floating[Any]], ablation: Ablation) -> Lifted:
+def _lift(
+    measurer: Measurer, track: Track, pixels: NDArray[np.floating[Any]], ablation: Ablation
+) -> Lifted:
     if not ablation.lifter:
         sigma = np.full(track.confidence.shape, DEPTH_SIGMA_M)
         return Lifted(track.world_landmarks, sigma, sigma)

@@ -15,10 +15,13 @@ from ...errors import UsageError
 
 SIGMA_M = 0.005
 SHORTEST_M, TALLEST_M = 0.5, 2.6  # statures outside are input errors
-MAX_DEVIATIONS = 4.5  # standard deviations of the population up to which the shapes of a body are realistic
-SHORTEST_CHILD_M = 0.8  # one year of age; below, growth extrapolated from that of six-year-olds makes legs too long
+# standard deviations of the population up to which the shapes of a body are realistic
+MAX_DEVIATIONS = 4.5
+# one year of age; below, growth extrapolated from that of six-year-olds makes legs too long
+SHORTEST_CHILD_M = 0.8
 STIFFNESS = 4.0  # κ of ``with_unknown_stature``
-UNKNOWN_M = 0.1  # s of `stature_sigma`, about the deviation of adults (benchmarks/notebook/shape.md)
+# s of `stature_sigma`, about the deviation of adults (benchmarks/notebook/shape.md)
+UNKNOWN_M = 0.1
 FIXED = 1e6  # information of a coefficient that does not vary
 _ROUNDS = 3
 
@@ -26,31 +29,38 @@ _ROUNDS = 3
 def with_stature(priors: Priors, body: Body, height_m: float, sigma_m: float = SIGMA_M) -> Priors:
     """Return the priors for a person of known stature: the most probable shapes of this height.
 
-    This is the population's N(0, Λ₀⁻¹) of β, conditioned on the height h(β) of the rest pose's highest vertex above its
-    lowest: Λ = Λ₀ + g gᵀ/σ² and mean Λ₀⁻¹g (H − h₀) / (σ₀² + gᵀΛ₀⁻¹g), with h(β) = h₀ + g·β as long as these two
-    vertices stay the same, and σ₀ = `SIGMA_M`. Λ₀ = I, but growth is fixed at 0 from `CHILD_BELOW_M` on.
+    This is the population's N(0, Λ₀⁻¹) of β, conditioned on the height h(β) of the rest pose's
+    highest vertex above its lowest: Λ = Λ₀ + g gᵀ/σ² and mean Λ₀⁻¹g (H − h₀) / (σ₀² + gᵀΛ₀⁻¹g),
+    with h(β) = h₀ + g·β as long as these two vertices stay the same, and σ₀ = `SIGMA_M`. Λ₀ = I,
+    but growth is fixed at 0 from `CHILD_BELOW_M` on.
 
     :param sigma_m: σ in Λ; the mean has this height in any case.
     """
     h0, g = _extremes_at(body, height_m)
     population = _population(body, is_child=height_m < CHILD_BELOW_M)
     mean = g / population * (height_m - h0) / (SIGMA_M**2 + g @ (g / population))
-    return replace(priors, shape_mean=mean, shape_information=np.diag(population) + np.outer(g, g) / sigma_m**2)
+    return replace(
+        priors, shape_mean=mean, shape_information=np.diag(population) + np.outer(g, g) / sigma_m**2
+    )
 
 
 def with_unknown_stature(priors: Priors, body: Body) -> Priors:
-    """Return the priors for a person whose stature is unknown: proportions that differ hardly change the stature.
+    """Return the priors for a person whose stature is unknown: proportions that differ hardly
+    change the stature.
 
-    A single camera measures proportions, not size. Among people, short ones have relatively long trunks, so that under
-    N(0, I) a long trunk makes a person short: exact keypoints of a person of 1.75 m, with the mean's legs and a trunk
-    12 % longer, give 1.66 m. Λ = I + κ ĝĝᵀ, with ĝ the direction of β along which the stature h(β) grows,
-    divides that pull by 1 + κ. The person is taken for an adult: growth is fixed at 0.
+    A single camera measures proportions, not size. Among people, short ones have relatively long
+    trunks, so that under N(0, I) a long trunk makes a person short: exact keypoints of a person of
+    1.75 m, with the mean's legs and a trunk 12 % longer, give 1.66 m. Λ = I + κ ĝĝᵀ, with ĝ the
+    direction of β along which the stature h(β) grows, divides that pull by 1 + κ. The person is
+    taken for an adult: growth is fixed at 0.
     """
     population = _population(body, is_child=False)
     _, g = _extremes_at(body, body.stature())
     along = g / population
     along /= max(float(np.linalg.norm(along)), 1e-12)
-    return replace(priors, shape_information=np.diag(population) + STIFFNESS * np.outer(along, along))
+    return replace(
+        priors, shape_information=np.diag(population) + STIFFNESS * np.outer(along, along)
+    )
 
 
 def with_population(priors: Priors, body: Body) -> Priors:
@@ -60,11 +70,15 @@ def with_population(priors: Priors, body: Body) -> Priors:
     return replace(priors, shape_information=np.diag(_population(body, is_child=False)))
 
 
-def stature_sigma(body: Body, betas: NDArray[np.floating[Any]], information: NDArray[Any], is_given: bool) -> float:
-    """Return the standard deviation of the stature h(β), metres: σ² = gᵀ Λ⁻¹ g + s², with s = 0 where it was given.
+def stature_sigma(
+    body: Body, betas: NDArray[np.floating[Any]], information: NDArray[Any], is_given: bool
+) -> float:
+    """Return the standard deviation of the stature h(β), metres: σ² = gᵀ Λ⁻¹ g + s², with s = 0
+    where it was given.
 
-    Frames repeat each other's errors, so Λ is the information of one of them. Proportions tell the size only as far as
-    they go together in the population, hence s = `UNKNOWN_M`. NaN for bodies of a single shape.
+    Frames repeat each other's errors, so Λ is the information of one of them. Proportions tell the
+    size only as far as they go together in the population, hence s = `UNKNOWN_M`. NaN for bodies of
+    a single shape.
 
     :param betas: (P,) the shape.
     :param information: (P, P) Λ, priors included.
@@ -84,19 +98,28 @@ def require_stature(body: Body, height_m: float) -> None:
     """
     if not SHORTEST_M <= height_m <= TALLEST_M:
         most = f"{100 * SHORTEST_M:.0f} to {100 * TALLEST_M:.0f} cm"
-        raise UsageError(f"a height of {100 * height_m:g} cm is not plausible: give one from {most}")
+        raise UsageError(
+            f"a height of {100 * height_m:g} cm is not plausible: give one from {most}"
+        )
     if body.P == 0:
-        raise UsageError(f"the body '{body.name}' has a single shape, whose height cannot be set: omit the height")
+        raise UsageError(
+            f"the body '{body.name}' has a single shape, whose height cannot be set: "
+            "omit the height"
+        )
     low, high = stature_range(body)
     if low <= height_m <= high:
         return
-    what = f"the body '{body.name}' can be {100 * low:.0f} to {100 * high:.0f} cm tall, not {100 * height_m:g}"
+    what = (
+        f"the body '{body.name}' can be {100 * low:.0f} to {100 * high:.0f} cm tall, not "
+        f"{100 * height_m:g}"
+    )
     other = body_with_children(body.name)
     if other != body.name and not body.file:
         low, high = stature_range(load_body(other))
         if low <= height_m <= high:
             raise UsageError(
-                f"{what}: use the body '{other}', which can be {100 * low:.0f} to {100 * high:.0f} cm tall"
+                f"{what}: use the body '{other}', which can be {100 * low:.0f} to {100 * high:.0f} "
+                "cm tall"
             )
     raise UsageError(f"{what}: omit the height")
 
@@ -111,7 +134,9 @@ def stature_range(body: Body) -> tuple[float, float]:
 
 
 def _most_probable_stature(body: Body, deviations: float) -> float:
-    """Return the stature of the most probable adult so many standard deviations above the mean, metres."""
+    """Return the stature of the most probable adult so many standard deviations above the mean,
+    metres.
+    """
     betas = np.zeros(body.P)
     for _ in range(_ROUNDS):
         g = _shape_at(body, betas)[1] / _population(body, is_child=False)
@@ -129,7 +154,9 @@ def _population(body: Body, is_child: bool) -> NDArray[np.float64]:
 
 
 def _extremes_at(body: Body, height_m: float) -> tuple[float, NDArray[np.float64]]:
-    """Return h₀ and g (P,) of the highest and the lowest vertex of the most probable shape of this height."""
+    """Return h₀ and g (P,) of the highest and the lowest vertex of the most probable shape of this
+    height.
+    """
     betas, h0, g = np.zeros(body.P), 0.0, np.zeros(body.P)
     population = _population(body, is_child=height_m < CHILD_BELOW_M)
     for _ in range(_ROUNDS):

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The solver over a whole track: one shape for the clip, then every frame with that shape.
 
-1. Some frames, spread over the clip, are fitted separately and then together with one shape (``fit_clip``).
-2. Every frame is fitted with this shape, from the previous frame; after a gap from a cold start (`frame_sequence`).
+1. Some frames, spread over the clip, are fitted separately and then together with one shape
+    (``fit_clip``).
+2. Every frame is fitted with this shape, from the previous frame; after a gap from a cold start
+    (`frame_sequence`).
 3. Once floor, feet and balance are known (`ground`), all frames are fitted together (`world/clip`).
 4. From there, every frame is fitted alone once more: the raw motion.
 """
@@ -47,17 +49,22 @@ def fit_track(prepared: PreparedTrack, progress: Callable[[str, int, int], None]
 
 
 def fit_single_frame(prepared: PreparedTrack) -> Fit | None:
-    """Fit the body, with a shape of its own, to a track of one frame; None if the measurements do not suffice."""
+    """Fit the body, with a shape of its own, to a track of one frame; None if the measurements do
+    not suffice.
+    """
     (found,) = _fit_shape(prepared).frames
     return found if is_usable(found) else None
 
 
-def ground(prepared: PreparedTrack, first: FittedTrack, stance: Stance) -> tuple[PreparedTrack, FittedTrack]:
-    """Add the pelvis and the floor as estimated in a stance to the measurements, and move the first fit there.
+def ground(
+    prepared: PreparedTrack, first: FittedTrack, stance: Stance
+) -> tuple[PreparedTrack, FittedTrack]:
+    """Add the pelvis and the floor as estimated in a stance to the measurements, and move the first
+    fit there.
 
-    A pose and a distance that explain the image together can both be wrong. With the distance estimated from the floor,
-    the pose follows. So does the shape, if the distance of the whole clip has changed: a person on the same floor as
-    others must have the size that this floor implies.
+    A pose and a distance that explain the image together can both be wrong. With the distance
+    estimated from the floor, the pose follows. So does the shape, if the distance of the whole clip
+    has changed: a person on the same floor as others must have the size that this floor implies.
 
     :param first: the first fit, in each frame's camera.
     :param stance: in each frame's camera.
@@ -66,7 +73,9 @@ def ground(prepared: PreparedTrack, first: FittedTrack, stance: Stance) -> tuple
     prepared, betas, root_cam = prepared.rotated(stance.turn), first.betas, stance.root_cam
     sigma = first.height_sigma_m
     if first.valid.any():
-        new, old = (np.linalg.norm(at[first.valid], axis=1) for at in (root_cam, first.t_camera_root))
+        new, old = (
+            np.linalg.norm(at[first.valid], axis=1) for at in (root_cam, first.t_camera_root)
+        )
         if abs(np.log(np.median(new / np.maximum(old, NEAREST_M)))) > RESIZE:
             shape = _fit_shape(prepared, root_cam)
             betas, sigma = shape.beta, _height_sigma(prepared, shape)
@@ -82,30 +91,45 @@ def fit_each_frame(
     T = len(start.valid)
     for k in range(T):
         if start.valid[k]:
-            frames.refit(k, State(start.rotations[k, 0], start.t_camera_root[k], start.rotations[k, 1:], np.zeros(0)))
+            frames.refit(
+                k,
+                State(
+                    start.rotations[k, 0],
+                    start.t_camera_root[k],
+                    start.rotations[k, 1:],
+                    np.zeros(0),
+                ),
+            )
         frames.repeat_last(k)
         if k % PROGRESS_FRAMES == 0 or k == T - 1:
             progress("solving each frame", k + 1, T)
     return frames.fitted()
 
 
-def _fit_shape(prepared: PreparedTrack, root_cam: NDArray[np.floating[Any]] | None = None) -> ClipFit:
+def _fit_shape(
+    prepared: PreparedTrack, root_cam: NDArray[np.floating[Any]] | None = None
+) -> ClipFit:
     """Estimate one shape from frames spread over the clip.
 
-    The keypoint network misplaces a keypoint in the same way in every frame, so many frames constrain the shape no more
-    than one does. The weight of the shape prior therefore grows with the number of frames. Where frames have person
-    masks, these frames decide, with the body's outline.
+    The keypoint network misplaces a keypoint in the same way in every frame, so many frames
+    constrain the shape no more than one does. The weight of the shape prior therefore grows with
+    the number of frames. Where frames have person masks, these frames decide, with the body's
+    outline.
 
     :param root_cam: (T, 3) known positions of the pelvis, camera frame, metres.
     """
     if masks := usable_masks(prepared):
         return fit_shape_to_outline(prepared, masks, root_cam)
     at = (lambda k: None) if root_cam is None else root_cam.__getitem__
-    measurements = [prepared.measure(k, at(k)) for k in _spread(np.flatnonzero(prepared.track.seen), SHAPE_FRAMES)]
+    measurements = [
+        prepared.measure(k, at(k))
+        for k in _spread(np.flatnonzero(prepared.track.seen), SHAPE_FRAMES)
+    ]
     weights = replace(prepared.weights, shape=prepared.weights.shape * len(measurements))
     options = replace(ROBUST, stages=cold_stages(weights))
     priors = prepared.priors
-    if root_cam is not None and priors.shape_mean is None:  # distance determines an unknown stature, proportions do not
+    # distance determines an unknown stature, proportions do not
+    if root_cam is not None and priors.shape_mean is None:
         priors = with_population(priors, prepared.body)
     return fit_clip(prepared.body, measurements, priors=priors, options=options)
 

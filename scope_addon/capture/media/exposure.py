@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Brightens dark footage for the networks, which miss people in the dark or misplace their limbs."""
+"""Brightens dark footage for the networks, which miss people in the dark or misplace their
+limbs.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,8 @@ from numpy.typing import NDArray
 DARK, BRIGHT = 110.0, 200.0  # of 255: highlights below DARK are raised to BRIGHT
 BLACK = 4.0  # highlights below which a frame shows nothing
 MAX_GAIN = 16.0
-SMOOTHING = 0.1  # share of the change of gain that is applied per frame, so that brightness does not flicker
+# share of the change of gain that is applied per frame, so that brightness does not flicker
+SMOOTHING = 0.1
 LIGHT_CHANGE = 2.0  # factor from which the light was switched and the gain changes at once
 _STEP = 16  # pixels and lines between samples
 _HIGHLIGHT_QUANTILE = 0.98  # of the brightness, above which pixels are highlights
@@ -25,13 +28,16 @@ class AutoExposure:
         self._gain = 0.0
 
     def brighten(self, image_rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Return the frame itself, or a brighter copy: each channel times BRIGHT / highlights, at most `MAX_GAIN`.
+        """Return the frame itself, or a brighter copy: each channel times BRIGHT / highlights, at
+        most `MAX_GAIN`.
 
         :param image_rgb: (H, W, 3) uint8.
         :return: (H, W, 3) uint8.
         """
         size = max(1, image_rgb.shape[1] // _STEP), max(1, image_rgb.shape[0] // _STEP)
-        samples = cv2.cvtColor(cv2.resize(image_rgb, size, interpolation=cv2.INTER_NEAREST), cv2.COLOR_RGB2GRAY).ravel()
+        samples = cv2.cvtColor(
+            cv2.resize(image_rgb, size, interpolation=cv2.INTER_NEAREST), cv2.COLOR_RGB2GRAY
+        ).ravel()
         rank = int(_HIGHLIGHT_QUANTILE * len(samples))
         level = float(np.partition(samples, rank)[rank])
         if level < BLACK:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Opening files whose names are not UTF-8, at which OpenCV's functions end the process with a segmentation fault."""
+"""Opening files whose names are not UTF-8, at which OpenCV's functions end the process with a
+segmentation fault.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,8 @@ from ...footage import display_text, is_utf8
 
 @contextmanager
 def utf8_name(path: Path) -> Iterator[str]:
-    """Give an absolute name of an existing file that a library in C or C++ can take, to open it within the context.
+    """Give an absolute name of an existing file that a library in C or C++ can take, to open it
+    within the context.
 
     :return: context manager that gives the file's own name, or that of a link to it.
     :raises VideoError: no link can be made.

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class Frame:
-    """One frame: source index, presentation time in seconds, and the upright image (H, W, 3) uint8 RGB."""
+    """One frame: source index, presentation time in seconds, and the upright image (H, W, 3) uint8
+    RGB.
+    """
 
     index: int
     timestamp_s: float

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The decoder of video files: frames in order, upright, with square pixels, in SDR and not interlaced.
+"""The decoder of video files: frames in order, upright, with square pixels, in SDR and not
+interlaced.
 
-PyAV decodes all of them. OpenCV's packages contain further copies of FFmpeg, which are older, lack decoders and differ
-from platform to platform; none of them is given a file to read.
+PyAV decodes all of them. OpenCV's packages contain further copies of FFmpeg, which are older, lack
+decoders and differ from platform to platform; none of them is given a file to read.
 """
 
 from __future__ import annotations
@@ -30,8 +31,10 @@ if TYPE_CHECKING:
 
 # Formats that footage comes in. Others may name further files, or devices.
 _FORMATS = (
-    "mov", "matroska", "webm", "avi", "mpegts", "mpeg", "mpegvideo", "flv", "asf", "ogg", "mxf", "gif", "apng", "mjpeg",
-    "h264", "hevc", "m4v", "av1", "obu", "ivf", "yuv4mpegpipe", "dv", "wtv", "nut", "gxf", "rm", "webp_pipe", "nsv",
+    "mov", "matroska", "webm", "avi", "mpegts", "mpeg", "mpegvideo", "flv", "asf", "ogg", "mxf",
+    "gif", "apng", "mjpeg",
+    "h264", "hevc", "m4v", "av1", "obu", "ivf", "yuv4mpegpipe", "dv", "wtv", "nut", "gxf", "rm",
+    "webp_pipe", "nsv",
     "jpeg_pipe", "vc1", "dnxhd", "h263", "h261", "vvc",
 )  # fmt: skip
 _ONLY = {"protocol_whitelist": "file", "format_whitelist": ",".join(_FORMATS)}
@@ -45,10 +48,16 @@ _STANDARD_RATES += [Fraction(n * 1000, 1001) for n in (24, 30, 48, 60, 120, 240)
 
 
 def _size(width: float, height: float, aspect: float) -> tuple[int, int]:
-    """Calculate width and height of an image with square pixels, its side with the coarser pixels stretched."""
+    """Calculate width and height of an image with square pixels, its side with the coarser pixels
+    stretched.
+    """
     if abs(aspect - 1) <= 1e-3:
         return round(width), round(height)
-    return (round(width * aspect), round(height)) if aspect > 1 else (round(width), round(height / aspect))
+    return (
+        (round(width * aspect), round(height))
+        if aspect > 1
+        else (round(width), round(height / aspect))
+    )
 
 
 def next_time(before: float | None, given: float | None, period: float) -> float:
@@ -62,19 +71,28 @@ def next_time(before: float | None, given: float | None, period: float) -> float
         return 0.0 if before is None else before + period
     if before is None or given > before:
         return given
-    # A repeated time must not move the frames after it; where the times stand still, they advance by the frame rate.
-    share = next((step for late, step in ((0.25, 0.5), (0.75, 0.25)) if before - given < late * period), 1.0)
+    # A repeated time must not move the frames after it; where the times stand still, they advance
+    # by the frame rate.
+    share = next(
+        (step for late, step in ((0.25, 0.5), (0.75, 0.25)) if before - given < late * period), 1.0
+    )
     return before + share * period
 
 
 def upright(
-    path: Path, image: NDArray[np.uint8], aspect: float, clockwise_deg: int, is_mirrored: bool = False
+    path: Path,
+    image: NDArray[np.uint8],
+    aspect: float,
+    clockwise_deg: int,
+    is_mirrored: bool = False,
 ) -> NDArray[np.uint8]:
-    """Stretch an image (H, W, 3) of a file or stream until its pixels are square; mirror it before and rotate it after.
+    """Stretch an image (H, W, 3) of a file or stream until its pixels are square; mirror it before
+    and rotate it after.
 
     :param aspect: width of a pixel over its height.
     :param clockwise_deg: a multiple of 90; others do not rotate.
-    :param is_mirrored: whether top and bottom are exchanged before the rotation, of which every mirroring consists.
+    :param is_mirrored: whether top and bottom are exchanged before the rotation, of which every
+        mirroring consists.
     :raises VideoError: it is too large or too long (see `image_size`).
     """
     if is_mirrored:
@@ -98,7 +116,8 @@ def _open_with_pyav(path: Path) -> tuple[type[Exception], InputContainer | None]
         import av
     except ImportError as error:
         raise VideoError(
-            f"{path} is a video, HEIC or AVIF, which needs the package 'av' that is not installed; install it, or give "
+            f"{path} is a video, HEIC or AVIF, which needs the package 'av' that is not installed; "
+            "install it, or give "
             "JPEG or PNG images"
         ) from error
     try:
@@ -119,7 +138,9 @@ def _film(path: Path, container: InputContainer) -> av.VideoStream:
     """
     from av.stream import Disposition
 
-    film = next((s for s in container.streams.video if not s.disposition & Disposition.attached_pic), None)
+    film = next(
+        (s for s in container.streams.video if not s.disposition & Disposition.attached_pic), None
+    )
     if film is None and container.streams.audio:
         raise VideoError(f"{path} contains only audio; choose the file with the video")
     if film is None or not film.codec_context:
@@ -130,7 +151,8 @@ def _film(path: Path, container: InputContainer) -> av.VideoStream:
 
 def _undecodable(path: Path) -> VideoError:
     return VideoError(
-        f"{path} is not a video or image that can be decoded; copy it again if it may be incomplete, or convert it to "
+        f"{path} is not a video or image that can be decoded; copy it again if it may be "
+        "incomplete, or convert it to "
         "an H.264 .mp4"
     )
 
@@ -148,7 +170,9 @@ def rgb(frame: av.VideoFrame, matrix: str | None = None) -> NDArray[np.uint8]:
 
 
 def orientation(frame: av.VideoFrame) -> tuple[int, bool]:
-    """Return by how many degrees clockwise, and whether mirrored, a decoded frame's display matrix shows it."""
+    """Return by how many degrees clockwise, and whether mirrored, a decoded frame's display matrix
+    shows it.
+    """
     return -round(frame.rotation) % 360, _is_mirrored(frame)
 
 
@@ -161,14 +185,17 @@ def _is_mirrored(frame: av.VideoFrame) -> bool:
     return bool(a * d < b * c)
 
 
-def decode_items(path: Path, numbers: Collection[int], max_pixels: int) -> dict[int, NDArray[np.uint8]]:
+def decode_items(
+    path: Path, numbers: Collection[int], max_pixels: int
+) -> dict[int, NDArray[np.uint8]]:
     """Decode items of a HEIF file (see `heif`).
 
-    PyAV's stream ids are the item numbers. Of several streams with one id, the first is the item; the others belong to
-    an animation.
+    PyAV's stream ids are the item numbers. Of several streams with one id, the first is the item;
+    the others belong to an animation.
 
     :param max_pixels: the limit for all items together, beyond which nothing is returned.
-    :return: (h, w, 3) uint8 RGB by item number; for a damaged file, the items that could be decoded.
+    :return: (h, w, 3) uint8 RGB by item number; for a damaged file, the items that could be
+        decoded.
     :raises VideoError: PyAV is not installed.
     """
     pictures: dict[int, NDArray[np.uint8]] = {}
@@ -177,9 +204,14 @@ def decode_items(path: Path, numbers: Collection[int], max_pixels: int) -> dict[
     if container is None:
         return pictures
     with container:
-        streams = {stream.id: stream for stream in reversed(container.streams.video) if stream.id in numbers}
+        streams = {
+            stream.id: stream
+            for stream in reversed(container.streams.video)
+            if stream.id in numbers
+        }
         for stream in streams.values():
-            stream.codec_context.thread_count = 1  # there may be hundreds of streams, each with its own threads
+            # there may be hundreds of streams, each with its own threads
+            stream.codec_context.thread_count = 1
         try:
             for packet in container.demux(list(streams.values())) if streams else ():
                 for frame in cast("list[av.VideoFrame]", packet.decode()):
@@ -198,13 +230,13 @@ def decode_items(path: Path, numbers: Collection[int], max_pixels: int) -> dict[
 class PyavReader:
     """A video file, decoded by PyAV, in which frames are read in order.
 
-    ``rate``: frames per second, 0 if the container does not say; ``frame_count`` according to the container;
-    ``shown_s``: for how many seconds it is shown, None if unknown. A video that was cut without re-encoding holds more
-    frames than it shows. ``is_mirrored``, ``clockwise_deg``: whether the last frame that was read had to be mirrored,
-    and by how much it was rotated then.
+    ``rate``: frames per second, 0 if the container does not say; ``frame_count`` according to the
+    container; ``shown_s``: for how many seconds it is shown, None if unknown. A video that was cut
+    without re-encoding holds more frames than it shows. ``is_mirrored``, ``clockwise_deg``: whether
+    the last frame that was read had to be mirrored, and by how much it was rotated then.
 
-    :raises VideoError: PyAV is not installed or cannot open the file, or its images are too large or too long (see
-        `image_size`).
+    :raises VideoError: PyAV is not installed or cannot open the file, or its images are too large
+        or too long (see `image_size`).
     """
 
     def __init__(self, path: Path) -> None:
@@ -223,7 +255,8 @@ class PyavReader:
         self._frames = self._whole(self._decoded)
         self._start = self._stream.start_time or 0  # in units of the stream
         self.is_mirrored, self.clockwise_deg = False, 0
-        self._aspect = float(self._stream.sample_aspect_ratio or 1)  # width of a pixel over its height
+        # width of a pixel over its height
+        self._aspect = float(self._stream.sample_aspect_ratio or 1)
         self.rate = float(self._stream.guessed_rate or self._stream.average_rate or 0)
         duration_s = (container.duration or 0) / 1e6
         self.frame_count = float(self._stream.frames or round(duration_s * self.rate))
@@ -234,9 +267,17 @@ class PyavReader:
             length_s = ((container.duration or 0) - late) / 1e6
             self.shown_s = length_s if length_s > 0 else None
 
-    def _whole(self, frames: Iterator[av.VideoFrame], before: av.VideoFrame | None = None) -> Iterator[av.VideoFrame]:
-        """Iterate over frames as whole images; ``before``: the frame before them, by which fields are completed."""
-        return frames if self._stream.codec_context.name in FIELD_CODECS else deinterlaced(frames, before)
+    def _whole(
+        self, frames: Iterator[av.VideoFrame], before: av.VideoFrame | None = None
+    ) -> Iterator[av.VideoFrame]:
+        """Iterate over frames as whole images; ``before``: the frame before them, by which fields
+        are completed.
+        """
+        return (
+            frames
+            if self._stream.codec_context.name in FIELD_CODECS
+            else deinterlaced(frames, before)
+        )
 
     def _decode(self) -> Iterator[av.VideoFrame]:
         """Decode from where the container is; what is damaged is left out."""
@@ -251,7 +292,8 @@ class PyavReader:
                 damaged = 0
             except EOFError:  # the decoder has given its last frame
                 return
-            except IndexError:  # PyAV's, at a stream that begins later, in a recording of television for instance
+            # PyAV's, at a stream that begins later, in a recording of television for instance
+            except IndexError:
                 packets, damaged = self._container.demux(self._stream), damaged + 1
             except (self._failure, OSError, ValueError):
                 damaged += 1
@@ -266,25 +308,26 @@ class PyavReader:
     def read(self) -> tuple[float | None, NDArray[np.uint8]] | None:
         """Decode the next frame.
 
-        :return: time in seconds, None if the container has none, and the upright image (H, W, 3) uint8 RGB; None at the
-            end, or where decoding fails.
+        :return: time in seconds, None if the container has none, and the upright image (H, W, 3)
+            uint8 RGB; None at the end, or where decoding fails.
         """
         frame = next(self._frames, None)
         if frame is None:
             return None
         self.clockwise_deg, self.is_mirrored = shown = orientation(frame)
-        image = rgb(frame, "ITU601")  # also where it states another matrix, so that a tag alone changes no result
+        # also where it states another matrix, so that a tag alone changes no result
+        image = rgb(frame, "ITU601")
         return self._time(frame), upright(self._path, image, self._aspect, *shown)
 
     def skip_to(self, seconds: float, fps: Fraction) -> tuple[int, float | None]:
         """Skip to the first frame at or after a time.
 
-        Seeks if the timestamps tell which frame the seek has led to, which saves decoding; else decodes frame by frame.
-        It has to be called before the first frame is read.
+        Seeks if the timestamps tell which frame the seek has led to, which saves decoding; else
+        decodes frame by frame. It has to be called before the first frame is read.
 
         :param fps: rate by which an index is converted to a time.
-        :return: index of the frame that is read next, or the number of frames if the video ends before; and the time of
-            the frame before, None if it was not decoded.
+        :return: index of the frame that is read next, or the number of frames if the video ends
+            before; and the time of the frame before, None if it was not decoded.
         """
         if seconds > _MIN_SEEK_S and self._seek(seconds - _MIN_SEEK_S / 2):
             frame = next(self._decoded, None)
@@ -330,10 +373,12 @@ class PyavReader:
 
 
 def exact_fps(fps: float) -> Fraction | None:
-    """Convert a float frame rate to the rational that it stands for; None if it is not a rate (0, NaN, 90000).
+    """Convert a float frame rate to the rational that it stands for; None if it is not a rate (0,
+    NaN, 90000).
 
-    A ratio of small integers survives the conversion to float and is returned as it is (30000/1001, 2997/100). A rate
-    averaged over a file's duration is not such a ratio; it becomes the standard rate within 0.001 %, if there is one.
+    A ratio of small integers survives the conversion to float and is returned as it is (30000/1001,
+    2997/100). A rate averaged over a file's duration is not such a ratio; it becomes the standard
+    rate within 0.001 %, if there is one.
     """
     if not 0.01 < fps <= 1000:  # also False for NaN
         return None
@@ -347,7 +392,9 @@ def exact_fps(fps: float) -> Fraction | None:
 
 
 def estimate_fps(reader: PyavReader) -> Fraction:
-    """Estimate the rate from the timestamps of the next 30 frames, for a container that does not report it."""
+    """Estimate the rate from the timestamps of the next 30 frames, for a container that does not
+    report it.
+    """
     times: list[float] = []
     while len(times) < 30 and (decoded := reader.read()) is not None:
         times.append(decoded[0] or 0.0)

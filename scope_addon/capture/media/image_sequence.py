@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Image sequences as footage: a folder, a pattern (walk_####.png, walk_%04d.png), or the first picture and a rate."""
+"""Image sequences as footage: a folder, a pattern (walk_####.png, walk_%04d.png), or the first
+picture and a rate.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import VideoError
-from ...footage import LAST_NUMBER, is_sequence, numbered, numbered_from, pictures_in, sequence_pattern
+from ...footage import (
+    LAST_NUMBER,
+    is_sequence,
+    numbered,
+    numbered_from,
+    pictures_in,
+    sequence_pattern,
+)
 from .stills.still_images import read_picture
 
 _NUMBER_SIGN = re.compile(r"#+|%0?\d*d")
@@ -23,8 +32,9 @@ _NUMBER_SIGN = re.compile(r"#+|%0?\d*d")
 class PictureSequence:
     """Numbered pictures in order: picture k is shown at ``slots[k]`` / fps seconds.
 
-    Slots follow from the numbers, so that a missing picture leaves a gap in time. Numbers in constant steps, such as
-    tens, count as consecutive. If more than half of the numbers are missing, they only give the order.
+    Slots follow from the numbers, so that a missing picture leaves a gap in time. Numbers in
+    constant steps, such as tens, count as consecutive. If more than half of the numbers are
+    missing, they only give the order.
     """
 
     paths: list[Path]
@@ -47,7 +57,11 @@ class PictureSequence:
             return cls(paths, slots, [])
         between = f"{name}: {missing} numbers between {numbers[0]} and {numbers[-1]} have no image"
         if 2 * missing > slots[-1] + 1:
-            return cls(paths, list(range(len(paths))), [f"{between}, so the images were read as consecutive frames"])
+            return cls(
+                paths,
+                list(range(len(paths))),
+                [f"{between}, so the images were read as consecutive frames"],
+            )
         return cls(paths, slots, [f"{between}; the time of these frames was kept free"])
 
     def time(self, index: int, fps: Fraction) -> float:
@@ -58,8 +72,8 @@ class PictureSequence:
 def find_sequence(path: Path, rate_given: bool) -> PictureSequence | None:
     """Find the pictures of a sequence; None if the path is not a sequence.
 
-    A folder of pictures or a pattern is a sequence. A single picture is one only if a rate is given and numbered
-    pictures follow it.
+    A folder of pictures or a pattern is a sequence. A single picture is one only if a rate is given
+    and numbered pictures follow it.
 
     :raises VideoError: a folder's pictures differ in more than their last number.
     """
@@ -90,8 +104,8 @@ class SequenceReader:
     def read(self) -> tuple[float, NDArray[np.uint8]] | None:
         """Read the next picture.
 
-        :return: time in seconds and the upright image (H, W, 3) uint8 RGB; None after the last one, or if the picture
-            cannot be decoded.
+        :return: time in seconds and the upright image (H, W, 3) uint8 RGB; None after the last one,
+            or if the picture cannot be decoded.
         """
         if self._next >= len(self._sequence.paths):
             return None
@@ -104,7 +118,10 @@ class SequenceReader:
 
     def skip_to(self, seconds: float, fps: Fraction) -> tuple[int, None]:
         """Skip to the first picture at or after a time, and return its index."""
-        while self._next < len(self._sequence.paths) and self._sequence.time(self._next, fps) < seconds - 1e-6:
+        while (
+            self._next < len(self._sequence.paths)
+            and self._sequence.time(self._next, fps) < seconds - 1e-6
+        ):
             self._next += 1
         return self._next, None
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Limits of the size of an image, so that a malicious file can take neither all memory nor all time."""
+"""Limits of the size of an image, so that a malicious file can take neither all memory nor all
+time.
+"""
 
 from __future__ import annotations
 
@@ -8,31 +10,36 @@ from pathlib import Path
 from ...errors import VideoError
 from ...footage import MAX_PIXELS
 
-MAX_RATIO = 20.0  # of the longer side to the shorter: the search for people takes time in proportion to it
+# of the longer side to the shorter: the search for people takes time in proportion to it
+MAX_RATIO = 20.0
 
 
 def check_size(path: Path, width: float, height: float) -> None:
     """Refuse an image that is too large or too long, from what its header says.
 
     :param width, height: of the image, in square pixels.
-    :raises VideoError: it has more than `MAX_PIXELS` pixels, or its sides differ by more than a factor of `MAX_RATIO`.
+    :raises VideoError: it has more than `MAX_PIXELS` pixels, or its sides differ by more than a
+        factor of `MAX_RATIO`.
     """
     if width * height > MAX_PIXELS:
         raise too_large(path, f"{width:.0f} × {height:.0f} pixels")
     shorter, longer = sorted((width, height))
     if longer > MAX_RATIO * max(shorter, 1):
         raise VideoError(
-            f"{path} shows {width:.0f} × {height:.0f} pixels, and footage may be at most {MAX_RATIO:.0f} times as long "
+            f"{path} shows {width:.0f} × {height:.0f} pixels, and footage may be at most "
+            f"{MAX_RATIO:.0f} times as long "
             "as it is wide; crop it around the person"
         )
 
 
 def check_depth(path: Path, width: int, height: int, bits: int) -> None:
-    """Refuse a still that takes more memory than one of `MAX_PIXELS` pixels with four channels of 16 bits: 2.2 GB.
+    """Refuse a still that takes more memory than one of `MAX_PIXELS` pixels with four channels of
+    16 bits: 2.2 GB.
 
     :raises VideoError: it does.
     """
-    cost = 2 * bits if bits > 16 else 16  # to decode the deeper ones, OpenCV takes three times their size, not twice
+    # to decode the deeper ones, OpenCV takes three times their size, not twice
+    cost = 2 * bits if bits > 16 else 16
     if width * height * cost > 16 * MAX_PIXELS:
         raise too_large(path, f"{width} × {height} pixels of {bits} bits")
 
@@ -40,5 +47,6 @@ def check_depth(path: Path, width: int, height: int, bits: int) -> None:
 def too_large(path: Path, size: str) -> VideoError:
     """Make the error for an image with too many pixels."""
     return VideoError(
-        f"{path} has {size}, and at most {MAX_PIXELS // 10**6} million can be read; scale it down, or crop it"
+        f"{path} has {size}, and at most {MAX_PIXELS // 10**6} million can be read; scale it down, "
+        "or crop it"
     )

@@ -11,7 +11,9 @@ import cv2
 
 @contextmanager
 def opencv_in_one_thread() -> Iterator[None]:
-    """Leave the cores to stages and networks that run in parallel; OpenCV's threads would wait for one another."""
+    """Leave the cores to stages and networks that run in parallel; OpenCV's threads would wait for
+    one another.
+    """
     before = cv2.getNumThreads()
     cv2.setNumThreads(1)
     try:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The focal length that phones write into their .mov and .mp4 files.
 
-QuickTime metadata: a ``meta`` box, of the movie (``moov``) or of a track (``trak``), holds ``keys`` (names) and
-``ilst`` (values, numbered like the names). Damaged or unknown metadata counts as absent. Phones write the focal length
-into the track, whose keys FFmpeg does not report.
+QuickTime metadata: a ``meta`` box, of the movie (``moov``) or of a track (``trak``), holds ``keys``
+(names) and ``ilst`` (values, numbered like the names). Damaged or unknown metadata counts as
+absent. Phones write the focal length into the track, whose keys FFmpeg does not report.
 """
 
 from __future__ import annotations
@@ -15,8 +15,20 @@ from typing import BinaryIO
 
 _KEY = b"com.apple.quicktime.camera.focal_length.35mm_equivalent"
 _LARGEST_INDEX = 64 << 20  # bytes; an hour of video has an index of a few MB
-# Data types of the QuickTime File Format, "Well-known types": code -> struct format of the big-endian number.
-_NUMBERS = {23: ">f", 24: ">d", 65: ">b", 66: ">h", 67: ">i", 74: ">q", 75: ">B", 76: ">H", 77: ">I", 78: ">Q"}
+# Data types of the QuickTime File Format, "Well-known types": code -> struct format of the
+# big-endian number.
+_NUMBERS = {
+    23: ">f",
+    24: ">d",
+    65: ">b",
+    66: ">h",
+    67: ">i",
+    74: ">q",
+    75: ">B",
+    76: ">H",
+    77: ">I",
+    78: ">Q",
+}
 
 
 def focal_35mm(path: Path) -> float | None:
@@ -71,7 +83,8 @@ def _value(meta: bytes) -> float | None:
     if meta[:4] == b"\0\0\0\0":  # MP4 has a version here, QuickTime has none
         meta = meta[4:]
     parts = dict(_boxes(meta))
-    names = [name for _, name in _boxes(parts.get(b"keys", b"")[8:])]  # after version and count; each "mdta", name
+    # after version and count; each "mdta", name
+    names = [name for _, name in _boxes(parts.get(b"keys", b"")[8:])]
     for number, item in _boxes(parts.get(b"ilst", b"")):
         index = struct.unpack(">I", number)[0] - 1
         data = dict(_boxes(item)).get(b"data", b"")
@@ -84,5 +97,6 @@ def _number(kind: int, value: bytes) -> float | None:
     if kind in (21, 22):  # integers of any length
         return float(int.from_bytes(value, "big", signed=kind == 21))
     if kind == 1:  # text
-        return float(value.decode("ascii", "replace").removesuffix("mm"))  # Apple documents "50.00mm"
+        # Apple documents "50.00mm"
+        return float(value.decode("ascii", "replace").removesuffix("mm"))
     return float(struct.unpack(_NUMBERS[kind], value)[0]) if kind in _NUMBERS else None

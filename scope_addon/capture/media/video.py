@@ -4,10 +4,11 @@
     with open_video("dance.mp4") as video:
         for frame in video:            # decoded ahead in a thread; at most a few frames in memory
             frame.index, frame.timestamp_s, frame.image_rgb
-    video.warnings                     # for the user: decoding stopped early, the frame size changed, ...
+    video.warnings                     # for the user: decoding stopped early, the frame size
+                                       changed, ...
 
-``open_video("dance.mp4", VideoRange(start_s=60, end_s=90, fps=Fraction(25)))`` gives a part of it at a
-lower rate; the index and time of each frame are still those of the whole video.
+``open_video("dance.mp4", VideoRange(start_s=60, end_s=90, fps=Fraction(25)))`` gives a part of it
+at a lower rate; the index and time of each frame are still those of the whole video.
 """
 
 from __future__ import annotations
@@ -37,18 +38,21 @@ from .video_range import FootageRange, FrameSampler, VideoRange
 
 cv2.setLogLevel(0)  # silent: failures are reported as exceptions
 
-# How lists of other files begin (ffconcat, HLS, DASH, SDP), which FFmpeg opens by their content, whatever the name.
+# How lists of other files begin (ffconcat, HLS, DASH, SDP), which FFmpeg opens by their content,
+# whatever the name.
 _LISTS = (b"ffconcat", b"#EXTM3U", b"<?xml", b"<MPD", b"v=0", b"[playlist]")
 _QUEUED_FRAMES = 4  # decoded ahead; a 4K frame takes 25 MB
 
 
 @dataclass
 class Video:
-    """Open footage, whose first frame could be decoded. Each iteration starts at the first frame of the range.
+    """Open footage, whose first frame could be decoded. Each iteration starts at the first frame of
+    the range.
 
-    ``width``, ``height`` in pixels of the upright frames; ``frame_count`` of the whole footage according to the
-    container, which may be wrong; ``fps``: rational rate of the frames that an iteration yields, ``source_fps`` of
-    those in the file; ``focal_35mm`` in mm on a 36 × 24 mm frame, or None; ``wanted``: the range.
+    ``width``, ``height`` in pixels of the upright frames; ``frame_count`` of the whole footage
+    according to the container, which may be wrong; ``fps``: rational rate of the frames that an
+    iteration yields, ``source_fps`` of those in the file; ``focal_35mm`` in mm on a 36 × 24 mm
+    frame, or None; ``wanted``: the range.
     """
 
     path: Path
@@ -75,7 +79,9 @@ class Video:
         """Number of frames that an iteration yields, if the container's frame count is right."""
         if self._sequence is not None:
             times = [self._sequence.time(k, self.fps) for k in range(self.frame_count)]
-            return max(1, sum(self.wanted.start_s - 1e-6 <= t <= self.wanted.end_s + 1e-6 for t in times))
+            return max(
+                1, sum(self.wanted.start_s - 1e-6 <= t <= self.wanted.end_s + 1e-6 for t in times)
+            )
         length = self.frame_count / self.source_fps
         start, end = Fraction(self.wanted.start_s), Fraction(min(self.wanted.end_s, float(length)))
         return max(1, round((min(end, length) - start) * self.fps))
@@ -90,11 +96,13 @@ class Video:
             yield from decoder
 
     def frames_from(self, start_s: float) -> Iterator[Frame]:
-        """Iterate over the frames of the range from a time on, which is sought where that saves decoding.
+        """Iterate over the frames of the range from a time on, which is sought where that saves
+        decoding.
 
-        Their indices may differ from those of the whole iteration by a constant, where the frame rate varies. Whether
-        images and times are the same depends on the file: one that does not mark its keyframes well gives other images
-        at first, and one that repeats times at a keyframe other times there. The caller has to compare.
+        Their indices may differ from those of the whole iteration by a constant, where the frame
+        rate varies. Whether images and times are the same depends on the file: one that does not
+        mark its keyframes well gives other images at first, and one that repeats times at a
+        keyframe other times there. The caller has to compare.
 
         :param start_s: within the range; it must have no frame rate of its own.
         """
@@ -113,13 +121,15 @@ class Video:
 
 
 def open_video(path: str | Path, wanted: FootageRange | None = None) -> Video:
-    """Open a video or a picture (JPEG, HEIC, PNG, WebP, TIFF, ..., also 16-bit and with alpha); decode its first frame.
+    """Open a video or a picture (JPEG, HEIC, PNG, WebP, TIFF, ..., also 16-bit and with alpha);
+    decode its first frame.
 
     Image sequences (see `image_sequence`) count as videos, with the rate of ``wanted``, or else 30.
 
     :param wanted: the range of frames and their rate; None for all.
-    :raises VideoError: it does not exist, is not a file, is a list of files, holds nothing that can be decoded, holds
-        images that are too large or too long (see `image_size`), or ends before the range.
+    :raises VideoError: it does not exist, is not a file, is a list of files, holds nothing that can
+        be decoded, holds images that are too large or too long (see `image_size`), or ends before
+        the range.
     :raises UsageError: a timecode of the range does not exist at the footage's rate.
     """
     path = Path(path)
@@ -129,21 +139,29 @@ def open_video(path: str | Path, wanted: FootageRange | None = None) -> Video:
         return _open_sequence(path, sequence, wanted)
     if path.is_dir():
         raise VideoError(
-            f"{path} is a folder that contains no images; give a video, an image or a folder of images,"
+            f"{path} is a folder that contains no images; give a video, an image or a folder of "
+            "images,"
             " or capture a folder of videos with scope batch"
         )
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):  # opening a pipe would wait for a writer
-            raise VideoError(f"{path} is a pipe or a device, and footage is read from files; save it as one first")
+            raise VideoError(
+                f"{path} is a pipe or a device, and footage is read from files; save "
+                "it as one first"
+            )
         with path.open("rb") as file:
             head = file.read(64)
     except FileNotFoundError as error:
         web = re.match(r"\w{2,}:[/\\]", str(path))
-        advice = "download it first, because footage is read from files" if web else "check the path"
+        advice = (
+            "download it first, because footage is read from files" if web else "check the path"
+        )
         raise VideoError(f"{path} does not exist; {advice}") from error
     except OSError as error:
-        raise VideoError(f"{path} cannot be read ({error.strerror}); check its permissions") from error
+        raise VideoError(
+            f"{path} cannot be read ({error.strerror}); check its permissions"
+        ) from error
     if status.st_size == 0:
         raise VideoError(f"{path} is empty (0 bytes); export or download it again")
     if head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(_LISTS):
@@ -163,12 +181,15 @@ def _open_sequence(path: Path, sequence: PictureSequence, requested: FootageRang
         raise _damaged(sequence.paths[0])
     height, width = first.rgb.shape[:2]
     count = len(sequence.paths)
-    video = Video(path, width, height, fps, count, first.focal_35mm, wanted=replace(wanted, fps=None))
+    video = Video(
+        path, width, height, fps, count, first.focal_35mm, wanted=replace(wanted, fps=None)
+    )
     video._sequence = sequence
     video.warnings += sequence.warnings
     if requested.fps is None and count > 1:
         video.warnings.append(
-            f"{path.name}: images have no frame rate, so 30 frames per second were assumed; set another with "
+            f"{path.name}: images have no frame rate, so 30 frames per second were assumed; set "
+            "another with "
             "--fps on the command line"
         )
     return video
@@ -181,24 +202,33 @@ def _open_still(path: Path, requested: FootageRange) -> Video:
     height, width = picture.rgb.shape[:2]
     video = Video(path, width, height, DEFAULT_FPS, 1, picture.focal_35mm, _still=picture.rgb)
     if requested != VideoRange():
-        video.warnings.append(f"{path.name} is a single image: a start, an end or a frame rate has no effect")
+        video.warnings.append(
+            f"{path.name} is a single image: a start, an end or a frame rate has no effect"
+        )
     if picture.length > 1:
         video.warnings.append(
-            f"{path.name} is an animation of {picture.length} images, and only the first was captured; "
+            f"{path.name} is an animation of {picture.length} images, and only the first was "
+            "captured; "
             "convert it to an .mp4 or a .gif to capture all of them"
         )
     return video
 
 
 def _damaged(picture: Path) -> VideoError:
-    return VideoError(f"{picture} is an image that cannot be decoded; it may be damaged, so export it again as JPEG")
+    return VideoError(
+        f"{picture} is an image that cannot be decoded; it may be damaged, so export "
+        "it again as JPEG"
+    )
 
 
 def _open_moving(path: Path, requested: FootageRange) -> Video:
     with closing(PyavReader(path)) as reader:
         first = reader.read()
         if first is None:
-            raise VideoError(f"{path} can be opened, but none of its frames can be decoded; convert it to H.264 .mp4")
+            raise VideoError(
+                f"{path} can be opened, but none of its frames can be decoded; "
+                "convert it to H.264 .mp4"
+            )
         fps = exact_fps(reader.rate) or estimate_fps(reader)
         count = reader.frame_count
         flip = ("Y" if reader.clockwise_deg % 180 == 0 else "X") if reader.is_mirrored else ""
@@ -209,26 +239,31 @@ def _open_moving(path: Path, requested: FootageRange) -> Video:
     video = Video(path, width, height, fps, frame_count, focal_35mm(path), wanted=wanted)
     if flip:
         video.warnings.append(
-            f"{path.name} is mirrored by its metadata, which Blender ignores; there, switch on Flip {flip} of the "
+            f"{path.name} is mirrored by its metadata, which Blender ignores; there, switch on "
+            f"Flip {flip} of the "
             "camera's background image"
         )
     if wanted.start_s > 0 and count > 0 and wanted.start_s * fps > frame_count + fps:
         raise VideoError(
-            f"{path} lasts {frame_count / float(fps):.1f} s, but the start is at {wanted.start_s:g} s; start earlier"
+            f"{path} lasts {frame_count / float(fps):.1f} s, but the start is at "
+            f"{wanted.start_s:g} s; start earlier"
         )
     if wanted.fps is not None:
         video._source_fps = fps
         video.fps = min(wanted.fps, fps)
         if wanted.fps > fps:
             video.warnings.append(
-                f"{path.name} has {float(fps):g} frames per second; {float(wanted.fps):g} would repeat some, "
+                f"{path.name} has {float(fps):g} frames per second; {float(wanted.fps):g} would "
+                "repeat some, "
                 "so each was used once"
             )
     return video
 
 
 class _Decoder:
-    """Decodes a video in its own thread into a bounded queue, so that decoding and inference overlap."""
+    """Decodes a video in its own thread into a bounded queue, so that decoding and inference
+    overlap.
+    """
 
     def __init__(self, video: Video) -> None:
         self._video = video
@@ -266,7 +301,11 @@ class _Decoder:
     def _run(self) -> None:
         try:
             sequence = self._video._sequence
-            source = SequenceReader(sequence, self._video.fps) if sequence else PyavReader(self._video.path)
+            source = (
+                SequenceReader(sequence, self._video.fps)
+                if sequence
+                else PyavReader(self._video.path)
+            )
             with closing(source) as reader:
                 self._decode(reader)
             self._put(None)
@@ -296,7 +335,10 @@ class _Decoder:
         if self._stop.is_set():
             return
         if resized:
-            self._warn(f"the frame size changes within {video.path.name}; all frames were scaled to the first one's")
+            self._warn(
+                f"the frame size changes within {video.path.name}; all frames were scaled "
+                "to the first one's"
+            )
         self._warn_of_end(index, time or 0.0)
 
     def _warn_of_end(self, index: int, time: float) -> None:
@@ -305,21 +347,31 @@ class _Decoder:
         :param index: of the frame that would have come next.
         """
         video = self._video
-        # Both tests: a container that counts frames from its duration is wrong for a variable frame rate.
+        # Both tests: a container that counts frames from its duration is wrong for a variable frame
+        # rate.
         missing = video.frame_count - index
         last = min(float((video.frame_count - 1) / video.source_fps), video.wanted.end_s)
         if missing > max(1, video.frame_count // 50) and time < 0.95 * last:
             self._warn(
-                f"decoding {video.path.name} stopped after {index} of about {video.frame_count} frames; "
+                f"decoding {video.path.name} stopped after {index} of about {video.frame_count} "
+                "frames; "
                 "the file may be damaged or incomplete"
             )
         if time <= video.wanted.end_s and self._has_grown():
-            self._warn(f"{video.path.name} grew while it was read; capture it again once it is written completely")
+            self._warn(
+                f"{video.path.name} grew while it was read; capture it again once it is "
+                "written completely"
+            )
 
     def _has_grown(self) -> bool:
-        """Return whether the file is still being written, as .mkv and .ts files are by recorders."""
+        """Return whether the file is still being written, as .mkv and .ts files are by
+        recorders.
+        """
         try:
-            return self._video._bytes is not None and self._video.path.stat().st_size > self._video._bytes
+            return (
+                self._video._bytes is not None
+                and self._video.path.stat().st_size > self._video._bytes
+            )
         except OSError:  # removed, or a network folder that is gone: everything was read
             return False
 

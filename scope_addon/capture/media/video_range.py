@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The range of frames to capture: start, end and frame rate.
 
-Times are seconds, MM:SS, HH:MM:SS.mmm, or timecode HH:MM:SS:FF or HH:MM:SS;FF. A timecode counts frames at the nominal
-rate r, the integer nearest to the footage's rate (30 for 30000/1001). With a semicolon it is drop-frame timecode (SMPTE
-ST 12-1), for 29.97 and 59.94 frames per second: to stay in step with the clock, it omits the first d = r / 15 numbers
-of each minute, except of every tenth minute,
+Times are seconds, MM:SS, HH:MM:SS.mmm, or timecode HH:MM:SS:FF or HH:MM:SS;FF. A timecode counts
+frames at the nominal rate r, the integer nearest to the footage's rate (30 for 30000/1001). With a
+semicolon it is drop-frame timecode (SMPTE ST 12-1), for 29.97 and 59.94 frames per second: to stay
+in step with the clock, it omits the first d = r / 15 numbers of each minute, except of every tenth
+minute,
 
     frame = r (3600 h + 60 m + s) + f − d (M − ⌊M / 10⌋),    M = 60 h + m
 
@@ -27,14 +28,17 @@ _FRAMES = re.compile(r"(\d{1,4})([:;])(\d\d)([:;])(\d\d)([:;])(\d{2,3})", re.A)
 _SEPARATORS = (":::", "::;", ";;;")  # some editors write drop-frame timecode like the last
 _DROP_RATES = (30, 60)
 _NEAR_NOMINAL = Fraction(1, 100)  # relative tolerance: phones report a rate averaged over the file
-_SAME_RATE = Fraction(1, 10_000)  # relative tolerance of 29.97 against 30000/1001; 30 differs ten times as much
+# relative tolerance of 29.97 against 30000/1001; 30 differs ten times as much
+_SAME_RATE = Fraction(1, 10_000)
 
 
 @dataclass(frozen=True)
 class VideoRange:
-    """Frames shown from ``start_s`` to ``end_s``, both included: ``fps`` of them per second, or all if None.
+    """Frames shown from ``start_s`` to ``end_s``, both included: ``fps`` of them per second, or all
+    if None.
 
-    :raises UsageError: start, end or rate is out of range, or the end does not come after the start.
+    :raises UsageError: start, end or rate is out of range, or the end does not come after the
+        start.
     """
 
     start_s: float = 0.0
@@ -45,9 +49,13 @@ class VideoRange:
         if not 0 <= self.start_s < float("inf"):
             raise UsageError(f"the start must be 0 s or later, but is {self.start_s} s")
         if not self.end_s > self.start_s:
-            raise UsageError(f"the end ({self.end_s:g} s) must come after the start ({self.start_s:g} s)")
+            raise UsageError(
+                f"the end ({self.end_s:g} s) must come after the start ({self.start_s:g} s)"
+            )
         if self.fps is not None and not 0 < self.fps <= 1000:
-            raise UsageError(f"frames per second must be above 0 and at most 1000, but are {float(self.fps):g}")
+            raise UsageError(
+                f"frames per second must be above 0 and at most 1000, but are {float(self.fps):g}"
+            )
 
     def at_rate(self, fps: Fraction) -> VideoRange:
         """Return the range itself: times in seconds do not depend on the rate."""
@@ -56,7 +64,9 @@ class VideoRange:
 
 @dataclass(frozen=True)
 class TimecodeRange:
-    """A range whose start or end may be a timecode, which has a time in seconds only at a given rate."""
+    """A range whose start or end may be a timecode, which has a time in seconds only at a given
+    rate.
+    """
 
     start: float | Timecode = 0.0
     end: float | Timecode = float("inf")
@@ -65,7 +75,8 @@ class TimecodeRange:
     def at_rate(self, fps: Fraction) -> VideoRange:
         """Convert to seconds, in footage of this rate.
 
-        :raises UsageError: a timecode does not exist at this rate, or the end does not come after the start.
+        :raises UsageError: a timecode does not exist at this rate, or the end does not come after
+            the start.
         """
         start, end = self.start, self.end
         if isinstance(start, Timecode):
@@ -79,7 +90,8 @@ FootageRange = VideoRange | TimecodeRange
 
 
 class FrameSampler:
-    """Samples frames at a constant rate: those nearest to t₀ + k / fps, t₀ the time of the first, each at most once.
+    """Samples frames at a constant rate: those nearest to t₀ + k / fps, t₀ the time of the first,
+    each at most once.
 
     :param fps: frames per second to keep, or None for all.
     """
@@ -130,7 +142,8 @@ class FrameSampler:
 def parse_range(start: str | None, end: str | None, fps: str | None) -> FootageRange:
     """Parse the arguments of ``--start``, ``--end`` and ``--fps``.
 
-    :raises UsageError: one of them is not a time or a rate, or the end does not come after the start.
+    :raises UsageError: one of them is not a time or a rate, or the end does not come after the
+        start.
     """
     first = 0.0 if start is None else parse_time(start)
     last = float("inf") if end is None else parse_time(end)
@@ -141,7 +154,8 @@ def parse_range(start: str | None, end: str | None, fps: str | None) -> FootageR
 
 
 def parse_rate(text: str) -> Fraction:
-    """Parse frames per second: "25", "30000/1001", or "29.97", which stands for 30000/1001 (likewise 23.976 etc.).
+    """Parse frames per second: "25", "30000/1001", or "29.97", which stands for 30000/1001
+    (likewise 23.976 etc.).
 
     :raises UsageError: the text is not a positive number of at most 1000.
     """
@@ -150,9 +164,15 @@ def parse_rate(text: str) -> Fraction:
     except (ValueError, ZeroDivisionError):
         rate = Fraction(0)
     if not 0 < rate <= 1000:
-        raise UsageError(f"{text!r} is not a frame rate; give frames per second, such as 25, 29.97 or 30000/1001")
+        raise UsageError(
+            f"{text!r} is not a frame rate; give frames per second, such as 25, 29.97 or 30000/1001"
+        )
     standard = Fraction(round(rate * 1001 / 1000) * 1000, 1001)
-    return standard if rate != standard and abs(rate - standard) < Fraction(1, 200) and rate.denominator > 1 else rate
+    return (
+        standard
+        if rate != standard and abs(rate - standard) < Fraction(1, 200) and rate.denominator > 1
+        else rate
+    )
 
 
 @dataclass(frozen=True)
@@ -177,30 +197,37 @@ class Timecode:
         """
         rate = round(fps)
         if abs(fps - rate) > _NEAR_NOMINAL * rate:
-            raise UsageError(f"{self} has no meaning at {float(fps):.5g} frames per second; give the time in seconds")
+            raise UsageError(
+                f"{self} has no meaning at {float(fps):.5g} frames per second; give "
+                "the time in seconds"
+            )
         if self.frames >= rate:
             raise UsageError(
-                f"{self} does not exist: at {float(fps):.5g} frames per second, frame numbers go up to {rate - 1}"
+                f"{self} does not exist: at {float(fps):.5g} frames per second, frame numbers go "
+                f"up to {rate - 1}"
             )
         number = rate * (3600 * self.hours + 60 * self.minutes + self.seconds) + self.frames
         if not self.drop_frame:
             return number
         if rate not in _DROP_RATES or abs(fps - Fraction(rate * 1000, 1001)) > _SAME_RATE * rate:
             raise UsageError(
-                f"{self} is drop-frame timecode, which is for 29.97 and 59.94 frames per second, and the footage has "
+                f"{self} is drop-frame timecode, which is for 29.97 and 59.94 frames per second, "
+                "and the footage has "
                 f"{float(fps):.5g}; write a colon before the frames"
             )
         dropped, minute = rate // 15, 60 * self.hours + self.minutes
         if self.minutes % 10 and self.seconds == 0 and self.frames < dropped:
             raise UsageError(
-                f"{self} does not exist: drop-frame timecode omits the first {dropped} frame numbers of this minute; "
+                f"{self} does not exist: drop-frame timecode omits the first {dropped} frame "
+                "numbers of this minute; "
                 f"the first one is {dropped:02}"
             )
         return number - dropped * (minute - minute // 10)
 
 
 def parse_time(text: str) -> float | Timecode:
-    """Parse "12.5", "MM:SS", "MM:SS.mmm", "HH:MM:SS" or "HH:MM:SS.mmm" to seconds, and "HH:MM:SS:FF" to a timecode.
+    """Parse "12.5", "MM:SS", "MM:SS.mmm", "HH:MM:SS" or "HH:MM:SS.mmm" to seconds, and
+    "HH:MM:SS:FF" to a timecode.
 
     :raises UsageError: the text has none of these forms, or minutes or seconds are 60 or more.
     """
@@ -208,7 +235,9 @@ def parse_time(text: str) -> float | Timecode:
         hours, first, minutes, second, seconds, third, frames = match.groups()
         if first + second + third in _SEPARATORS:
             _check_sixty(text, int(minutes), int(seconds))
-            return Timecode(int(hours), int(minutes), int(seconds), int(frames), drop_frame=third == ";")
+            return Timecode(
+                int(hours), int(minutes), int(seconds), int(frames), drop_frame=third == ";"
+            )
     match = _CLOCK.fullmatch(text.strip())
     if match is None:
         raise UsageError(
@@ -217,7 +246,9 @@ def parse_time(text: str) -> float | Timecode:
         )
     hours, minutes, seconds = match.groups()
     value = float(seconds.replace(",", "."))
-    _check_sixty(text, int(minutes or 0) if hours is not None else 0, value if minutes is not None else 0)
+    _check_sixty(
+        text, int(minutes or 0) if hours is not None else 0, value if minutes is not None else 0
+    )
     return 3600.0 * int(hours or 0) + 60.0 * int(minutes or 0) + value
 
 

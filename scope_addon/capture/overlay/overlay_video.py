@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Draws the fitted bodies over the footage, to show at a glance whether a capture is right.
 
-The mesh is posed in the world from the motion file and transformed into each frame's camera by the inverse of
-``world_from_camera``, so that the overlay checks the data that other programs read, not the state of the solver.
+The mesh is posed in the world from the motion file and transformed into each frame's camera by the
+inverse of ``world_from_camera``, so that the overlay checks the data that other programs read, not
+the state of the solver.
 """
 
 from __future__ import annotations
@@ -39,7 +40,9 @@ _ROUNDED_S = 0.001  # by which containers change times; at high rates, less
 _FACE_COLOR = (255, 255, 255)
 OPACITY = 0.6  # of the bodies
 _FAINT = 0.35  # opacity of a filled-in pose, relative to one that was seen
-_TINTS = np.array([[1.0, 0.55, 0.15], [0.2, 0.75, 1.0], [0.55, 0.9, 0.3], [0.95, 0.4, 0.75], [0.95, 0.85, 0.25]])
+_TINTS = np.array(
+    [[1.0, 0.55, 0.15], [0.2, 0.75, 1.0], [0.55, 0.9, 0.3], [0.95, 0.4, 0.75], [0.95, 0.85, 0.25]]
+)
 
 Progress = Callable[[int, int], None]
 
@@ -55,12 +58,13 @@ def write_overlay(
 ) -> None:
     """Write the footage with every person's body over it.
 
-    The video has the footage's times and size (at most 1920 pixels along the longer side, both sides even). With the
-    suffix of a picture (.png, .jpg, .webp), only the first frame in which a person was seen is written.
+    The video has the footage's times and size (at most 1920 pixels along the longer side, both
+    sides even). With the suffix of a picture (.png, .jpg, .webp), only the first frame in which a
+    person was seen is written.
 
     :param wanted: the range of the footage that was captured.
-    :param progress: called with (frames done, frames expected). An exception that it raises stops the work, and no file
-        is left behind.
+    :param progress: called with (frames done, frames expected). An exception that it raises stops
+        the work, and no file is left behind.
     :raises OutputError: the suffix is not supported, or the file cannot be written.
     :raises VideoError: the footage cannot be read.
     :raises ShapeError: a motion does not have the joints of the body.
@@ -76,7 +80,9 @@ def write_overlay(
         try:
             with atomic_path(path) as temporary:
                 if suffix in STILL_SUFFIXES:
-                    first = min((int(m.frames[m.valid][0]) for m in people if m.valid.any()), default=0)
+                    first = min(
+                        (int(m.frames[m.valid][0]) for m in people if m.valid.any()), default=0
+                    )
                     _write_still(temporary, painter, video, first)
                 else:
                     _write_video(temporary, painter, video, path, progress)
@@ -92,7 +98,8 @@ def painted_frames(
     *,
     wanted: FootageRange | None = None,
 ) -> Iterator[tuple[int, NDArray[np.uint8]]]:
-    """Generate some frames of the overlay: source frame index and (H, W, 3) RGB, at most 1920 pixels wide and high.
+    """Generate some frames of the overlay: source frame index and (H, W, 3) RGB, at most 1920
+    pixels wide and high.
 
     :param indices: source frame indices; those that the footage does not have are left out.
     :raises VideoError: the footage cannot be read.
@@ -129,14 +136,26 @@ def draw_overlay(
     :param opacity: 0..1, one for all or one per person.
     :return: a new image of the same size.
     """
-    people = [np.asarray(vertices_cam)] if np.ndim(vertices_cam) == 2 else [np.asarray(v) for v in vertices_cam]
+    people = (
+        [np.asarray(vertices_cam)]
+        if np.ndim(vertices_cam) == 2
+        else [np.asarray(v) for v in vertices_cam]
+    )
     if colors is None:
         colors = [tint(i) for i in range(len(people))]
     elif isinstance(colors, np.ndarray) and len(people) == 1 and colors.ndim <= 2:
         colors = [colors]
     opacities = np.broadcast_to(np.asarray(opacity, float), (len(people),)).tolist()
     canvas = Canvas.blank(image_rgb.shape[1], image_rgb.shape[0])
-    _draw_bodies(canvas, people, faces, intrinsics, dist, list(cast("Sequence[ArrayLike]", colors)), opacities)
+    _draw_bodies(
+        canvas,
+        people,
+        faces,
+        intrinsics,
+        dist,
+        list(cast("Sequence[ArrayLike]", colors)),
+        opacities,
+    )
     return blended(image_rgb, canvas)
 
 
@@ -149,8 +168,12 @@ def _draw_bodies(
     colors: Sequence[ArrayLike],
     opacities: Sequence[float],
 ) -> None:
-    """Draw the bodies of several people into a canvas; as `draw_overlay`, but with a list element per person."""
-    triangles = faces if faces.shape[1] == 3 else np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
+    """Draw the bodies of several people into a canvas; as `draw_overlay`, but with a list element
+    per person.
+    """
+    triangles = (
+        faces if faces.shape[1] == 3 else np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
+    )
     for vertices, color, opacity in zip(vertices_cam, colors, opacities, strict=True):
         per_face = np.asarray(color, np.float32)
         if per_face.ndim == 2 and len(per_face) != len(triangles):
@@ -172,7 +195,9 @@ def tint(person: int) -> NDArray[np.float64]:
 
 
 def body_colors(body: Body, person: int) -> NDArray[np.float64]:
-    """Calculate the (F, 3) sRGB colours of the faces: the body's materials mixed with the person's tint."""
+    """Calculate the (F, 3) sRGB colours of the faces: the body's materials mixed with the person's
+    tint.
+    """
     if body.face_material is None or body.material_colors is None:
         return np.tile(tint(person), (len(body.faces), 1))
     linear = np.clip(body.material_colors[:, :3], 0, 1)
@@ -194,7 +219,9 @@ def camera_vertices(motion: Motion, body: Body, row: int) -> NDArray[np.float64]
 @cached
 @njit(nogil=True)
 def _blend(image: NDArray[np.uint8], rgba: NDArray[np.uint8]) -> None:
-    """Blend ``rgba`` over ``image`` in place; at outlines, opacity is scaled by the covered share of the neighbours."""
+    """Blend ``rgba`` over ``image`` in place; at outlines, opacity is scaled by the covered share
+    of the neighbours.
+    """
     height, width = image.shape[:2]
     for v in range(height):
         for u in range(width):
@@ -205,7 +232,9 @@ def _blend(image: NDArray[np.uint8], rgba: NDArray[np.uint8]) -> None:
                 for j in range(max(0, u - 1), min(width, u + 2)):
                     if rgba[i, j, 3] > 0:
                         covered += 1
-            inside = 1.0 if 0 in (u, v) or u == width - 1 or v == height - 1 else min(1.0, covered / 8)
+            inside = (
+                1.0 if 0 in (u, v) or u == width - 1 or v == height - 1 else min(1.0, covered / 8)
+            )
             a = rgba[v, u, 3] / 255 * inside
             for k in range(3):
                 image[v, u, k] = np.uint8(image[v, u, k] * (1 - a) + rgba[v, u, k] * a + 0.5)
@@ -217,7 +246,10 @@ class _Painter:
     def __init__(self, people: list[Motion], body: Body, video: Video, even: bool) -> None:
         for motion in people:
             if motion.joint_count != body.K + 1:
-                raise ShapeError(f"the motion has {motion.joint_count} joints, but body '{body.name}' has {body.K + 1}")
+                raise ShapeError(
+                    f"the motion has {motion.joint_count} joints, but body "
+                    f"'{body.name}' has {body.K + 1}"
+                )
         self._people, self._body = people, body
         self._rows = [{int(f): row for row, f in enumerate(motion.frames)} for motion in people]
         self._colors = [body_colors(body, i) for i in range(len(people))]
@@ -231,7 +263,9 @@ class _Painter:
     def paint(self, frame: Frame) -> NDArray[np.uint8]:
         image = frame.image_rgb
         if image.shape[1::-1] != self._resized:
-            image = cast(NDArray[np.uint8], cv2.resize(image, self._resized, interpolation=cv2.INTER_AREA))
+            image = cast(
+                NDArray[np.uint8], cv2.resize(image, self._resized, interpolation=cv2.INTER_AREA)
+            )
         width, height = self.size
         image = np.ascontiguousarray(image[:height, :width])
         shown = [(i, rows[frame.index]) for i, rows in enumerate(self._rows) if frame.index in rows]
@@ -257,7 +291,10 @@ class _Painter:
         return image
 
     def _draw_keypoints(
-        self, image: NDArray[np.uint8], keypoints: NDArray[np.floating[Any]], color: NDArray[np.float64]
+        self,
+        image: NDArray[np.uint8],
+        keypoints: NDArray[np.floating[Any]],
+        color: NDArray[np.float64],
     ) -> None:
         """Draw the confident keypoints (n, 3) of one person into the image, in place."""
         radius = max(1, round(max(image.shape[:2]) / 500))
@@ -266,7 +303,14 @@ class _Painter:
                 center = (round(float(u * self._scale)), round(float(v * self._scale)))
                 if k < KEYPOINT_COUNT:  # those of a hand are too close together for a dark rim
                     cv2.circle(image, center, radius + 1, (20, 20, 20), -1, cv2.LINE_AA)
-                cv2.circle(image, center, radius, tuple(int(c) for c in 255 * (0.5 + 0.5 * color)), -1, cv2.LINE_AA)
+                cv2.circle(
+                    image,
+                    center,
+                    radius,
+                    tuple(int(c) for c in 255 * (0.5 + 0.5 * color)),
+                    -1,
+                    cv2.LINE_AA,
+                )
 
     def _draw_face(self, image: NDArray[np.uint8], face: dict[str, NDArray[Any]], row: int) -> None:
         """Draw the points of one person's face into the image, in place, if it was seen."""
@@ -274,7 +318,9 @@ class _Painter:
             return
         for u, v in face["face_points"][row] * self._scale:
             if max(abs(u), abs(v)) < 1e5:
-                cv2.circle(image, (round(float(u)), round(float(v))), 1, _FACE_COLOR, -1, cv2.LINE_AA)
+                cv2.circle(
+                    image, (round(float(u)), round(float(v))), 1, _FACE_COLOR, -1, cv2.LINE_AA
+                )
 
 
 def _write_still(path: Path, painter: _Painter, video: Video, index: int) -> None:
@@ -292,11 +338,14 @@ def _write_still(path: Path, painter: _Painter, video: Video, index: int) -> Non
 
 
 def _without_frames(video: Video) -> VideoError:
-    return VideoError(f"{video.path} has no frames between the given start and end; change one of them")
+    return VideoError(
+        f"{video.path} has no frames between the given start and end; change one of them"
+    )
 
 
 def _shown_s(time_s: float, fps: Fraction, before_s: float) -> float:
-    """Return a frame's time: that of the frame rate, where the container has only rounded it to milliseconds.
+    """Return a frame's time: that of the frame rate, where the container has only rounded it to
+    milliseconds.
 
     :param before_s: time of the frame before.
     """
@@ -305,7 +354,9 @@ def _shown_s(time_s: float, fps: Fraction, before_s: float) -> float:
     return nominal if is_rounded else time_s
 
 
-def _write_video(temporary: Path, painter: _Painter, video: Video, path: Path, progress: Progress | None) -> None:
+def _write_video(
+    temporary: Path, painter: _Painter, video: Video, path: Path, progress: Progress | None
+) -> None:
     start_s, shown_s = None, -1.0
     with VideoWriter(temporary, video.fps, *painter.size, path) as writer:
         for frame in video:

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A small z-buffer rasterizer: from triangles in camera axes to images of colour, opacity and depth.
+"""A small z-buffer rasterizer: from triangles in camera axes to images of colour, opacity and
+depth.
 
 A vertex (x, y, z) in camera axes (OpenCV: x right, y down, z forward, metres) appears at
 
     (u, v) = K · distort(x / z, y / z)          pixel centres at integers, as in OpenCV
 
-with OpenCV's five distortion coefficients (k1, k2, p1, p2, k3). Within a triangle 1/z is linear in (u, v), and an
-attribute a is interpolated with perspective: a = Σ λᵢ aᵢ/zᵢ / Σ λᵢ/zᵢ. Distortion is applied to vertices, so that
-edges stay straight. Shading is Lambertian, with a light above and to the left of the camera, plus a rim light at
-grazing angles.
+with OpenCV's five distortion coefficients (k1, k2, p1, p2, k3). Within a triangle 1/z is linear in
+(u, v), and an attribute a is interpolated with perspective: a = Σ λᵢ aᵢ/zᵢ / Σ λᵢ/zᵢ. Distortion is
+applied to vertices, so that edges stay straight. Shading is Lambertian, with a light above and to
+the left of the camera, plus a rim light at grazing angles.
 """
 
 from __future__ import annotations
@@ -25,12 +26,15 @@ from ....solver.compiled.kernel import cached
 NEAR = 0.05  # metres; the near plane, at which triangles are clipped
 _TO_LIGHT = np.array([-0.40, -0.66, -0.63]) / np.linalg.norm([-0.40, -0.66, -0.63])
 _AMBIENT, _DIFFUSE, _RIM = 0.42, 0.58, 0.30
-_BEHIND, _OUTSIDE = 1, 2  # of a vertex: behind the near plane, beyond the distortion model; 0: visible
+# of a vertex: behind the near plane, beyond the distortion model; 0: visible
+_BEHIND, _OUTSIDE = 1, 2
 
 
 @dataclass
 class Canvas:
-    """The drawing: ``rgba`` (H, W, 4) uint8, sRGB and opacity, and ``depth`` (H, W) float32 metres, inf if empty."""
+    """The drawing: ``rgba`` (H, W, 4) uint8, sRGB and opacity, and ``depth`` (H, W) float32 metres,
+    inf if empty.
+    """
 
     rgba: NDArray[np.uint8]
     depth: NDArray[np.float32]
@@ -38,7 +42,9 @@ class Canvas:
     @classmethod
     def blank(cls, width: int, height: int) -> Canvas:
         """Create an empty canvas; width and height in pixels."""
-        return cls(np.zeros((height, width, 4), np.uint8), np.full((height, width), np.inf, np.float32))
+        return cls(
+            np.zeros((height, width, 4), np.uint8), np.full((height, width), np.inf, np.float32)
+        )
 
     @property
     def coverage(self) -> NDArray[np.bool_]:
@@ -76,7 +82,8 @@ def rasterize(
     corners = np.ascontiguousarray(triangles, np.int32)
     if shading is None:
         shading = shade(vertices, vertex_normals(vertices, corners))
-    colors = np.empty((len(corners), 3), np.float32)  # a broadcast view would be another type, and compiled again
+    # a broadcast view would be another type, and compiled again
+    colors = np.empty((len(corners), 3), np.float32)
     colors[:] = face_colors
     lens = np.zeros(5)
     if dist is not None:
@@ -85,13 +92,18 @@ def rasterize(
     K = np.ascontiguousarray(intrinsics, np.float64)
     screen, where = _project(vertices, K, lens, _largest_radius2(lens))
     alpha = np.uint8(round(255 * min(max(opacity, 0.0), 1.0)))
-    _draw(canvas.rgba, canvas.depth, vertices, screen, where, shading, corners, colors, K, lens, alpha)
+    _draw(
+        canvas.rgba, canvas.depth, vertices, screen, where, shading, corners, colors, K, lens, alpha
+    )
 
 
 @cached
 @njit(nogil=True)
-def fill_silhouette(coverage: NDArray[np.bool_], screen: NDArray[np.float64], triangles: NDArray[np.int32]) -> None:
-    """Set the pixels whose centres triangles cover that are seen from outside, as `rasterize` would draw them.
+def fill_silhouette(
+    coverage: NDArray[np.bool_], screen: NDArray[np.float64], triangles: NDArray[np.int32]
+) -> None:
+    """Set the pixels whose centres triangles cover that are seen from outside, as `rasterize` would
+    draw them.
 
     :param coverage: (H, W), modified in place.
     :param screen: (V, 2) pixels; triangles with a vertex that is not finite are left out.
@@ -100,7 +112,14 @@ def fill_silhouette(coverage: NDArray[np.bool_], screen: NDArray[np.float64], tr
     height, width = coverage.shape
     for f in range(len(triangles)):
         a, b, c = triangles[f]
-        ax, ay, bx, by, cx, cy = screen[a, 0], screen[a, 1], screen[b, 0], screen[b, 1], screen[c, 0], screen[c, 1]
+        ax, ay, bx, by, cx, cy = (
+            screen[a, 0],
+            screen[a, 1],
+            screen[b, 0],
+            screen[b, 1],
+            screen[c, 0],
+            screen[c, 1],
+        )
         area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
         if not (area < 0 and abs(area) < 1e18):
             continue
@@ -120,8 +139,11 @@ def fill_silhouette(coverage: NDArray[np.bool_], screen: NDArray[np.float64], tr
 
 @cached
 @njit(nogil=True)
-def vertex_normals(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.float64]:
-    """Calculate unit normals (V, 3), area-weighted means of the triangles around each vertex (zero without triangles).
+def vertex_normals(
+    vertices: NDArray[np.float64], triangles: NDArray[np.int32]
+) -> NDArray[np.float64]:
+    """Calculate unit normals (V, 3), area-weighted means of the triangles around each vertex (zero
+    without triangles).
 
     :param vertices: (V, 3).
     :param triangles: (F, 3) vertex indices.
@@ -129,8 +151,16 @@ def vertex_normals(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) 
     normals = np.zeros_like(vertices)
     for f in range(len(triangles)):
         a, b, c = triangles[f]
-        e0, e1, e2 = (vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2])
-        d0, d1, d2 = (vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1], vertices[c, 2] - vertices[a, 2])
+        e0, e1, e2 = (
+            vertices[b, 0] - vertices[a, 0],
+            vertices[b, 1] - vertices[a, 1],
+            vertices[b, 2] - vertices[a, 2],
+        )
+        d0, d1, d2 = (
+            vertices[c, 0] - vertices[a, 0],
+            vertices[c, 1] - vertices[a, 1],
+            vertices[c, 2] - vertices[a, 2],
+        )
         n0, n1, n2 = e1 * d2 - e2 * d1, e2 * d0 - e0 * d2, e0 * d1 - e1 * d0
         for i in (a, b, c):
             normals[i, 0] += n0
@@ -147,7 +177,8 @@ def vertex_normals(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) 
 @cached
 @njit(nogil=True)
 def shade(vertices: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Calculate the shading (V, 2): factor on the surface's colour (ambient + Lambert), and white to add (rim).
+    """Calculate the shading (V, 2): factor on the surface's colour (ambient + Lambert), and white
+    to add (rim).
 
     :param vertices: (V, 3) metres, camera axes.
     :param normals: (V, 3) unit vectors.
@@ -164,7 +195,9 @@ def shade(vertices: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArra
 
 
 def _largest_radius2(lens: NDArray[np.float64]) -> float:
-    """Calculate the squared normalized radius beyond which radial distortion is no longer monotonic."""
+    """Calculate the squared normalized radius beyond which radial distortion is no longer
+    monotonic.
+    """
     k1, k2, _, _, k3 = lens
     roots = np.roots([7 * k3, 5 * k2, 3 * k1, 1.0])
     real = roots[(abs(roots.imag) < 1e-9) & (roots.real > 0)].real
@@ -173,7 +206,9 @@ def _largest_radius2(lens: NDArray[np.float64]) -> float:
 
 @cached
 @njit(nogil=True)
-def _pixel(x: float, y: float, K: NDArray[np.float64], lens: NDArray[np.float64]) -> tuple[float, float]:
+def _pixel(
+    x: float, y: float, K: NDArray[np.float64], lens: NDArray[np.float64]
+) -> tuple[float, float]:
     """Project the normalized image point (x, y) to a pixel."""
     r2 = x * x + y * y
     radial = 1 + r2 * (lens[0] + r2 * (lens[1] + r2 * lens[4]))
@@ -187,7 +222,9 @@ def _pixel(x: float, y: float, K: NDArray[np.float64], lens: NDArray[np.float64]
 def _project(
     vertices: NDArray[np.float64], K: NDArray[np.float64], lens: NDArray[np.float64], largest: float
 ) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
-    """Project the vertices: (V, 3) pixels and 1/z, and (V,) whether they are in front, behind or outside."""
+    """Project the vertices: (V, 3) pixels and 1/z, and (V,) whether they are in front, behind or
+    outside.
+    """
     screen = np.zeros((len(vertices), 3))
     where = np.zeros(len(vertices), np.uint8)
     for i in range(len(vertices)):
@@ -224,7 +261,18 @@ def _draw(
         if behind == 3 or where[a] == _OUTSIDE or where[b] == _OUTSIDE or where[c] == _OUTSIDE:
             continue
         if behind == 0:
-            _fill(rgba, depth, screen[a], screen[b], screen[c], shading[a], shading[b], shading[c], colors[f], alpha)
+            _fill(
+                rgba,
+                depth,
+                screen[a],
+                screen[b],
+                screen[c],
+                shading[a],
+                shading[b],
+                shading[c],
+                colors[f],
+                alpha,
+            )
             continue
         n = _clip_at_near(cut, vertices, shading, triangles[f], K, lens)
         for k in range(1, n - 1):
@@ -242,7 +290,9 @@ def _clip_at_near(
     K: NDArray[np.float64],
     lens: NDArray[np.float64],
 ) -> int:
-    """Clip a triangle at the near plane to a fan of 3 or 4 corners (u, v, 1/z, shading); return their number."""
+    """Clip a triangle at the near plane to a fan of 3 or 4 corners (u, v, 1/z, shading); return
+    their number.
+    """
     n = 0
     for i in range(3):
         a, b = triangle[i], triangle[(i + 1) % 3]
@@ -277,7 +327,9 @@ def _fill(
     color: NDArray[np.float32],
     alpha: np.uint8,
 ) -> None:
-    """Fill one triangle with corners (u, v, 1/z): the pixels whose centres it covers and that pass the depth test."""
+    """Fill one triangle with corners (u, v, 1/z): the pixels whose centres it covers and that pass
+    the depth test.
+    """
     height, width = depth.shape
     area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
     # A triangle that is counter-clockwise seen from outside is clockwise here, since v points down.

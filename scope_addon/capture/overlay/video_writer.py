@@ -17,15 +17,18 @@ from ..media.file_names import utf8_name
 if TYPE_CHECKING:
     import av
 
-# Codec, and its options: visually without loss at a size and speed that suit a preview. No B-frames: MP4 takes its
-# duration from the times of decoding, which B-frames put before those of showing, by seconds at a variable rate.
+# Codec, and its options: visually without loss at a size and speed that suit a preview. No
+# B-frames: MP4 takes its duration from the times of decoding, which B-frames put before those of
+# showing, by seconds at a variable rate.
 _CODECS = (("libx264", {"preset": "veryfast", "crf": "20", "bf": "0"}), ("mpeg4", {"qscale": "4"}))
 _LARGEST = 65535  # of numerator and denominator of MPEG-4's clock
-_TICKS = 60000  # per second, about as many as MPEG-4's clock can have, for images whose times are given
+# per second, about as many as MPEG-4's clock can have, for images whose times are given
+_TICKS = 60000
 
 
 class VideoWriter:
-    """A video that is being written, as a context. Leaving it without an error, or `close`, completes the file.
+    """A video that is being written, as a context. Leaving it without an error, or `close`,
+    completes the file.
 
     :raises OutputError: PyAV is not installed, or the file cannot be written.
     """
@@ -40,11 +43,13 @@ class VideoWriter:
             import av
         except ImportError as error:
             raise OutputError(
-                f"cannot write {path}: it needs the package 'av', which is not installed; choose a .png or .jpg overlay"
+                f"cannot write {path}: it needs the package 'av', which is not installed; choose a "
+                ".png or .jpg overlay"
             ) from error
         self._av, self._path = av, path
         self._failures = (av.error.FFmpegError, OSError, ValueError)
-        temporary.touch()  # a name that is not UTF-8 is opened by a link to the file, with the first image
+        # a name that is not UTF-8 is opened by a link to the file, with the first image
+        temporary.touch()
         self._name = ExitStack()
         try:
             name = self._name.enter_context(utf8_name(temporary))
@@ -53,7 +58,8 @@ class VideoWriter:
             self._name.close()
             raise self._refused() from error
         rate = _rate(fps)
-        self._clock = Fraction(1, rate.numerator * max(1, _TICKS // rate.numerator))  # has every time of the rate
+        # has every time of the rate
+        self._clock = Fraction(1, rate.numerator * max(1, _TICKS // rate.numerator))
         self._last = -1
         self._stream = self._add_stream(rate, width, height)
 
@@ -65,7 +71,9 @@ class VideoWriter:
             stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
             return stream
         self.abandon()
-        raise OutputError(f"cannot write {self._path}: no video encoder was found; choose a .png or .jpg overlay")
+        raise OutputError(
+            f"cannot write {self._path}: no video encoder was found; choose a .png or .jpg overlay"
+        )
 
     def __enter__(self) -> VideoWriter:
         return self
@@ -80,7 +88,8 @@ class VideoWriter:
         """Append an image.
 
         :param image: (H, W, 3) uint8 RGB.
-        :param time_s: when it is shown, after the one before by at least a tick; given for every image, or for none.
+        :param time_s: when it is shown, after the one before by at least a tick; given for every
+            image, or for none.
         :raises OutputError: the system refused.
         """
         frame = self._av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="rgb24")
@@ -111,7 +120,9 @@ class VideoWriter:
             self._container.close()
 
     def _refused(self) -> OutputError:
-        return OutputError(f"could not finish writing {self._path}; free some space or choose another folder")
+        return OutputError(
+            f"could not finish writing {self._path}; free some space or choose another folder"
+        )
 
 
 def _rate(fps: Fraction) -> Fraction:

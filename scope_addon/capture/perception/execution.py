@@ -25,7 +25,9 @@ _AUTOMATIC = ("cuda", DIRECTML, "coreml")
 
 
 def session_options_of(name: str) -> tuple[list[str], bool]:
-    """Return onnxruntime's names of a provider and of the CPU as its fallback, and whether it takes memory patterns."""
+    """Return onnxruntime's names of a provider and of the CPU as its fallback, and whether it takes
+    memory patterns.
+    """
     return [PROVIDERS[each][0] for each in dict.fromkeys((name, CPU))], name != DIRECTML
 
 
@@ -33,8 +35,8 @@ def session_options_of(name: str) -> tuple[list[str], bool]:
 class Execution:
     """The requested execution provider, and which providers opened sessions or failed to.
 
-    ``provider``: one of `CHOICES`; ``used``, ``failed``: our names of the providers that opened a session, in order, or
-    could not.
+    ``provider``: one of `CHOICES`; ``used``, ``failed``: our names of the providers that opened a
+    session, in order, or could not.
 
     :raises UsageError: the provider does not exist.
     """
@@ -47,7 +49,9 @@ class Execution:
     def __post_init__(self) -> None:
         """Check that the provider exists."""
         if self.provider not in CHOICES:
-            raise UsageError(f"provider {self.provider!r} does not exist; choose one of {', '.join(CHOICES)}")
+            raise UsageError(
+                f"provider {self.provider!r} does not exist; choose one of {', '.join(CHOICES)}"
+            )
 
     def candidates(self, available: Sequence[str]) -> list[str]:
         """List our names of the providers to try, in order, the CPU last.
@@ -60,7 +64,8 @@ class Execution:
             labels = [label for ort_name, label in PROVIDERS.values() if ort_name in available]
             self._warn(
                 self.provider,
-                f"{PROVIDERS[self.provider][1]} was requested, but this onnxruntime has only {', '.join(labels)}; "
+                f"{PROVIDERS[self.provider][1]} was requested, but this onnxruntime has only "
+                f"{', '.join(labels)}; "
                 "the networks run on the CPU",
             )
         return [*(name for name in usable if name not in self.failed), CPU]
@@ -71,9 +76,14 @@ class Execution:
             self.used.append(name)
 
     def fell_back(self, name: str, why: object) -> None:
-        """Record that no session could be opened on this provider, which is not tried again, and warn."""
+        """Record that no session could be opened on this provider, which is not tried again, and
+        warn.
+        """
         text = " ".join(str(why).split())
-        self._warn(name, f"{PROVIDERS[name][1]} cannot run the networks ({text}); they run on the CPU instead")
+        self._warn(
+            name,
+            f"{PROVIDERS[name][1]} cannot run the networks ({text}); they run on the CPU instead",
+        )
 
     def _warn(self, name: str, text: str) -> None:
         if name not in self.failed:
@@ -83,11 +93,15 @@ class Execution:
     def describe(self, threads: int) -> str:
         """Describe the providers that were used, such as "CUDA" or "CPU, 2 threads"."""
         count = "1 thread" if threads == 1 else f"{threads} threads"
-        return " and ".join(PROVIDERS[n][1] + (f", {count}" if n == CPU else "") for n in self.used or [CPU])
+        return " and ".join(
+            PROVIDERS[n][1] + (f", {count}" if n == CPU else "") for n in self.used or [CPU]
+        )
 
 
 class SerializedSession:
-    """A session that runs in one thread at a time, because DirectML sessions are not thread-safe."""
+    """A session that runs in one thread at a time, because DirectML sessions are not
+    thread-safe.
+    """
 
     def __init__(self, session: Any) -> None:
         self._session, self._lock = session, threading.Lock()

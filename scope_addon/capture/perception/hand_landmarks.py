@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hands in the image: their landmark network, the palm detector, and the regions that the former looks at.
+"""Hands in the image: their landmark network, the palm detector, and the regions that the former
+looks at.
 
-A region follows from the body's arm, from a detected palm, or from the hand's keypoints. In each, the fingers point up
-from the wrist, and a hand with straight fingers fills half of it.
+A region follows from the body's arm, from a detected palm, or from the hand's keypoints. In each,
+the fingers point up from the wrist, and a hand with straight fingers fills half of it.
 """
 
 from __future__ import annotations
@@ -36,25 +37,35 @@ _LAYERS = ((8, 2), (16, 6))  # stride, anchors per cell; the three stride-16 lay
 SIDES = ("left", "right")
 HAND_LENGTH_M = 0.18  # wrist to the tip of the middle finger
 _ARM = np.array(
-    [[KEYPOINT_NAMES.index(f"{side}_{name}") for name in ("elbow", "wrist", "index", "pinky")] for side in SIDES]
+    [
+        [KEYPOINT_NAMES.index(f"{side}_{name}") for name in ("elbow", "wrist", "index", "pinky")]
+        for side in SIDES
+    ]
 )
 ELBOWS, WRISTS = _ARM[:, 0], _ARM[:, 1]
-_STATURE = [[KEYPOINT_NAMES.index(f"{side}_{name}") for name in ("shoulder", "hip", "knee", "ankle")] for side in SIDES]
+_STATURE = [
+    [KEYPOINT_NAMES.index(f"{side}_{name}") for name in ("shoulder", "hip", "knee", "ankle")]
+    for side in SIDES
+]
 _STATURE_M = 1.35  # shoulder to ankle along the bones
 _MIDDLE = 0.45  # distance from the wrist to the hand's centre, in hand lengths
-_BODY_SCALE = 1.5  # side of the region in hand lengths; large, because the body gives only a rough position
-_PALM_SCALE, _PALM_SHIFT = 2.6, 0.5  # MediaPipe's: side, and shift towards the fingers, in sides of the palm's box
+# side of the region in hand lengths; large, because the body gives only a rough position
+_BODY_SCALE = 1.5
+# MediaPipe's: side, and shift towards the fingers, in sides of the palm's box
+_PALM_SCALE, _PALM_SHIFT = 2.6, 0.5
 _TRACK_SCALE, _TRACK_SHIFT = 2.0, 0.1  # the same in sides of the box of the keypoints below
-_RIGID = np.array([0, 1, 2, 3, 5, 6, 9, 10, 13, 14, 17, 18])  # keypoints of the palm and of the finger bases
+# keypoints of the palm and of the finger bases
+_RIGID = np.array([0, 1, 2, 3, 5, 6, 9, 10, 13, 14, 17, 18])
 
 
 @dataclass(frozen=True)
 class HandEstimate:
     """The network's estimate for one region.
 
-    ``keypoints_px`` (21, 2) image pixels; ``world_landmarks`` (21, 3) metres in camera axes (x right, y down,
-    z forward), the hand's centre at 0; ``presence``: probability that there is a hand; ``left``: probability that it is
-    a left hand; ``region``: the input region. Order: `HAND_NAMES`.
+    ``keypoints_px`` (21, 2) image pixels; ``world_landmarks`` (21, 3) metres in camera axes (x
+    right, y down, z forward), the hand's centre at 0; ``presence``: probability that there is a
+    hand; ``left``: probability that it is a left hand; ``region``: the input region. Order:
+    `HAND_NAMES`.
     """
 
     keypoints_px: NDArray[np.float64]
@@ -70,7 +81,8 @@ class HandEstimate:
 
     @property
     def disagreement(self) -> float:
-        """Inconsistency of the keypoints in the image and in space, see `PoseEstimate.disagreement`.
+        """Inconsistency of the keypoints in the image and in space, see
+        `PoseEstimate.disagreement`.
 
         0.08..0.2 for visible hands; up to 0.5 for occluded ones, which the network guesses.
         """
@@ -78,8 +90,13 @@ class HandEstimate:
 
     @property
     def size_px(self) -> float:
-        """Longer side in pixels of the keypoints' bounding box in the axes of the region; the unit of distances."""
-        return float(np.ptp(self.region.crop_from_image(self.keypoints_px), axis=0).max() * self.region.side_px)
+        """Longer side in pixels of the keypoints' bounding box in the axes of the region; the unit
+        of distances.
+        """
+        return float(
+            np.ptp(self.region.crop_from_image(self.keypoints_px), axis=0).max()
+            * self.region.side_px
+        )
 
 
 class HandNetwork:
@@ -118,8 +135,12 @@ class PalmDetector:
         self._session = open_session(network_path("palm_detection"), threads, execution)
         self._anchors = make_anchors(PALM_INPUT_SIZE, _LAYERS)
 
-    def detect(self, image_rgb: NDArray[np.uint8], square: Region, threshold: float = PALM_THRESHOLD) -> list[Region]:
-        """Return the hands' regions by all palms in a square of an (H, W, 3) uint8 RGB image, the best palm first."""
+    def detect(
+        self, image_rgb: NDArray[np.uint8], square: Region, threshold: float = PALM_THRESHOLD
+    ) -> list[Region]:
+        """Return the hands' regions by all palms in a square of an (H, W, 3) uint8 RGB image, the
+        best palm first.
+        """
         blob = cv2.dnn.blobFromImage(square.cut(image_rgb, PALM_INPUT_SIZE), 1 / 255.0)
         boxes, scores = self._session.run(["boxes", "scores"], {"input": blob})
         _, values = merge_overlapping(*decode(boxes[0], scores[0, :, 0], self._anchors, threshold))
@@ -127,24 +148,35 @@ class PalmDetector:
 
 
 def _in_image(values: NDArray[np.float64], square: Region) -> Region:
-    """Calculate the hand's region in the image from a box and points (18,) in the network's input pixels."""
+    """Calculate the hand's region in the image from a box and points (18,) in the network's input
+    pixels.
+    """
     unit = values / PALM_INPUT_SIZE
     in_square = region_from_palm(unit[:4], unit[4:].reshape(-1, 2))
     x, y = square.image_from_crop(np.array(in_square.center_px))
-    return Region((float(x), float(y)), in_square.side_px * square.side_px, in_square.rotation + square.rotation)
+    return Region(
+        (float(x), float(y)),
+        in_square.side_px * square.side_px,
+        in_square.rotation + square.rotation,
+    )
 
 
-def pixels_per_metre(keypoints_px: NDArray[np.float64], world_landmarks: NDArray[np.float64]) -> float:
+def pixels_per_metre(
+    keypoints_px: NDArray[np.float64], world_landmarks: NDArray[np.float64]
+) -> float:
     """Estimate the image scale at the person's distance, in pixels per metre.
 
-    s = ‖p − mean p‖ / ‖w_xy − mean w_xy‖ of all 33 keypoints p and world landmarks w, by scaled orthographic
-    projection. Without world landmarks (all 0): the length of trunk and longer leg in the image over an adult's.
+    s = ‖p − mean p‖ / ‖w_xy − mean w_xy‖ of all 33 keypoints p and world landmarks w, by scaled
+    orthographic projection. Without world landmarks (all 0): the length of trunk and longer leg in
+    the image over an adult's.
 
     :param keypoints_px: (33, 2) pixels.
     :param world_landmarks: (33, 3) metres in camera axes, or all 0.
     """
     if not world_landmarks.any():
-        trunk_and_legs = [np.linalg.norm(np.diff(keypoints_px[chain], axis=0), axis=1).sum() for chain in _STATURE]
+        trunk_and_legs = [
+            np.linalg.norm(np.diff(keypoints_px[chain], axis=0), axis=1).sum() for chain in _STATURE
+        ]
         return float(max(trunk_and_legs)) / _STATURE_M
     image = keypoints_px - keypoints_px.mean(axis=0)
     space = world_landmarks[:, :2] - world_landmarks[:, :2].mean(axis=0)
@@ -154,9 +186,9 @@ def pixels_per_metre(keypoints_px: NDArray[np.float64], world_landmarks: NDArray
 def region_from_body(keypoints_px: NDArray[np.float64], scale: float, side: int) -> Region:
     """Predict the region of a hand from the body's keypoints.
 
-    The centre lies beyond the wrist in the direction of the finger keypoints' mean m = (index + pinky) / 2, with their
-    foreshortening. m is half-way along the hand, so the centre is wrist + (m − wrist) · 0.45 / 0.5. The region's up
-    direction follows m and the forearm.
+    The centre lies beyond the wrist in the direction of the finger keypoints' mean m = (index +
+    pinky) / 2, with their foreshortening. m is half-way along the hand, so the centre is wrist + (m
+    − wrist) · 0.45 / 0.5. The region's up direction follows m and the forearm.
 
     :param keypoints_px: (33, 2) pixels, of the body.
     :param scale: see `pixels_per_metre`.
@@ -176,7 +208,8 @@ def region_from_body(keypoints_px: NDArray[np.float64], scale: float, side: int)
 def region_from_palm(box_px: NDArray[np.float64], points_px: NDArray[np.float64]) -> Region:
     """Calculate the region of a hand from its detected palm.
 
-    :param box_px: (4,) left, top, right, bottom of the palm's square box, in the axes of the detector's input.
+    :param box_px: (4,) left, top, right, bottom of the palm's square box, in the axes of the
+        detector's input.
     :param points_px: (7, 2) in the same axes: 0 the wrist, 2 the base of the middle finger.
     """
     size = float(max(box_px[2] - box_px[0], box_px[3] - box_px[1]))
@@ -187,8 +220,9 @@ def region_from_palm(box_px: NDArray[np.float64], points_px: NDArray[np.float64]
 def region_from_landmarks(keypoints_px: NDArray[np.float64]) -> Region:
     """Calculate the region for the next frame from this one's keypoints (21, 2), in pixels.
 
-    Up is from the wrist to the weighted mean of the base joints of index, middle and ring finger (weights ¼, ½, ¼). The
-    box is that of the palm and of the finger bases in these axes, so that moving fingers do not move the region.
+    Up is from the wrist to the weighted mean of the base joints of index, middle and ring finger
+    (weights ¼, ½, ¼). The box is that of the palm and of the finger bases in these axes, so that
+    moving fingers do not move the region.
     """
     up = 0.25 * (keypoints_px[5] + keypoints_px[13]) + 0.5 * keypoints_px[9] - keypoints_px[0]
     rotation = _rotation(up)
@@ -196,7 +230,9 @@ def region_from_landmarks(keypoints_px: NDArray[np.float64]) -> Region:
     return _shifted(center, float(sides.max()), rotation, _TRACK_SCALE, _TRACK_SHIFT)
 
 
-def _shifted(center: NDArray[np.float64], size: float, rotation: float, scale: float, shift: float) -> Region:
+def _shifted(
+    center: NDArray[np.float64], size: float, rotation: float, scale: float, shift: float
+) -> Region:
     """Build a region ``scale`` times ``size``, shifted up (in its own axes) by ``shift`` sizes."""
     up = np.array([math.sin(rotation), -math.cos(rotation)])
     x, y = center + shift * size * up

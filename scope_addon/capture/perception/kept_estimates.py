@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Estimates of the landmark networks on disk, so that a capture that was killed does not begin again.
+"""Estimates of the landmark networks on disk, so that a capture that was killed does not begin
+again.
 
-An estimate depends on its network, the region and the pixels in it alone. These are its key, so that an estimate is
-found only where the network would give the same again, bit for bit, whatever the footage and the options are.
+An estimate depends on its network, the region and the pixels in it alone. These are its key, so
+that an estimate is found only where the network would give the same again, bit for bit, whatever
+the footage and the options are.
 """
 
 from __future__ import annotations
@@ -26,7 +28,8 @@ INTERVAL_S = 20.0  # between two files: the work that a kill can cost
 LARGEST = 1 << 30  # bytes of one capture's files; some five hours
 _KEY_BYTES = 16
 _PIXEL_STEP = 4  # rows of the crop between those in the key
-_LOADED = 2  # files whose values are in memory; a capture asks in the order in which they were written
+# files whose values are in memory; a capture asks in the order in which they were written
+_LOADED = 2
 Values = NDArray[np.float64]
 
 
@@ -86,7 +89,8 @@ class KeptEstimates:
         """Write what is new; after a failure, or when there is too much, nothing any more."""
         assert self._folder is not None
         self._written_s = time.monotonic()
-        path = self._folder / f"{time.time_ns():020d}-{os.getpid()}.npz"  # sorted by time, and no other process's
+        # sorted by time, and no other process's
+        path = self._folder / f"{time.time_ns():020d}-{os.getpid()}.npz"
         try:
             if not self._wrote:
                 self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -111,7 +115,12 @@ class KeptEstimates:
         with suppress(ScopeError, OSError, KeyError):
             arrays = read_members(path, ("keys", "values"), "")[0]
             values, rows = arrays["values"], len(arrays["keys"])
-            if values.dtype == np.float64 and values.ndim == 2 and len(values) == rows and np.isfinite(values).all():
+            if (
+                values.dtype == np.float64
+                and values.ndim == 2
+                and len(values) == rows
+                and np.isfinite(values).all()
+            ):
                 while len(self._loaded) >= _LOADED:
                     self._loaded.pop(next(iter(self._loaded)))
                 self._loaded[path] = values

@@ -25,7 +25,8 @@ INPUT_SIZE = 256
 KEYPOINT_NAMES = BLAZEPOSE  # the network's order
 KEYPOINT_COUNT = 33
 _POINTS = 39  # the keypoints, two auxiliary points and four unused ones
-_HIP_CENTER, _BODY_CIRCLE = 33, 34  # auxiliary points: hip centre; a point on the body circle around it
+# auxiliary points: hip centre; a point on the body circle around it
+_HIP_CENTER, _BODY_CIRCLE = 33, 34
 _HIPS = (23, 24)
 _WINDOW = 7  # side in heatmap cells of the window that refines a keypoint
 _HEAT_THRESHOLD = 0.5
@@ -40,11 +41,13 @@ _WITH_MASK = {"with_mask": np.array(True)}  # an input without which the mask is
 class PoseEstimate:
     """The network's estimate for one region.
 
-    ``keypoints_px`` (33, 2) image pixels; ``keypoints_confidence`` (33,) probability that a keypoint is in the image
-    and not occluded; ``world_landmarks`` (33, 3) metres in camera axes (x right, y down, z forward), the hip centre at
-    0, or all 0 from a network without depth; ``presence``: probability that there is a person; ``region``: the input
-    region; ``next_region``: the region for the next frame; ``mask``: the probability (256, 256), half precision, that a
-    pixel of the region shows its person, if it was requested. Where nobody is, the network invents somebody.
+    ``keypoints_px`` (33, 2) image pixels; ``keypoints_confidence`` (33,) probability that a
+    keypoint is in the image and not occluded; ``world_landmarks`` (33, 3) metres in camera axes (x
+    right, y down, z forward), the hip centre at 0, or all 0 from a network without depth;
+    ``presence``: probability that there is a person; ``region``: the input region; ``next_region``:
+    the region for the next frame; ``mask``: the probability (256, 256), half precision, that a
+    pixel of the region shows its person, if it was requested. Where nobody is, the network invents
+    somebody.
     """
 
     keypoints_px: NDArray[np.float64]
@@ -57,9 +60,11 @@ class PoseEstimate:
 
     @property
     def spread(self) -> float:
-        """Root mean square distance of the keypoints from their centre over the radius of the body circle.
+        """Root mean square distance of the keypoints from their centre over the radius of the body
+        circle.
 
-        0.5..0.8 for people, less when they curl up; 0.1..0.35 for something else that the network mistakes for a body.
+        0.5..0.8 for people, less when they curl up; 0.1..0.35 for something else that the network
+        mistakes for a body.
         """
         offsets = self.keypoints_px - self.keypoints_px.mean(axis=0)
         radius = self.region.side_px / (2 * MARGIN)
@@ -67,16 +72,22 @@ class PoseEstimate:
 
     @property
     def disagreement(self) -> float:
-        """Inconsistency of the keypoints in the image and in space, relative to the keypoints' spread.
+        """Inconsistency of the keypoints in the image and in space, relative to the keypoints'
+        spread.
 
-        min over s, t of ‖p − s·w_xy − t‖ / ‖p − mean(p)‖, by scaled orthographic projection of the world landmarks w.
-        Below 0.15 for people; perspective adds some. 0 without world landmarks.
+        min over s, t of ‖p − s·w_xy − t‖ / ‖p − mean(p)‖, by scaled orthographic projection of the
+        world landmarks w. Below 0.15 for people; perspective adds some. 0 without world landmarks.
         """
-        return disagreement(self.keypoints_px, self.world_landmarks) if self.world_landmarks.any() else 0.0
+        return (
+            disagreement(self.keypoints_px, self.world_landmarks)
+            if self.world_landmarks.any()
+            else 0.0
+        )
 
 
 def disagreement(keypoints_px: NDArray[np.float64], world_landmarks: NDArray[np.float64]) -> float:
-    """Calculate how inconsistent keypoints in the image and in space are, see `PoseEstimate.disagreement`.
+    """Calculate how inconsistent keypoints in the image and in space are, see
+    `PoseEstimate.disagreement`.
 
     :param keypoints_px: (n, 2) pixels.
     :param world_landmarks: (n, 3) metres in camera axes.
@@ -89,13 +100,16 @@ def disagreement(keypoints_px: NDArray[np.float64], world_landmarks: NDArray[np.
 
 
 class LandmarkNetwork:
-    """A landmark network (``pose_landmark_lite``, ``_full`` or ``_heavy``); stateless between calls.
+    """A landmark network (``pose_landmark_lite``, ``_full`` or ``_heavy``); stateless between
+    calls.
 
-    Several regions are processed in parallel with half of the threads each, which is faster than sequentially with all
-    threads: threads that share a region synchronize at every layer. A single region gets all threads only in the heavy
-    network; in the small ones they would mostly wait for each other, and decoding needs a core.
+    Several regions are processed in parallel with half of the threads each, which is faster than
+    sequentially with all threads: threads that share a region synchronize at every layer. A single
+    region gets all threads only in the heavy network; in the small ones they would mostly wait for
+    each other, and decoding needs a core.
 
-    :param kept: estimates of an earlier capture, and where to keep new ones; those with masks are not kept.
+    :param kept: estimates of an earlier capture, and where to keep new ones; those with masks are
+        not kept.
     :raises SetupError: the network has not been built.
     :raises ModelFileError: its file is damaged.
     """
@@ -112,7 +126,8 @@ class LandmarkNetwork:
         self._threads_alone = threads if name in _WORTH_ALL_THREADS else max(1, threads // _WORKERS)
         self._pool = ThreadPoolExecutor(min(_WORKERS, threads), "scope-landmarks")
         self._sessions: dict[int, onnxruntime.InferenceSession] = {}
-        self._session(self._threads_alone)  # opened now, so that a damaged file is reported before the first frame
+        # opened now, so that a damaged file is reported before the first frame
+        self._session(self._threads_alone)
 
     def _session(self, threads: int) -> onnxruntime.InferenceSession:
         if threads not in self._sessions:
@@ -126,17 +141,26 @@ class LandmarkNetwork:
         if len(regions) < 2 or self._threads == 1:
             alone = self._session(self._threads_alone)
             return [self._estimate(alone, image_rgb, region, with_masks) for region in regions]
-        return [pending.result() for pending in [self.begin(image_rgb, region, with_masks) for region in regions]]
+        return [
+            pending.result()
+            for pending in [self.begin(image_rgb, region, with_masks) for region in regions]
+        ]
 
-    def begin(self, image_rgb: NDArray[np.uint8], region: Region, with_mask: bool = False) -> Future[PoseEstimate]:
-        """Start the estimate of one region in another thread; the image (H, W, 3) must not change until it is done."""
+    def begin(
+        self, image_rgb: NDArray[np.uint8], region: Region, with_mask: bool = False
+    ) -> Future[PoseEstimate]:
+        """Start the estimate of one region in another thread; the image (H, W, 3) must not change
+        until it is done.
+        """
         shared = self._session(max(1, self._threads // _WORKERS))
         return self._pool.submit(self._estimate, shared, image_rgb, region, with_mask)
 
     def mask(self, image_rgb: NDArray[np.uint8], region: Region) -> NDArray[np.float32]:
-        """Return the probability (256, 256) that a pixel of the region of an (H, W, 3) image shows its person.
+        """Return the probability (256, 256) that a pixel of the region of an (H, W, 3) image shows
+        its person.
 
-        This is a run of its own; `estimate` and `begin` give the mask of the run that they make anyway.
+        This is a run of its own; `estimate` and `begin` give the mask of the run that they make
+        anyway.
         """
         (logits,) = self._session(self._threads_alone).run(
             ["mask"], {"input": _blob(region.cut(image_rgb, INPUT_SIZE))} | _WITH_MASK
@@ -144,7 +168,11 @@ class LandmarkNetwork:
         return _probability(logits)
 
     def _estimate(
-        self, session: onnxruntime.InferenceSession, image_rgb: NDArray[np.uint8], region: Region, with_mask: bool
+        self,
+        session: onnxruntime.InferenceSession,
+        image_rgb: NDArray[np.uint8],
+        region: Region,
+        with_mask: bool,
     ) -> PoseEstimate:
         crop_rgb = region.cut(image_rgb, INPUT_SIZE)
         key = None if with_mask else self._kept.key(self._name, crop_rgb, region)
@@ -158,7 +186,11 @@ class LandmarkNetwork:
         estimate = interpret(landmarks[0], float(presence[0, 0]), heatmap[0], world[0], region)
         if key is not None:
             self._kept.add(key, _packed(estimate))
-        return replace(estimate, mask=_probability(logits[0]).astype(np.float16)) if with_mask else estimate
+        return (
+            replace(estimate, mask=_probability(logits[0]).astype(np.float16))
+            if with_mask
+            else estimate
+        )
 
 
 def _probability(logits: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -191,7 +223,9 @@ def _unpacked(values: NDArray[np.float64], region: Region) -> PoseEstimate:
     keypoints, confidence, world, others = np.split(values, np.cumsum([2 * K, K, 3 * K]))
     presence, x, y, side_px, rotation = others.tolist()
     after = Region((x, y), side_px, rotation)
-    return PoseEstimate(keypoints.reshape(K, 2), confidence, world.reshape(K, 3), presence, region, after)
+    return PoseEstimate(
+        keypoints.reshape(K, 2), confidence, world.reshape(K, 3), presence, region, after
+    )
 
 
 def interpret(
@@ -224,8 +258,8 @@ def interpret(
 def refine(points: NDArray[np.float64], heatmaps: NDArray[np.float32]) -> NDArray[np.float64]:
     """Move each point to the centroid of its heatmap within 7 × 7 cells around it.
 
-    Points without a cell of at least 0.5 in this window stay. The network was trained with cell c at c / columns, not
-    at its centre.
+    Points without a cell of at least 0.5 in this window stay. The network was trained with cell c
+    at c / columns, not at its centre.
 
     :param points: (N, 2) crop coordinates, 0..1.
     :param heatmaps: (N, rows, columns) logits.
@@ -242,6 +276,8 @@ def refine(points: NDArray[np.float64], heatmaps: NDArray[np.float32]) -> NDArra
     heat = 1.0 / (1.0 + np.exp(-np.clip(logits.astype(float), -50.0, 50.0)))
     heat *= ((y >= 0) & (y < rows))[:, :, None] & ((x >= 0) & (x < columns))[:, None]
     hot = inside & (heat.max(axis=(1, 2)) >= _HEAT_THRESHOLD)
-    moments = np.stack([(heat.sum(axis=1) * x).sum(axis=1), (heat.sum(axis=2) * y).sum(axis=1)], axis=1)
+    moments = np.stack(
+        [(heat.sum(axis=1) * x).sum(axis=1), (heat.sum(axis=2) * y).sum(axis=1)], axis=1
+    )
     centroid = moments / np.maximum(heat.sum(axis=(1, 2)), 1e-9)[:, None]
     return np.where(hot[:, None], centroid / size, points)

@@ -55,13 +55,17 @@ def fit_in(
     left, top = ((width - size[0]) // 2, (height - size[1]) // 2) if centered else (0, 0)
     picture = np.full((height, width, 3), border, np.uint8)
     picture[top : top + size[1], left : left + size[0]] = _resize(image_rgb, *size)
-    return Letterbox(picture, np.array([size[0] / columns, size[1] / rows]), np.array([left, top], float))
+    return Letterbox(
+        picture, np.array([size[0] / columns, size[1] / rows]), np.array([left, top], float)
+    )
 
 
 def _resize(image: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:
     """Resize without aliasing."""
     if width >= image.shape[1]:
-        return cast(NDArray[np.uint8], cv2.resize(image, (width, height), interpolation=cv2.INTER_LINEAR))
+        return cast(
+            NDArray[np.uint8], cv2.resize(image, (width, height), interpolation=cv2.INTER_LINEAR)
+        )
     while min(image.shape[1] / width, image.shape[0] / height) >= _HALVING_FROM:
         image = halved(image)
     return cast(NDArray[np.uint8], cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA))

@@ -1,17 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The lifting network: from keypoints in the image, with or without world landmarks, to the body model's in 3D.
+"""The lifting network: from keypoints in the image, with or without world landmarks, to the body
+model's in 3D.
 
-The input is a view of the person through a virtual camera that looks straight at them, so that it depends neither on
-position nor on size in the image. With x̂_j the keypoint's ray (x/z, y/z, 1) and c the mean ray of hips and shoulders,
+The input is a view of the person through a virtual camera that looks straight at them, so that it
+depends neither on position nor on size in the image. With x̂_j the keypoint's ray (x/z, y/z, 1) and
+c the mean ray of hips and shoulders,
 
     R_virtual_camera = rows (right, down, c/|c|),  right ⟂ the camera's y axis
     u_j = project(R_virtual_camera x̂_j),  s = rms_j |u_j − ū| over the limbs
     input = [u_j / s, confidence_j, W_j / 0.5 m · known, known, log s]
 
-with W the world landmarks (known = 1) or zeros (known = 0). The network gets a window of such inputs around the frame,
-each from the virtual camera of its own time. The output is in the axes of the middle frame's
-virtual camera: the keypoints of the body model relative to the hip centre, and the logarithms of their standard
-deviations across and along the line of sight. The positions are then rotated into camera axes.
+with W the world landmarks (known = 1) or zeros (known = 0). The network gets a window of such
+inputs around the frame, each from the virtual camera of its own time. The output is in the axes of
+the middle frame's virtual camera: the keypoints of the body model relative to the hip centre, and
+the logarithms of their standard deviations across and along the line of sight. The positions are
+then rotated into camera axes.
 """
 
 from __future__ import annotations
@@ -35,9 +38,11 @@ INPUT_SIZE = KEYPOINT_COUNT * 6 + 2
 WORLD_UNIT_M = 0.5
 TORSO = np.array([11, 12, 23, 24])  # shoulders and hips
 HIPS = np.array([23, 24])
-LIMBS = np.array([0, *range(11, 17), *range(23, 29)])  # nose, arms, legs: they determine the size in the image
-# Calibration of the network's standard deviations across and along the line of sight. They are right for the simulated
-# detections of the training, but too small for real images, whose poses, builds and detector errors differ.
+# nose, arms, legs: they determine the size in the image
+LIMBS = np.array([0, *range(11, 17), *range(23, 29)])
+# Calibration of the network's standard deviations across and along the line of sight. They are
+# right for the simulated detections of the training, but too small for real images, whose poses,
+# builds and detector errors differ.
 SIGMA_CALIBRATION = np.array([1.0, 1.3])
 WORLD_SHARE = 0.75  # weight in the mixture of the estimate with world landmarks
 _WORLD_AND_KNOWN = slice(KEYPOINT_COUNT * 3, KEYPOINT_COUNT * 6 + 1)  # of the input
@@ -53,8 +58,9 @@ LONGEST_GAP_S = 0.25
 class Lifted:
     """Lifted keypoints of the body model, for T frames.
 
-    ``points`` (T, 33, 3) metres, camera axes, the hip centre at 0; ``sigma_across``, ``sigma_along`` (T, 33) metres:
-    standard deviation of a coordinate across and along the line of sight to the person.
+    ``points`` (T, 33, 3) metres, camera axes, the hip centre at 0; ``sigma_across``,
+    ``sigma_along`` (T, 33) metres: standard deviation of a coordinate across and along the line of
+    sight to the person.
     """
 
     points: NDArray[np.floating[Any]]
@@ -76,7 +82,9 @@ def virtual_camera(rays: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]
 
 
 def camera_towards(center: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
-    """Calculate the rotations (T, 3, 3) that bring rays (T, 2), in normalized image coordinates, onto the z axis."""
+    """Calculate the rotations (T, 3, 3) that bring rays (T, 2), in normalized image coordinates,
+    onto the z axis.
+    """
     z = np.concatenate([center, np.ones_like(center[:, :1])], axis=1)
     z /= np.linalg.norm(z, axis=1, keepdims=True)
     x = np.stack([z[:, 2], np.zeros_like(z[:, 0]), -z[:, 0]], axis=1)
@@ -122,11 +130,13 @@ def network_input(
     return np.concatenate(parts, axis=1), R
 
 
-def mixture(estimates: list[Lifted], weights: list[float], R_virtual_camera: NDArray[np.floating[Any]]) -> Lifted:
+def mixture(
+    estimates: list[Lifted], weights: list[float], R_virtual_camera: NDArray[np.floating[Any]]
+) -> Lifted:
     """Calculate mean and standard deviation of a mixture of several estimates of the same T frames.
 
-    P = Σ_i a_i P_i and σ² = Σ_i a_i (σ_i² + (P_i − P)²), the latter in the axes of the virtual camera. The deviation
-    grows where the estimates disagree.
+    P = Σ_i a_i P_i and σ² = Σ_i a_i (σ_i² + (P_i − P)²), the latter in the axes of the virtual
+    camera. The deviation grows where the estimates disagree.
 
     :param weights: a_i, with sum 1.
     :param R_virtual_camera: (T, 3, 3).
@@ -134,11 +144,17 @@ def mixture(estimates: list[Lifted], weights: list[float], R_virtual_camera: NDA
     weighted = list(zip(weights, estimates, strict=True))
     points = np.sum([a * estimate.points for a, estimate in weighted], axis=0)
     R_camera_virtual = np.swapaxes(R_virtual_camera, 1, 2)
-    spread = np.sum([a * np.square((estimate.points - points) @ R_camera_virtual) for a, estimate in weighted], axis=0)
-    across = np.sum([a * np.square(estimate.sigma_across) for a, estimate in weighted], axis=0) + spread[..., :2].mean(
-        axis=-1
+    spread = np.sum(
+        [a * np.square((estimate.points - points) @ R_camera_virtual) for a, estimate in weighted],
+        axis=0,
     )
-    along = np.sum([a * np.square(estimate.sigma_along) for a, estimate in weighted], axis=0) + spread[..., 2]
+    across = np.sum(
+        [a * np.square(estimate.sigma_across) for a, estimate in weighted], axis=0
+    ) + spread[..., :2].mean(axis=-1)
+    along = (
+        np.sum([a * np.square(estimate.sigma_along) for a, estimate in weighted], axis=0)
+        + spread[..., 2]
+    )
     return Lifted(points, np.sqrt(across), np.sqrt(along))
 
 
@@ -162,12 +178,15 @@ class Lifter:
         self.path = path or LIFTER_FILE
         if not self.path.is_file():
             raise SetupError(
-                f"{self.path} is missing; install the extension again, or restore the file from the repository."
+                f"{self.path} is missing; install the extension again, or restore the file from "
+                "the repository."
             )
         self._session = open_session(self.path, 1)
         shapes = [s.shape[1:] for s in (*self._session.get_inputs(), *self._session.get_outputs())]
         if shapes != [[WINDOW, INPUT_SIZE], [KEYPOINT_COUNT, 3], [KEYPOINT_COUNT, 2]]:
-            raise ModelFileError(f"{self.path} is not a lifting network of this version: its shapes are {shapes}.")
+            raise ModelFileError(
+                f"{self.path} is not a lifting network of this version: its shapes are {shapes}."
+            )
 
     def lift(
         self,
@@ -180,7 +199,8 @@ class Lifter:
 
         :param rays: (T, 33, 2) normalized image coordinates without lens distortion.
         :param confidence: (T, 33) 0..1.
-        :param world: (T, 33, 3) world landmarks in metres, hip-centred, or None to lift without them.
+        :param world: (T, 33, 3) world landmarks in metres, hip-centred, or None to lift without
+            them.
         :param windows: of the frames around each; None if every frame is a still.
         :raises ShapeError: an array has the wrong shape.
         """
@@ -200,7 +220,8 @@ class Lifter:
         windows: Windows | None = None,
         rows: NDArray[np.intp] | None = None,
     ) -> Lifted:
-        """Mix the estimates with and without world landmarks, which is more accurate on real clips than either.
+        """Mix the estimates with and without world landmarks, which is more accurate on real clips
+        than either.
 
         :param rays: (T, 33, 2), see `lift`.
         :param confidence: (T, 33) 0..1.
@@ -226,14 +247,20 @@ class Lifter:
         sigma = np.exp(log_sigma) * SIGMA_CALIBRATION
         return Lifted(points @ R_virtual_camera, sigma[..., 0], sigma[..., 1])
 
-    def run(self, x: NDArray[np.float32]) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
+    def run(
+        self, x: NDArray[np.float32]
+    ) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
         """Run the network.
 
         :param x: (T, 9, 200) float32, windows of `network_input`.
-        :return: points (T, 33, 3) in metres and log σ (T, 33, 2), both in the virtual camera's axes.
+        :return: points (T, 33, 3) in metres and log σ (T, 33, 2), both in the virtual camera's
+            axes.
         """
         name = self._session.get_inputs()[0].name
-        runs = [self._session.run(None, {name: x[k : k + _BATCH]}) for k in range(0, max(len(x), 1), _BATCH)]
+        runs = [
+            self._session.run(None, {name: x[k : k + _BATCH]})
+            for k in range(0, max(len(x), 1), _BATCH)
+        ]
         points, log_sigma = (np.concatenate([r[i] for r in runs]).astype(float) for i in (0, 1))
         return points, log_sigma
 
@@ -256,20 +283,26 @@ def _window_input(
     world: NDArray[np.floating[Any]] | None,
     around: Windows,
 ) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
-    """Calculate the input (t, 9, 200) float32 of the frames ``rows`` (t,), and R_virtual_camera (t, 3, 3)."""
+    """Calculate the input (t, 9, 200) float32 of the frames ``rows`` (t,), and R_virtual_camera (t,
+    3, 3).
+    """
     first, end = around.span(rows) if len(rows) else (0, 0)
     n = end - first
     landmarks = np.zeros((n, KEYPOINT_COUNT, 3)) if world is None else world[first:end]
-    x, R = network_input(rays[first:end], confidence[first:end], landmarks, np.full(n, world is not None, float))
+    x, R = network_input(
+        rays[first:end], confidence[first:end], landmarks, np.full(n, world is not None, float)
+    )
     return around.gather(x.astype(np.float32), rows, first), R[rows - first]
 
 
 @dataclass(frozen=True)
 class Windows:
-    """Windows around T frames, of samples that are evenly spaced: ``(1 - share) x[before] + share x[after]``.
+    """Windows around T frames, of samples that are evenly spaced: ``(1 - share) x[before] + share
+    x[after]``.
 
-    At any frame rate, a sample between two frames is interpolated linearly. A window ends where the person was not seen
-    for longer than `LONGEST_GAP_S`; its last sample is then repeated. The window of a still repeats one frame.
+    At any frame rate, a sample between two frames is interpolated linearly. A window ends where the
+    person was not seen for longer than `LONGEST_GAP_S`; its last sample is then repeated. The
+    window of a still repeats one frame.
 
     ``before``, ``after`` (T, WINDOW) rows; ``share`` (T, WINDOW) float32, 0..1.
     """
@@ -278,7 +311,9 @@ class Windows:
     after: NDArray[np.intp]
     share: NDArray[np.float32]
 
-    def gather(self, x: NDArray[np.float32], rows: NDArray[np.intp], first: int) -> NDArray[np.float32]:
+    def gather(
+        self, x: NDArray[np.float32], rows: NDArray[np.intp], first: int
+    ) -> NDArray[np.float32]:
         """Interpolate the windows of some frames.
 
         :param x: (N, C) values, whose row 0 is that of frame ``first``.
@@ -301,14 +336,16 @@ def windows_around(times: NDArray[np.floating[Any]], seen: NDArray[np.bool_]) ->
     """Calculate the windows of T frames, from those in which the person was seen.
 
     :param times: (T,) seconds, ascending.
-    :param seen: (T,) whether the person was seen. The windows of other frames consist of the seen frames around them.
+    :param seen: (T,) whether the person was seen. The windows of other frames consist of the seen
+        frames around them.
     """
     rows = np.flatnonzero(seen)
     if not len(rows):
         rows = np.arange(len(times))
     known = times[rows]
     run = np.concatenate([[0], np.cumsum(np.diff(known) > LONGEST_GAP_S)])
-    own = np.maximum(np.searchsorted(rows, np.arange(len(times)), side="right") - 1, 0)  # the last seen frame
+    # the last seen frame
+    own = np.maximum(np.searchsorted(rows, np.arange(len(times)), side="right") - 1, 0)
     low, high = (ends[own, None] for ends in ends_of_runs(run))
     samples = times[:, None] + OFFSETS_S
     after = np.clip(np.searchsorted(known, samples), low, high)
@@ -319,7 +356,9 @@ def windows_around(times: NDArray[np.floating[Any]], seen: NDArray[np.bool_]) ->
 
 
 def ends_of_runs(numbers: NDArray[Any]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Find the indices (n,) of the first and of the last number equal to each of the non-decreasing numbers (n,)."""
+    """Find the indices (n,) of the first and of the last number equal to each of the non-decreasing
+    numbers (n,).
+    """
     return np.searchsorted(numbers, numbers), np.searchsorted(numbers, numbers, side="right") - 1
 
 

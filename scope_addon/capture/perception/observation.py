@@ -18,9 +18,11 @@ PendingReference = Future[NDArray[np.float64] | None]
 
 @dataclass(frozen=True)
 class PersonMask:
-    """Which pixels of a region show its person: ``probability`` (256, 256) in the crop of ``region``.
+    """Which pixels of a region show its person: ``probability`` (256, 256) in the crop of
+    ``region``.
 
-    ``image_size``: width and height of the image in pixels; beyond its border the mask says nothing.
+    ``image_size``: width and height of the image in pixels; beyond its border the mask says
+    nothing.
     """
 
     region: Region
@@ -32,15 +34,17 @@ class PersonMask:
 class Observation:
     """Estimate of one person in one frame.
 
-    ``keypoints_px`` (33, 2) pixels of the frame; ``keypoints_confidence`` (33,) 0..1; ``world_landmarks`` (33, 3)
-    metres, the hip centre at 0, in camera axes (x right, y down, z forward), or all 0 where depth is unknown;
-    ``presence``: the network's probability that there is a person; ``region``: the network's input region;
-    ``acquired``: the person was not tracked from the previous frame; ``appearance``: see `appearance`, in some frames;
-    ``reference_landmarks``: pending result of the heavy network, to replace ``world_landmarks``, in few frames. Order:
-    `KEYPOINT_NAMES`. ``hands`` (2, 21, 6), if requested: pixels, confidence and world landmarks of the left and right
-    hand, see `hand_tracker`; zeros where not seen, the confidence negative where `tentative_hands` decides later. The
-    tracker fills a hand in up to a third of a second later, if it is found again, so the array has to be kept itself.
-    ``face``, if requested: see `face_record`. ``mask``: the person's outline, in few frames.
+    ``keypoints_px`` (33, 2) pixels of the frame; ``keypoints_confidence`` (33,) 0..1;
+    ``world_landmarks`` (33, 3) metres, the hip centre at 0, in camera axes (x right, y down, z
+    forward), or all 0 where depth is unknown; ``presence``: the network's probability that there is
+    a person; ``region``: the network's input region; ``acquired``: the person was not tracked from
+    the previous frame; ``appearance``: see `appearance`, in some frames; ``reference_landmarks``:
+    pending result of the heavy network, to replace ``world_landmarks``, in few frames. Order:
+    `KEYPOINT_NAMES`. ``hands`` (2, 21, 6), if requested: pixels, confidence and world landmarks of
+    the left and right hand, see `hand_tracker`; zeros where not seen, the confidence negative where
+    `tentative_hands` decides later. The tracker fills a hand in up to a third of a second later, if
+    it is found again, so the array has to be kept itself. ``face``, if requested: see
+    `face_record`. ``mask``: the person's outline, in few frames.
     """
 
     keypoints_px: NDArray[np.float64]

@@ -18,14 +18,19 @@ from .sessions import network_path, open_session
 INPUT_SIZE = 224
 SCORE_THRESHOLD = 0.5
 OVERLAP_THRESHOLD = 0.3
-_LAYERS = ((8, 2), (16, 2), (32, 6))  # stride, anchors per cell; the three stride-32 layers are combined
+# stride, anchors per cell; the three stride-32 layers are combined
+_LAYERS = ((8, 2), (16, 2), (32, 6))
 _SCORE_LIMIT = 100.0
-_SURE_SCORE = 0.8  # from which the squares are not searched: such a person fills a good part of the image
+# from which the squares are not searched: such a person fills a good part of the image
+_SURE_SCORE = 0.8
 _SQUARES_FROM = 1.2  # aspect ratio from which squares show people larger
 _SMALL_SCORE = 0.8  # least score of a small person: more squares hold more that resembles a person
-_SMALL_SIDE = 1 / 3  # of the squares in which small people are looked for, in shorter sides of the image
-_SMALL_STEP = 0.6  # from one of them to the next at most, in their sides; the rest holds such a person's height
-_PART_SIDE = 0.6  # of the squares in which people are looked for beside larger ones, in shorter sides of the image
+# of the squares in which small people are looked for, in shorter sides of the image
+_SMALL_SIDE = 1 / 3
+# from one of them to the next at most, in their sides; the rest holds such a person's height
+_SMALL_STEP = 0.6
+# of the squares in which people are looked for beside larger ones, in shorter sides of the image
+_PART_SIDE = 0.6
 _PART_STEP = 2 / 3  # the same for these
 
 
@@ -33,8 +38,9 @@ _PART_STEP = 2 / 3  # the same for these
 class Detection:
     """One detected person.
 
-    ``score`` 0..1; ``box_px`` (4,) left, top, right, bottom of the face; ``points_px`` (4, 2), both in image pixels.
-    Point 0 is the hip centre, point 1 lies on the body circle around it, above the head.
+    ``score`` 0..1; ``box_px`` (4,) left, top, right, bottom of the face; ``points_px`` (4, 2), both
+    in image pixels. Point 0 is the hip centre, point 1 lies on the body circle around it, above the
+    head.
     """
 
     score: float
@@ -59,55 +65,75 @@ class PersonDetector:
         self._anchors = make_anchors()
 
     def detect(
-        self, image_rgb: NDArray[np.uint8], threshold: float = SCORE_THRESHOLD, closely: bool = False
+        self,
+        image_rgb: NDArray[np.uint8],
+        threshold: float = SCORE_THRESHOLD,
+        closely: bool = False,
     ) -> list[Detection]:
         """Detect all people in an (H, W, 3) uint8 RGB image, best first.
 
-        Searches the whole image. If that finds nobody with a high score, or with ``closely``, the search continues in
-        overlapping squares of an oblong image, which show people larger.
+        Searches the whole image. If that finds nobody with a high score, or with ``closely``, the
+        search continues in overlapping squares of an oblong image, which show people larger.
         """
         found = self._detect_in(image_rgb, threshold, (0, 0))
         if closely or not found or found[0].score < _SURE_SCORE:
             for left, top, side in squares(*image_rgb.shape[:2]):
-                found += self._detect_in(image_rgb[top : top + side, left : left + side], threshold, (left, top))
+                found += self._detect_in(
+                    image_rgb[top : top + side, left : left + side], threshold, (left, top)
+                )
             found = unique(found)
         return found
 
     def detect_small(self, image_rgb: NDArray[np.uint8]) -> list[Detection]:
-        """Detect people of about a tenth to a quarter of the shorter side, whom `detect` misses, best first.
+        """Detect people of about a tenth to a quarter of the shorter side, whom `detect` misses,
+        best first.
 
-        Searches some thirty to fifty squares of an (H, W, 3) uint8 RGB image, and takes as many times as long as
-        `detect` takes for the whole image.
+        Searches some thirty to fifty squares of an (H, W, 3) uint8 RGB image, and takes as many
+        times as long as `detect` takes for the whole image.
         """
         return self._detect_in_squares(image_rgb, small_squares(*image_rgb.shape[:2]))
 
     def detect_in_parts(self, image_rgb: NDArray[np.uint8]) -> list[Detection]:
-        """Detect people of about a fifth to two fifths of the shorter side, whom `detect` misses, best first.
+        """Detect people of about a fifth to two fifths of the shorter side, whom `detect` misses,
+        best first.
 
-        Beside somebody larger, their scores are low even in an image that shows them large enough. Searches some four
-        to eight squares of an (H, W, 3) uint8 RGB image, and takes as many times as long as `detect` takes for the
-        whole image.
+        Beside somebody larger, their scores are low even in an image that shows them large enough.
+        Searches some four to eight squares of an (H, W, 3) uint8 RGB image, and takes as many times
+        as long as `detect` takes for the whole image.
         """
         return self._detect_in_squares(image_rgb, parts(*image_rgb.shape[:2]))
 
-    def _detect_in_squares(self, image_rgb: NDArray[np.uint8], within: list[tuple[int, int, int]]) -> list[Detection]:
+    def _detect_in_squares(
+        self, image_rgb: NDArray[np.uint8], within: list[tuple[int, int, int]]
+    ) -> list[Detection]:
         found: list[Detection] = []
         for left, top, side in within:
-            found += self._detect_in(image_rgb[top : top + side, left : left + side], _SMALL_SCORE, (left, top))
+            found += self._detect_in(
+                image_rgb[top : top + side, left : left + side], _SMALL_SCORE, (left, top)
+            )
         return unique(found)
 
-    def _detect_in(self, image_rgb: NDArray[np.uint8], threshold: float, corner: tuple[int, int]) -> list[Detection]:
-        fitted, scale = fit_in(image_rgb, INPUT_SIZE, INPUT_SIZE, border=0), INPUT_SIZE / max(image_rgb.shape[:2])
+    def _detect_in(
+        self, image_rgb: NDArray[np.uint8], threshold: float, corner: tuple[int, int]
+    ) -> list[Detection]:
+        fitted, scale = (
+            fit_in(image_rgb, INPUT_SIZE, INPUT_SIZE, border=0),
+            INPUT_SIZE / max(image_rgb.shape[:2]),
+        )
         blob = cv2.dnn.blobFromImage(fitted.picture_rgb, 1 / 127.5, mean=(127.5, 127.5, 127.5))
         boxes, scores = self._session.run(["boxes", "scores"], {"input": blob})
         score, values = decode(boxes[0], scores[0, :, 0], self._anchors, threshold)
         score, values = merge_overlapping(score, values)
         values = (values.reshape(-1, 6, 2) - fitted.offset) / scale - 0.5 + corner
-        return [Detection(float(s), v[:2].ravel(), v[2:]) for s, v in zip(score, values, strict=True)]
+        return [
+            Detection(float(s), v[:2].ravel(), v[2:]) for s, v in zip(score, values, strict=True)
+        ]
 
 
 def squares(height: int, width: int) -> list[tuple[int, int, int]]:
-    """Calculate (left, top, side) of the overlapping squares that cover an image; none if it is nearly square."""
+    """Calculate (left, top, side) of the overlapping squares that cover an image; none if it is
+    nearly square.
+    """
     side, length = min(height, width), max(height, width)
     if length < _SQUARES_FROM * side:
         return []
@@ -124,21 +150,29 @@ def small_squares(height: int, width: int) -> list[tuple[int, int, int]]:
 
 
 def parts(height: int, width: int) -> list[tuple[int, int, int]]:
-    """Calculate (left, top, side) of the squares in which people are looked for beside larger ones, row by row."""
+    """Calculate (left, top, side) of the squares in which people are looked for beside larger ones,
+    row by row.
+    """
     return _grid(height, width, max(1, round(min(height, width) * _PART_SIDE)), _PART_STEP)
 
 
 def _grid(height: int, width: int, side: int, step: float) -> list[tuple[int, int, int]]:
-    """Calculate (left, top, side) of squares that cover an image; one begins ``step`` sides after another at most."""
+    """Calculate (left, top, side) of squares that cover an image; one begins ``step`` sides after
+    another at most.
+    """
     starts = [
-        np.linspace(0, length - side, math.ceil((length - side) / (side * step)) + 1).astype(int).tolist()
+        np.linspace(0, length - side, math.ceil((length - side) / (side * step)) + 1)
+        .astype(int)
+        .tolist()
         for length in (height, width)
     ]
     return [(left, top, side) for top in starts[0] for left in starts[1]]
 
 
 def unique(detections: list[Detection]) -> list[Detection]:
-    """Drop detections whose hips are well inside the body circle of a better one of similar size; best first."""
+    """Drop detections whose hips are well inside the body circle of a better one of similar size;
+    best first.
+    """
     kept: list[Detection] = []
     for detection in sorted(detections, key=lambda d: -d.score):
         if not any(detection.region.resembles(other.region, 0.25) for other in kept):
@@ -146,8 +180,11 @@ def unique(detections: list[Detection]) -> list[Detection]:
     return kept
 
 
-def make_anchors(size: int = INPUT_SIZE, strides: tuple[tuple[int, int], ...] = _LAYERS) -> NDArray[np.float64]:
-    """Calculate the anchor centres in the network's order: by layer, row, column, anchor of the cell.
+def make_anchors(
+    size: int = INPUT_SIZE, strides: tuple[tuple[int, int], ...] = _LAYERS
+) -> NDArray[np.float64]:
+    """Calculate the anchor centres in the network's order: by layer, row, column, anchor of the
+    cell.
 
     :param size: side of the network's input, pixels.
     :param strides: stride and anchors per cell of each layer.
@@ -162,14 +199,19 @@ def make_anchors(size: int = INPUT_SIZE, strides: tuple[tuple[int, int], ...] = 
 
 
 def decode(
-    boxes: NDArray[np.float32], logits: NDArray[np.float32], anchors: NDArray[np.float64], threshold: float
+    boxes: NDArray[np.float32],
+    logits: NDArray[np.float32],
+    anchors: NDArray[np.float64],
+    threshold: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Convert the network's raw outputs to boxes and points.
 
-    :param boxes: (A, 4 + 2n): box centre relative to the anchor, box size, n points relative to the anchor.
+    :param boxes: (A, 4 + 2n): box centre relative to the anchor, box size, n points relative to the
+        anchor.
     :param logits: (A,) of the scores.
     :param anchors: (A, 2), see `make_anchors`.
-    :return: scores (N,) and values (N, 4 + 2n): left, top, right, bottom, n × (x, y) in input pixels; best first.
+    :return: scores (N,) and values (N, 4 + 2n): left, top, right, bottom, n × (x, y) in input
+        pixels; best first.
     """
     score = 1.0 / (1.0 + np.exp(-np.clip(logits.astype(float), -_SCORE_LIMIT, _SCORE_LIMIT)))
     chosen = np.flatnonzero(score >= threshold)
@@ -183,7 +225,8 @@ def decode(
 def merge_overlapping(
     score: NDArray[np.float64], values: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Merge each cluster of boxes to its score-weighted mean with its best score (weighted non-maximum suppression).
+    """Merge each cluster of boxes to its score-weighted mean with its best score (weighted
+    non-maximum suppression).
 
     :param score: (N,) descending.
     :param values: (N, 4 + 2n), see `decode`.
@@ -196,7 +239,8 @@ def merge_overlapping(
 
 
 def overlap_clusters(corners: NDArray[np.float64], threshold: float) -> list[NDArray[np.intp]]:
-    """Cluster boxes: the best remaining box and all whose intersection over union with it exceeds the threshold.
+    """Cluster boxes: the best remaining box and all whose intersection over union with it exceeds
+    the threshold.
 
     :param corners: (N, 4 + M) left, top, right, bottom and M more columns; best box first.
     :return: indices of the boxes of each cluster, the best first.

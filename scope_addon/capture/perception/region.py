@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The rotated square of the image that a landmark network looks at.
 
-Image coordinates are OpenCV's: the centre of the top left pixel is (0, 0), y runs down. Crop coordinates s run from
-(0, 0) at the top left corner of the square to (1, 1) at its bottom right one.
+Image coordinates are OpenCV's: the centre of the top left pixel is (0, 0), y runs down. Crop
+coordinates s run from (0, 0) at the top left corner of the square to (1, 1) at its bottom right
+one.
 """
 
 from __future__ import annotations
@@ -23,7 +24,9 @@ MARGIN = 1.25  # side of the square over the body circle's diameter
 
 @dataclass(frozen=True)
 class Region:
-    """A square of ``side_px`` around ``center_px`` (x, y), rotated by ``rotation`` radians, clockwise on screen."""
+    """A square of ``side_px`` around ``center_px`` (x, y), rotated by ``rotation`` radians,
+    clockwise on screen.
+    """
 
     center_px: tuple[float, float]
     side_px: float
@@ -48,7 +51,8 @@ class Region:
         return cropped
 
     def cut(self, image_rgb: NDArray[np.uint8], size: int) -> NDArray[np.uint8]:
-        """Resample the square to (size, size, 3); outside the image (H, W, 3), its border pixels are repeated.
+        """Resample the square to (size, size, 3); outside the image (H, W, 3), its border pixels
+        are repeated.
 
         A black border would cost the landmark networks 3 mm of accuracy on people at the edge.
         """
@@ -63,7 +67,9 @@ class Region:
         return cast(NDArray[np.uint8], crop)
 
     def rotate_to_camera(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Rotate 3D vectors (..., 3) from the square's axes (x right, y down, z forward) to the camera's axes."""
+        """Rotate 3D vectors (..., 3) from the square's axes (x right, y down, z forward) to the
+        camera's axes.
+        """
         R_camera_crop = np.eye(3)
         R_camera_crop[:2, :2] = self.R_image_crop
         return np.asarray(vectors) @ R_camera_crop.T
@@ -74,17 +80,23 @@ class Region:
         return replace(self, center_px=(float(x), float(y)))
 
     def is_near(self, other: Region) -> bool:
-        """Check if a person in one may occlude one in the other: centres within three quarters of a side."""
+        """Check if a person in one may occlude one in the other: centres within three quarters of a
+        side.
+        """
         return math.dist(self.center_px, other.center_px) <= 0.75 * max(self.side_px, other.side_px)
 
     def resembles(self, other: Region, distance: float) -> bool:
-        """Check if both may show the same person: centres within ``distance`` sides, sides within a factor of two."""
+        """Check if both may show the same person: centres within ``distance`` sides, sides within a
+        factor of two.
+        """
         apart = math.dist(self.center_px, other.center_px)
         larger, smaller = max(self.side_px, other.side_px), min(self.side_px, other.side_px)
         return apart <= distance * larger and larger <= 2 * smaller
 
     def difference(self, other: Region) -> float:
-        """Return the distance of the centres in sides of the larger square plus |log| of the ratio of the sides."""
+        """Return the distance of the centres in sides of the larger square plus |log| of the ratio
+        of the sides.
+        """
         smaller, larger = sorted((max(self.side_px, 1e-9), max(other.side_px, 1e-9)))
         return math.dist(self.center_px, other.center_px) / larger + math.log(larger / smaller)
 
@@ -92,7 +104,8 @@ class Region:
 def _shrink(
     image: NDArray[np.uint8], A: NDArray[np.float64], size: int, halvings: int
 ) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
-    """Shrink the image under the square by powers of two, so that a large square is sampled without aliasing.
+    """Shrink the image under the square by powers of two, so that a large square is sampled without
+    aliasing.
 
     :return: the smaller image, and the affine map onto it.
     """
@@ -115,13 +128,14 @@ def _shrink(
 
 
 def region_from_points(center_px: NDArray[np.float64], top_px: NDArray[np.float64]) -> Region:
-    """Calculate the region of a person, centred on the hips, with ``top_px`` straight above in the crop.
+    """Calculate the region of a person, centred on the hips, with ``top_px`` straight above in the
+    crop.
 
     side = 2 · |top − center| · 1.25; the rotation makes center → top point up: atan2(dx, −dy).
 
     :param center_px: (2,) hip centre, pixels.
-    :param top_px: (2,) on the circle around the hips that encloses the whole person (MediaPipe's second detection point
-        and auxiliary landmark).
+    :param top_px: (2,) on the circle around the hips that encloses the whole person (MediaPipe's
+        second detection point and auxiliary landmark).
     """
     dx, dy = (np.asarray(top_px, float) - np.asarray(center_px, float)).tolist()
     side = 2.0 * MARGIN * math.hypot(dx, dy)
@@ -131,7 +145,9 @@ def region_from_points(center_px: NDArray[np.float64], top_px: NDArray[np.float6
 def box_along(
     points: NDArray[np.floating[Any]], rotation: float
 ) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
-    """Calculate the centre (2,) and the sides (2,) of the box around points (n, 2) in the axes of a rotated region."""
+    """Calculate the centre (2,) and the sides (2,) of the box around points (n, 2) in the axes of a
+    rotated region.
+    """
     R_image_box = Region((0.0, 0.0), 1.0, rotation).R_image_crop
     along = points @ R_image_box
     low, high = along.min(axis=0), along.max(axis=0)
@@ -144,13 +160,17 @@ def bounds(points: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
 
 
 def surroundings(points: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
-    """Calculate the bounding box (4,) of a person's points (n, 2), with a margin of a tenth of its longer side."""
+    """Calculate the bounding box (4,) of a person's points (n, 2), with a margin of a tenth of its
+    longer side.
+    """
     low, high = np.split(bounds(points), 2)
     margin = 0.1 * (high - low).max()
     return np.concatenate([low - margin, high + margin])
 
 
-def inside(points: NDArray[np.floating[Any]], boxes: Sequence[NDArray[np.floating[Any]]]) -> NDArray[np.bool_]:
+def inside(
+    points: NDArray[np.floating[Any]], boxes: Sequence[NDArray[np.floating[Any]]]
+) -> NDArray[np.bool_]:
     """Check (n,) whether each point (n, 2) is in one of the boxes (4,) x0, y0, x1, y1."""
     found = np.zeros(len(points), bool)
     for box in boxes:

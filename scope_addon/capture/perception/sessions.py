@@ -31,7 +31,10 @@ def landmark_network_name(quality: str) -> str:
     :raises UsageError: there is no such preset.
     """
     if quality not in LANDMARK_NETWORK_OF_QUALITY:
-        raise UsageError(f"Quality {quality!r} does not exist; choose one of {', '.join(LANDMARK_NETWORK_OF_QUALITY)}.")
+        raise UsageError(
+            f"Quality {quality!r} does not exist; choose one of "
+            f"{', '.join(LANDMARK_NETWORK_OF_QUALITY)}."
+        )
     return LANDMARK_NETWORK_OF_QUALITY[quality]
 
 
@@ -43,7 +46,8 @@ def network_path(name: str) -> Path:
     path = NETWORKS_FOLDER / f"{name}.onnx"
     if not path.is_file():
         raise SetupError(
-            f"{path} is missing. Build the networks in the repository with: python -m scope.tools.convert_networks "
+            f"{path} is missing. Build the networks in the repository with: python -m "
+            "scope.tools.convert_networks "
             "(a wheel contains none: capture with the scripts of the repository)"
         )
     return path
@@ -55,7 +59,8 @@ def open_session(
     execution: Execution | None = None,
     open_on: Callable[[str, Path, int], Any] | None = None,
 ) -> onnxruntime.InferenceSession:
-    """Open an onnxruntime session with ``threads`` threads, on the requested provider if it is available.
+    """Open an onnxruntime session with ``threads`` threads, on the requested provider if it is
+    available.
 
     :param open_on: opens the session on a provider, given by our name; None: in this process.
     :raises ModelFileError: the file is damaged, or uses operators that onnxruntime does not have.
@@ -96,14 +101,18 @@ def _cannot_load(path: Path, error: Exception) -> str:
     text = f"{path}: onnxruntime cannot load this network ({' '.join(str(error).split())})."
     if path.parent == NETWORKS_FOLDER:
         return f"{text} Build it again with: python -m scope.tools.convert_networks --force"
-    return f"{text} Export it again, with standard operators alone, an opset that is not newer, and all its weights."
+    return (
+        f"{text} Export it again, with standard operators alone, an opset that is not newer, and "
+        f"all its weights."
+    )
 
 
 @cache
 def _runtime() -> ModuleType:
     try:
         runtime = load_runtime()
-        if not hasattr(runtime, "InferenceSession"):  # it swallows the reason why its library was not loaded
+        # it swallows the reason why its library was not loaded
+        if not hasattr(runtime, "InferenceSession"):
             raise ImportError("its library cannot be loaded")
     except ImportError as error:
         raise SetupError(

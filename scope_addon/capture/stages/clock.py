@@ -9,13 +9,16 @@ from contextlib import contextmanager
 
 MAX_TIMES = 4  # that are listed in a sentence
 FINDING = "finding the person"  # a stage, in which the footage is decoded and observed
-COMPILING = "compiling the solver"  # a stage of the first capture on a computer for which no machine code is shipped
+# a stage of the first capture on a computer for which no machine code is shipped
+COMPILING = "compiling the solver"
 # Called with the stage's name, the steps done and the total (0: unknown). May raise CancelledError.
 Progress = Callable[[str, int, int], None]
 
 
 class StageClock:
-    """Adds up the seconds of each stage; of stages in other threads, only the time that the main thread waited for."""
+    """Adds up the seconds of each stage; of stages in other threads, only the time that the main
+    thread waited for.
+    """
 
     def __init__(self) -> None:
         """Start with no stage."""

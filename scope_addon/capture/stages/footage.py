@@ -19,7 +19,8 @@ from ..options import CaptureOptions
 from ..perception.observation import Observation
 from .clock import Progress
 
-# Called with each decoded frame, its largest person, and the object that fits the body to such an observation.
+# Called with each decoded frame, its largest person, and the object that fits the body to such an
+# observation.
 Watch = Callable[[Frame, Observation | None, LiveBody], None]
 
 

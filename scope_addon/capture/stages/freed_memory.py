@@ -9,7 +9,9 @@ from contextlib import suppress
 
 
 def return_freed_memory() -> None:
-    """Have glibc return what it keeps for later; nothing with other C libraries, which return it themselves."""
+    """Have glibc return what it keeps for later; nothing with other C libraries, which return it
+    themselves.
+    """
     if sys.platform.startswith("linux"):
         with suppress(OSError, AttributeError):  # musl has no such function
             ctypes.CDLL(None).malloc_trim(0)

@@ -24,10 +24,14 @@ class Trackers(NamedTuple):
 
 
 def network_threads(wanted: int, execution: Execution) -> int:
-    """Return how many threads to use: at most as many as there are cores, since more would wait for each other."""
+    """Return how many threads to use: at most as many as there are cores, since more would wait for
+    each other.
+    """
     cores = os.cpu_count() or 1
     if wanted > cores:
-        execution.warnings.append(f"{wanted} threads were requested, but there are only {cores} cores")
+        execution.warnings.append(
+            f"{wanted} threads were requested, but there are only {cores} cores"
+        )
     return min(wanted or cores, cores)
 
 
@@ -45,6 +49,11 @@ def open_trackers(
         kept=kept,
     )
     least_px = LARGE_HAND_PX if options.hands == AUTO else SMALLEST_HAND_PX
-    hands = None if options.hands == OFF else HandTracker(threads, execution=execution, least_px=least_px)
-    # The face's small layers take twice the processor time in two threads, which mostly wait for each other.
+    hands = (
+        None
+        if options.hands == OFF
+        else HandTracker(threads, execution=execution, least_px=least_px)
+    )
+    # The face's small layers take twice the processor time in two threads, which mostly wait for
+    # each other.
     return Trackers(people, hands, FaceTracker(1, execution=execution) if options.face else None)

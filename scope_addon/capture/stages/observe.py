@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Observation: the people in every frame, and the camera as estimated from the background. No frame is kept."""
+"""Observation: the people in every frame, and the camera as estimated from the background. No frame
+is kept.
+"""
 
 from __future__ import annotations
 
@@ -32,8 +34,8 @@ def observe(
 ) -> tuple[Footage, list[Track]]:
     """Detect and track the people of all frames, the most prominent one first.
 
-    :param unfinished: folder with what an earlier capture that was killed has found, and in which to keep what this one
-        finds; None: nothing is kept.
+    :param unfinished: folder with what an earlier capture that was killed has found, and in which
+        to keep what this one finds; None: nothing is kept.
     :param windows: folder with windows of the clip that were observed before.
     :raises VideoError: there is no frame in the chosen range.
     :raises NoPersonError: nobody was found.
@@ -43,7 +45,10 @@ def observe(
     live = LiveBody(body, camera, options.ablation, next(iter(options.heights_m), None))
     fits = FocalFits(body, options.ablation)
     plan = plan_windows(video, options.window_s)
-    with BackgroundEstimators(camera, video.width, video.height, live, fits) as background, opencv_in_one_thread():
+    with (
+        BackgroundEstimators(camera, video.width, video.height, live, fits) as background,
+        opencv_in_one_thread(),
+    ):
         clip = WindowedClip(video, plan, options, clock, background.pool, unfinished)
         footage, tracks = clip.observe(background, live, listeners, windows)
     if not tracks:
@@ -55,10 +60,12 @@ def observe(
 def _no_person_error(path: Path, frames: int, own_networks: list[Path]) -> NoPersonError:
     where = f"in the {frames} frames of {path.name}" if frames > 1 else f"in {path.name}"
     networks = "".join(
-        f"; if people are found without {own.name}, state in {description_path(own).name} which colours it expects"
+        f"; if people are found without {own.name}, state in {description_path(own).name} which "
+        "colours it expects"
         for own in own_networks
     )
     return NoPersonError(
-        f"no person was found {where}: at least one person must be mostly in the image and at least "
+        f"no person was found {where}: at least one person must be mostly in the image and at "
+        "least "
         f"a tenth as tall as its shorter side; crop footage of smaller people{networks}"
     )

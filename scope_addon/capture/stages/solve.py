@@ -26,15 +26,16 @@ from ..world.world_frame import SharedWorld, find_world
 from .clock import Progress
 from .freed_memory import return_freed_memory
 
-# Of the prior of a stature that follows from the floor, relative. A compromise: 0.05 suits adults best, less suits
-# children, whose proportions are taken for adults' (benchmarks/notebook/clip.md).
+# Of the prior of a stature that follows from the floor, relative. A compromise: 0.05 suits adults
+# best, less suits children, whose proportions are taken for adults' (benchmarks/notebook/clip.md).
 FLOOR_STATURE_SIGMA = 0.02
 MIN_RESIZE = 0.03  # relative change of a size from which on a person is fitted again
 
 
 @dataclass(frozen=True)
 class Solved:
-    """Motions, the most prominent person first; the camera's path; the solver's mean iterations per frame.
+    """Motions, the most prominent person first; the camera's path; the solver's mean iterations per
+    frame.
 
     ``up_source``: what the world's up direction follows from, see `SharedWorld`.
     """
@@ -45,10 +46,13 @@ class Solved:
     up_source: str
 
 
-def solve(shot: Shot, tracks: Iterable[Track], progress: Progress, heights_m: Sequence[float] = ()) -> Solved:
+def solve(
+    shot: Shot, tracks: Iterable[Track], progress: Progress, heights_m: Sequence[float] = ()
+) -> Solved:
     """Fit each person separately, estimate the world they share, and transform the motions to it.
 
-    For a clip of an hour, each list below takes hundreds of megabytes, so it is deleted as soon as possible.
+    For a clip of an hour, each list below takes hundreds of megabytes, so it is deleted as soon as
+    possible.
 
     :param tracks: the most prominent person's first; an iterator that keeps none saves 40 MB each.
     :param heights_m: known statures of the first people, metres.
@@ -57,17 +61,23 @@ def solve(shot: Shot, tracks: Iterable[Track], progress: Progress, heights_m: Se
     return_freed_memory()
     count = len(prepared)
     fits = [
-        to_single_precision(fit_track(each, progress_of_person(progress, k, count))) for k, each in enumerate(prepared)
+        to_single_precision(fit_track(each, progress_of_person(progress, k, count)))
+        for k, each in enumerate(prepared)
     ]
     prepared, fits = resize_people(shot, prepared, fits, heights_m, progress)
-    shot, iterations = replace(shot, path=find_camera_path(shot, prepared[0], fits[0])), fits[0].iterations
+    shot, iterations = (
+        replace(shot, path=find_camera_path(shot, prepared[0], fits[0])),
+        fits[0].iterations,
+    )
     known = [(each.track, each.whole_body) for each in prepared]
     if shot.ablation.stance and not shot.is_still:
         prepared, fits = ground_all(shot, prepared, fits)
     return_freed_memory()
     people, placed = [], []
     for k, (track, body) in enumerate(known):
-        raw, finished = refine(shot, prepared.pop(0), fits.pop(0), progress_of_person(progress, k, count))
+        raw, finished = refine(
+            shot, prepared.pop(0), fits.pop(0), progress_of_person(progress, k, count)
+        )
         people.append(FittedPerson(track, RawMotion.of(track, raw, shot.path), body))
         del raw
         placed.append(place(shot, track, finished, smoothing=False))
@@ -83,7 +93,8 @@ def solve(shot: Shot, tracks: Iterable[Track], progress: Progress, heights_m: Se
 
 
 def progress_of_person(progress: Progress, number: int, count: int) -> Progress:
-    """Return what reports the progress of the ``number``-th of ``count`` people, from 0, as that of all together.
+    """Return what reports the progress of the ``number``-th of ``count`` people, from 0, as that of
+    all together.
 
     A stage without steps has one for each person if there are several.
     """
@@ -98,7 +109,9 @@ def progress_of_person(progress: Progress, number: int, count: int) -> Progress:
 
 
 def prepare(shot: Shot, tracks: Iterable[Track], heights_m: Sequence[float]) -> list[PreparedTrack]:
-    """Lift every track to 3D and set up its priors. The fingers of people of whom no hand is seen are left out."""
+    """Lift every track to 3D and set up its priors. The fingers of people of whom no hand is seen
+    are left out.
+    """
     out = []
     for k, track in enumerate(tracks):
         height_m = heights_m[k] if k < len(heights_m) else None
@@ -114,7 +127,9 @@ def place(shot: Shot, track: Track, fit: FittedTrack, smoothing: bool = True) ->
     return place_track(shot.body, track, fit, smoothing, shot.path, shot.uneven_ground)
 
 
-def place_each(shot: Shot, prepared: Sequence[PreparedTrack], fits: Sequence[FittedTrack]) -> list[PlacedTrack]:
+def place_each(
+    shot: Shot, prepared: Sequence[PreparedTrack], fits: Sequence[FittedTrack]
+) -> list[PlacedTrack]:
     """Place the fit of each person; see `place`."""
     pairs = zip(prepared, fits, strict=True)
     return [place(shot, each.track, fit.with_fingers_at_rest(each)) for each, fit in pairs]
@@ -129,7 +144,8 @@ def resize_people(
 ) -> tuple[list[PreparedTrack], list[FittedTrack]]:
     """Fit those again whose size contradicts that of somebody of known stature on the same floor.
 
-    The camera's travel is not known yet, so with a camera that travels, sizes follow from the clip's first places.
+    The camera's travel is not known yet, so with a camera that travels, sizes follow from the
+    clip's first places.
     """
     prepared, fits, count = list(prepared), list(fits), len(prepared)
     if not 0 < len(heights_m) < count or not shot.ablation.stance or shot.uneven_ground:
@@ -142,13 +158,19 @@ def resize_people(
     for k, factor in enumerate(relative_sizes(people)):
         if abs(np.log(factor)) > MIN_RESIZE:
             height_m = factor * people[k].stature_m
-            prepared[k] = prepared[k].with_height(max(height_m, CHILD_BELOW_M), FLOOR_STATURE_SIGMA * height_m)
-            fits[k] = to_single_precision(fit_track(prepared[k], progress_of_person(progress, k, count)))
+            prepared[k] = prepared[k].with_height(
+                max(height_m, CHILD_BELOW_M), FLOOR_STATURE_SIGMA * height_m
+            )
+            fits[k] = to_single_precision(
+                fit_track(prepared[k], progress_of_person(progress, k, count))
+            )
     return prepared, fits
 
 
 def find_camera_path(shot: Shot, first: PreparedTrack, fit: FittedTrack) -> CameraPath:
-    """Return the camera's path; the travel of a rotating camera is estimated from one person's feet."""
+    """Return the camera's path; the travel of a rotating camera is estimated from one person's
+    feet.
+    """
     if shot.path.is_static or shot.is_still:
         return shot.path
     [placed] = place_each(shot, [first], [fit])
@@ -160,7 +182,9 @@ def find_camera_path(shot: Shot, first: PreparedTrack, fit: FittedTrack) -> Came
 def ground_all(
     shot: Shot, prepared: Sequence[PreparedTrack], fits: Sequence[FittedTrack]
 ) -> tuple[list[PreparedTrack], list[FittedTrack]]:
-    """Add to each person's measurements the distance and lean that follow from floor, feet and balance."""
+    """Add to each person's measurements the distance and lean that follow from floor, feet and
+    balance.
+    """
     placed = place_each(shot, prepared, fits)
     world = find_world(placed, shot.lines)
     return_freed_memory()
@@ -180,24 +204,33 @@ def ground_all(
 def refine(
     shot: Shot, prepared: PreparedTrack, start: FittedTrack, progress: Progress
 ) -> tuple[FittedTrack, FittedTrack]:
-    """Return the raw motion, of which every frame is fitted alone, and the finished one, of all frames together.
+    """Return the raw motion, of which every frame is fitted alone, and the finished one, of all
+    frames together.
 
     Both are of the whole body.
     """
     if shot.is_still:
         start = start.with_fingers_at_rest(prepared)
         return start, start
-    finished = fit_clip(prepared, start, shot.path, progress, shot.ablation) if shot.smoothing else start
+    finished = (
+        fit_clip(prepared, start, shot.path, progress, shot.ablation) if shot.smoothing else start
+    )
     del start
     return_freed_memory()
     raw = to_single_precision(fit_each_frame(prepared, finished, progress))
     raw = replace(raw, joint_sigma_m=finished.joint_sigma_m, height_sigma_m=finished.height_sigma_m)
     raw = raw.with_fingers_at_rest(prepared)
-    return raw, to_single_precision(finished).with_fingers_at_rest(prepared) if shot.smoothing else raw
+    return raw, to_single_precision(finished).with_fingers_at_rest(
+        prepared
+    ) if shot.smoothing else raw
 
 
-def finish(shot: Shot, person: FittedPerson, placed: PlacedTrack, world: SharedWorld, number: int) -> Motion:
-    """Raise the feet of one person, the ``number``-th of the world, out of the floor, and assemble the motion."""
+def finish(
+    shot: Shot, person: FittedPerson, placed: PlacedTrack, world: SharedWorld, number: int
+) -> Motion:
+    """Raise the feet of one person, the ``number``-th of the world, out of the floor, and assemble
+    the motion.
+    """
     contact = placed.contact(world.up)
     if shot.ablation.contact and not shot.uneven_ground and (shot.smoothing or shot.is_still):
         placed = raise_feet(placed, contact, world.floor_from_camera(number))

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The colours of a person's clothes as histograms: they identify people where position and motion do not."""
+"""The colours of a person's clothes as histograms: they identify people where position and motion
+do not.
+"""
 
 from __future__ import annotations
 
@@ -13,24 +15,29 @@ from ..perception.landmark_network import KEYPOINT_NAMES
 
 _INDEX = {name: i for i, name in enumerate(KEYPOINT_NAMES)}
 _TORSO = [_INDEX[name] for name in ("left_shoulder", "right_shoulder", "left_hip", "right_hip")]
-_LEGS = [[_INDEX[f"{side}_{joint}"] for joint in ("hip", "knee", "ankle")] for side in ("left", "right")]
-_TORSO_FRACTIONS = np.linspace(0.15, 0.85, 9)  # the outline of the torso is background as often as not
+_LEGS = [
+    [_INDEX[f"{side}_{joint}"] for joint in ("hip", "knee", "ankle")] for side in ("left", "right")
+]
+# the outline of the torso is background as often as not
+_TORSO_FRACTIONS = np.linspace(0.15, 0.85, 9)
 _LEG_FRACTIONS = np.linspace(0.1, 0.9, 12)
 _MIN_PIXELS = 6  # of a part; fewer give no histogram
 _HUES, _GREYS = 12, 6
 SIZE = 2 * (_HUES + _GREYS)
 
 
-def appearance(image_rgb: NDArray[np.uint8], keypoints_px: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+def appearance(
+    image_rgb: NDArray[np.uint8], keypoints_px: NDArray[np.floating[Any]]
+) -> NDArray[np.float64]:
     """Sample the colours of the torso and the legs.
 
-    A pixel is counted in the bin of its hue with the weight c = saturation · √value, and in the bin of its grey level
-    with the weight 1 − c. Compare two appearances with `distance`.
+    A pixel is counted in the bin of its hue with the weight c = saturation · √value, and in the bin
+    of its grey level with the weight 1 − c. Compare two appearances with `distance`.
 
     :param image_rgb: (H, W, 3).
     :param keypoints_px: (33, 2) pixels.
-    :return: (36,) square roots of two normalized histograms, torso and legs, each of 12 hues and 6 grey levels; zeros
-        for a part that is outside the image.
+    :return: (36,) square roots of two normalized histograms, torso and legs, each of 12 hues and 6
+        grey levels; zeros for a part that is outside the image.
     """
     left_top, right_top, left_low, right_low = keypoints_px[_TORSO]
     across, down = np.meshgrid(_TORSO_FRACTIONS, _TORSO_FRACTIONS)
@@ -40,13 +47,16 @@ def appearance(image_rgb: NDArray[np.uint8], keypoints_px: NDArray[np.floating[A
     legs = []
     for hip, knee, ankle in _LEGS:
         for a, b in ((hip, knee), (knee, ankle)):
-            legs.append(keypoints_px[a] + _LEG_FRACTIONS[:, None] * (keypoints_px[b] - keypoints_px[a]))
+            legs.append(
+                keypoints_px[a] + _LEG_FRACTIONS[:, None] * (keypoints_px[b] - keypoints_px[a])
+            )
     histograms = [_histogram(sample(image_rgb, points)) for points in (torso, np.concatenate(legs))]
     return np.sqrt(np.concatenate(histograms))
 
 
 def distance(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    """Compute the Hellinger distance of two appearances, or of sums of several, over the parts that both contain.
+    """Compute the Hellinger distance of two appearances, or of sums of several, over the parts that
+    both contain.
 
     d² = 1 − Σ √(p q) for the histograms p, q of each part.
 
@@ -88,7 +98,9 @@ def _histogram(pixels: NDArray[np.uint8]) -> NDArray[np.float64]:
 def _soft_histogram(
     position: NDArray[np.float64], weight: NDArray[np.float64], count: int, *, wraps: bool
 ) -> NDArray[np.float64]:
-    """Distribute each weight over the two nearest bins, so that a small change of light does not change the bin."""
+    """Distribute each weight over the two nearest bins, so that a small change of light does not
+    change the bin.
+    """
     bins = np.zeros(count)
     low = np.floor(position).astype(int)
     share = position - low

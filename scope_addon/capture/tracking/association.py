@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Association of tracklets: which ones belong to a person who was occluded, or away for a while.
 
-The end of a tracklet and the start of a later one are linked when position, motion, size and appearance match:
+The end of a tracklet and the start of a later one are linked when position, motion, size and
+appearance match:
 
     cost = |Δposition| / (0.15 + 0.8 · gap) + 3 · Δappearance + |log(size ratio)|
 
-with the gap in seconds and Δposition in sides of the region. Δposition is the mean of two distances: from the start to
-the end's position extrapolated forward, and from the end to the start's position extrapolated backward. The links of a
-clip are chosen together, for the least total cost.
+with the gap in seconds and Δposition in sides of the region. Δposition is the mean of two
+distances: from the start to the end's position extrapolated forward, and from the end to the
+start's position extrapolated backward. The links of a clip are chosen together, for the least total
+cost.
 """
 
 from __future__ import annotations
@@ -25,7 +27,8 @@ POSITION_SIGMA = 0.15  # sides of the region
 SPEED_SIGMA = 0.8  # sides per second: nobody keeps exactly the same velocity
 APPEARANCE_WEIGHT = 3.0
 MAX_LINK_COST = 3.0
-LONG_GAP_S = 2.0  # after a longer gap the position carries no information, so the appearance has to match closely
+# after a longer gap the position carries no information, so the appearance has to match closely
+LONG_GAP_S = 2.0
 LONG_GAP_MAX_APPEARANCE = 0.35
 LONG_GAP_COST = 2.0
 _VELOCITY_WINDOW_S = 0.25  # of a tracklet's end, for its velocity
@@ -36,7 +39,9 @@ _NO_LINK = 1e6
 
 @dataclass(frozen=True)
 class End:
-    """One end of a tracklet: seconds, trunk (2,) px, velocity (2,) px/s forward in time, side of the region px."""
+    """One end of a tracklet: seconds, trunk (2,) px, velocity (2,) px/s forward in time, side of
+    the region px.
+    """
 
     time: float
     center_px: NDArray[np.float64]
@@ -49,7 +54,8 @@ def link(tracklets: Sequence[Tracklet], times: Sequence[float]) -> list[list[int
 
     :param tracklets: in any order; their rows index ``times``.
     :param times: seconds of each frame of the clip.
-    :return: each person's tracklet numbers in order of time. Every tracklet that has a frame is in exactly one list.
+    :return: each person's tracklet numbers in order of time. Every tracklet that has a frame is in
+        exactly one list.
     """
     used = [k for k, t in enumerate(tracklets) if t.rows]
     starts = [_end(tracklets[k], times, first=True) for k in used]
@@ -83,7 +89,10 @@ def link_cost(end: End, start: End, appearance_distance: float) -> float:
     if gap > LONG_GAP_S:
         if appearance_distance > LONG_GAP_MAX_APPEARANCE:
             return _NO_LINK
-        return LONG_GAP_COST * (0.5 + 0.5 * appearance_distance / LONG_GAP_MAX_APPEARANCE) + 0.5 * size_change
+        return (
+            LONG_GAP_COST * (0.5 + 0.5 * appearance_distance / LONG_GAP_MAX_APPEARANCE)
+            + 0.5 * size_change
+        )
     side, elapsed = (start.side_px + end.side_px) / 2, min(gap, _MAX_EXTRAPOLATION_S)
     forward = np.linalg.norm(start.center_px - end.center_px - end.velocity_px * elapsed)
     backward = np.linalg.norm(start.center_px - start.velocity_px * elapsed - end.center_px)
@@ -92,9 +101,11 @@ def link_cost(end: End, start: End, appearance_distance: float) -> float:
 
 
 def cheapest_links(cost: NDArray[np.float64], max_cost: float) -> dict[int, int]:
-    """Choose the links with the least sum of ``cost - max_cost``, among those cheaper than ``max_cost``.
+    """Choose the links with the least sum of ``cost - max_cost``, among those cheaper than
+    ``max_cost``.
 
-    The problem splits into groups of rows and columns that can be linked to each other; each is solved separately.
+    The problem splits into groups of rows and columns that can be linked to each other; each is
+    solved separately.
 
     :param cost: (N, M) of linking a row to a column.
     :param max_cost: a link that costs as much is no better than none.

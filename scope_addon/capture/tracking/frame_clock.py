@@ -11,12 +11,15 @@ PATIENCE_S = 4 * FRAME_S  # between two attempts afterwards
 _TOLERANCE_S = 0.005  # of a frame's time
 
 
-def is_search_due(time_s: float, seen_s: float, searched_s: float, eager_step_s: float = 0.0) -> bool:
+def is_search_due(
+    time_s: float, seen_s: float, searched_s: float, eager_step_s: float = 0.0
+) -> bool:
     """Return whether a lost hand or face is to be looked for in the frame of this time.
 
     :param seen_s: when it was last seen; if never, when it was first looked for.
     :param searched_s: when it was last looked for.
-    :param eager_step_s: least time between two attempts during the first `EAGER_S` after it was lost.
+    :param eager_step_s: least time between two attempts during the first `EAGER_S` after it was
+        lost.
     """
     interval_s = eager_step_s if time_s - seen_s <= EAGER_S + _TOLERANCE_S else PATIENCE_S
     return time_s - searched_s >= interval_s - _TOLERANCE_S
@@ -44,9 +47,13 @@ class FrameClock:
         self.time_s = time_s
 
     def has_passed(self, interval_s: float, elapsed_s: float) -> bool:
-        """Return whether this frame is the one nearest to the end of an interval, or a later one."""
+        """Return whether this frame is the one nearest to the end of an interval, or a later
+        one.
+        """
         return elapsed_s + self.step_s / 2 >= interval_s
 
     def is_within(self, interval_s: float, since_s: float) -> bool:
-        """Return whether an interval that began at ``since_s`` still lasts; the frame nearest to its end counts."""
+        """Return whether an interval that began at ``since_s`` still lasts; the frame nearest to
+        its end counts.
+        """
         return self.time_s - since_s - self.step_s / 2 <= interval_s

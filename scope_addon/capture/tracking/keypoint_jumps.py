@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keypoint jumps: keypoints that leave their path for a few frames and return, because the network was mistaken.
+"""Keypoint jumps: keypoints that leave their path for a few frames and return, because the network
+was mistaken.
 
-To deviate from the straight line by D, and to be back on it n + 1 frames after the last point on it, takes an
-acceleration of at least
+To deviate from the straight line by D, and to be back on it n + 1 frames after the last point on
+it, takes an acceleration of at least
 
     a = 8 D / ((n + 1) Δt)²,
 
-as for a ball thrown up. If that is more than a person's limbs can reach, the keypoint is an outlier. It is replaced by
-the point on the line, with less confidence. The largest network rarely jumps, the smaller ones do where left and right
-are uncertain.
+as for a ball thrown up. If that is more than a person's limbs can reach, the keypoint is an
+outlier. It is replaced by the point on the line, with less confidence. The largest network rarely
+jumps, the smaller ones do where left and right are uncertain.
 """
 
 from __future__ import annotations
@@ -32,11 +33,15 @@ SPREAD_S = 1.0  # window of the scale: people who bend for a moment do not shrin
 
 
 def repair_keypoint_jumps(track: Track) -> Track:
-    """Return the track with outlying keypoints and landmarks moved onto the straight line, see the module."""
+    """Return the track with outlying keypoints and landmarks moved onto the straight line, see the
+    module.
+    """
     if len(track) < 3:
         return track
     step_s = float(np.median(np.diff(track.times)))
-    in_image = find_keypoint_jumps(track.keypoints_px / scale_px_per_m(track)[:, None, None], track.seen, step_s)
+    in_image = find_keypoint_jumps(
+        track.keypoints_px / scale_px_per_m(track)[:, None, None], track.seen, step_s
+    )
     in_space = in_image | find_keypoint_jumps(track.world_landmarks, track.seen, step_s)
     if not in_space.any():
         return track
@@ -48,11 +53,14 @@ def repair_keypoint_jumps(track: Track) -> Track:
     )
 
 
-def find_keypoint_jumps(points: NDArray[np.floating[Any]], seen: NDArray[np.bool_], step_s: float) -> NDArray[np.bool_]:
+def find_keypoint_jumps(
+    points: NDArray[np.floating[Any]], seen: NDArray[np.bool_], step_s: float
+) -> NDArray[np.bool_]:
     """Find the points that jump.
 
-    Only points that are seen without a gap from the frame before to the frame after count. They deviate by more than
-    the distance of these two: a point that moves elsewhere and stays there does not jump.
+    Only points that are seen without a gap from the frame before to the frame after count. They
+    deviate by more than the distance of these two: a point that moves elsewhere and stays there
+    does not jump.
 
     :param points: (T, J, n) metres.
     :param seen: (T,)
@@ -76,9 +84,13 @@ def find_keypoint_jumps(points: NDArray[np.floating[Any]], seen: NDArray[np.bool
 
 
 def scale_px_per_m(track: Track) -> NDArray[np.float64]:
-    """Estimate the (T,) pixels per metre at the person's distance, roughly, from the size of the body."""
+    """Estimate the (T,) pixels per metre at the person's distance, roughly, from the size of the
+    body.
+    """
     size = np.where(track.seen, person_size(track.keypoints_px), 0.0)
-    reach = round(SPREAD_S / max(float(np.median(np.diff(track.times))), 1e-3)) if len(track) > 1 else 0
+    reach = (
+        round(SPREAD_S / max(float(np.median(np.diff(track.times))), 1e-3)) if len(track) > 1 else 0
+    )
     padded = np.pad(size, reach, mode="edge")
     largest = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
     scale: NDArray[np.float64] = np.maximum(largest / SPREAD_M, 1e-3)
@@ -88,7 +100,9 @@ def scale_px_per_m(track: Track) -> NDArray[np.float64]:
 def _interpolated(
     values: NDArray[np.floating[Any]], jumps: NDArray[np.bool_], seen: NDArray[np.bool_]
 ) -> NDArray[np.floating[Any]]:
-    """Return values (T, J, n) with those that jump interpolated between the frames before and after."""
+    """Return values (T, J, n) with those that jump interpolated between the frames before and
+    after.
+    """
     out, rows = values.copy(), np.arange(len(values))
     for j in np.flatnonzero(jumps.any(axis=0)):
         good = np.flatnonzero(seen & ~jumps[:, j])

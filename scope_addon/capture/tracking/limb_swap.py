@@ -1,22 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Limb swaps: finds the frames in which left and right of the legs alone, or the arms alone, are swapped.
+"""Limb swaps: finds the frames in which left and right of the legs alone, or the arms alone, are
+swapped.
 
-Networks that know a body's left and right still confuse its legs where these pass each other. The rest of the body is
-continuous then, so this comes after `left_right`, which considers all of it at once.
+Networks that know a body's left and right still confuse its legs where these pass each other. The
+rest of the body is continuous then, so this comes after `left_right`, which considers all of it at
+once.
 
-The limbs' motion distinguishes them where they meet. Let f_t be the position of knees and ankles (elbows and wrists)
-relative to the middle of the hips (shoulders), in metres, and their confidence, read as the label x_t says: 0 as
-detected, 1 swapped. The labels minimize
+The limbs' motion distinguishes them where they meet. Let f_t be the position of knees and ankles
+(elbows and wrists) relative to the middle of the hips (shoulders), in metres, and their confidence,
+read as the label x_t says: 0 as detected, 1 swapped. The labels minimize
 
     Σ_t swap · x_t + Σ_t change · [x_t ≠ x_{t−1}] + Σ_t r_t + Σ_{t in A} j_t,
-    r_t = mean over the joints of min(limit, |f_t − p_t| / (σ₀ + σ₁ Δt)),   p_t = f_{t−1} + a (f_{t−1} − f_{t−2}),
+    r_t = mean over the joints of min(limit, |f_t − p_t| / (σ₀ + σ₁ Δt)),
+    p_t = f_{t−1} + a (f_{t−1} − f_{t−2}),
 
-with a = max(0, 1 − Δt / τ) times the ratio of the two frames' durations, because at a low rate a limb reverses before
-the next frame. j_t is the same as r_t for the distance from the reference network's landmarks in the frames A, in
-units of σ_j. The solution is the cheapest path through pairs of labels.
+with a = max(0, 1 − Δt / τ) times the ratio of the two frames' durations, because at a low rate a
+limb reverses before the next frame. j_t is the same as r_t for the distance from the reference
+network's landmarks in the frames A, in units of σ_j. The solution is the cheapest path through
+pairs of labels.
 
-A swap has to pay for two changes and for every frame: a wrong repair is worse than none. At ten frames per second,
-walking legs are so ambiguous that half of the swaps remain, below seven all of them.
+A swap has to pay for two changes and for every frame: a wrong repair is worse than none. At ten
+frames per second, walking legs are so ambiguous that half of the swaps remain, below seven all of
+them.
 """
 
 from __future__ import annotations
@@ -35,7 +40,8 @@ from .track import Track
 
 SIGMA_M, SIGMA_M_S = 0.02, 0.35  # σ₀ and σ₁ of the prediction
 VELOCITY_S = 0.2  # τ
-MAX_STEP_S = 0.15  # from one frame to the next: after that a walking leg may be where the other one was
+# from one frame to the next: after that a walking leg may be where the other one was
+MAX_STEP_S = 0.15
 LIMIT = 6.0  # of one joint's residual
 CHANGE_COST = 3.0
 SWAP_COST = 0.3
@@ -55,15 +61,25 @@ class _Limbs:
 
 def _indices(*parts: str) -> NDArray[np.intp]:
     """Return the indices of these keypoints, left and right alternating."""
-    return np.array([KEYPOINT_NAMES.index(f"{side}_{part}") for part in parts for side in ("left", "right")])
+    return np.array(
+        [KEYPOINT_NAMES.index(f"{side}_{part}") for part in parts for side in ("left", "right")]
+    )
 
 
-LEGS = _Limbs(_indices("knee", "ankle"), _indices("hip"), _indices("knee", "ankle", "heel", "foot_index"))
-ARMS = _Limbs(_indices("elbow", "wrist"), _indices("shoulder"), _indices("elbow", "wrist", "pinky", "index", "thumb"))
+LEGS = _Limbs(
+    _indices("knee", "ankle"), _indices("hip"), _indices("knee", "ankle", "heel", "foot_index")
+)
+ARMS = _Limbs(
+    _indices("elbow", "wrist"),
+    _indices("shoulder"),
+    _indices("elbow", "wrist", "pinky", "index", "thumb"),
+)
 
 
 def repair_limb_swaps(track: Track) -> Track:
-    """Return the track with legs and arms swapped where `find_limb_swaps` says so; hands go with the arms."""
+    """Return the track with legs and arms swapped where `find_limb_swaps` says so; hands go with
+    the arms.
+    """
     for limbs in (LEGS, ARMS):
         where = find_limb_swaps(track, limbs)
         if where.any():
@@ -81,7 +97,8 @@ def _swap(track: Track, limbs: _Limbs, where: NDArray[np.bool_]) -> Track:
 
 
 def find_limb_swaps(track: Track, limbs: _Limbs) -> NDArray[np.bool_]:
-    """Find the frames in which left and right of these limbs are swapped, see the module's equation.
+    """Find the frames in which left and right of these limbs are swapped, see the module's
+    equation.
 
     :return: (T,)
     """
@@ -98,12 +115,14 @@ def find_limb_swaps(track: Track, limbs: _Limbs) -> NDArray[np.bool_]:
 
 
 def _features(track: Track, limbs: _Limbs) -> tuple[NDArray[np.floating[Any]], NDArray[np.float64]]:
-    """Return f: (T, 4, 3 or 4) x, y, (z,) confidence; and the reference network's (T, 4, 2 or 3), NaN elsewhere."""
+    """Return f: (T, 4, 3 or 4) x, y, (z,) confidence; and the reference network's (T, 4, 2 or 3),
+    NaN elsewhere.
+    """
 
     def from_anchor(points: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
-        relative: NDArray[np.floating[Any]] = points[:, limbs.joints] - points[:, limbs.anchors].mean(
-            axis=1, keepdims=True
-        )
+        relative: NDArray[np.floating[Any]] = points[:, limbs.joints] - points[
+            :, limbs.anchors
+        ].mean(axis=1, keepdims=True)
         return relative
 
     dimensions = 3 if track.has_depth else 2
@@ -115,20 +134,27 @@ def _features(track: Track, limbs: _Limbs) -> tuple[NDArray[np.floating[Any]], N
     return np.concatenate([in_image, depth, certainty], axis=-1), reference
 
 
-def _reference_cost(f: NDArray[np.floating[Any]], reference: NDArray[np.float64]) -> NDArray[np.floating[Any]]:
+def _reference_cost(
+    f: NDArray[np.floating[Any]], reference: NDArray[np.float64]
+) -> NDArray[np.floating[Any]]:
     """Return j_t by label, (N, 2); 0 in frames without a reference."""
-    residual = np.linalg.norm(f[..., : reference.shape[-1]] - reference, axis=-1) / REFERENCE_SIGMA_M
-    cost: NDArray[np.floating[Any]] = np.where(np.isfinite(residual), np.minimum(residual, LIMIT), 0.0).mean(axis=-1).T
+    residual = (
+        np.linalg.norm(f[..., : reference.shape[-1]] - reference, axis=-1) / REFERENCE_SIGMA_M
+    )
+    cost: NDArray[np.floating[Any]] = (
+        np.where(np.isfinite(residual), np.minimum(residual, LIMIT), 0.0).mean(axis=-1).T
+    )
     return cost
 
 
 def _continuity_cost(
     f: NDArray[np.floating[Any]], times: NDArray[np.float64], acquired: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
-    """Return r_t and the cost of a change, (N, 2, 2, 2) by the labels of the frames t − 2, t − 1 and t.
+    """Return r_t and the cost of a change, (N, 2, 2, 2) by the labels of the frames t − 2, t − 1
+    and t.
 
-    0 where the person was found again, and without r_t after too long a step. The first frame's values are not used,
-    and the second's do not depend on the frame before the first.
+    0 where the person was found again, and without r_t after too long a step. The first frame's
+    values are not used, and the second's do not depend on the frame before the first.
     """
     step = np.diff(times, prepend=times[0])
     step_before = np.concatenate([step[:1], step[:-1]])
@@ -141,21 +167,27 @@ def _continuity_cost(
         last, second_last = np.roll(f[b], 1, axis=0), np.roll(f[a], 2, axis=0)
         off = f[c] - last - extrapolation[:, None, None] * (last - second_last)
         r = np.minimum(np.linalg.norm(off, axis=-1) / sigma[:, None], LIMIT).mean(axis=-1)
-        cost[:, a, b, c] = np.where(acquired, 0.0, np.where(step > MAX_STEP_S, 0.0, r) + CHANGE_COST * (b != c))
+        cost[:, a, b, c] = np.where(
+            acquired, 0.0, np.where(step > MAX_STEP_S, 0.0, r) + CHANGE_COST * (b != c)
+        )
     return cost
 
 
-def _cheapest(cost: NDArray[np.float64], label_cost: NDArray[np.floating[Any]]) -> NDArray[np.bool_]:
+def _cheapest(
+    cost: NDArray[np.float64], label_cost: NDArray[np.floating[Any]]
+) -> NDArray[np.bool_]:
     """Return the (N,) labels with the least total cost.
 
-    A state of the path is a pair of successive labels, so the first label of a state is the second of the one before.
+    A state of the path is a pair of successive labels, so the first label of a state is the second
+    of the one before.
 
     :param cost: (N, 2, 2, 2) of three labels in a row.
     :param label_cost: (N, 2) of each label.
     """
     pairs = np.repeat(label_cost[1:, None], 2, axis=1)  # (N−1, 2, 2)
     pairs[0] += label_cost[0][:, None] + cost[1].mean(axis=0)
-    switching = np.where(np.eye(2, dtype=bool)[:, :, None], cost[2:, :, :, None], np.inf)  # (N−2, a, b, b', c)
+    # (N−2, a, b, b', c)
+    switching = np.where(np.eye(2, dtype=bool)[:, :, None], cost[2:, :, :, None], np.inf)
     path = least_cost_path(pairs.reshape(-1, 4), switching.reshape(-1, 4, 4))
     labels: NDArray[np.bool_] = np.concatenate([path[:1] // 2, path % 2]).astype(bool)
     return labels

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Detection of scene cuts, at which tracking starts again.
 
-A frame begins another scene if it, and the frame after it, differ from the frame before by far more than successive
-frames differ before and after. A flash lasts one frame, and a camera that pans quickly changes every frame: neither is
-a cut. Frames of nearly one colour are a gap in the footage, not a scene.
+A frame begins another scene if it, and the frame after it, differ from the frame before by far more
+than successive frames differ before and after. A flash lasts one frame, and a camera that pans
+quickly changes every frame: neither is a cut. Frames of nearly one colour are a gap in the footage,
+not a scene.
 """
 
 from __future__ import annotations
@@ -43,10 +44,16 @@ class SceneCuts:
         before, self._before = self._before, now
         if before is None:
             return False
-        change, usual = _difference(before, now), float(np.median(self._differences)) if self._differences else 0.0
+        change, usual = (
+            _difference(before, now),
+            float(np.median(self._differences)) if self._differences else 0.0,
+        )
         has_contrast = min(before.std(), now.std()) >= MIN_CONTRAST
         if self._upcoming is not None:
-            if change >= MIN_DIFFERENCE and _difference(before, self._upcoming) < PERSISTENCE * change:
+            if (
+                change >= MIN_DIFFERENCE
+                and _difference(before, self._upcoming) < PERSISTENCE * change
+            ):
                 self._before = before  # a short disturbance, after which the scene may continue
                 return False
             usual = max(usual, _difference(now, self._upcoming))
@@ -60,7 +67,9 @@ def _thumbnail(image_rgb: NDArray[np.uint8]) -> NDArray[np.float32]:
     height, width = image_rgb.shape[:2]
     is_large = min(height, width) >= _STRIDE * max(_SIZE)
     coarse = (width // _STRIDE, height // _STRIDE)
-    source = cv2.resize(image_rgb, coarse, interpolation=cv2.INTER_NEAREST) if is_large else image_rgb
+    source = (
+        cv2.resize(image_rgb, coarse, interpolation=cv2.INTER_NEAREST) if is_large else image_rgb
+    )
     return cv2.resize(source, _SIZE, interpolation=cv2.INTER_AREA).astype(np.float32)
 
 

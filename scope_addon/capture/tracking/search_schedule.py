@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""When the detector searches a frame for people who are not tracked, and when it searches closely."""
+"""When the detector searches a frame for people who are not tracked, and when it searches
+closely.
+"""
 
 from __future__ import annotations
 
@@ -14,12 +16,17 @@ from .tracked_target import TrackedTarget
 
 SEARCH_S = 8 * FRAME_S  # between two searches for people who have entered the picture
 SEARCH_LARGEST_S = 20 * FRAME_S
-SEARCH_LOST_S = 4 * FRAME_S  # the same while a lost person is remembered, and for rivals in the opening
-OPENING_S = 2.0  # of the clip: a person who is visible from the start may be the most prominent one over the clip
+# the same while a lost person is remembered, and for rivals in the opening
+SEARCH_LOST_S = 4 * FRAME_S
+# of the clip: a person who is visible from the start may be the most prominent one over the clip
+OPENING_S = 2.0
 SMALL_SHARE = 0.39  # of the picture's longer side
-SMALL_SEARCH_S = 1.0  # between two searches for small people, each of which takes as long as some twenty plain ones
-PARTS_SEARCH_S = 64 * FRAME_S  # at most, between two searches beside people, each of which takes six or more plain ones
-SMALL_SIDE = 0.4  # of the picture's shorter side: a smaller region holds somebody whom a plain detection may miss
+# between two searches for small people, each of which takes as long as some twenty plain ones
+SMALL_SEARCH_S = 1.0
+# at most, between two searches beside people, each of which takes six or more plain ones
+PARTS_SEARCH_S = 64 * FRAME_S
+# of the picture's shorter side: a smaller region holds somebody whom a plain detection may miss
+SMALL_SIDE = 0.4
 EAGER_S = 15 * FRAME_S  # for which a lost person is looked for in every frame
 
 
@@ -38,37 +45,55 @@ class SearchSchedule:
 
     def forget(self) -> None:
         """Forget when the last searches were."""
-        self._search_s = self._close_search_s = self._small_search_s = self._parts_search_s = -math.inf
+        self._search_s = self._close_search_s = self._small_search_s = (
+            self._parts_search_s
+        ) = -math.inf
         self._parts_beside, self._parts_interval_s = 0, SEARCH_LOST_S  # see `begin_parts`
 
     def is_due(
-        self, image_rgb: NDArray[np.uint8], live: Sequence[TrackedTarget], lost: Sequence[TrackedTarget]
+        self,
+        image_rgb: NDArray[np.uint8],
+        live: Sequence[TrackedTarget],
+        lost: Sequence[TrackedTarget],
     ) -> bool:
         """Return whether to search this frame (H, W, 3)."""
-        return self._clock.has_passed(self._interval_s(image_rgb, live, lost), self._clock.time_s - self._search_s)
+        return self._clock.has_passed(
+            self._interval_s(image_rgb, live, lost), self._clock.time_s - self._search_s
+        )
 
-    def begin(self, image_rgb: NDArray[np.uint8], live: Sequence[TrackedTarget], lost: Sequence[TrackedTarget]) -> bool:
+    def begin(
+        self,
+        image_rgb: NDArray[np.uint8],
+        live: Sequence[TrackedTarget],
+        lost: Sequence[TrackedTarget],
+    ) -> bool:
         """Note a search in this frame (H, W, 3).
 
-        :return: whether to search closely: where somebody small may be, and less often at a low frame rate, because
-            it costs more.
+        :return: whether to search closely: where somebody small may be, and less often at a low
+            frame rate, because it costs more.
         """
         clock = self._clock
         self._search_s = clock.time_s
         closely = not self._largest_only or self._searches_for_rivals(image_rgb, live)
         if closely:
-            interval_s = self._interval_s(image_rgb, live, lost) * max(1.0, math.sqrt(clock.step_s / FRAME_S))
+            interval_s = self._interval_s(image_rgb, live, lost) * max(
+                1.0, math.sqrt(clock.step_s / FRAME_S)
+            )
             closely = clock.has_passed(interval_s, clock.time_s - self._close_search_s)
         if closely:
             self._close_search_s = clock.time_s
         return closely
 
     def begin_small(
-        self, image_rgb: NDArray[np.uint8], live: Sequence[TrackedTarget], lost: Sequence[TrackedTarget]
+        self,
+        image_rgb: NDArray[np.uint8],
+        live: Sequence[TrackedTarget],
+        lost: Sequence[TrackedTarget],
     ) -> bool:
         """Return whether to look for small people in this frame (H, W, 3), and if so, note it.
 
-        Only where nobody is tracked, and nobody is remembered whom a plain detection would find again.
+        Only where nobody is tracked, and nobody is remembered whom a plain detection would find
+        again.
         """
         due = self._clock.has_passed(SMALL_SEARCH_S, self._clock.time_s - self._small_search_s)
         if live or not due or not _are_small(image_rgb, lost):
@@ -79,35 +104,47 @@ class SearchSchedule:
     def begin_parts(self, live: Sequence[TrackedTarget]) -> bool:
         """Return whether to look for people beside larger ones in this frame, and if so, note it.
 
-        Only where fewer people are tracked than are wanted, and more and more rarely until their number changes:
-        somebody whom a close search missed is mostly there from the start.
+        Only where fewer people are tracked than are wanted, and more and more rarely until their
+        number changes: somebody whom a close search missed is mostly there from the start.
         """
         if len(live) != self._parts_beside:
             self._parts_beside, self._parts_interval_s = len(live), SEARCH_LOST_S
         if self._largest_only or not 0 < len(live) < self._wanted:
             return False
-        if not self._clock.has_passed(self._parts_interval_s, self._clock.time_s - self._parts_search_s):
+        if not self._clock.has_passed(
+            self._parts_interval_s, self._clock.time_s - self._parts_search_s
+        ):
             return False
         self._parts_search_s = self._clock.time_s
         self._parts_interval_s = min(2 * self._parts_interval_s, PARTS_SEARCH_S)
         return True
 
     def _interval_s(
-        self, image_rgb: NDArray[np.uint8], live: Sequence[TrackedTarget], lost: Sequence[TrackedTarget]
+        self,
+        image_rgb: NDArray[np.uint8],
+        live: Sequence[TrackedTarget],
+        lost: Sequence[TrackedTarget],
     ) -> float:
         """Return the seconds between two searches at present; 0: in every frame."""
         if not live or any(self._clock.is_within(EAGER_S, f.seen_s) for f in lost):
             return 0.0
         if lost or self._searches_for_rivals(image_rgb, live):
             return SEARCH_LOST_S
-        if self._largest_only:  # a small person may be somebody in the background, before the most prominent one comes
+        # a small person may be somebody in the background, before the most prominent one comes
+        if self._largest_only:
             return SEARCH_LOST_S if _are_small(image_rgb, live) else SEARCH_LARGEST_S
         # As many as are wanted are tracked: a newcomer counts only if they become more prominent.
-        complete = len(live) >= self._wanted and self._clock.time_s >= self._clock.begin_s + OPENING_S
+        complete = (
+            len(live) >= self._wanted and self._clock.time_s >= self._clock.begin_s + OPENING_S
+        )
         return SEARCH_LARGEST_S if complete else SEARCH_S
 
-    def _searches_for_rivals(self, image_rgb: NDArray[np.uint8], live: Sequence[TrackedTarget]) -> bool:
-        """Return whether somebody half as large as the most prominent person would be missed by a plain detection."""
+    def _searches_for_rivals(
+        self, image_rgb: NDArray[np.uint8], live: Sequence[TrackedTarget]
+    ) -> bool:
+        """Return whether somebody half as large as the most prominent person would be missed by a
+        plain detection.
+        """
         if not self._largest_only or self._clock.time_s >= self._clock.begin_s + OPENING_S:
             return False
         sides = [f.estimate.next_region.side_px for f in live]

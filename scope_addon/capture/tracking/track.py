@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the networks report of one person: in an interval without interruption (tracklet), and in a clip (track)."""
+"""What the networks report of one person: in an interval without interruption (tracklet), and in a
+clip (track).
+"""
 
 from __future__ import annotations
 
@@ -23,13 +25,15 @@ _FOR_EACH_ROW = ("rows", "values", "centers_px", "sides_px", "hands", "faces")
 
 @dataclass
 class Track:
-    """Observations of one person in T frames; rows where they were not seen hold zeros, and ``seen`` is False.
+    """Observations of one person in T frames; rows where they were not seen hold zeros, and
+    ``seen`` is False.
 
-    ``acquired`` marks frames in which the person was found (again) rather than followed from the frame before.
-    ``reference_rows`` and ``reference_landmarks`` are the reference network's world landmarks in a few frames, see
-    `left_right`. ``hands`` holds pixels, confidence and world landmarks of the left and the right hand; None: hands
-    were not looked for. ``masks`` holds the person's outline in a few frames, each with its row. ``face`` holds what
-    was seen of the face, see `face_record`; None: it was not looked for.
+    ``acquired`` marks frames in which the person was found (again) rather than followed from the
+    frame before. ``reference_rows`` and ``reference_landmarks`` are the reference network's world
+    landmarks in a few frames, see `left_right`. ``hands`` holds pixels, confidence and world
+    landmarks of the left and the right hand; None: hands were not looked for. ``masks`` holds the
+    person's outline in a few frames, each with its row. ``face`` holds what was seen of the face,
+    see `face_record`; None: it was not looked for.
     """
 
     frames: NDArray[np.int64]  # (T,) source frame index
@@ -37,7 +41,8 @@ class Track:
     seen: NDArray[np.bool_]  # (T,)
     keypoints_px: NDArray[np.floating[Any]]  # (T, 33, 2) pixels of the decoded, upright frame
     confidence: NDArray[np.floating[Any]]  # (T, 33) 0..1
-    world_landmarks: NDArray[np.floating[Any]]  # (T, 33, 3) metres, hip-centred, camera axes; all 0: unknown
+    # (T, 33, 3) metres, hip-centred, camera axes; all 0: unknown
+    world_landmarks: NDArray[np.floating[Any]]
     acquired: NDArray[np.bool_]  # (T,)
     reference_rows: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))  # (A,)
     reference_landmarks: NDArray[np.floating[Any]] = field(  # (A, 33, 3)
@@ -59,28 +64,43 @@ class Track:
         """Return the track without world landmarks, which take 43 MB for an hour."""
         nothing = np.broadcast_to(np.float32(0.0), self.world_landmarks.shape)
         return replace(
-            self, world_landmarks=nothing, reference_rows=self.reference_rows[:0], reference_landmarks=nothing[:0]
+            self,
+            world_landmarks=nothing,
+            reference_rows=self.reference_rows[:0],
+            reference_landmarks=nothing[:0],
         )
 
 
 @dataclass
 class Tracklet:
-    """Grows frame by frame, in single precision: one person takes some 90 MB for an hour, and no image is kept."""
+    """Grows frame by frame, in single precision: one person takes some 90 MB for an hour, and no
+    image is kept.
+    """
 
     rows: list[int] = field(default_factory=list)  # index of each frame in the clip
-    values: list[NDArray[np.float32]] = field(default_factory=list)  # (33, 6) pixels, confidence, world landmarks
-    centers_px: list[NDArray[np.floating[Any]]] = field(default_factory=list)  # (2,) middle of the trunk
+    # (33, 6) pixels, confidence, world landmarks
+    values: list[NDArray[np.float32]] = field(default_factory=list)
+    # (2,) middle of the trunk
+    centers_px: list[NDArray[np.floating[Any]]] = field(default_factory=list)
     sides_px: list[float] = field(default_factory=list)  # of the region
-    appearance: NDArray[np.float64] = field(default_factory=lambda: np.zeros(APPEARANCE_SIZE))  # sum over the frames
-    references: list[tuple[int, PendingReference]] = field(default_factory=list)  # each with its row
-    hands: list[NDArray[np.float32]] = field(default_factory=list)  # (2, 21, 6), see `Observation`; empty if not wanted
+    # sum over the frames
+    appearance: NDArray[np.float64] = field(default_factory=lambda: np.zeros(APPEARANCE_SIZE))
+    # each with its row
+    references: list[tuple[int, PendingReference]] = field(default_factory=list)
+    # (2, 21, 6), see `Observation`; empty if not wanted
+    hands: list[NDArray[np.float32]] = field(default_factory=list)
     masks: list[tuple[int, PersonMask]] = field(default_factory=list)  # each with its row
-    faces: list[NDArray[np.float32]] = field(default_factory=list)  # (RECORD,); empty if faces are not looked for
+    # (RECORD,); empty if faces are not looked for
+    faces: list[NDArray[np.float32]] = field(default_factory=list)
 
     def add(self, row: int, observation: Observation) -> None:
-        """Append the frame with index ``row``; an observation that is not finite counts as not seen."""
+        """Append the frame with index ``row``; an observation that is not finite counts as not
+        seen.
+        """
         o = observation
-        values = np.concatenate([o.keypoints_px, o.keypoints_confidence[:, None], o.world_landmarks], axis=1)
+        values = np.concatenate(
+            [o.keypoints_px, o.keypoints_confidence[:, None], o.world_landmarks], axis=1
+        )
         if not np.isfinite(values).all():
             return
         self.rows.append(row)
@@ -108,7 +128,9 @@ class Tracklet:
                 del getattr(self, name)[count:]
 
     def since(self, first: int, offset: int) -> Tracklet:
-        """Return the frames from a row on as another tracklet, whose rows are larger by an offset."""
+        """Return the frames from a row on as another tracklet, whose rows are larger by an
+        offset.
+        """
         at = bisect_left(self.rows, first)
         own = replace(
             self,
@@ -132,18 +154,26 @@ def trunk_px(keypoints_px: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any
     return center
 
 
-def make_track(frames: Sequence[int], times: Sequence[float], tracklets: Sequence[Tracklet]) -> Track:
+def make_track(
+    frames: Sequence[int], times: Sequence[float], tracklets: Sequence[Tracklet]
+) -> Track:
     """Join one person's tracklets; waits for the reference network.
 
     :param frames: source frame index of each of the clip's T frames.
     :param tracklets: in order of time; their rows index ``frames``.
     """
-    keypoints, confidence, world = (np.zeros((len(frames), KEYPOINT_COUNT, n), np.float32) for n in (2, 1, 3))
+    keypoints, confidence, world = (
+        np.zeros((len(frames), KEYPOINT_COUNT, n), np.float32) for n in (2, 1, 3)
+    )
     seen, acquired = np.zeros(len(frames), bool), np.zeros(len(frames), bool)
     references: list[tuple[int, NDArray[Any]]] = []
     shapes = {hands.shape for tracklet in tracklets for hands in tracklet.hands[:1]}
     hands = np.zeros((len(frames), *shapes.pop()), np.float32) if shapes else None
-    face = np.zeros((len(frames), RECORD), np.float32) if any(tracklet.faces for tracklet in tracklets) else None
+    face = (
+        np.zeros((len(frames), RECORD), np.float32)
+        if any(tracklet.faces for tracklet in tracklets)
+        else None
+    )
     for tracklet in tracklets:
         if tracklet.rows:
             for row, value in zip(tracklet.rows, tracklet.values, strict=True):
@@ -165,7 +195,9 @@ def make_track(frames: Sequence[int], times: Sequence[float], tracklets: Sequenc
         world_landmarks=world,
         acquired=acquired,
         reference_rows=np.array([row for row, _ in references], np.int64),
-        reference_landmarks=np.array([w for _, w in references], float).reshape(-1, KEYPOINT_COUNT, 3),
+        reference_landmarks=np.array([w for _, w in references], float).reshape(
+            -1, KEYPOINT_COUNT, 3
+        ),
         hands=hands,
         masks=tuple(mask for tracklet in tracklets for mask in tracklet.masks),
         face=face,
@@ -179,7 +211,9 @@ def track_of(times_s: Sequence[float], observations: Sequence[Observation]) -> T
     """
     tracklet = Tracklet()
     for row, observation in enumerate(observations):
-        tracklet.add(row, replace(observation, reference_landmarks=None, hands=None, face=None, mask=None))
+        tracklet.add(
+            row, replace(observation, reference_landmarks=None, hands=None, face=None, mask=None)
+        )
     track = make_track(range(len(times_s)), times_s, [tracklet])
     track.acquired[:] = [observation.acquired for observation in observations]
     return track

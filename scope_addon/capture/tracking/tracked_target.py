@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The tracker's state of one person: prediction, estimate, confidence, occlusion.
 
-A person who becomes occluded is seen with less and less confidence, until the landmarks jump onto the occluder. From
-then on the networks may report a body there for seconds, with full confidence.
+A person who becomes occluded is seen with less and less confidence, until the landmarks jump onto
+the occluder. From then on the networks may report a body there for seconds, with full confidence.
 """
 
 from __future__ import annotations
@@ -20,8 +20,10 @@ from .left_right import mean_distance
 
 OCCLUSION_INNOVATION = 0.08  # see `TrackedTarget.innovation`
 CONFIDENCE_DROP = 0.8  # share of the recent confidence below which it has dropped
-RECENT_S, RECENT_FRAMES = 0.5, 5  # over which confidence is remembered, and the least number of frames
-OCCLUSION_DISTANCE = 0.5  # from where the person is predicted, or was last seen, in sides of the region
+# over which confidence is remembered, and the least number of frames
+RECENT_S, RECENT_FRAMES = 0.5, 5
+# from where the person is predicted, or was last seen, in sides of the region
+OCCLUSION_DISTANCE = 0.5
 MIN_VELOCITY_FRAMES = 2  # after which the velocity is meaningful
 _VELOCITY_MEMORY = 0.7
 
@@ -30,9 +32,9 @@ _VELOCITY_MEMORY = 0.7
 class TrackedTarget:
     """A person who was seen in the last frame, or lost ``frames_lost`` frames ago.
 
-    ``seen_s`` is the time of the frame in which they were last seen, ``tracked_s`` the total time for which they were
-    seen. ``reference_s`` and ``appearance_s`` are values of ``tracked_s``: when the reference network was asked, and
-    when the appearance was sampled.
+    ``seen_s`` is the time of the frame in which they were last seen, ``tracked_s`` the total time
+    for which they were seen. ``reference_s`` and ``appearance_s`` are values of ``tracked_s``: when
+    the reference network was asked, and when the appearance was sampled.
     """
 
     tracklet: int
@@ -44,10 +46,13 @@ class TrackedTarget:
     tracked_s: float = 0.0
     reference_s: float = -math.inf
     appearance_s: float = -math.inf
-    swapped: bool = False  # whether left and right were swapped since the reference network was asked
+    # whether left and right were swapped since the reference network was asked
+    swapped: bool = False
     fallback_s: float = -math.inf  # time since which the fallback network is in use
-    pending: Future[PoseEstimate] | None = None  # the estimate in the next frame, at the predicted region
-    confidences: list[tuple[float, float]] = field(default_factory=list)  # recent ones, each with its time
+    # the estimate in the next frame, at the predicted region
+    pending: Future[PoseEstimate] | None = None
+    # recent ones, each with its time
+    confidences: list[tuple[float, float]] = field(default_factory=list)
     is_occluded: bool = False  # lost, and apparently behind something
 
     def __post_init__(self) -> None:
@@ -61,19 +66,26 @@ class TrackedTarget:
 
     def keeps_confidence(self, estimate: PoseEstimate) -> bool:
         """Return whether the estimate's confidence has not dropped below the recent one."""
-        return _confidence(estimate) >= CONFIDENCE_DROP * float(np.median([c for _, c in self.confidences]))
+        return _confidence(estimate) >= CONFIDENCE_DROP * float(
+            np.median([c for _, c in self.confidences])
+        )
 
     def becomes_occluded(self, estimate: PoseEstimate) -> bool:
-        """Return whether the estimate shows the occluder: far from the prediction, and with less confidence.
+        """Return whether the estimate shows the occluder: far from the prediction, and with less
+        confidence.
 
-        Neither is enough on its own. A somersault is far from the prediction, and a person who turns away from the
-        light is seen with less confidence.
+        Neither is enough on its own. A somersault is far from the prediction, and a person who
+        turns away from the light is seen with less confidence.
         """
-        is_unexpected = self.age >= MIN_VELOCITY_FRAMES and self.innovation(estimate) > OCCLUSION_INNOVATION
+        is_unexpected = (
+            self.age >= MIN_VELOCITY_FRAMES and self.innovation(estimate) > OCCLUSION_INNOVATION
+        )
         return is_unexpected and not self.keeps_confidence(estimate)
 
     def is_occluded_by(self, estimate: PoseEstimate) -> bool:
-        """Return whether a body was found where this person is occluded, with no more confidence than they had."""
+        """Return whether a body was found where this person is occluded, with no more confidence
+        than they had.
+        """
         regions = self.predicted_region, self.estimate.next_region
         is_near = any(estimate.region.resembles(region, OCCLUSION_DISTANCE) for region in regions)
         return self.is_occluded and is_near and not self.keeps_confidence(estimate)
@@ -91,7 +103,9 @@ class TrackedTarget:
     def innovation(self, estimate: PoseEstimate) -> float:
         """Return the mean distance of the keypoints from the prediction, in sides of the region."""
         predicted_px = self.estimate.keypoints_px + self.velocity_px * max(self.frames_lost, 1)
-        return float(mean_distance(estimate.keypoints_px, predicted_px)) / self.estimate.region.side_px
+        return (
+            float(mean_distance(estimate.keypoints_px, predicted_px)) / self.estimate.region.side_px
+        )
 
     def update(self, estimate: PoseEstimate, swapped: bool, time_s: float, step_s: float) -> None:
         """Take over the estimate of the next frame.

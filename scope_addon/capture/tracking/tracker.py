@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tracking of people through a video: detect now and then, and follow each person's landmarks in between.
+"""Tracking of people through a video: detect now and then, and follow each person's landmarks in
+between.
 
-The results are tracklets: intervals in which a person was followed from frame to frame. A tracklet ends where the
-person is lost, and where their identity is in doubt: behind somebody else, or after a jump. `people` decides over the
-whole clip which tracklets are the same person.
+The results are tracklets: intervals in which a person was followed from frame to frame. A tracklet
+ends where the person is lost, and where their identity is in doubt: behind somebody else, or after
+a jump. `people` decides over the whole clip which tracklets are the same person.
 """
 
 from __future__ import annotations
@@ -42,24 +43,32 @@ from .left_right import looks_swapped, swap_ratio
 from .search_schedule import EAGER_S, SearchSchedule
 from .tracked_target import TrackedTarget
 
-SURE_SCORE = 0.9  # of a detection; one with a lower score has to pass stricter limits, see `plausibility`
-MAX_SHARE_WITHIN = 0.5  # of the keypoints of such a detection, in the bounding box of somebody who is tracked
+# of a detection; one with a lower score has to pass stricter limits, see `plausibility`
+SURE_SCORE = 0.9
+# of the keypoints of such a detection, in the bounding box of somebody who is tracked
+MAX_SHARE_WITHIN = 0.5
 MAX_INNOVATION = 0.25  # see `TrackedTarget.innovation`: more in one frame may be another person
 ESTABLISHED_S = 10 * FRAME_S
 NOVELTY_INNOVATION = 0.05  # what being new counts as, see MAX_INNOVATION
-MEMORY_S = 60 * FRAME_S  # for which a lost person is looked for, and preferred to a more prominent one
-RIVAL_SIDE = 0.5  # a person with a smaller share of the largest side will not become the most prominent one
-REPLACING_SIDE = 1.5  # a person this much larger takes the place of the smallest one, when all places are taken
+# for which a lost person is looked for, and preferred to a more prominent one
+MEMORY_S = 60 * FRAME_S
+# a person with a smaller share of the largest side will not become the most prominent one
+RIVAL_SIDE = 0.5
+# a person this much larger takes the place of the smallest one, when all places are taken
+REPLACING_SIDE = 1.5
 MAX_PEOPLE = 12
 REFERENCE_S = 30 * FRAME_S  # between two calls of the reference network
 REFERENCE_SWAPPED_S = 8 * FRAME_S  # the same where left and right seem to be swapped
-FALLBACK_S = 15 * FRAME_S  # for which the largest network replaces a smaller one that lost the person, or swapped sides
+# for which the largest network replaces a smaller one that lost the person, or swapped sides
+FALLBACK_S = 15 * FRAME_S
 HALF_SWAPPED = 2.0  # `swap_ratio` below which a network may be about to confuse the sides
 APPEARANCE_S = 4 * FRAME_S  # between two samples of the appearance
 _MIN_REDETECTION_AGE = 6  # frames for which somebody was tracked
 _JUST_LOST_FRAMES = 2  # within which a detected body at the prediction continues the tracklet
-_SAME_TARGET, _LOST_TARGET, _REPLACED_TARGET = 0.12, 0.5, 0.35  # distances of regions in sides, see `Region.resembles`
-# Of the regions in which somebody who was lost is looked for, see `redetect_rotated`, and of what is found there.
+# distances of regions in sides, see `Region.resembles`
+_SAME_TARGET, _LOST_TARGET, _REPLACED_TARGET = 0.12, 0.5, 0.35
+# Of the regions in which somebody who was lost is looked for, see `redetect_rotated`, and of what
+# is found there.
 _REDETECTION_ROTATIONS = tuple(k * math.pi / 6 for k in range(12))
 _REDETECTION_SCALES = (1.0, 1.35)
 _MIN_REDETECTION_PRESENCE = 0.9
@@ -72,8 +81,8 @@ class PeopleTracker:
     """Tracks the people of a video. Frames are given in order; call `reset` before another video.
 
     :param quality: ``fast``, ``balanced`` or ``best``.
-    :param people: how many people are wanted at most; None: only the most prominent one of the clip. Then only those
-        who may turn out to be that one are tracked.
+    :param people: how many people are wanted at most; None: only the most prominent one of the
+        clip. Then only those who may turn out to be that one are tracked.
     :param detector: an ONNX file of the user's that replaces the built-in detector; see `adapters`.
     :param keypoints: the same for the landmark network.
     :param kept: estimates of the built-in landmark networks on disk; None: none.
@@ -93,7 +102,9 @@ class PeopleTracker:
         execution: Execution | None = None,
         kept: KeptEstimates | None = None,
     ) -> None:
-        self._networks = networks = open_networks(quality, threads, detector, keypoints, execution, kept)
+        self._networks = networks = open_networks(
+            quality, threads, detector, keypoints, execution, kept
+        )
         self._estimator = LandmarkEstimator(networks)
         self._reference = ReferenceEstimator(networks.reference) if networks.reference else None
         self._people = people
@@ -104,7 +115,8 @@ class PeopleTracker:
     def restarted(self, regions: Sequence[Region] = ()) -> PeopleTracker:
         """Return a tracker with the same networks that has seen nothing.
 
-        :param regions: in which people are known to be in its first frame; they are followed before it searches.
+        :param regions: in which people are known to be in its first frame; they are followed before
+            it searches.
         """
         tracker = copy.copy(self)
         tracker._estimator = LandmarkEstimator(self._networks)
@@ -128,8 +140,12 @@ class PeopleTracker:
 
     @property
     def mask_network(self) -> LandmarkNetwork | None:
-        """The network that gives person masks; only the largest one, whose preset is not made for speed."""
-        largest = self._networks.prefetches and isinstance(self._networks.landmarks, LandmarkNetwork)
+        """The network that gives person masks; only the largest one, whose preset is not made for
+        speed.
+        """
+        largest = self._networks.prefetches and isinstance(
+            self._networks.landmarks, LandmarkNetwork
+        )
         return self._networks.begins_early if largest else None
 
     def step(
@@ -141,20 +157,23 @@ class PeopleTracker:
     ) -> list[tuple[int, Observation]]:
         """Track everybody in the next frame.
 
-        The detector runs when somebody was lost and, for people who enter, now and then. With ``upcoming_rgb``, the
-        networks start on that frame before this call returns. The largest network estimates both frames at once, the
-        second one in predicted regions; that result counts only if this frame confirms the prediction.
+        The detector runs when somebody was lost and, for people who enter, now and then. With
+        ``upcoming_rgb``, the networks start on that frame before this call returns. The largest
+        network estimates both frames at once, the second one in predicted regions; that result
+        counts only if this frame confirms the prediction.
 
         :param image_rgb: (H, W, 3) RGB.
         :param upcoming_rgb: (H, W, 3) the frame after it.
         :param time_s: when the frame is shown; None: a thirtieth of a second after the one before.
-        :param upcoming_with_masks: whether the people of the frame after it need masks; only `mask_network` gives them,
-            and not to people whom it was not already following.
+        :param upcoming_with_masks: whether the people of the frame after it need masks; only
+            `mask_network` gives them, and not to people whom it was not already following.
         :return: tracklet number and observation of each person.
         :raises ShapeError: the frame is not (H, W, 3) uint8.
         """
         if image_rgb.ndim != 3 or image_rgb.shape[2] != 3 or image_rgb.dtype != np.uint8:
-            raise ShapeError(f"A frame must be (H, W, 3) uint8 RGB, but got {image_rgb.shape} {image_rgb.dtype}.")
+            raise ShapeError(
+                f"A frame must be (H, W, 3) uint8 RGB, but got {image_rgb.shape} {image_rgb.dtype}."
+            )
         self._clock.advance(time_s)
         self._estimator.advance(upcoming_with_masks)
         self._update_live(image_rgb, upcoming_rgb)
@@ -164,22 +183,30 @@ class PeopleTracker:
         if self._schedule.is_due(image_rgb, self._live, self._lost):
             self._search(image_rgb)
         references = self._begin_references(image_rgb)
-        return [(f.tracklet, self._observe(image_rgb, f, references.get(f.tracklet))) for f in self._live]
+        return [
+            (f.tracklet, self._observe(image_rgb, f, references.get(f.tracklet)))
+            for f in self._live
+        ]
 
-    def _update_live(self, image_rgb: NDArray[np.uint8], upcoming_rgb: NDArray[np.uint8] | None) -> None:
+    def _update_live(
+        self, image_rgb: NDArray[np.uint8], upcoming_rgb: NDArray[np.uint8] | None
+    ) -> None:
         """Track everybody from the frame before to this one; people who are not found are lost."""
         for lost in self._lost:
             lost.frames_lost += 1
         self._lost = [lost for lost in self._lost if self._clock.is_within(MEMORY_S, lost.seen_s)]
         found = self._estimator.estimate_live(image_rgb, upcoming_rgb, self._live)
-        checked = [self._with_fallback(image_rgb, f, e) for f, e in zip(self._live, found, strict=True)]
+        checked = [
+            self._with_fallback(image_rgb, f, e) for f, e in zip(self._live, found, strict=True)
+        ]
         seen = []
         for f, (e, swap) in zip(self._live, checked, strict=True):
             f.is_occluded = e is not None and f.becomes_occluded(e)
             if e is not None and not f.is_occluded:
                 seen.append((f, e, swap, f.innovation(e)))
-        # Two targets on one body: one person went behind another. The body belongs to the target with the smaller
-        # innovation; if these are similar, a target that was found just now was a mistake.
+        # Two targets on one body: one person went behind another. The body belongs to the target
+        # with the smaller innovation; if these are similar, a target that was found just now was a
+        # mistake.
         seen.sort(key=lambda entry: (entry[3] > MAX_INNOVATION, entry[3] + self._novelty(entry[0])))
         kept: list[TrackedTarget] = []
         accepted: list[PoseEstimate] = []
@@ -199,20 +226,27 @@ class PeopleTracker:
         self._live = sorted(kept, key=lambda f: f.tracklet)
 
     def _start_given(self, image_rgb: NDArray[np.uint8]) -> None:
-        """Start a tracklet for everybody in the given regions, also for those who would lose against others."""
+        """Start a tracklet for everybody in the given regions, also for those who would lose
+        against others.
+        """
         regions, self._given = self._given, []
         for estimate in self._estimator.estimate(image_rgb, regions) if regions else ():
-            if estimate is not None and not any(is_same_body(estimate, f.estimate) for f in self._live):
+            if estimate is not None and not any(
+                is_same_body(estimate, f.estimate) for f in self._live
+            ):
                 self._live.append(self._start(estimate))
 
     def _novelty(self, target: TrackedTarget) -> float:
-        """Return a value that falls from NOVELTY_INNOVATION to 0 while a person becomes established."""
+        """Return a value that falls from NOVELTY_INNOVATION to 0 while a person becomes
+        established.
+        """
         return NOVELTY_INNOVATION * (1 - min(target.tracked_s / ESTABLISHED_S, 1.0))
 
     def _with_fallback(
         self, image_rgb: NDArray[np.uint8], target: TrackedTarget, estimate: PoseEstimate | None
     ) -> tuple[PoseEstimate | None, bool]:
-        """Replace the estimate by the largest network's for a while after a smaller one lost the person or the sides.
+        """Replace the estimate by the largest network's for a while after a smaller one lost the
+        person or the sides.
 
         :return: the estimate, and whether left and right are swapped in it.
         """
@@ -234,7 +268,11 @@ class PeopleTracker:
 
     def _redetect(self, image_rgb: NDArray[np.uint8]) -> None:
         """Look for everybody who was just lost, in rotated regions."""
-        recent = [f for f in self._lost if self._clock.is_within(EAGER_S, f.seen_s) and f.age >= _MIN_REDETECTION_AGE]
+        recent = [
+            f
+            for f in self._lost
+            if self._clock.is_within(EAGER_S, f.seen_s) and f.age >= _MIN_REDETECTION_AGE
+        ]
         for lost in recent:
             if len(self._live) >= self._max_live:
                 return
@@ -243,15 +281,25 @@ class PeopleTracker:
                 self._resume(lost, estimate)
 
     def _search(self, image_rgb: NDArray[np.uint8]) -> None:
-        """Start a tracklet for everybody who is detected and not tracked yet; small people only if nobody else is."""
+        """Start a tracklet for everybody who is detected and not tracked yet; small people only if
+        nobody else is.
+        """
         closely = self._schedule.begin(image_rgb, self._live, self._lost)
-        self._start_detected(image_rgb, self._networks.detector.detect(image_rgb, closely=closely), SURE_SCORE)
+        self._start_detected(
+            image_rgb, self._networks.detector.detect(image_rgb, closely=closely), SURE_SCORE
+        )
         if self._schedule.begin_parts(self._live):
-            self._start_detected(image_rgb, self._networks.detector.detect_in_parts(image_rgb), SURE_SCORE)
+            self._start_detected(
+                image_rgb, self._networks.detector.detect_in_parts(image_rgb), SURE_SCORE
+            )
         if self._schedule.begin_small(image_rgb, self._live, self._lost):
-            self._start_detected(image_rgb, self._networks.detector.detect_small(image_rgb), math.inf)
+            self._start_detected(
+                image_rgb, self._networks.detector.detect_small(image_rgb), math.inf
+            )
 
-    def _start_detected(self, image_rgb: NDArray[np.uint8], found: list[Detection], sure_score: float) -> None:
+    def _start_detected(
+        self, image_rgb: NDArray[np.uint8], found: list[Detection], sure_score: float
+    ) -> None:
         """Start a tracklet for every plausible body that is not tracked yet.
 
         Each is estimated twice: the landmarks give a better region than the detector.
@@ -266,7 +314,9 @@ class PeopleTracker:
         likely = [k for k, e in enumerate(first) if e.presence >= PRESENCE_THRESHOLD]
         for sure in (True, False):
             chosen = [k for k in likely if (detections[k].score >= sure_score) == sure]
-            for estimate in self._estimator.estimate(image_rgb, [first[k].next_region for k in chosen], sure):
+            for estimate in self._estimator.estimate(
+                image_rgb, [first[k].next_region for k in chosen], sure
+            ):
                 if estimate is not None:
                     self._add(estimate, sure)
 
@@ -275,7 +325,9 @@ class PeopleTracker:
 
         def rank(detection: Detection) -> tuple[bool, float]:
             region = detection.region
-            may_be_lost = any(region.resembles(f.predicted_region, _LOST_TARGET) for f in self._lost)
+            may_be_lost = any(
+                region.resembles(f.predicted_region, _LOST_TARGET) for f in self._lost
+            )
             return may_be_lost, detection.score * region.side_px
 
         return sorted(detections, key=rank, reverse=True)
@@ -283,23 +335,33 @@ class PeopleTracker:
     def _may_be_new(self, region: Region) -> bool:
         """Return whether nobody is tracked in the region, and its size matters.
 
-        Somebody who is lost in front of or behind another person may be in nearly the same region as that person.
+        Somebody who is lost in front of or behind another person may be in nearly the same region
+        as that person.
         """
         lost = min((region.difference(f.predicted_region) for f in self._lost), default=math.inf)
         tracked = (f.estimate.next_region for f in self._live)
-        if any(region.resembles(other, _SAME_TARGET) and region.difference(other) <= lost for other in tracked):
+        if any(
+            region.resembles(other, _SAME_TARGET) and region.difference(other) <= lost
+            for other in tracked
+        ):
             return False
         largest = max((f.estimate.region.side_px for f in self._live), default=0.0)
         return not self._largest_only or region.side_px >= RIVAL_SIDE * largest
 
     def _add(self, estimate: PoseEstimate, sure: bool) -> None:
-        """Start a tracklet, unless the body is tracked already or enough people of at least its size are."""
+        """Start a tracklet, unless the body is tracked already or enough people of at least its
+        size are.
+        """
         if any(is_same_body(estimate, f.estimate) for f in self._live):
             return
         if any(f.is_occluded_by(estimate) for f in self._lost):
             return
-        # The legs of somebody who is tracked, with or without the background, can look like another person.
-        overlaps = (max(share_within(estimate, f.estimate), share_within(f.estimate, estimate)) for f in self._live)
+        # The legs of somebody who is tracked, with or without the background, can look like another
+        # person.
+        overlaps = (
+            max(share_within(estimate, f.estimate), share_within(f.estimate, estimate))
+            for f in self._live
+        )
         if not sure and any(share > MAX_SHARE_WITHIN for share in overlaps):
             return
         if len(self._live) >= self._max_live:
@@ -310,17 +372,25 @@ class PeopleTracker:
         largest = max((f.estimate.region.side_px for f in self._live), default=0.0)
         if self._largest_only and estimate.region.side_px < RIVAL_SIDE * largest:
             return
-        just_lost = (f for f in self._lost if f.frames_lost <= _JUST_LOST_FRAMES and not f.is_occluded)
+        just_lost = (
+            f for f in self._lost if f.frames_lost <= _JUST_LOST_FRAMES and not f.is_occluded
+        )
         nearest = min(just_lost, key=lambda f: f.innovation(estimate), default=None)
         if nearest is not None and nearest.innovation(estimate) <= MAX_INNOVATION:
             self._resume(nearest, estimate)
             return
-        self._lost = [f for f in self._lost if not estimate.region.resembles(f.predicted_region, _REPLACED_TARGET)]
+        self._lost = [
+            f
+            for f in self._lost
+            if not estimate.region.resembles(f.predicted_region, _REPLACED_TARGET)
+        ]
         self._live.append(self._start(estimate))
 
     def _resume(self, lost: TrackedTarget, estimate: PoseEstimate) -> None:
         """Continue the tracklet of a lost person who was found again."""
-        lost.update(estimate, looks_swapped(lost.estimate, estimate), self._clock.time_s, self._clock.step_s)
+        lost.update(
+            estimate, looks_swapped(lost.estimate, estimate), self._clock.time_s, self._clock.step_s
+        )
         lost.frames_lost = 0
         self._lost.remove(lost)
         self._live.append(lost)
@@ -334,7 +404,9 @@ class PeopleTracker:
         self._lost.append(target)
 
     def _begin_references(self, image_rgb: NDArray[np.uint8]) -> dict[int, PendingReference]:
-        """Ask the reference network about the people whose left and right are due or in doubt; by tracklet."""
+        """Ask the reference network about the people whose left and right are due or in doubt; by
+        tracklet.
+        """
         if self._reference is None:
             return {}
         calls = {}
@@ -346,10 +418,15 @@ class PeopleTracker:
         return calls
 
     def _observe(
-        self, image_rgb: NDArray[np.uint8], target: TrackedTarget, reference: PendingReference | None
+        self,
+        image_rgb: NDArray[np.uint8],
+        target: TrackedTarget,
+        reference: PendingReference | None,
     ) -> Observation:
         e = target.estimate
-        samples_appearance = self._clock.has_passed(APPEARANCE_S, target.tracked_s - target.appearance_s)
+        samples_appearance = self._clock.has_passed(
+            APPEARANCE_S, target.tracked_s - target.appearance_s
+        )
         if samples_appearance:
             target.appearance_s = target.tracked_s
         return Observation(
@@ -361,7 +438,9 @@ class PeopleTracker:
             acquired=target.age == 0,
             appearance=appearance(image_rgb, e.keypoints_px) if samples_appearance else None,
             reference_landmarks=reference,
-            mask=None if e.mask is None else PersonMask(e.region, e.mask, (image_rgb.shape[1], image_rgb.shape[0])),
+            mask=None
+            if e.mask is None
+            else PersonMask(e.region, e.mask, (image_rgb.shape[1], image_rgb.shape[0])),
         )
 
 
@@ -373,9 +452,9 @@ def redetect_rotated(
 ) -> PoseEstimate | None:
     """Look for a lost person at the predicted position, in rotated regions.
 
-    A body that is curled up or upside down looks less like a body, so the estimate has to be near the prediction. An
-    occluded person is not looked for, because something else is visible there; neither is one who has walked out of
-    the image, or who is predicted near somebody else.
+    A body that is curled up or upside down looks less like a body, so the estimate has to be near
+    the prediction. An occluded person is not looked for, because something else is visible there;
+    neither is one who has walked out of the image, or who is predicted near somebody else.
 
     :param image_rgb: (H, W, 3).
     :return: the estimate with the smallest innovation, or None.
@@ -386,14 +465,24 @@ def redetect_rotated(
     if any(target.estimate.next_region.is_near(predicted) for target in live):
         return None
     candidates = [
-        replace(predicted, rotation=predicted.rotation + rotation, side_px=predicted.side_px * scale)
+        replace(
+            predicted, rotation=predicted.rotation + rotation, side_px=predicted.side_px * scale
+        )
         for scale in _REDETECTION_SCALES
         for rotation in _REDETECTION_ROTATIONS
     ]
     regions = [region for region in candidates if is_in_image(region, image_rgb)]
-    found = [e for e in landmarks.estimate(image_rgb, regions) if e.presence >= _MIN_REDETECTION_PRESENCE]
-    found = [e for e in found if e.spread >= CURLED_SPREAD and e.disagreement <= DISAGREEMENT_THRESHOLD]
+    found = [
+        e for e in landmarks.estimate(image_rgb, regions) if e.presence >= _MIN_REDETECTION_PRESENCE
+    ]
+    found = [
+        e for e in found if e.spread >= CURLED_SPREAD and e.disagreement <= DISAGREEMENT_THRESHOLD
+    ]
     found = [e for e in found if is_center_in_image(e, image_rgb)]
     found = [e for e in found if not any(is_same_body(e, target.estimate) for target in live)]
     nearest = min(found, key=lost.innovation, default=None)
-    return nearest if nearest is not None and lost.innovation(nearest) <= _MAX_REDETECTION_INNOVATION else None
+    return (
+        nearest
+        if nearest is not None and lost.innovation(nearest) <= _MAX_REDETECTION_INNOVATION
+        else None
+    )

@@ -1,18 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Raising feet out of the floor: the last step, for whatever depth errors have left under it.
 
-The image determines a foot's depth poorly, so feet go under the floor where it is wrong by centimetres, mostly near the
-camera and where a person enters or leaves the image. A foot whose skin is at the height h < 0 goes to
+The image determines a foot's depth poorly, so feet go under the floor where it is wrong by
+centimetres, mostly near the camera and where a person enters or leaves the image. A foot whose skin
+is at the height h < 0 goes to
 
     φ(h) = −τ (1 − exp(h / τ)) > −τ,
 
-which is what it was at h = 0, with the same slope, so that a foot slows down at the floor as a real one does, and a
-foot at rest a few millimetres below it hardly moves. Where h stays within `UNDER_FLOOR_M`, nothing changes at all.
+which is what it was at h = 0, with the same slope, so that a foot slows down at the floor as a real
+one does, and a foot at rest a few millimetres below it hardly moves. Where h stays within
+`UNDER_FLOOR_M`, nothing changes at all.
 
-Body and legs share the lift. The root rises by what the deeper foot needs, except as far as the other foot or a palm
-rests on the floor and would leave it; the legs bend by the rest. Feet that are not in the image are a guess, and do not
-move the body. Where a foot rests on something clearly below the
-floor, as after a leap from a wall, the floor is another one and the motion stays.
+Body and legs share the lift. The root rises by what the deeper foot needs, except as far as the
+other foot or a palm rests on the floor and would leave it; the legs bend by the rest. Feet that are
+not in the image are a guess, and do not move the body. Where a foot rests on something clearly
+below the floor, as after a leap from a wall, the floor is another one and the motion stays.
 """
 
 from __future__ import annotations
@@ -33,24 +35,29 @@ from .placement import PlacedTrack
 
 SOFTNESS_M = 0.007  # τ
 LIFT_CUTOFF_HZ, ROOT_CUTOFF_HZ = 6.0, 4.0
-RESTING = 0.9  # contact probability from which on a foot or a palm carries weight and stays where it is
+# contact probability from which on a foot or a palm carries weight and stays where it is
+RESTING = 0.9
 ROUNDS = 4  # of smoothing without going below what is needed
 
 
 def raise_feet(
     placed: PlacedTrack, contact: NDArray[np.floating[Any]], T_floor_camera: NDArray[np.float64]
 ) -> PlacedTrack:
-    """Raise the feet of a motion that go under the floor; a motion that has none is returned as it is.
+    """Raise the feet of a motion that go under the floor; a motion that has none is returned as it
+    is.
 
     :param contact: (T, 6) probability that each sole point and palm rests on something.
     :param T_floor_camera: (4, 4) camera to world, with this person's floor at z = 0.
-    :return: the motion with new rotations and root; joints and contact points are still those of the given motion.
+    :return: the motion with new rotations and root; joints and contact points are still those of
+        the given motion.
     """
     lifts = _foot_lifts(_heights(placed, T_floor_camera), contact, placed.times)
     if not lifts.any():
         return placed
     up = T_floor_camera[2, :3]
-    supports = np.stack([contact[:, :2].max(1), contact[:, 2:4].max(1), contact[:, len(SOLES) :].max(1)], axis=1)
+    supports = np.stack(
+        [contact[:, :2].max(1), contact[:, 2:4].max(1), contact[:, len(SOLES) :].max(1)], axis=1
+    )
     supports = np.minimum(supports / RESTING, 1.0)
     seen = placed.contact_points_visible[:, : len(SOLES)].reshape(-1, 2, 2).max(axis=2)
     rise = _root_rise(lifts, seen, supports, placed.times)
@@ -60,10 +67,16 @@ def raise_feet(
     body, pelvis_at_rest = placed.body, placed.body.rest_joints(placed.betas)[0]
 
     def bend(
-        rotations: NDArray[np.floating[Any]], root: NDArray[np.floating[Any]], shift: NDArray[np.floating[Any]]
+        rotations: NDArray[np.floating[Any]],
+        root: NDArray[np.floating[Any]],
+        shift: NDArray[np.floating[Any]],
     ) -> tuple[NDArray[np.floating[Any]]]:
         poses = body.forward_kinematics(rotations, root - pelvis_at_rest, placed.betas)
-        return (move_feet(body, rotations, poses, shift[..., None] * up).astype(rotations.dtype, copy=False),)
+        return (
+            move_feet(body, rotations, poses, shift[..., None] * up).astype(
+                rotations.dtype, copy=False
+            ),
+        )
 
     rotations = by_blocks(bend, placed.rotations, placed.root, shift)[0]
     return replace(placed, rotations=rotations, root=placed.root + rise[:, None] * up)
@@ -74,18 +87,24 @@ def _heights(placed: PlacedTrack, T_floor_camera: NDArray[np.float64]) -> NDArra
     body, betas = placed.body, placed.betas
     skin, pelvis_at_rest = FootSkin(body, betas), body.rest_joints(betas)[0]
 
-    def heights(rotations: NDArray[np.floating[Any]], root: NDArray[np.floating[Any]]) -> tuple[NDArray[np.float64]]:
+    def heights(
+        rotations: NDArray[np.floating[Any]], root: NDArray[np.floating[Any]]
+    ) -> tuple[NDArray[np.float64]]:
         poses = body.forward_kinematics(rotations, root - pelvis_at_rest, betas)
         return (skin.heights(*poses, T_floor_camera[2, :3]),)
 
-    above: NDArray[np.float64] = by_blocks(heights, placed.rotations, placed.root)[0] + T_floor_camera[2, 3]
+    above: NDArray[np.float64] = (
+        by_blocks(heights, placed.rotations, placed.root)[0] + T_floor_camera[2, 3]
+    )
     return above
 
 
 def _foot_lifts(
     heights: NDArray[np.float64], contact: NDArray[np.floating[Any]], times: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return by how much the left and the right foot have to rise, (T, 2), smooth in time and nowhere too little."""
+    """Return by how much the left and the right foot have to rise, (T, 2), smooth in time and
+    nowhere too little.
+    """
     lowest = np.minimum(heights[:, [0, 2]], heights[:, [1, 3]])
     for first, end in lower_floors(heights, contact[:, : len(SOLES)], times):
         lowest[first:end] = 0.0
@@ -110,7 +129,8 @@ def _root_rise(
     supports: NDArray[np.floating[Any]],
     times: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return by how much the whole body rises, (T,): what the deeper foot needs, unless something else rests.
+    """Return by how much the whole body rises, (T,): what the deeper foot needs, unless something
+    else rests.
 
     :param lifts: (T, 2) of the feet.
     :param seen: (T, 2) 0..1, whether each foot was seen.

@@ -39,28 +39,43 @@ def assemble_motion(
 ) -> Motion:
     """Transform a person's motion to the world, and add what else is known of each frame.
 
-    Rotations relative to the parent do not depend on the world; R_world_root = R_world_camera R_camera_root and
-    trans = T_world_camera t_camera_root − J_0(β).
+    Rotations relative to the parent do not depend on the world; R_world_root = R_world_camera
+    R_camera_root and trans = T_world_camera t_camera_root − J_0(β).
 
     :param placed: the final motion: its rotations and root, in the first frame's camera axes.
     :param contact: (T, 6) probability that each sole point and palm rests on something.
     :param T_world_camera: (4, 4) the first frame's camera to the world that all people share.
     """
-    track, betas, path, J0 = person.track, placed.betas, shot.path, shot.body.rest_joints(placed.betas)[0]
+    track, betas, path, J0 = (
+        person.track,
+        placed.betas,
+        shot.path,
+        shot.body.rest_joints(placed.betas)[0],
+    )
     raw = person.raw
-    poses_raw, trans_raw = _to_world(T_world_camera, J0, raw.R_first_root, raw.t_first_root, raw.joints)
+    poses_raw, trans_raw = _to_world(
+        T_world_camera, J0, raw.R_first_root, raw.t_first_root, raw.joints
+    )
     poses, trans = _to_world(
-        T_world_camera, J0, placed.rotations[:, 0], placed.root, rotation_vectors_of_joints(placed.rotations)
+        T_world_camera,
+        J0,
+        placed.rotations[:, 0],
+        placed.root,
+        rotation_vectors_of_joints(placed.rotations),
     )
     joints = placed.place(placed.rotations, placed.root)[0]
     keypoints = np.concatenate([track.keypoints_px, track.confidence[..., None]], axis=-1)
     names: tuple[str, ...] = KEYPOINT_NAMES
     if track.hands is not None:
-        keypoints = np.concatenate([keypoints, track.hands[..., :3].reshape(len(track), -1, 3)], axis=1)
+        keypoints = np.concatenate(
+            [keypoints, track.hands[..., :3].reshape(len(track), -1, 3)], axis=1
+        )
         names += HAND_KEYPOINT_NAMES
     sigma, face = raw.joint_sigma_m, {}
     if track.face is not None:
-        face = expression_motion(with_expressions(track.face, placed.times), placed.times, shot.smoothing)
+        face = expression_motion(
+            with_expressions(track.face, placed.times), placed.times, shot.smoothing
+        )
     return Motion(
         poses=poses,
         trans=trans,
@@ -84,7 +99,9 @@ def assemble_motion(
         residual_px=reprojection_error(shot, person, placed),
         image_size=np.array(shot.image_size),
         source=shot.source,
-        joint_sigma_m=None if sigma is None else np.sqrt((sigma[..., 0] ** 2 + 2.0 * sigma[..., 1] ** 2) / 3.0),
+        joint_sigma_m=None
+        if sigma is None
+        else np.sqrt((sigma[..., 0] ** 2 + 2.0 * sigma[..., 1] ** 2) / 3.0),
         joint_sigma_depth_m=None if sigma is None else sigma[..., 0],
         height_sigma_m=raw.height_sigma_m,
         uneven_ground=shot.uneven_ground,
@@ -99,10 +116,14 @@ def _to_world(
     t_root: NDArray[np.floating[Any]],
     joints: NDArray[np.float32],
 ) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
-    """Return poses (T, 3 (K+1)) and trans (T, 3) of a root and the rotation vectors (T, K, 3) of its joints."""
+    """Return poses (T, 3 (K+1)) and trans (T, 3) of a root and the rotation vectors (T, K, 3) of
+    its joints.
+    """
     R_world_camera, t_world_camera = T_world_camera[:3, :3], T_world_camera[:3, 3]
 
-    def to_world(R: NDArray[Any], t: NDArray[Any], joints: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+    def to_world(
+        R: NDArray[Any], t: NDArray[Any], joints: NDArray[Any]
+    ) -> tuple[NDArray[Any], NDArray[Any]]:
         root = rotations.log(R_world_camera @ R).astype(np.float32)
         poses = np.concatenate([root[:, None], joints], axis=1)
         return poses.reshape(len(poses), -1), t @ R_world_camera.T + t_world_camera - J0
@@ -111,8 +132,11 @@ def _to_world(
     return poses, trans
 
 
-def reprojection_error(shot: Shot, person: FittedPerson, placed: PlacedTrack) -> NDArray[np.float64]:
-    """Return the (T,) median reprojection error of confident keypoints, in pixels; 0 where the person was not seen.
+def reprojection_error(
+    shot: Shot, person: FittedPerson, placed: PlacedTrack
+) -> NDArray[np.float64]:
+    """Return the (T,) median reprojection error of confident keypoints, in pixels; 0 where the
+    person was not seen.
 
     :param placed: the motion: its rotations and root, in the first frame's camera axes.
     """
@@ -136,13 +160,21 @@ def reprojection_error(shot: Shot, person: FittedPerson, placed: PlacedTrack) ->
         median[known] = np.nanmedian(distance[known], axis=1)
         return (median,)
 
-    rows = (track.keypoints_px, track.confidence, placed.valid, shot.path.R_first_camera, shot.path.center)
+    rows = (
+        track.keypoints_px,
+        track.confidence,
+        placed.valid,
+        shot.path.R_first_camera,
+        shot.path.center,
+    )
     return by_blocks(error, placed.rotations, placed.root, *rows)[0]
 
 
 @dataclass(frozen=True)
 class Shot:
-    """One continuous recording. Where a motion is in the axes of one camera, this is the first frame's camera."""
+    """One continuous recording. Where a motion is in the axes of one camera, this is the first
+    frame's camera.
+    """
 
     body: Body  # the one that the motion file names
     camera: Camera

@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Balance: rotations of the whole body that bring its zero moment point between the contact points.
 
-How far a body leans towards the camera or away from it can hardly be seen in the image. With the centre of mass c, its
-height h above the contact points p_i, gravity g and the horizontal direction s of the line of sight, the zero moment
-point, in which weight and inertial forces act on the floor, must satisfy
+How far a body leans towards the camera or away from it can hardly be seen in the image. With the
+centre of mass c, its height h above the contact points p_i, gravity g and the horizontal direction
+s of the line of sight, the zero moment point, in which weight and inertial forces act on the floor,
+must satisfy
 
     x = s·(c − c̈ h / g),   min_i s·p_i ≤ x ≤ max_i s·p_i.
 
-If it does not, the whole body is rotated about the centre of the contact points. The correction gets weaker the faster
-a person moves, since c̈ is then not known well enough. It is not applied to people who may sit or kneel, see
-`leg_support`.
+If it does not, the whole body is rotated about the centre of the contact points. The correction
+gets weaker the faster a person moves, since c̈ is then not known well enough. It is not applied to
+people who may sit or kneel, see `leg_support`.
 
-Sources: Vukobratović and Borovac 2004 (zero moment point); Winter 2009 (masses of body parts and their centres).
+Sources: Vukobratović and Borovac 2004 (zero moment point); Winter 2009 (masses of body parts and
+their centres).
 """
 
 from __future__ import annotations
@@ -28,9 +30,11 @@ from ...kinematics.smoothing import gaussian_smooth
 from ...kinematics.standing import line_of_sight
 from .placement import PlacedTrack
 
-STANDING_M_S = 0.5  # speed of the centre of mass at which the weight of the correction has fallen to 1/e
+# speed of the centre of mass at which the weight of the correction has fallen to 1/e
+STANDING_M_S = 0.5
 CUTOFF_HZ = 1.0
-# How far a sole extends behind its heel point and beyond its toe point, in units of the distance between the two.
+# How far a sole extends behind its heel point and beyond its toe point, in units of the distance
+# between the two.
 BEHIND, BEYOND = 1.2, 0.4
 DOUBT = 0.2  # share of nearby frames in contact at which the correction is halved, roughly
 GRAVITY_M_S2 = 9.81
@@ -45,7 +49,8 @@ _LIMBS = (
     (0.0145, "ankle", "foot", 0.5),
 )
 _HEAD, _TRUNK = 0.081, 0.497
-# Knees bent by more than the first angle do not support the body; knees bent by less than the second one do.
+# Knees bent by more than the first angle do not support the body; knees bent by less than the
+# second one do.
 RESTING_KNEE_COS, CARRYING_KNEE_COS = np.cos(np.radians([75.0, 60.0]))
 
 
@@ -53,7 +58,9 @@ def center_of_mass(body: Body, joints: NDArray[np.floating[Any]]) -> NDArray[np.
     """Return the (T, 3) centre of mass of a body with joints (T, K+1, 3), metres."""
     at = {name: i for i, name in enumerate(body.joint_names)}
     trunk = [at[f"{side}_{name}"] for side in ("left", "right") for name in ("hip", "shoulder")]
-    total: NDArray[np.floating[Any]] = _HEAD * joints[:, at["head"]] + _TRUNK * joints[:, trunk].mean(axis=1)
+    total: NDArray[np.floating[Any]] = _HEAD * joints[:, at["head"]] + _TRUNK * joints[
+        :, trunk
+    ].mean(axis=1)
     for mass, start, end, share in _LIMBS:
         for side in ("left", "right"):
             a, b = joints[:, at[f"{side}_{start}"]], joints[:, at[f"{side}_{end}"]]
@@ -62,14 +69,17 @@ def center_of_mass(body: Body, joints: NDArray[np.floating[Any]]) -> NDArray[np.
 
 
 def leg_support(body: Body, joints: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
-    """Return how far the legs may carry the body's weight: 1 if one is straight enough, 0 if both are bent.
+    """Return how far the legs may carry the body's weight: 1 if one is straight enough, 0 if both
+    are bent.
 
     With bent knees, the weight may rest on a chair or on the shins.
 
     :param joints: (T, K+1, 3) metres.
     :return: (T,) 0..1.
     """
-    straight = np.max([(shank * thigh).sum(1) for shank, thigh in leg_directions(body, joints)], axis=0)
+    straight = np.max(
+        [(shank * thigh).sum(1) for shank, thigh in leg_directions(body, joints)], axis=0
+    )
     support: NDArray[np.floating[Any]] = np.clip(
         (straight - RESTING_KNEE_COS) / (CARRYING_KNEE_COS - RESTING_KNEE_COS), 0.0, 1.0
     )
@@ -79,7 +89,9 @@ def leg_support(body: Body, joints: NDArray[np.floating[Any]]) -> NDArray[np.flo
 def leg_directions(
     body: Body, joints: NDArray[np.floating[Any]]
 ) -> list[tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]]:
-    """Return, for the left and the right leg, the (T, 3) unit vectors along shank and thigh, from below upwards."""
+    """Return, for the left and the right leg, the (T, 3) unit vectors along shank and thigh, from
+    below upwards.
+    """
     return [
         (
             direction(body, joints, f"{side}_ankle", f"{side}_knee"),
@@ -89,7 +101,9 @@ def leg_directions(
     ]
 
 
-def direction(body: Body, joints: NDArray[np.floating[Any]], a: str, b: str) -> NDArray[np.floating[Any]]:
+def direction(
+    body: Body, joints: NDArray[np.floating[Any]], a: str, b: str
+) -> NDArray[np.floating[Any]]:
     """Return the (T, 3) unit vectors from joint a to joint b, given the joints (T, K+1, 3)."""
     d = joints[:, body.joint_names.index(b)] - joints[:, body.joint_names.index(a)]
     unit: NDArray[np.floating[Any]] = d / np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1e-9)
@@ -103,7 +117,8 @@ def balancing_rotations(
 
     :param contact: (T, 6) probability that each sole point and palm rests on the floor.
     :param up: (3,) unit vector, in the first frame's camera axes.
-    :return: rotations (T, 3, 3) and the points (T, 3) about which they turn, in the first frame's camera axes.
+    :return: rotations (T, 3, 3) and the points (T, 3) about which they turn, in the first frame's
+        camera axes.
     """
     times = placed.times
     mass = gaussian_smooth(center_of_mass(placed.body, placed.joints), times, CUTOFF_HZ)
@@ -117,7 +132,9 @@ def balancing_rotations(
     if len(times) > 2:
         velocity = np.gradient(mass, times, axis=0)
         certainty *= np.exp(-np.square(np.linalg.norm(velocity, axis=1) / STANDING_M_S))
-        zero_moment_point = mass - np.gradient(velocity, times, axis=0) * (height / GRAVITY_M_S2)[:, None]
+        zero_moment_point = (
+            mass - np.gradient(velocity, times, axis=0) * (height / GRAVITY_M_S2)[:, None]
+        )
     out = _excess(placed.contact_points, in_contact, zero_moment_point, sight)
     angle = gaussian_smooth(-certainty * np.arctan2(out, height), times, CUTOFF_HZ)
     angle /= gaussian_smooth(certainty, times, CUTOFF_HZ) + DOUBT
@@ -131,7 +148,8 @@ def _excess(
     zero_moment_point: NDArray[np.floating[Any]],
     sight: NDArray[np.floating[Any]],
 ) -> NDArray[np.floating[Any]]:
-    """Return by how much the zero moment point lies beyond the contact points along the line of sight.
+    """Return by how much the zero moment point lies beyond the contact points along the line of
+    sight.
 
     :param contact_points: (T, 6, 3) metres, camera frame.
     :param in_contact: (T, 6).
@@ -149,8 +167,12 @@ def _excess(
 
 
 def _sole_ends(contact_points: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
-    """Move heel and toe points to the ends of the soles; palms stay. (T, 6, 3) in the order of the contact points."""
+    """Move heel and toe points to the ends of the soles; palms stay. (T, 6, 3) in the order of the
+    contact points.
+    """
     soles, palms = np.split(contact_points, [len(SOLES)], axis=1)
     heel, toe = soles[:, 0::2], soles[:, 1::2]
-    ends = np.stack([heel - BEHIND * (toe - heel), toe + BEYOND * (toe - heel)], axis=2).reshape(soles.shape)
+    ends = np.stack([heel - BEHIND * (toe - heel), toe + BEYOND * (toe - heel)], axis=2).reshape(
+        soles.shape
+    )
     return np.concatenate([ends, palms], axis=1)

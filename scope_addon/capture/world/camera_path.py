@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Position and rotation of the camera in every frame, in the first frame's axes; its travel, from a person's feet."""
+"""Position and rotation of the camera in every frame, in the first frame's axes; its travel, from a
+person's feet.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,8 @@ from ..tracking.scene_cuts import SCENE_GAP_S
 
 # Of the travel, see `camera_travel`.
 MIN_SPEED_M_S = 0.25  # slower sliding is explained by depth errors
-MAX_SPREAD = 0.8  # median deviation of the feet's velocities from their median, relative to the median
+# median deviation of the feet's velocities from their median, relative to the median
+MAX_SPREAD = 0.8
 MIN_SAMPLES = 12
 MAX_VERTICAL_M_S = 0.6  # vertical speed of a sole that carries the body
 MAX_HEIGHT_M = 0.03  # of such a sole above the median of the lowest soles
@@ -27,7 +30,9 @@ FOOT_CUTOFF_HZ = 6.0
 
 @dataclass(frozen=True)
 class CameraPath:
-    """p_first = R_first_camera p_camera + center for each of T frames; identities for a static camera."""
+    """p_first = R_first_camera p_camera + center for each of T frames; identities for a static
+    camera.
+    """
 
     R_first_camera: NDArray[np.float64]  # (T, 3, 3)
     center: NDArray[np.float64]  # (T, 3) metres
@@ -52,7 +57,9 @@ class CameraPath:
         return not self.center.any() and bool((self.R_first_camera == np.eye(3)).all())
 
     def to_first(self, fit: FittedTrack) -> FittedTrack:
-        """Transform a fit from each frame's camera to the first frame's axes; the argument for a static camera."""
+        """Transform a fit from each frame's camera to the first frame's axes; the argument for a
+        static camera.
+        """
         if self.is_static:
             return fit
         rotations = fit.rotations.copy()
@@ -61,7 +68,9 @@ class CameraPath:
         return replace(fit, rotations=rotations, t_camera_root=root)
 
     def to_frames(self, fit: FittedTrack) -> FittedTrack:
-        """Transform a fit from the first frame's axes to each frame's camera; the argument for a static camera."""
+        """Transform a fit from the first frame's axes to each frame's camera; the argument for a
+        static camera.
+        """
         if self.is_static:
             return fit
         rotations = fit.rotations.copy()
@@ -77,11 +86,15 @@ class CameraPath:
         """
         if self.is_static:
             return points
-        local: NDArray[np.float64] = np.einsum("tji,tkj->tki", self.R_first_camera, points - self.center[:, None])
+        local: NDArray[np.float64] = np.einsum(
+            "tji,tkj->tki", self.R_first_camera, points - self.center[:, None]
+        )
         return local
 
     def stance_to_frames(self, stance: Stance) -> Stance:
-        """Transform a stance from the first frame's axes to each frame's camera; the argument for a static camera."""
+        """Transform a stance from the first frame's axes to each frame's camera; the argument for a
+        static camera.
+        """
         if self.is_static:
             return stance
         return Stance(
@@ -94,7 +107,9 @@ class CameraPath:
         )
 
     def world_from_frames(self, T_world_first: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the (T, 4, 4) world_from_camera of all frames, given that of the first frame's axes (4, 4)."""
+        """Return the (T, 4, 4) world_from_camera of all frames, given that of the first frame's
+        axes (4, 4).
+        """
         out = np.tile(T_world_first, (len(self.center), 1, 1))
         out[:, :3, :3] = T_world_first[:3, :3] @ self.R_first_camera
         out[:, :3, 3] = self.center @ T_world_first[:3, :3].T + T_world_first[:3, 3]
@@ -108,14 +123,18 @@ def camera_travel(
     times: NDArray[np.float64],
     uneven_ground: bool = False,
 ) -> NDArray[np.float64]:
-    """Return the (T, 3) displacement of the camera's centre since the first frame, metres; zeros if it is unknown.
+    """Return the (T, 3) displacement of the camera's centre since the first frame, metres; zeros if
+    it is unknown.
 
-    The background determines how the camera rotates (`camera_rotation`), but its travel only up to scale. A foot that
-    carries the body does not move on the floor, so if all feet in contact seem to slide alike, the camera moves:
+    The background determines how the camera rotates (`camera_rotation`), but its travel only up to
+    scale. A foot that carries the body does not move on the floor, so if all feet in contact seem
+    to slide alike, the camera moves:
 
-        v_camera(t) = −v_foot(t),   horizontal, where a sole is the lowest of its frame and neither rises nor falls.
+        v_camera(t) = −v_foot(t),
+        horizontal, where a sole is the lowest of its frame and neither rises nor falls.
 
-    This is used only for a camera that rotates: on a treadmill, feet slide in front of a static camera.
+    This is used only for a camera that rotates: on a treadmill, feet slide in front of a static
+    camera.
 
     :param soles: (T, F, 3) metres, relative to the camera's centre, in axes that do not rotate.
     :param valid: (T,) frames in which the person was seen.
@@ -140,7 +159,9 @@ def camera_travel(
         return unknown
     median = np.median(v[carries], axis=0)
     deviation = np.linalg.norm(v - median, axis=1)
-    if np.linalg.norm(median) < MIN_SPEED_M_S or np.median(deviation[carries]) > MAX_SPREAD * np.linalg.norm(median):
+    if np.linalg.norm(median) < MIN_SPEED_M_S or np.median(
+        deviation[carries]
+    ) > MAX_SPREAD * np.linalg.norm(median):
         return unknown
     carries &= deviation < 3.0 * np.median(deviation[carries])
     # A slowly changing velocity through the samples; the median far from any sample.

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A fitted track as a motion in the first frame's camera axes: without gaps, smoothed, with contact points."""
+"""A fitted track as a motion in the first frame's camera axes: without gaps, smoothed, with contact
+points.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,12 @@ from numpy.typing import NDArray
 
 from ....solver import rotations
 from ....solver.body import Body
-from ...kinematics.contact_points import FOOT_PARTS, SOLES, contact_point_positions, with_contact_points
+from ...kinematics.contact_points import (
+    FOOT_PARTS,
+    SOLES,
+    contact_point_positions,
+    with_contact_points,
+)
 from ...kinematics.frame_blocks import by_blocks
 from ...kinematics.single_precision import to_single_precision
 from ...kinematics.smoothing import fill_gaps, fill_rotation_gaps, smooth_root, smooth_rotations
@@ -21,11 +28,12 @@ from ..tracking.scene_cuts import SCENE_GAP_S
 from ..tracking.track import Track
 from .camera_path import CameraPath
 
-# Confidence from which on a foot counts as visible: an occluded foot has 0.1 and more, one outside the image less than
-# 0.01.
+# Confidence from which on a foot counts as visible: an occluded foot has 0.1 and more, one outside
+# the image less than 0.01.
 VISIBLE_CONFIDENCE = 0.1
 MIN_SOLE_WEIGHT = 1e-9
-MAX_STEP_S, MAX_STEP = 1.0, 1.5  # between two frames of one scene; the second in units of the median step
+# between two frames of one scene; the second in units of the median step
+MAX_STEP_S, MAX_STEP = 1.0, 1.5
 
 
 @dataclass(frozen=True)
@@ -36,7 +44,8 @@ class PlacedTrack:
     betas: NDArray[np.floating[Any]]  # (P,)
     times: NDArray[np.float64]  # (T,) seconds
     valid: NDArray[np.bool_]  # (T,) measured, not filled in
-    rotations: NDArray[np.floating[Any]]  # (T, K+1, 3, 3); part 0 R_camera_root, the others relative to their parents
+    # (T, K+1, 3, 3); part 0 R_camera_root, the others relative to their parents
+    rotations: NDArray[np.floating[Any]]
     root: NDArray[np.floating[Any]]  # (T, 3) the pelvis
     joints: NDArray[np.floating[Any]]  # (T, K+1, 3)
     contact_points: NDArray[np.floating[Any]]  # (T, 6, 3) sole points and palms
@@ -52,7 +61,8 @@ class PlacedTrack:
     def place(
         self, rotations: NDArray[np.floating[Any]], root: NDArray[np.floating[Any]]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Return joints (T, K+1, 3) and contact points (T, 6, 3) of another motion of this body, camera frame.
+        """Return joints (T, K+1, 3) and contact points (T, 6, 3) of another motion of this body,
+        camera frame.
 
         :param rotations: (T, K+1, 3, 3), as the field.
         :param root: (T, 3) the pelvis.
@@ -60,7 +70,9 @@ class PlacedTrack:
         return _place(self.body, self.betas, rotations, root)
 
     def contact_center(self, contact: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
-        """Return the (T, 3) mean of the contact points weighted by ``contact`` (T, 6); of the soles if all are 0."""
+        """Return the (T, 3) mean of the contact points weighted by ``contact`` (T, 6); of the soles
+        if all are 0.
+        """
         weight = contact.copy()
         weight[:, : len(SOLES)] += MIN_SOLE_WEIGHT
         share = weight / weight.sum(axis=1, keepdims=True)
@@ -68,13 +80,16 @@ class PlacedTrack:
         return center
 
     def contact(self, up: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
-        """Return the (T, 6) probability that each contact point rests on something, 0 for those that are not visible.
+        """Return the (T, 6) probability that each contact point rests on something, 0 for those
+        that are not visible.
 
         Contacts end at scene cuts, and at pauses much longer than the usual time between frames.
 
         :param up: (3,) unit vector.
         """
-        contact = resting_probability(self.contact_points, up, self.times, self.center, self.uneven_ground)
+        contact = resting_probability(
+            self.contact_points, up, self.times, self.center, self.uneven_ground
+        )
         contact *= self.contact_points_visible * self.valid[:, None]
         steps = np.diff(self.times)
         if len(steps):
@@ -126,7 +141,9 @@ def place_track(
 def without_gaps(
     track: Track, fitted: FittedTrack, path: CameraPath
 ) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
-    """Return rotations (T, K+1, 3, 3) and pelvis (T, 3) as fitted, without gaps, in the first frame's camera axes."""
+    """Return rotations (T, K+1, 3, 3) and pelvis (T, 3) as fitted, without gaps, in the first
+    frame's camera axes.
+    """
     fitted = path.to_first(fitted)
     rotations = fill_rotation_gaps(fitted.rotations, fitted.valid, track.times)
     return rotations, fill_gaps(fitted.t_camera_root, fitted.valid, track.times)
@@ -144,7 +161,9 @@ def _place(
         rotations: NDArray[np.floating[Any]], root: NDArray[np.floating[Any]]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         R, t = body_with_contacts.forward_kinematics(rotations, root - pelvis_at_rest, betas)
-        return t.astype(np.float32), contact_point_positions(body_with_contacts, R, t).astype(np.float32)
+        return t.astype(np.float32), contact_point_positions(body_with_contacts, R, t).astype(
+            np.float32
+        )
 
     joints, contact_points = by_blocks(place, rotations, root)
     return joints, contact_points
@@ -154,9 +173,9 @@ def _place(
 class RawMotion:
     """The motion of which every frame was fitted alone, as it is kept until the world is known.
 
-    T frames without gaps, in the first frame's camera axes, metres and radians. An hour of rotation matrices takes
-    93 MB, as rotation vectors a third of that. The world turns the root alone, so the other joints have the rotation
-    vectors of the motion file from the start.
+    T frames without gaps, in the first frame's camera axes, metres and radians. An hour of rotation
+    matrices takes 93 MB, as rotation vectors a third of that. The world turns the root alone, so
+    the other joints have the rotation vectors of the motion file from the start.
     """
 
     R_first_root: NDArray[np.floating[Any]]  # (T, 3, 3)
@@ -171,12 +190,18 @@ class RawMotion:
         """Return the motion of a fit in each frame's camera."""
         matrices, t_first_root = without_gaps(track, fitted, path)
         return cls(
-            matrices[:, 0].copy(), t_first_root, rotation_vectors_of_joints(matrices), fitted.joint_confidence,
-            fitted.joint_sigma_m, fitted.height_sigma_m,
-        )  # fmt: skip
+            matrices[:, 0].copy(),
+            t_first_root,
+            rotation_vectors_of_joints(matrices),
+            fitted.joint_confidence,
+            fitted.joint_sigma_m,
+            fitted.height_sigma_m,
+        )
 
 
 def rotation_vectors_of_joints(matrices: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
-    """Return (T, K, 3) for rotations (T, K+1, 3, 3) without the root's, in single precision as in the motion file."""
+    """Return (T, K, 3) for rotations (T, K+1, 3, 3) without the root's, in single precision as in
+    the motion file.
+    """
     (vectors,) = by_blocks(lambda some: (rotations.log(some[:, 1:]).astype(np.float32),), matrices)
     return vectors

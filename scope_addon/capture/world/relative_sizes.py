@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Sizes of people who stand on one floor, from those of them whose stature is known.
 
-One camera sees no absolute size: a person who is taken for r times their stature seems r times as far away, and their
-floor r times as far below the camera. People on one floor have it at the same height C below the camera, so the heights
-h_k at which each of them alone would have it tell their sizes relative to each other. With log r_k = log C − log h_k, C
-maximizes
+One camera sees no absolute size: a person who is taken for r times their stature seems r times as
+far away, and their floor r times as far below the camera. People on one floor have it at the same
+height C below the camera, so the heights h_k at which each of them alone would have it tell their
+sizes relative to each other. With log r_k = log C − log h_k, C maximizes
 
     Σ_k log(w_a N(log r_k; 0, σ_k² + n_k²) + w_s [S_min ≤ r_k S_k ≤ S_k] + w_f),
 
-where a person of estimated stature S_k is an adult as estimated, σ_k apart (0 of a known stature), or somebody small,
-as children are, or somebody on another floor. n_k is the relative error of h_k.
+where a person of estimated stature S_k is an adult as estimated, σ_k apart (0 of a known stature),
+or somebody small, as children are, or somebody on another floor. n_k is the relative error of h_k.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from .world_frame import floor_height
 
 STATURE_SIGMA = 0.06  # σ, of adults: 10 cm
 HEIGHT_SIGMA, FLOOR_SIGMA_M = 0.03, 0.05  # n_k = hypot of the first and of the second over h_k
-# Densities per unit of log r: a tenth of all people is small, anywhere between adults and S_min; one in fifty of those
-# who are seen together stands on another floor.
+# Densities per unit of log r: a tenth of all people is small, anywhere between adults and S_min;
+# one in fifty of those who are seen together stands on another floor.
 ADULTS, SMALL, OTHER_FLOOR = 0.88, 0.15, 0.02
 SHORTEST_M = 0.8  # S_min
 MIN_CAMERA_M = 0.4  # of a camera nearer to the floor, errors of depth are as large as h_k
@@ -39,7 +39,9 @@ _SMALL, _ELSEWHERE = 1, 2  # rows of `_log_densities`, after those who are as es
 
 @dataclass(frozen=True)
 class Stander:
-    """A person as captured alone: height h of the camera above their floor, and stature S, both in metres."""
+    """A person as captured alone: height h of the camera above their floor, and stature S, both in
+    metres.
+    """
 
     height_m: float  # NaN where their feet say nothing of the floor
     stature_m: float
@@ -47,10 +49,11 @@ class Stander:
 
 
 def relative_sizes(people: Sequence[Stander]) -> NDArray[np.float64]:
-    """Return the (n,) factors r on the people's sizes; 1 without anybody of known stature, and on another floor.
+    """Return the (n,) factors r on the people's sizes; 1 without anybody of known stature, and on
+    another floor.
 
-    A factor is C / h where somebody is small, and as far from 1 as both errors explain where not. Without a known
-    stature, nothing tells who of two people has the wrong size.
+    A factor is C / h where somebody is small, and as far from 1 as both errors explain where not.
+    Without a known stature, nothing tells who of two people has the wrong size.
     """
     factors = np.ones(len(people))
     usable = [k for k, each in enumerate(people) if each.height_m >= MIN_CAMERA_M]
@@ -64,7 +67,11 @@ def relative_sizes(people: Sequence[Stander]) -> NDArray[np.float64]:
         kind, log_r = int(np.argmax(model[:, best])), log_c[best] - at
         if kind == _ELSEWHERE or people[k].is_known:
             continue
-        share = 1.0 if kind == _SMALL else STATURE_SIGMA**2 / (STATURE_SIGMA**2 + _noise(people[k]) ** 2)
+        share = (
+            1.0
+            if kind == _SMALL
+            else STATURE_SIGMA**2 / (STATURE_SIGMA**2 + _noise(people[k]) ** 2)
+        )
         factors[k] = np.exp(share * log_r)
     return factors
 
@@ -78,7 +85,9 @@ def _log_densities(person: Stander, log_r: NDArray[np.float64]) -> NDArray[np.fl
     sigma = np.hypot(0.0 if person.is_known else STATURE_SIGMA, _noise(person))
     adult = np.log(ADULTS / (sigma * np.sqrt(2 * np.pi))) - 0.5 * (log_r / sigma) ** 2
     stature = person.stature_m * np.exp(log_r)
-    small = np.where((stature >= SHORTEST_M) & (log_r < 0) & (not person.is_known), np.log(SMALL), -np.inf)
+    small = np.where(
+        (stature >= SHORTEST_M) & (log_r < 0) & (not person.is_known), np.log(SMALL), -np.inf
+    )
     return np.stack([adult, small, np.full(len(log_r), np.log(OTHER_FLOOR))])
 
 

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Distance and lean of a body, corrected by floor, feet and balance.
 
-A camera observes directions accurately and depth poorly. When a foot is in contact, its distance follows from the floor
-and from its being at rest, so both correct the depth of every frame. A foot may also stand on something else: people
-climb stairs and jump off walls. A foot in contact at height h stands on the floor with probability s(4(1 − |h|/h_l)),
-with the logistic function s: nearly 1 within the noise of depth, nearly 0 beyond.
+A camera observes directions accurately and depth poorly. When a foot is in contact, its distance
+follows from the floor and from its being at rest, so both correct the depth of every frame. A foot
+may also stand on something else: people climb stairs and jump off walls. A foot in contact at
+height h stands on the floor with probability s(4(1 − |h|/h_l)), with the logistic function s:
+nearly 1 within the noise of depth, nearly 0 beyond.
 """
 
 from __future__ import annotations
@@ -25,10 +26,13 @@ DEPTH_RATE_SIGMA_M_S = 0.3  # σ_r, rate of change of this error
 SLIDE_SIGMA_M_S = 0.1  # σ_s, horizontal speed of a foot in contact
 
 
-def stance_on_ground(placed: PlacedTrack, T_floor_camera: NDArray[np.float64], balanced: bool) -> Stance:
+def stance_on_ground(
+    placed: PlacedTrack, T_floor_camera: NDArray[np.float64], balanced: bool
+) -> Stance:
     """Estimate the distance and lean of a body, in the first frame's camera axes.
 
-    On uneven ground, the distance follows from feet at rest alone, and no foot is pulled to the floor.
+    On uneven ground, the distance follows from feet at rest alone, and no foot is pulled to the
+    floor.
 
     :param T_floor_camera: (4, 4) camera to world, with this person's floor at z = 0.
     :param balanced: whether the zero moment point has to lie between the contact points.
@@ -37,7 +41,12 @@ def stance_on_ground(placed: PlacedTrack, T_floor_camera: NDArray[np.float64], b
     contact = placed.contact(up)
     one_floor = not placed.uneven_ground
     shift_m = correct_depth(
-        root - placed.center, placed.contact_points, contact, T_floor_camera, placed.times, one_floor
+        root - placed.center,
+        placed.contact_points,
+        contact,
+        T_floor_camera,
+        placed.times,
+        one_floor,
     )
     shift = shift_m[:, None] * line_of_sight(root - placed.center)
     turn = np.broadcast_to(np.eye(3), (len(root), 3, 3))
@@ -60,12 +69,13 @@ def correct_depth(
 ) -> NDArray[np.float64]:
     """Return the (T,) displacement of each frame's body along its root's line of sight, metres.
 
-    With the upward and horizontal components g and d of the line of sight in the world, and heights h and horizontal
-    steps s of the points, it minimizes over δ
+    With the upward and horizontal components g and d of the line of sight in the world, and heights
+    h and horizontal steps s of the points, it minimizes over δ
         Σ_t max(2 c_t − 1, 0) f_t (h_t + g_t δ_t)²/σ_h² + δ_t²/σ_δ²
         + Σ_t c_t |s_t + d_t (δ_t+1 − δ_t)|²/(σ_s Δt)² + (δ_t+1 − δ_t)²/(σ_r Δt)²,
-    where c_t is the contact probability (of a step, the smaller one of its ends) and f_t the probability that a point
-    at this height stands on the floor. The system is tridiagonal and solved in O(T).
+    where c_t is the contact probability (of a step, the smaller one of its ends) and f_t the
+    probability that a point at this height stands on the floor. The system is tridiagonal and
+    solved in O(T).
 
     :param root_cam: (T, 3) metres, relative to the camera's centre.
     :param points_cam: (T, F, 3) metres, in the same axes.
@@ -123,5 +133,7 @@ def _solve_tridiagonal(
 
 
 def floor_probability(height: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
-    """Return the probability (...) that feet in contact at the heights (...), metres, stand on the floor."""
+    """Return the probability (...) that feet in contact at the heights (...), metres, stand on the
+    floor.
+    """
     return logistic(4 * (1 - np.abs(height) / LEVEL_M))

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The world that all people share: up direction, floor, and the floors of people who stand on something else."""
+"""The world that all people share: up direction, floor, and the floors of people who stand on
+something else.
+"""
 
 from __future__ import annotations
 
@@ -17,34 +19,40 @@ from ..camera.verticals import estimate_up_from_lines
 from .balance import center_of_mass, direction, leg_directions, leg_support
 from .placement import PlacedTrack
 
-STANDING_KNEE_COS = np.cos(np.radians(30.0))  # the straightness of a leg whose knee is bent by 30 degrees is 0
+# the straightness of a leg whose knee is bent by 30 degrees is 0
+STANDING_KNEE_COS = np.cos(np.radians(30.0))
 FLOOR_NOISE_M = 0.05  # σ_floor, scatter of a foot's height on the floor, which depends on its depth
 STANCE_M = 0.2  # a, weight of u_0 relative to the displacement of the centre of mass from the feet
 ROUNDS = 2
 MOMENT_S = 0.1  # length of a clip in which the weight b is halved
 MIN_CONTACT = 1e-3  # added to the contact probability of a frame
-SAME_FLOOR_M = 0.4  # the feet of people on one floor may differ so much in height, as their distances are uncertain
+# the feet of people on one floor may differ so much in height, as their distances are uncertain
+SAME_FLOOR_M = 0.4
 UP_NOISE_RAD = np.radians(5.0)  # σ_up, error of an up direction estimated from bodies
 FIRST_S = 0.5  # on uneven ground, of the contact that determines the floor
 LEVEL_UP = (0.0, -1.0, 0.0)  # up in the axes of a level camera
 # What the up direction follows from: edges of the background, or how people stand and move.
 LINES = "lines"
 BODIES = "bodies"
-# Standard deviations of the up direction, degrees, in (clips, still images): the root mean square of its errors in five
-# clips and five pictures of people whose true up direction is known, most of them with lines.
+# Standard deviations of the up direction, degrees, in (clips, still images): the root mean square
+# of its errors in five clips and five pictures of people whose true up direction is known, most of
+# them with lines.
 UP_DEVIATIONS_DEG = {LINES: (1.5, 4.0), BODIES: (3.5, 11.0)}
 
 
 def up_from_standing(people: Sequence[PlacedTrack]) -> NDArray[np.float64]:
     """Estimate the up direction from standing bodies: from ankles to neck.
 
-    Frames are weighted by how straight legs and trunk are. People lying down or doing push-ups are straight as well, so
-    the weight also depends on how upright a person is in the image. If no frame has weight, the trunk alone is used, as
-    far as it is upright. A prior with the weight of one frame assumes a level camera.
+    Frames are weighted by how straight legs and trunk are. People lying down or doing push-ups are
+    straight as well, so the weight also depends on how upright a person is in the image. If no
+    frame has weight, the trunk alone is used, as far as it is upright. A prior with the weight of
+    one frame assumes a level camera.
 
     :return: (3,) unit vector, camera axes.
     """
-    trunk, body_up, weight = (np.concatenate(each) for each in zip(*map(_straightness, people), strict=True))
+    trunk, body_up, weight = (
+        np.concatenate(each) for each in zip(*map(_straightness, people), strict=True)
+    )
     level = np.array(LEVEL_UP)
     weight *= np.maximum(body_up @ level, 0.0) ** 4
     if weight.sum() < 1.0:
@@ -59,7 +67,9 @@ def up_from_standing(people: Sequence[PlacedTrack]) -> NDArray[np.float64]:
 def _straightness(
     person: PlacedTrack,
 ) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
-    """Return directions (n, 3) of trunk and body, and how straight the body is (n,), in the n frames it was seen in."""
+    """Return directions (n, 3) of trunk and body, and how straight the body is (n,), in the n
+    frames it was seen in.
+    """
     trunk = direction(person.body, person.joints, "pelvis", "neck")
     straightness = np.ones(len(trunk))
     lower = np.zeros_like(trunk)
@@ -74,17 +84,19 @@ def _straightness(
 
 
 def up_from_bodies(people: Sequence[PlacedTrack]) -> NDArray[np.float64]:
-    """Estimate the up direction from people who stand, walk or bend: their weight is above their feet.
+    """Estimate the up direction from people who stand, walk or bend: their weight is above their
+    feet.
 
-    With d_t from the centre of the contact points to the centre of mass, w_t the probability that a sole is in contact
-    and no palm is, and u_0 the direction of the bodies themselves (`up_from_standing`),
+    With d_t from the centre of the contact points to the centre of mass, w_t the probability that a
+    sole is in contact and no palm is, and u_0 the direction of the bodies themselves
+    (`up_from_standing`),
 
         Σ_t (a u_0 + b w_t k_t max(y·d_t / |d_t|, 0)² d_t)
 
-    points up, where a is a length (`STANCE_M`). Inertial forces average out over a clip, but not in a single moment:
-    b grows from 0 to 1 with the length of the clip. People who sit, kneel or lie have feet at rest as well. They are
-    largely excluded by k_t, which falls from 1 to 0 while both knees bend from 60 to 75 degrees, and by y, up in the
-    image.
+    points up, where a is a length (`STANCE_M`). Inertial forces average out over a clip, but not in
+    a single moment: b grows from 0 to 1 with the length of the clip. People who sit, kneel or lie
+    have feet at rest as well. They are largely excluded by k_t, which falls from 1 to 0 while both
+    knees bend from 60 to 75 degrees, and by y, up in the image.
 
     :return: (3,) unit vector, camera axes.
     """
@@ -97,20 +109,27 @@ def up_from_bodies(people: Sequence[PlacedTrack]) -> NDArray[np.float64]:
         for each, mass, supported in zip(people, masses, support, strict=True):
             contact = each.contact(up)
             above = mass - each.contact_center(contact)
-            upright = np.maximum(above @ level, 0.0) / np.maximum(np.linalg.norm(above, axis=1), 1e-9)
+            upright = np.maximum(above @ level, 0.0) / np.maximum(
+                np.linalg.norm(above, axis=1), 1e-9
+            )
             on_hands = contact[:, len(SOLES) :].max(axis=1, initial=0.0)
             weight = contact[:, : len(SOLES)].max(axis=1) * (1 - on_hands) * supported * upright**2
             duration_s = float(np.ptp(each.times))
-            total += STANCE_M * each.valid.sum() * start + duration_s / (duration_s + MOMENT_S) * (weight @ above)
+            total += STANCE_M * each.valid.sum() * start + duration_s / (duration_s + MOMENT_S) * (
+                weight @ above
+            )
         up = _unit(total)
     return up
 
 
-def up_from_floor(feet_cam: NDArray[np.floating[Any]], up: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
-    """Rotate ``up`` so that feet in contact lie in one horizontal plane, as far as they are spread over the floor.
+def up_from_floor(
+    feet_cam: NDArray[np.floating[Any]], up: NDArray[np.floating[Any]]
+) -> NDArray[np.float64]:
+    """Rotate ``up`` so that feet in contact lie in one horizontal plane, as far as they are spread
+    over the floor.
 
-    Minimizes Σ_k (n·p̃_k)²/σ_floor² + N ‖n − up‖²/σ_up² over n, with p̃ the lowest foot point of each frame minus their
-    median.
+    Minimizes Σ_k (n·p̃_k)²/σ_floor² + N ‖n − up‖²/σ_up² over n, with p̃ the lowest foot point of
+    each frame minus their median.
 
     :param feet_cam: (T, F, 3) points of the soles, camera axes, metres.
     :param up: (3,) unit vector, camera axes.
@@ -119,20 +138,26 @@ def up_from_floor(feet_cam: NDArray[np.floating[Any]], up: NDArray[np.floating[A
     lowest = _lowest(feet_cam, up)
     p = lowest - np.median(lowest, axis=0)
     off = np.abs(p @ up)
-    p = p[off <= max(3 * np.median(off), 1e-3)]  # without jumps and outliers, in which nothing is in contact
+    # without jumps and outliers, in which nothing is in contact
+    p = p[off <= max(3 * np.median(off), 1e-3)]
     kappa = len(p) * (FLOOR_NOISE_M / UP_NOISE_RAD) ** 2
     return _unit(np.linalg.solve(p.T @ p + kappa * np.eye(3), kappa * up))
 
 
 def up_from_scene(
-    up_body: NDArray[np.floating[Any]], feet_cam: NDArray[np.floating[Any]] | None, lines: Lines | None
+    up_body: NDArray[np.floating[Any]],
+    feet_cam: NDArray[np.floating[Any]] | None,
+    lines: Lines | None,
 ) -> tuple[NDArray[np.floating[Any]], str]:
-    """Correct the up direction of the bodies by the lines of the background or, failing that, by the feet.
+    """Correct the up direction of the bodies by the lines of the background or, failing that, by
+    the feet.
 
-    Lines that determine only one horizontal direction, such as a fence's, remove the component along it.
+    Lines that determine only one horizontal direction, such as a fence's, remove the component
+    along it.
 
     :param up_body: (3,) unit vector, camera axes.
-    :param feet_cam: (T, F, 3) points of the soles, camera axes, metres; None: they are not on one floor.
+    :param feet_cam: (T, F, 3) points of the soles, camera axes, metres; None: they are not on one
+        floor.
     :return: (3,) unit vector, camera axes; `LINES` if lines alone determine it, else `BODIES`.
     """
     estimate = estimate_up_from_lines(lines or Lines.none(), up_body)
@@ -145,12 +170,16 @@ def up_from_scene(
 
 
 def floor_height(
-    soles_cam: NDArray[np.floating[Any]], contact: NDArray[np.floating[Any]], up: NDArray[np.floating[Any]]
+    soles_cam: NDArray[np.floating[Any]],
+    contact: NDArray[np.floating[Any]],
+    up: NDArray[np.floating[Any]],
 ) -> float:
-    """Estimate the height of a person's floor above the camera: the weighted median of each frame's lowest sole point.
+    """Estimate the height of a person's floor above the camera: the weighted median of each frame's
+    lowest sole point.
 
-    Frames are weighted by contact, because people who jump or climb for most of a clip are not on the floor then. (Feet
-    that hang still in the air seem to be in contact, though.) If there is no contact at all, all frames count equally.
+    Frames are weighted by contact, because people who jump or climb for most of a clip are not on
+    the floor then. (Feet that hang still in the air seem to be in contact, though.) If there is no
+    contact at all, all frames count equally.
 
     :param soles_cam: (T, F, 3) points of the soles, camera axes, metres.
     :param contact: (T, F) contact probability of each point.
@@ -165,7 +194,8 @@ def floor_height(
 
 @dataclass(frozen=True)
 class SharedWorld:
-    """``T_world_camera`` (4, 4) for all people, and the height of each person's own floor in that world, metres.
+    """``T_world_camera`` (4, 4) for all people, and the height of each person's own floor in that
+    world, metres.
 
     ``up_source``: what the up direction follows from, `LINES` or `BODIES`.
     """
@@ -187,11 +217,13 @@ class SharedWorld:
 
 
 def find_world(placed: list[PlacedTrack], lines: Lines | None = None) -> SharedWorld:
-    """Estimate the world: z up, the floor at z = 0, the origin below the first position of the most prominent person.
+    """Estimate the world: z up, the floor at z = 0, the origin below the first position of the most
+    prominent person.
 
-    The up direction is estimated from the background's lines, or from all bodies and floors together. Each person's
-    feet are taken relative to their own mean position, so that neither a step nor a wrong distance tilts the world. On
-    uneven ground, feet do not determine the up direction, and everybody's floor is what they stand on at first.
+    The up direction is estimated from the background's lines, or from all bodies and floors
+    together. Each person's feet are taken relative to their own mean position, so that neither a
+    step nor a wrong distance tilts the world. On uneven ground, feet do not determine the up
+    direction, and everybody's floor is what they stand on at first.
 
     :param placed: the most prominent person first.
     :param lines: of the background, in the first frame's camera axes.
@@ -203,16 +235,24 @@ def find_world(placed: list[PlacedTrack], lines: Lines | None = None) -> SharedW
     contacts = [person.contact(up)[person.valid, : len(SOLES)] for person in placed]
     heights = []
     for person, soles, contact in zip(placed, all_soles, contacts, strict=True):
-        rows = _first_contact(contact, person.times[person.valid]) if person.uneven_ground else slice(None)
+        rows = (
+            _first_contact(contact, person.times[person.valid])
+            if person.uneven_ground
+            else slice(None)
+        )
         heights.append(floor_height(soles[rows], contact[rows], up))
     T_world_camera = world_from_level_camera(up, height=-heights[0])
     start = transform_points(T_world_camera, placed[0].joints[placed[0].valid.argmax(), :1])[0]
     T_world_camera[:2, 3] -= start[:2]
     relative = [height - heights[0] for height in heights]
-    return SharedWorld(T_world_camera, [h if abs(h) > SAME_FLOOR_M else 0.0 for h in relative], up_source)
+    return SharedWorld(
+        T_world_camera, [h if abs(h) > SAME_FLOOR_M else 0.0 for h in relative], up_source
+    )
 
 
-def _first_contact(contact: NDArray[np.floating[Any]], times: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _first_contact(
+    contact: NDArray[np.floating[Any]], times: NDArray[np.float64]
+) -> NDArray[np.bool_]:
     """Return the frames (T,) until somebody has been on the ground for `FIRST_S` altogether."""
     if len(times) < 2:
         return np.ones(len(times), np.bool_)
@@ -221,9 +261,13 @@ def _first_contact(contact: NDArray[np.floating[Any]], times: NDArray[np.float64
     return first
 
 
-def _lowest(soles_cam: NDArray[np.floating[Any]], up: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+def _lowest(
+    soles_cam: NDArray[np.floating[Any]], up: NDArray[np.floating[Any]]
+) -> NDArray[np.floating[Any]]:
     """Return the (T, 3) lowest sole point of each frame."""
-    lowest: NDArray[np.floating[Any]] = soles_cam[np.arange(len(soles_cam)), (soles_cam @ up).argmin(axis=1)]
+    lowest: NDArray[np.floating[Any]] = soles_cam[
+        np.arange(len(soles_cam)), (soles_cam @ up).argmin(axis=1)
+    ]
     return lowest
 
 

@@ -22,7 +22,16 @@ from ...kinematics.smoothing import smooth_rotations
 from ...motion import Motion
 from ..clip import Clip, clip_from_motion
 from ..spans import swap_sides
-from .corrections import Contact, Correction, Exchange, Pin, floor_height, from_arrays, to_arrays, world_of
+from .corrections import (
+    Contact,
+    Correction,
+    Exchange,
+    Pin,
+    floor_height,
+    from_arrays,
+    to_arrays,
+    world_of,
+)
 from .edits import edited
 from .moved import moved_clip, moved_motion
 from .rays import pixel_of
@@ -45,21 +54,27 @@ def shot_of(motion: Motion, start: float = 0.0) -> Shot:
 
     :param start: seconds of the clip's clock at the footage's time 0.
     """
-    return Shot(motion.frames, motion.timestamps + start, motion.world_from_camera, motion.intrinsics)
+    return Shot(
+        motion.frames, motion.timestamps + start, motion.world_from_camera, motion.intrinsics
+    )
 
 
 def distance_from_pin(motion: Motion, pin: Pin, place: NDArray[np.float64] | None = None) -> float:
     """Return how far a joint is from its pin: pixels of a pin in the image, metres of one in space.
 
     :param place: (3,) metres, where the joint is in the world; where the motion has it if None.
-    :return: 0 in frames that the motion does not have, and without ``place`` of fingers, which depend on the body.
+    :return: 0 in frames that the motion does not have, and without ``place`` of fingers, which
+        depend on the body.
     """
     rows = np.flatnonzero(motion.frames == pin.frame)
     if not len(rows) or (place is None and pin.joint not in BODY_JOINTS):
         return 0.0
     T = motion.world_from_camera[rows[0]]
     if place is None:
-        place = T[:3, :3] @ motion.joints_cam[rows[0], BODY_JOINTS.index(pin.joint)].astype(float) + T[:3, 3]
+        place = (
+            T[:3, :3] @ motion.joints_cam[rows[0], BODY_JOINTS.index(pin.joint)].astype(float)
+            + T[:3, 3]
+        )
     if pin.pixel is not None:
         return float(np.linalg.norm(pixel_of((T, motion.intrinsics), place) - pin.pixel))
     target = np.array(pin_in_world(motion, pin).position, float)
@@ -154,19 +169,24 @@ def _pinned(clip: Clip, motion: Motion, body: Body) -> Clip:
     wanted = [c for c in corrections if isinstance(c, Pin | Contact)]
     if not wanted:
         return clip
-    # An upright line turns the world about a point on the floor, so the floor's height is nearly the same before it.
+    # An upright line turns the world about a point on the floor, so the floor's height is nearly
+    # the same before it.
     return resolve(clip, body, motion.betas, wanted, shot, floor=floor_of(motion, corrections))
 
 
 def floor_of(motion: Motion, corrections: Iterable[Correction] = ()) -> float:
-    """Return the floor's height z with these corrections, metres; −∞ on uneven ground, which has no floor."""
+    """Return the floor's height z with these corrections, metres; −∞ on uneven ground, which has no
+    floor.
+    """
     return -np.inf if motion.uneven_ground else floor_height(corrections)
 
 
 def before_smoothing(motion: Motion, body: Body) -> Motion:
-    """Return the motion as it would have been captured with left and right as they are in the user's eyes.
+    """Return the motion as it would have been captured with left and right as they are in the
+    user's eyes.
 
-    At the ends of an exchanged span, smoothing has mixed both sides: there, the raw motion is smoothed again.
+    At the ends of an exchanged span, smoothing has mixed both sides: there, the raw motion is
+    smoothed again.
 
     :raises MotionFileError: the motion's corrections are damaged.
     """
@@ -189,12 +209,17 @@ def before_smoothing(motion: Motion, body: Body) -> Motion:
     sided = np.flatnonzero([name.startswith(("left_", "right_")) for name in body.joint_names])
     again = np.ix_(np.flatnonzero(mixed), sided)
     finished.rotations[again] = smooth[again]
-    new_raw, new = (_poses(clip, getattr(base, poses)) for clip, poses in ((raw, "poses_raw"), (finished, "poses")))
+    new_raw, new = (
+        _poses(clip, getattr(base, poses))
+        for clip, poses in ((raw, "poses_raw"), (finished, "poses"))
+    )
     return replace(base, poses_raw=new_raw, poses=new)
 
 
 def _poses(clip: Clip, before: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
-    """Return axis-angle vectors (T, 3(K+1)), unchanged in the frames that the clip has not changed."""
+    """Return axis-angle vectors (T, 3(K+1)), unchanged in the frames that the clip has not
+    changed.
+    """
     rotations = exp(before.reshape(len(before), -1, 3).astype(float))
     new = (clip.rotations != rotations).any((1, 2, 3))
     poses = before.copy()

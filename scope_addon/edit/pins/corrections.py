@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a user corrects in a motion, as values and as the plain arrays of a motion file.
 
-Frames are those of the footage (``Motion.frames``), so that corrections stay valid whatever smoothing or frame rate the
-keys have.
+Frames are those of the footage (``Motion.frames``), so that corrections stay valid whatever
+smoothing or frame rate the keys have.
 """
 
 from __future__ import annotations
@@ -31,20 +31,25 @@ class Pin:
     frame: int
     joint: str
     pixel: tuple[float, float] | None = None  # of the upright frame, without lens distortion
-    position: tuple[float, float, float] | None = None  # metres, captured world: before an upright line turns it
+    # metres, captured world: before an upright line turns it
+    position: tuple[float, float, float] | None = None
     reach: float = REACH_S  # seconds
 
     def __post_init__(self) -> None:
         """Check the values.
 
-        :raises UsageError: neither or both of pixel and position are given, or a number is not finite.
+        :raises UsageError: neither or both of pixel and position are given, or a number is not
+            finite.
         """
         if (self.pixel is None) == (self.position is None):
-            raise UsageError(f"a pin of {self.joint} needs either a pixel or a position in the world")
+            raise UsageError(
+                f"a pin of {self.joint} needs either a pixel or a position in the world"
+            )
         numbers = [*(self.pixel or ()), *(self.position or ()), self.reach]
         if not np.isfinite(numbers).all() or self.reach <= 0:
             raise UsageError(
-                f"the pin of {self.joint} in frame {self.frame} has the values {numbers}, which no fit can use"
+                f"the pin of {self.joint} in frame {self.frame} has the values {numbers}, which no "
+                "fit can use"
             )
 
 
@@ -86,7 +91,9 @@ class Exchange:
 
 @dataclass(frozen=True)
 class Interpolation:
-    """The motion from one frame to another, both inclusive, is interpolated from the frames around them."""
+    """The motion from one frame to another, both inclusive, is interpolated from the frames around
+    them.
+    """
 
     first: int
     last: int
@@ -101,11 +108,14 @@ class Interpolation:
 
 @dataclass(frozen=True)
 class FeetOnFloor:
-    """Feet in contact are put on the floor of the world that the upright line has turned; see `edit.floor.refloor`."""
+    """Feet in contact are put on the floor of the world that the upright line has turned; see
+    `edit.floor.refloor`.
+    """
 
     level: bool = False  # the soles in contact too, by turning the motion without the camera
     lift: bool = True  # also frames in which a foot is under the floor
-    height: float = 0.0  # metres; of the floor that was corrected before, since the feet are put on that
+    # metres; of the floor that was corrected before, since the feet are put on that
+    height: float = 0.0
 
     def __post_init__(self) -> None:
         """Check the values.
@@ -113,7 +123,9 @@ class FeetOnFloor:
         :raises UsageError: the height is not a number of metres that a world has.
         """
         if not abs(self.height) < _HIGHEST_M:
-            raise UsageError(f"feet cannot be put on a floor at {self.height} m, which no capture has")
+            raise UsageError(
+                f"feet cannot be put on a floor at {self.height} m, which no capture has"
+            )
 
 
 @dataclass(frozen=True)
@@ -130,7 +142,9 @@ class Upright:
         T = np.array(self.rows, float)
         rigid = T.shape == (16,) and np.isfinite(T).all()
         T = T.reshape(4, 4) if rigid else np.zeros((4, 4))
-        if not np.allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-6) or not np.allclose(T[3], [0, 0, 0, 1]):
+        if not np.allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-6) or not np.allclose(
+            T[3], [0, 0, 0, 1]
+        ):
             raise UsageError("an upright line needs a rigid transform of the world")
 
     @staticmethod
@@ -146,7 +160,9 @@ class Upright:
 
 @dataclass(frozen=True)
 class Floor:
-    """The world, with the camera, is moved up or down so that a foot rests on the floor in one frame."""
+    """The world, with the camera, is moved up or down so that a foot rests on the floor in one
+    frame.
+    """
 
     frame: int
     height: float  # metres above z = 0 of the world that the upright line has turned
@@ -157,7 +173,9 @@ class Floor:
         :raises UsageError: the height is not a number of metres that a world has.
         """
         if not abs(self.height) < _HIGHEST_M:
-            raise UsageError(f"the floor in frame {self.frame} is {self.height} m high, which no capture has")
+            raise UsageError(
+                f"the floor in frame {self.frame} is {self.height} m high, which no capture has"
+            )
 
     @property
     def transform(self) -> NDArray[np.float64]:
@@ -171,9 +189,14 @@ Correction = Pin | Contact | Exchange | Interpolation | Upright | Floor | FeetOn
 
 
 def world_of(corrections: Iterable[Correction]) -> NDArray[np.float64] | None:
-    """Return the transform (4, 4) of the captured world by the upright line, then the floor; None without both."""
+    """Return the transform (4, 4) of the captured world by the upright line, then the floor; None
+    without both.
+    """
     out: NDArray[np.float64] | None = None
-    for c in sorted((c for c in corrections if isinstance(c, Upright | Floor)), key=lambda c: isinstance(c, Floor)):
+    for c in sorted(
+        (c for c in corrections if isinstance(c, Upright | Floor)),
+        key=lambda c: isinstance(c, Floor),
+    ):
         out = c.transform if out is None else c.transform @ out
     return out
 
@@ -192,15 +215,17 @@ def _check_span(first: int, last: int) -> None:
     if max(abs(first), abs(last)) > _LAST_FRAME:
         raise UsageError(f"there are no frames from {first} to {last}")
     if last < first:
-        raise UsageError(f"the span ends in frame {last}, before it begins in frame {first}; swap them")
+        raise UsageError(
+            f"the span ends in frame {last}, before it begins in frame {first}; swap them"
+        )
 
 
 def added(corrections: tuple[Correction, ...], new: Correction) -> tuple[Correction, ...]:
     """Return the corrections with a new one; a pin replaces the same joint's pin in the same frame.
 
-    The same exchange a second time undoes the first, so that neither remains. An upright line and a floor move the
-    world that those before have made, so that one of each remains. An interpolation replaces those within its span.
-    Feet are put on the floor that was corrected last.
+    The same exchange a second time undoes the first, so that neither remains. An upright line and a
+    floor move the world that those before have made, so that one of each remains. An interpolation
+    replaces those within its span. Feet are put on the floor that was corrected last.
     """
     if isinstance(new, Upright | Floor):
         return _moved_on(corrections, new)
@@ -210,16 +235,24 @@ def added(corrections: tuple[Correction, ...], new: Correction) -> tuple[Correct
     if isinstance(new, Exchange) and new in corrections:
         return tuple(c for c in corrections if c != new)
     if isinstance(new, Interpolation):
-        corrections = tuple(c for c in corrections if not (isinstance(c, Interpolation) and _is_within(c, new)))
+        corrections = tuple(
+            c for c in corrections if not (isinstance(c, Interpolation) and _is_within(c, new))
+        )
     if isinstance(new, Pin):
         corrections = tuple(
-            c for c in corrections if not (isinstance(c, Pin) and (c.frame, c.joint) == (new.frame, new.joint))
+            c
+            for c in corrections
+            if not (isinstance(c, Pin) and (c.frame, c.joint) == (new.frame, new.joint))
         )
     return corrections if new in corrections else (*corrections, new)
 
 
-def removed(corrections: tuple[Correction, ...], kinds: tuple[type[Correction], ...]) -> tuple[Correction, ...]:
-    """Return the corrections without these kinds; without a corrected floor, feet are put on the captured one."""
+def removed(
+    corrections: tuple[Correction, ...], kinds: tuple[type[Correction], ...]
+) -> tuple[Correction, ...]:
+    """Return the corrections without these kinds; without a corrected floor, feet are put on the
+    captured one.
+    """
     kept = tuple(c for c in corrections if not isinstance(c, kinds))
     if floor_height(kept) == floor_height(corrections):
         return kept
@@ -231,7 +264,8 @@ def _is_within(inner: Interpolation, outer: Interpolation) -> bool:
 
 
 def _moved_on(corrections: tuple[Correction, ...], new: Upright | Floor) -> tuple[Correction, ...]:
-    """Add what moves the present world: W' = N W, kept as W' = F' U' of a floor and an upright line.
+    """Add what moves the present world: W' = N W, kept as W' = F' U' of a floor and an upright
+    line.
 
     What is upright by a line is not levelled by the feet any more.
     """
@@ -243,13 +277,17 @@ def _moved_on(corrections: tuple[Correction, ...], new: Upright | Floor) -> tupl
         before = np.eye(4) if upright is None else upright.transform
         lowered = np.eye(4) if floor is None else floor.transform
         upright = Upright.of(np.linalg.inv(lowered) @ new.transform @ lowered @ before)
-        corrections = tuple(replace(c, level=False) if isinstance(c, FeetOnFloor) else c for c in corrections)
+        corrections = tuple(
+            replace(c, level=False) if isinstance(c, FeetOnFloor) else c for c in corrections
+        )
     others = tuple(c for c in corrections if not isinstance(c, Upright | Floor))
     return (*others, *(c for c in (upright, floor) if c is not None))
 
 
 def to_arrays(corrections: tuple[Correction, ...]) -> dict[str, NDArray[Any]]:
-    """Return the arrays of a motion file; see docs/motion_file.md. Coordinates that a pin does not have are NaN."""
+    """Return the arrays of a motion file; see docs/motion_file.md. Coordinates that a pin does not
+    have are NaN.
+    """
     pins = [c for c in corrections if isinstance(c, Pin)]
     contacts = [c for c in corrections if isinstance(c, Contact)]
     exchanges = [c for c in corrections if isinstance(c, Exchange)]
@@ -271,7 +309,9 @@ def to_arrays(corrections: tuple[Correction, ...]) -> dict[str, NDArray[Any]]:
         "upright": np.array([u.rows for u in upright], np.float64).reshape(-1, 4, 4),
         "floor_frames": np.array([f.frame for f in floors], np.int64),
         "floor_heights": np.array([f.height for f in floors], np.float64),
-        "interpolated_spans": np.array([(i.first, i.last) for i in interpolations], np.int64).reshape(-1, 2),
+        "interpolated_spans": np.array(
+            [(i.first, i.last) for i in interpolations], np.int64
+        ).reshape(-1, 2),
         "snap_level": np.array([s.level for s in snaps], np.bool_),
         "snap_lift": np.array([s.lift for s in snaps], np.bool_),
         "snap_heights": np.array([s.height for s in snaps], np.float64),
@@ -293,23 +333,37 @@ def from_arrays(arrays: Mapping[str, NDArray[Any]]) -> tuple[Correction, ...]:
 
     spans = column("contact_spans", 2), column("exchange_spans", 2)
     floors = column("floor_frames"), column("floor_heights")
-    interpolated, snaps = column("interpolated_spans", 2), (column("snap_level"), column("snap_lift"))
+    interpolated, snaps = (
+        column("interpolated_spans", 2),
+        (column("snap_level"), column("snap_lift")),
+    )
     if len(interpolated) > _MAX_INTERPOLATIONS:
         raise MotionFileError(
-            f"the motion has {len(interpolated)} interpolated spans, but may have at most {_MAX_INTERPOLATIONS}"
+            f"the motion has {len(interpolated)} interpolated spans, but may have at most "
+            f"{_MAX_INTERPOLATIONS}"
         )
     if any(len(flags) and flags.dtype != np.bool_ for flags in snaps):
-        raise MotionFileError("the motion's corrections are damaged: snap_level and snap_lift are not true or false")
+        raise MotionFileError(
+            "the motion's corrections are damaged: snap_level and snap_lift are not true or false"
+        )
     try:
         pins = zip(
-            *(column("pin_frames"), column("pin_joints"), column("pin_uv", 2), column("pin_xyz", 3)),
+            *(
+                column("pin_frames"),
+                column("pin_joints"),
+                column("pin_uv", 2),
+                column("pin_xyz", 3),
+            ),
             column("pin_reach"),
             strict=True,
         )
         contacts = zip(*spans[0].T, column("contact_feet"), strict=True) if len(spans[0]) else ()
         exchanges = zip(*spans[1].T, column("exchange_limbs"), strict=True) if len(spans[1]) else ()
         return (
-            *(Pin(int(f), str(j), _numbers(uv), _numbers(xyz), float(r)) for f, j, uv, xyz, r in pins),
+            *(
+                Pin(int(f), str(j), _numbers(uv), _numbers(xyz), float(r))
+                for f, j, uv, xyz, r in pins
+            ),
             *(Contact(int(a), int(b), str(foot)) for a, b, foot in contacts),
             *(Exchange(int(a), int(b), str(limbs)) for a, b, limbs in exchanges),
             *(Interpolation(int(a), int(b)) for a, b in interpolated),
@@ -321,7 +375,9 @@ def from_arrays(arrays: Mapping[str, NDArray[Any]]) -> tuple[Correction, ...]:
             ),
         )
     except (ValueError, TypeError, OverflowError, UsageError) as error:
-        raise MotionFileError(f"the motion's corrections are damaged: {in_one_line(error)}") from error
+        raise MotionFileError(
+            f"the motion's corrections are damaged: {in_one_line(error)}"
+        ) from error
 
 
 def _numbers(row: NDArray[np.float64]) -> Any:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Edits that a motion keeps: frames that are interpolated, and feet that are put on the floor.
 
-They change what was captured, in whatever smoothing. Feet that stand and pins are measurements and are applied to the
-result, so that they hold.
+They change what was captured, in whatever smoothing. Feet that stand and pins are measurements and
+are applied to the result, so that they hold.
 """
 
 from __future__ import annotations
@@ -17,15 +17,27 @@ from ....solver.body import Body
 from ..clip import Clip
 from ..floor import refloor
 from ..spans import interpolate
-from .corrections import Correction, FeetOnFloor, Interpolation, feet_on_floor, floor_height, world_of
+from .corrections import (
+    Correction,
+    FeetOnFloor,
+    Interpolation,
+    feet_on_floor,
+    floor_height,
+    world_of,
+)
 from .moved import moved_clip
 from .solve_pins import Shot, keys_of_span
 
 
 def edited(
-    clip: Clip, body: Body, betas: NDArray[np.floating[Any]], corrections: Iterable[Correction], shot: Shot
+    clip: Clip,
+    body: Body,
+    betas: NDArray[np.floating[Any]],
+    corrections: Iterable[Correction],
+    shot: Shot,
 ) -> Clip:
-    """Apply the edits among the corrections, in the captured world: interpolations in their order, then the feet.
+    """Apply the edits among the corrections, in the captured world: interpolations in their order,
+    then the feet.
 
     :param betas: (P,) shape coefficients.
     """
@@ -37,11 +49,16 @@ def edited(
     height = floor_above(corrections, feet)
     if world is None:
         return on_floor(out, body, betas, feet, height)
-    return moved_clip(on_floor(moved_clip(out, world), body, betas, feet, height), np.linalg.inv(world))
+    return moved_clip(
+        on_floor(moved_clip(out, world), body, betas, feet, height), np.linalg.inv(world)
+    )
 
 
-def interpolated(clip: Clip, spans: Iterable[Interpolation], shot: Shot, *, strict: bool = False) -> Clip:
-    """Interpolate spans of source frames, one after the other, those that have a key on both sides; others stay.
+def interpolated(
+    clip: Clip, spans: Iterable[Interpolation], shot: Shot, *, strict: bool = False
+) -> Clip:
+    """Interpolate spans of source frames, one after the other, those that have a key on both sides;
+    others stay.
 
     :param shot: of the footage, on the clip's clock.
     :param strict: refuse the others.
@@ -54,18 +71,23 @@ def interpolated(clip: Clip, spans: Iterable[Interpolation], shot: Shot, *, stri
             if strict:  # says why not
                 out = interpolate(out, shot.time(each.first), shot.time(each.last))
             continue
-        around = slice(max(span[0] - 2, 0), span[-1] + 3)  # two keys on each side have the velocities
+        # two keys on each side have the velocities
+        around = slice(max(span[0] - 2, 0), span[-1] + 3)
         part = interpolate(out.rows(around), out.times[span[0]], out.times[span[-1]])
         out.rotations[around], out.root[around] = part.rotations, part.root
     return out
 
 
 def floor_above(corrections: Iterable[Correction], feet: FeetOnFloor) -> float:
-    """Return the z of the floor that feet are put on, metres, in the world that the corrections have moved."""
+    """Return the z of the floor that feet are put on, metres, in the world that the corrections
+    have moved.
+    """
     return feet.height - floor_height(corrections)
 
 
-def on_floor(clip: Clip, body: Body, betas: NDArray[np.floating[Any]], feet: FeetOnFloor, height: float) -> Clip:
+def on_floor(
+    clip: Clip, body: Body, betas: NDArray[np.floating[Any]], feet: FeetOnFloor, height: float
+) -> Clip:
     """Put the feet on a floor at a ``height`` z, metres, in the clip's world.
 
     :param betas: (P,) shape coefficients.

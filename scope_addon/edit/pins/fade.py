@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Interpolating a correction between the keys where it is known, and fading it out beyond them.
 
-A monotone cubic (Fritsch and Carlson, *Monotone Piecewise Cubic Interpolation*, 1980): the correction never overshoots
-what is known, and its slope is zero where it begins and ends.
+A monotone cubic (Fritsch and Carlson, *Monotone Piecewise Cubic Interpolation*, 1980): the
+correction never overshoots what is known, and its slope is zero where it begins and ends.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ def faded(
 ) -> NDArray[np.float64]:
     """Interpolate values that fade to zero ``reach`` seconds beyond the known ones.
 
-    Between two known values it interpolates, unless they are farther apart than twice the sum of their reaches.
+    Between two known values it interpolates, unless they are farther apart than twice the sum of
+    their reaches.
 
     :param times: (T,) seconds at which the values are wanted.
     :param known: (H,) seconds, increasing.
@@ -44,7 +45,9 @@ def faded(
     return inside.reshape(len(times), *values.shape[1:])
 
 
-def _monotone_cubic(times: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+def _monotone_cubic(
+    times: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Evaluate the monotone cubic through (x, y) with zero slopes at both ends; zero beyond them.
 
     :param x: (H,) increasing; y: (H, D), zero at both ends.
@@ -53,7 +56,8 @@ def _monotone_cubic(times: NDArray[np.float64], x: NDArray[np.float64], y: NDArr
     slope = np.diff(y, axis=0) / step
     m = np.zeros_like(y)
     before, after = slope[:-1], slope[1:]
-    with np.errstate(divide="ignore", invalid="ignore"):  # the harmonic mean, where both have the same sign
+    # the harmonic mean, where both have the same sign
+    with np.errstate(divide="ignore", invalid="ignore"):
         w0, w1 = 2 * step[1:] + step[:-1], step[1:] + 2 * step[:-1]
         mean = (w0 + w1) / (w0 / before + w1 / after)
     m[1:-1] = np.where(before * after > 0, mean, 0.0)

@@ -18,7 +18,9 @@ LOWER = "lower"
 _PARTS = {LOWER: slice(0, 4), "left": slice(0, 2), "right": slice(2, 4)}
 
 
-def foot_height(clip: Clip, body: Body, betas: NDArray[np.floating[Any]], time: float, foot: str) -> float:
+def foot_height(
+    clip: Clip, body: Body, betas: NDArray[np.floating[Any]], time: float, foot: str
+) -> float:
     """Return the height in metres of the lowest skin of a foot at a time.
 
     :param betas: (P,) shape coefficients.

@@ -23,7 +23,9 @@ def moved_motion(motion: Motion, body: Body, transform: NDArray[np.float64]) -> 
     rest = body.rest_joints(motion.betas)[0]
     changed: dict[str, Any] = {"world_from_camera": transform @ motion.world_from_camera}
     for poses, trans in (("poses", "trans"), ("poses_raw", "trans_raw")):
-        changed[poses], changed[trans] = _moved(getattr(motion, poses), getattr(motion, trans), rest, transform)
+        changed[poses], changed[trans] = _moved(
+            getattr(motion, poses), getattr(motion, trans), rest, transform
+        )
     return replace(motion, **changed)
 
 
@@ -40,7 +42,9 @@ def _moved(
     rest: NDArray[np.float64],
     transform: NDArray[np.float64],
 ) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
-    """Move poses (T, 3(K+1)) and translations (T, 3) of a body whose pelvis rests at ``rest`` (3,)."""
+    """Move poses (T, 3(K+1)) and translations (T, 3) of a body whose pelvis rests at ``rest``
+    (3,).
+    """
     new = poses.copy()
     new[:, :3] = log(transform[:3, :3] @ exp(poses[:, :3].astype(float)))
     pelvis = (rest + trans) @ transform[:3, :3].T + transform[:3, 3]

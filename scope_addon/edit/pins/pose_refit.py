@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fitting one pose again to a few corrected points, with the pose as it was as the prior.
 
-    minimize  ½ Σ w_p |r_p|² + ½ Σ w_i |log(Ω̂_iᵀ Ω_i)|² + ½ w_R |log(R̂_0ᵀ R_0)|² + ½ w_t |t_0 − t̂_0|²
+    minimize  ½ Σ w_p |r_p|² + ½ Σ w_i |log(Ω̂_iᵀ Ω_i)|² + ½ w_R |log(R̂_0ᵀ R_0)|² + ½ w_t |t_0 −
+              t̂_0|²
 
-where r_p are the corrected points, in the image or in space, and held points: other hands, feet and the head, which
-should stay where they were. The joints of the corrected limb are free to turn, all others are stiff. The skin of the
-feet has a one-sided residual, which keeps it above the floor.
+where r_p are the corrected points, in the image or in space, and held points: other hands, feet and
+the head, which should stay where they were. The joints of the corrected limb are free to turn, all
+others are stiff. The skin of the feet has a one-sided residual, which keeps it above the floor.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ from ...kinematics.contact_points import SOLES, with_contact_points
 from ...kinematics.foot_skin import UNDER_FLOOR_M, FootSkin
 from .rays import Camera, point_at_depth
 
-# Inverse variances: per radian² of joints, per metre² of points and of the pelvis, per squared image coordinate.
+# Inverse variances: per radian² of joints, per metre² of points and of the pelvis, per squared
+# image coordinate.
 FREE, GIRDLE, STIFF = 1.0, 10.0, 100.0
 PELVIS_ROTATION, PELVIS_POSITION = 400.0, 400.0
 PINNED, PINNED_2D = 1e6, 1e7  # 1 mm; 0.3 pixels at a focal length of 1000
@@ -37,7 +39,10 @@ STANDING, HELD = 1e4, 1e3  # 1 cm, 3 cm
 ABOVE_FLOOR = 1e5  # 3 mm for each point of the skin that is under the floor
 FLOOR_M = -0.8 * UNDER_FLOOR_M  # a capture leaves feet nearly a centimetre under the floor, too
 _TRUNK = ("pelvis", "spine1", "spine2", "spine3", "neck", "head")
-_LIMBS = {"arm": ("collar", "shoulder", "elbow", "wrist", "hand"), "leg": ("hip", "knee", "ankle", "foot")}
+_LIMBS = {
+    "arm": ("collar", "shoulder", "elbow", "wrist", "hand"),
+    "leg": ("hip", "knee", "ankle", "foot"),
+}
 _ENDS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "head")
 
 
@@ -48,7 +53,8 @@ class Points:
     numbers: list[int] = field(default_factory=list)
     values: list[NDArray[np.float64]] = field(default_factory=list)  # (3,) metres, or (2,) pixels
     weights: list[float] = field(default_factory=list)
-    floor: float | None = None  # height that the feet's skin may not go below; None: it may be anywhere
+    # height that the feet's skin may not go below; None: it may be anywhere
+    floor: float | None = None
 
     def add(self, number: int, value: NDArray[np.float64], weight: float) -> None:
         """Add a point.
@@ -70,20 +76,29 @@ def limb_of(joint: str) -> str:
 
 
 def _bent_by(joints: tuple[str, ...]) -> set[str]:
-    """Return the limbs that bend where the pelvis or hips are moved: the legs, whose feet stay where they are."""
+    """Return the limbs that bend where the pelvis or hips are moved: the legs, whose feet stay
+    where they are.
+    """
     moved = "pelvis" in joints or any(joint.endswith("hip") for joint in joints)
     return {"left_leg", "right_leg"} if moved else set()
 
 
 def compiled_solver() -> ModuleType:
-    """Return the solver; inside Blender, where it is loaded as ``scope`` as well, that one, which has machine code."""
+    """Return the solver; inside Blender, where it is loaded as ``scope`` as well, that one, which
+    has machine code.
+    """
     loaded = sys.modules.get("scope.solver")
     return loaded if loaded is not None and loaded.__file__ == own_solver.__file__ else own_solver
 
 
 def _options(solver: ModuleType) -> Any:
     weights = solver.Weights(
-        keypoints2d=1.0, keypoints3d=1.0, joint_prior=1.0, joint_limits=500.0, shape=1.0, floor=ABOVE_FLOOR
+        keypoints2d=1.0,
+        keypoints3d=1.0,
+        joint_prior=1.0,
+        joint_limits=500.0,
+        shape=1.0,
+        floor=ABOVE_FLOOR,
     )
     return solver.Options(
         stages=(solver.Stage(weights, 1e-9, 60),),
@@ -132,17 +147,22 @@ class PoseRefit:
 
     def soles_of(self, limb: str) -> list[str]:
         """Return the sole points of a leg; none for other limbs."""
-        return [s for s in SOLES if limb.endswith("leg") and s.startswith(f"sole/{limb.split('_')[0]}")]
+        return [
+            s for s in SOLES if limb.endswith("leg") and s.startswith(f"sole/{limb.split('_')[0]}")
+        ]
 
     def place(
         self, rotations: NDArray[np.float64], root: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return orientations (..., K+1, 3, 3) and positions (..., K+1, 3) of all parts, and the soles (..., 4, 3).
+        """Return orientations (..., K+1, 3, 3) and positions (..., K+1, 3) of all parts, and the
+        soles (..., 4, 3).
 
         :param rotations: (..., K+1, 3, 3), the root's in the world.
         :param root: (..., 3) metres.
         """
-        R, t = self.body.forward_kinematics(rotations, root - self.body.rest_joints(self.betas)[0], self.betas)
+        R, t = self.body.forward_kinematics(
+            rotations, root - self.body.rest_joints(self.betas)[0], self.betas
+        )
         first = self.body.keypoint_names.index(SOLES[0])
         return R, t, self.body.keypoints(R, t, self.betas, which=slice(first, first + len(SOLES)))
 
@@ -168,32 +188,55 @@ class PoseRefit:
         in_image = [k for k, v in enumerate(points.values) if len(v) == 2]
         numbers, weights = np.array(points.numbers, int), np.array(points.weights)
         measured = self._solver.Measurements(
-            pose_priors=self._root_prior(R_camera_world @ rotations[0], R_camera_world @ (root_prior - center), joints)
+            pose_priors=self._root_prior(
+                R_camera_world @ rotations[0], R_camera_world @ (root_prior - center), joints
+            )
         )
         if in_space:
             xyz = (np.array([points.values[k] for k in in_space]) - center) @ R_camera_world.T
-            measured.keypoints3d = self._solver.Keypoints3D(numbers[in_space], xyz, weights[in_space])
+            measured.keypoints3d = self._solver.Keypoints3D(
+                numbers[in_space], xyz, weights[in_space]
+            )
         if in_image and camera is not None:
             uv = np.array([points.values[k] for k in in_image])
             measured.intrinsics = camera[1]
-            measured.keypoints2d = self._solver.Keypoints2D(numbers[in_image], uv, weights[in_image])
+            measured.keypoints2d = self._solver.Keypoints2D(
+                numbers[in_image], uv, weights[in_image]
+            )
         if points.floor is not None:
             numbers, up = self._skin_points, R_camera_world[:, 2]
-            measured.floor = self._solver.Floor(numbers, up, points.floor - center[2], np.zeros(len(numbers)))
+            measured.floor = self._solver.Floor(
+                numbers, up, points.floor - center[2], np.zeros(len(numbers))
+            )
         state = self._solver.State(
-            R_camera_world @ rotations[0], R_camera_world @ (root - center), rotations[1:].copy(), np.zeros(0)
+            R_camera_world @ rotations[0],
+            R_camera_world @ (root - center),
+            rotations[1:].copy(),
+            np.zeros(0),
         )
-        priors = self._solver.Priors(rotations[1:].copy(), self._weights(joints), limits=self._limits_of(joints))
+        priors = self._solver.Priors(
+            rotations[1:].copy(), self._weights(joints), limits=self._limits_of(joints)
+        )
         found = self._solver.fit_tree(self._tree, measured, state, priors, self._options).state
         out = np.concatenate([(R_camera_world.T @ found.R_camera_root)[None], found.Omega])
         return out, R_camera_world.T @ found.t_camera_root + center
 
     def _shift_in_image(
-        self, rotations: NDArray[np.float64], root: NDArray[np.float64], points: Points, camera: Camera | None
+        self,
+        rotations: NDArray[np.float64],
+        root: NDArray[np.float64],
+        points: Points,
+        camera: Camera | None,
     ) -> NDArray[np.float64]:
-        """Return the shift (3,) by which hips that are measured in the image move there at their depth."""
+        """Return the shift (3,) by which hips that are measured in the image move there at their
+        depth.
+        """
         numbers = {self.number(name): self.joint(name) for name in ("left_hip", "right_hip")}
-        pixels = [(numbers[n], v) for n, v in zip(points.numbers, points.values, strict=True) if n in numbers]
+        pixels = [
+            (numbers[n], v)
+            for n, v in zip(points.numbers, points.values, strict=True)
+            if n in numbers
+        ]
         pixels = [(joint, value) for joint, value in pixels if len(value) == 2]
         if not pixels or camera is None:
             return np.zeros(3)
@@ -202,12 +245,17 @@ class PoseRefit:
         mean: NDArray[np.float64] = np.mean(shifts, axis=0)
         return mean
 
-    def _root_prior(self, R: NDArray[np.float64], t: NDArray[np.float64], joints: tuple[str, ...]) -> PosePriors:
+    def _root_prior(
+        self, R: NDArray[np.float64], t: NDArray[np.float64], joints: tuple[str, ...]
+    ) -> PosePriors:
         """Return the prior on the pelvis, which may move where the trunk is corrected."""
         trunk = any(limb_of(j) == "trunk" or j.endswith(("hip", "collar")) for j in joints)
-        share = 0.1 if trunk and not _bent_by(joints) else 1.0  # legs rather than bend than let the body move away
+        # legs rather than bend than let the body move away
+        share = 0.1 if trunk and not _bent_by(joints) else 1.0
         rotation = PELVIS_ROTATION * (0.1 if trunk else 1.0)
-        posed: PosePriors = self._solver.PosePriors([0], R[None], t[None], [rotation], [PELVIS_POSITION * share])
+        posed: PosePriors = self._solver.PosePriors(
+            [0], R[None], t[None], [rotation], [PELVIS_POSITION * share]
+        )
         return posed
 
     def _weights(self, joints: tuple[str, ...]) -> NDArray[np.float64]:
@@ -222,15 +270,21 @@ class PoseRefit:
                 ancestor = self.names[part]
                 in_limb = limb_of(ancestor) == limb_of(name) and not ancestor.endswith("collar")
                 girdle = (
-                    ancestor.endswith("collar") or limb_of(name) == "trunk" or name.endswith(("shoulder", "collar"))
+                    ancestor.endswith("collar")
+                    or limb_of(name) == "trunk"
+                    or name.endswith(("shoulder", "collar"))
                 )
-                weights[part] = min(weights[part], FREE if in_limb and limb_of(name) != "trunk" else STIFF)
+                weights[part] = min(
+                    weights[part], FREE if in_limb and limb_of(name) != "trunk" else STIFF
+                )
                 weights[part] = min(weights[part], GIRDLE if girdle else STIFF)
                 part = int(self.body.parents[part])
         return weights[1:]
 
     def _limits_of(self, joints: tuple[str, ...]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Return the limits of knees and elbows of the corrected limbs: other joints stay as they were."""
+        """Return the limits of knees and elbows of the corrected limbs: other joints stay as they
+        were.
+        """
         ints, floats = self._limits
         limbs = {limb_of(name) for name in joints} | _bent_by(joints)
         keep = np.array([limb_of(self.names[k]) in limbs for k in ints[:, 0]], bool)

@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Solving a motion again around the frames that a user corrected.
 
-Each corrected joint is treated in three steps. (1) The pose of every pinned key is fitted to the pin, with the pose as
-it was as the prior. (2) What changed, as rotation vectors log(Ω_beforeᵀ Ω_after) and a shift of the pelvis, is
-interpolated between the pinned keys and fades out beyond them. (3) Every key of that span is fitted again with the
-interpolated pose as the prior, the corrected joint where that pose has it, and feet that stand, other hands and the
-head where they were. Keys outside of the span are not touched. The joints of a limb, and limbs whose spans overlap, are
-treated in turns until all pins are met. A pin that its limb cannot reach is approached, see ``reach.py``.
+Each corrected joint is treated in three steps. (1) The pose of every pinned key is fitted to the
+pin, with the pose as it was as the prior. (2) What changed, as rotation vectors log(Ω_beforeᵀ
+Ω_after) and a shift of the pelvis, is interpolated between the pinned keys and fades out beyond
+them. (3) Every key of that span is fitted again with the interpolated pose as the prior, the
+corrected joint where that pose has it, and feet that stand, other hands and the head where they
+were. Keys outside of the span are not touched. The joints of a limb, and limbs whose spans overlap,
+are treated in turns until all pins are met. A pin that its limb cannot reach is approached, see
+``reach.py``.
 
-On captured walks whose arm was turned away from the known truth over half a second to a second, pins of elbow and wrist
-reduce the wrist's mean error over the span from 83 pixels to 27, 15 and 10 with one, two and three pinned frames, and
-from 20 cm to 6, 3 and 1 cm if they are pinned in space. With the pose as it was as the prior of step 3, only to 46
-pixels and 11 cm.
+On captured walks whose arm was turned away from the known truth over half a second to a second,
+pins of elbow and wrist reduce the wrist's mean error over the span from 83 pixels to 27, 15 and 10
+with one, two and three pinned frames, and from 20 cm to 6, 3 and 1 cm if they are pinned in space.
+With the pose as it was as the prior of step 3, only to 46 pixels and 11 cm.
 """
 
 from __future__ import annotations
@@ -67,7 +69,9 @@ class Shot:
 
 @dataclass
 class _Track:
-    """The corrected joints of one limb: keys (H,), their measured points, and how far the correction reaches."""
+    """The corrected joints of one limb: keys (H,), their measured points, and how far the
+    correction reaches.
+    """
 
     joints: list[str]  # from the trunk outwards
     keys: list[int]
@@ -107,7 +111,8 @@ def resolve(
 
 
 def missed(clip: Clip, body: Body, betas: NDArray[np.floating[Any]], pin: Pin, shot: Shot) -> float:
-    """Return how far the joint is from its pin: pixels of a pin in the image, metres of one in space.
+    """Return how far the joint is from its pin: pixels of a pin in the image, metres of one in
+    space.
 
     :param betas: (P,) shape coefficients.
     """
@@ -121,22 +126,29 @@ def missed(clip: Clip, body: Body, betas: NDArray[np.floating[Any]], pin: Pin, s
 class _Correction:
     """The limbs of one cluster, treated in turns. Changes the clip that it is given."""
 
-    def __init__(self, refit: PoseRefit, clip: Clip, tracks: list[_Track], slack: float, floor: float) -> None:
+    def __init__(
+        self, refit: PoseRefit, clip: Clip, tracks: list[_Track], slack: float, floor: float
+    ) -> None:
         self._refit, self._clip, self._tracks, self._slack = refit, clip, tracks, slack
         self._spans = [_keys_within_reach(clip, track) for track in tracks]
         times = clip.times
         first, last = min(s[0] for s in self._spans), max(s[-1] for s in self._spans)
-        around = np.flatnonzero((times >= times[first] - _AROUND_S) & (times <= times[last] + _AROUND_S))
+        around = np.flatnonzero(
+            (times >= times[first] - _AROUND_S) & (times <= times[last] + _AROUND_S)
+        )
         R, at, soles = refit.place(clip.rotations[around], clip.root[around])
         lowest = floor + FLOOR_M
-        self._floor = np.full(len(clip), lowest)  # what feet may not go below: where they were, if that is lower
+        # what feet may not go below: where they were, if that is lower
+        self._floor = np.full(len(clip), lowest)
         self._floor[around] = np.minimum(lowest, refit.skin.heights(R, at, UP).min(axis=1))
         self._limited: set[int] = set()  # tracks whose pins are where the limb can reach them
         self._standing = np.zeros((len(clip), soles.shape[1]))
         self._standing[around] = standing_probability(soles, UP, times[around])
 
     def run(self) -> None:
-        """Treat every joint from the trunk outwards, then each limb as a whole until all are where they should be."""
+        """Treat every joint from the trunk outwards, then each limb as a whole until all are where
+        they should be.
+        """
         for index, track in enumerate(self._tracks):
             for joint in track.joints:
                 self._treat(index, [joint])
@@ -153,9 +165,14 @@ class _Correction:
         _, at, soles = self._refit.place(before.rotations, before.root)
         self._limit(index, at)
         held = [self._held(index, int(key), at[k], soles[k]) for k, key in enumerate(span)]
-        hard = [h for h, points in enumerate(track.points) if any(joint in points for joint in joints)]
+        hard = [
+            h for h, points in enumerate(track.points) if any(joint in points for joint in joints)
+        ]
         turn, shift = self._changes(track, hard, span, before, held)
-        known, reach = clip.times[[track.keys[h] for h in hard]], np.array([track.reach[h] for h in hard])
+        known, reach = (
+            clip.times[[track.keys[h] for h in hard]],
+            np.array([track.reach[h] for h in hard]),
+        )
         rotations = before.rotations @ exp(faded(before.times, known, turn, reach))
         root = before.root + faded(before.times, known, shift, reach)
         R, at, soles = self._refit.place(rotations, root)
@@ -174,7 +191,8 @@ class _Correction:
             clip.rotations[key], clip.root[key] = pose
 
     def _limit(self, index: int, at: NDArray[np.float64]) -> None:
-        """Move the pins of a limb that are out of its reach to where it can reach them, before it is first treated.
+        """Move the pins of a limb that are out of its reach to where it can reach them, before it
+        is first treated.
 
         :param at: (T, K+1, 3) the joints at the keys of the limb's span, world.
         """
@@ -190,16 +208,25 @@ class _Correction:
                 moved[joint] = points
                 if len(points.numbers) == 1:  # not a foot that stands, which has several
                     places = at[key - first], pinned
-                    reached = within_reach(self._refit, joint, points.values[0], places, track.cameras[h], self._slack)
+                    reached = within_reach(
+                        self._refit, joint, points.values[0], places, track.cameras[h], self._slack
+                    )
                     moved[joint] = Points(points.numbers, [reached], points.weights)
                     if len(reached) == 3:
                         pinned[joint] = reached
             track.points[h] = moved
 
     def _changes(
-        self, track: _Track, hard: list[int], span: NDArray[np.intp], before: Clip, held: list[Points]
+        self,
+        track: _Track,
+        hard: list[int],
+        span: NDArray[np.intp],
+        before: Clip,
+        held: list[Points],
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Fit the pinned keys; return the rotation vectors (H, K+1, 3) and shifts (H, 3) that this takes."""
+        """Fit the pinned keys; return the rotation vectors (H, K+1, 3) and shifts (H, 3) that this
+        takes.
+        """
         turns, shifts = [], []
         for h in hard:
             k = int(track.keys[h] - span[0])
@@ -207,18 +234,23 @@ class _Correction:
             for measured in track.points[h].values():
                 _add_all(points, measured)
             pose = before.rotations[k], before.root[k]
-            rotations, root = self._refit.solve(*pose, tuple(track.joints), points, track.cameras[h])
+            rotations, root = self._refit.solve(
+                *pose, tuple(track.joints), points, track.cameras[h]
+            )
             turns.append(log(np.swapaxes(before.rotations[k], -1, -2) @ rotations))
             shifts.append(root - before.root[k])
         return np.array(turns), np.array(shifts)
 
-    def _held(self, index: int, key: int, joints: NDArray[np.float64], soles: NDArray[np.float64]) -> Points:
+    def _held(
+        self, index: int, key: int, joints: NDArray[np.float64], soles: NDArray[np.float64]
+    ) -> Points:
         """Return the points of other limbs, which stay where they are while a limb is corrected."""
         refit, own, points = self._refit, self._tracks[index].joints, Points()
         limb = limb_of(own[0])
         if not limb.endswith("arm") and np.isfinite(self._floor[key]):
             points.floor = float(self._floor[key])
-        free = () if all(joint.endswith("hip") for joint in own) else refit.soles_of(limb)  # a hip moves over its foot
+        # a hip moves over its foot
+        free = () if all(joint.endswith("hip") for joint in own) else refit.soles_of(limb)
         for k, name in enumerate(refit.sole_names):
             if name not in free and self._standing[key, k] > _STANDS:
                 points.add(refit.number(name), soles[k], STANDING * self._standing[key, k])
@@ -233,8 +265,11 @@ class _Correction:
                     points.add(refit.number(name), joints[refit.joint(name)], PINNED * share)
         return points
 
-    def _rise(self, track: _Track, span: NDArray[np.intp], heights: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return by how much, (T, 3), the points of a leg have to be higher for its foot to be above the floor.
+    def _rise(
+        self, track: _Track, span: NDArray[np.intp], heights: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return by how much, (T, 3), the points of a leg have to be higher for its foot to be
+        above the floor.
 
         :param heights: (T, 4) of the feet's skin at the keys of the span.
         """
@@ -250,21 +285,38 @@ class _Correction:
         return float(faded(times[key : key + 1], times[track.keys], ones, np.array(track.reach))[0])
 
     def _follow(
-        self, points: Points, joint: str, track: _Track, joints: NDArray[np.float64], soles: NDArray[np.float64]
+        self,
+        points: Points,
+        joint: str,
+        track: _Track,
+        joints: NDArray[np.float64],
+        soles: NDArray[np.float64],
     ) -> None:
-        """Add the corrected points of a key that is not pinned, where the interpolated pose has them."""
+        """Add the corrected points of a key that is not pinned, where the interpolated pose has
+        them.
+        """
         refit = self._refit
         for number in next(p[joint] for p in track.points if joint in p).numbers:
             sole = number - refit.number(refit.sole_names[0])
-            points.add(number, soles[sole] if 0 <= sole < len(soles) else joints[refit.joint(joint)], PINNED)
+            points.add(
+                number,
+                soles[sole] if 0 <= sole < len(soles) else joints[refit.joint(joint)],
+                PINNED,
+            )
 
     def _all_met(self) -> bool:
-        """Return whether every pinned joint is where it should be; a standing foot is after one turn."""
+        """Return whether every pinned joint is where it should be; a standing foot is after one
+        turn.
+        """
         for track in self._tracks:
-            joints = self._refit.place(self._clip.rotations[track.keys], self._clip.root[track.keys])[1]
+            joints = self._refit.place(
+                self._clip.rotations[track.keys], self._clip.root[track.keys]
+            )[1]
             for at, by_joint, camera in zip(joints, track.points, track.cameras, strict=True):
                 for joint, points in by_joint.items():
-                    if len(points.numbers) == 1 and not _met(at[self._refit.joint(joint)], points.values[0], camera):
+                    if len(points.numbers) == 1 and not _met(
+                        at[self._refit.joint(joint)], points.values[0], camera
+                    ):
                         return False
         return True
 
@@ -305,9 +357,13 @@ def _key_at(clip: Clip, time: float) -> int | None:
 
 
 def keys_of_span(clip: Clip, first: int, last: int, shot: Shot) -> NDArray[np.intp]:
-    """Return the indices of a clip's keys at the source frames from ``first`` to ``last``, both inclusive."""
+    """Return the indices of a clip's keys at the source frames from ``first`` to ``last``, both
+    inclusive.
+    """
     half = 0.5 * float(np.median(np.diff(shot.times))) if len(shot.times) > 1 else 0.01
-    return np.flatnonzero((clip.times >= shot.time(first) - half) & (clip.times <= shot.time(last) + half))
+    return np.flatnonzero(
+        (clip.times >= shot.time(first) - half) & (clip.times <= shot.time(last) + half)
+    )
 
 
 def _pin_tracks(refit: PoseRefit, clip: Clip, pins: list[Pin], shot: Shot) -> list[_Track]:
@@ -323,7 +379,9 @@ def _pin_tracks(refit: PoseRefit, clip: Clip, pins: list[Pin], shot: Shot) -> li
         keys = sorted(by_key)
         gaps = np.diff(clip.times[keys], prepend=-np.inf, append=np.inf)
         track = _Track(joints, keys, [], [], [])
-        for key, gap in zip(keys, np.where(len(keys) > 1, np.minimum(gaps[:-1], gaps[1:]), np.inf), strict=True):
+        for key, gap in zip(
+            keys, np.where(len(keys) > 1, np.minimum(gaps[:-1], gaps[1:]), np.inf), strict=True
+        ):
             reach = max(pin.reach for pin in by_key[key])
             track.reach.append(float(np.clip(gap, reach / 4, reach)))
             track.points.append({pin.joint: _measured(refit, pin) for pin in by_key[key]})
@@ -346,22 +404,32 @@ def _clusters(clip: Clip, tracks: list[_Track]) -> list[list[_Track]]:
     """Group the tracks whose spans overlap."""
     spans = [_keys_within_reach(clip, track)[[0, -1]] for track in tracks]
     groups: list[tuple[int, int, list[_Track]]] = []
-    for (first, last), track in sorted(zip(spans, tracks, strict=True), key=lambda pair: int(pair[0][0])):
+    for (first, last), track in sorted(
+        zip(spans, tracks, strict=True), key=lambda pair: int(pair[0][0])
+    ):
         if groups and first <= groups[-1][1]:
             begin, end, together = groups.pop()
             groups.append((begin, max(end, int(last)), [*together, track]))
         else:
             groups.append((int(first), int(last), [track]))
     # The trunk first: how far the limbs reach depends on where it is.
-    return [sorted(together, key=lambda t: limb_of(t.joints[0]) != "trunk") for _, _, together in groups]
+    return [
+        sorted(together, key=lambda t: limb_of(t.joints[0]) != "trunk") for _, _, together in groups
+    ]
 
 
-def _contact_track(refit: PoseRefit, clip: Clip, contact: Contact, shot: Shot, floor: float) -> _Track | None:
-    """Return the track of a foot that stands: its sole stays at its median position, on the floor if that is near."""
+def _contact_track(
+    refit: PoseRefit, clip: Clip, contact: Contact, shot: Shot, floor: float
+) -> _Track | None:
+    """Return the track of a foot that stands: its sole stays at its median position, on the floor
+    if that is near.
+    """
     span = keys_of_span(clip, contact.first, contact.last, shot)
     if not len(span):
         return None
-    which = [k for k, name in enumerate(refit.sole_names) if name.startswith(f"sole/{contact.foot}")]
+    which = [
+        k for k, name in enumerate(refit.sole_names) if name.startswith(f"sole/{contact.foot}")
+    ]
     soles = refit.place(clip.rotations[span], clip.root[span])[2][:, which]
     where = np.median(soles, axis=0)
     lowest = float(where[:, 2].min()) - floor
@@ -372,4 +440,6 @@ def _contact_track(refit: PoseRefit, clip: Clip, contact: Contact, shot: Shot, f
         points.add(number, where[k], PINNED)
     n = len(span)
     joint = f"{contact.foot}_foot"
-    return _Track([joint], [int(k) for k in span], [{joint: points}] * n, [None] * n, [_CONTACT_REACH_S] * n)
+    return _Track(
+        [joint], [int(k) for k in span], [{joint: points}] * n, [None] * n, [_CONTACT_REACH_S] * n
+    )

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far pins put feet under the floor, where one asks for it: otherwise the fit keeps them above."""
+"""How far pins put feet under the floor, where one asks for it: otherwise the fit keeps them
+above.
+"""
 
 from __future__ import annotations
 
@@ -15,16 +17,19 @@ _NOTICED_M = 0.002
 
 
 def feet_under_floor(motion: Motion, body: Body) -> tuple[float, int]:
-    """Return how far a foot is under the floor because of what was measured, metres, and in how many frames.
+    """Return how far a foot is under the floor because of what was measured, metres, and in how
+    many frames.
 
     :param body: that of the motion.
-    :return: of feet that are more than `UNDER_FLOOR_M` under the floor and lower than without pins; or 0 and 0, as
-        on uneven ground.
+    :return: of feet that are more than `UNDER_FLOOR_M` under the floor and lower than without pins;
+        or 0 and 0, as on uneven ground.
     :raises MotionFileError: the motion's corrections are damaged.
     """
     if motion.uneven_ground:
         return 0.0, 0
-    free = with_corrections(motion, body, tuple(c for c in corrections_of(motion) if not isinstance(c, Contact | Pin)))
+    free = with_corrections(
+        motion, body, tuple(c for c in corrections_of(motion) if not isinstance(c, Contact | Pin))
+    )
     lowest, before = (foot_heights(m, body).min(axis=1) for m in (motion, free))
     under = (lowest < -UNDER_FLOOR_M) & (lowest < before - _NOTICED_M)
     return (-float(lowest[under].min()), int(np.count_nonzero(under))) if under.any() else (0.0, 0)

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Turning a motion and its camera so that a line that the user drew in the image or in another view is upright.
+"""Turning a motion and its camera so that a line that the user drew in the image or in another view
+is upright.
 
-The line and the camera's centre, or the direction of an orthographic view, span a plane with the normal n; what is
-upright in the world lies in it. Of all such directions the nearest to the present up z is u = z − (z·n) n, normalized.
-The rotation from u to z is applied to everything about a point on the floor, after which the feet are again as high as
-they were. A line determines the tilt across the direction of its view, so the image shows a roll, and a view from the
-side a lean towards the camera or away from it.
+The line and the camera's centre, or the direction of an orthographic view, span a plane with the
+normal n; what is upright in the world lies in it. Of all such directions the nearest to the present
+up z is u = z − (z·n) n, normalized. The rotation from u to z is applied to everything about a point
+on the floor, after which the feet are again as high as they were. A line determines the tilt across
+the direction of its view, so the image shows a roll, and a view from the side a lean towards the
+camera or away from it.
 """
 
 from __future__ import annotations
@@ -34,7 +36,8 @@ def upright_transform(
 
     :param frame: source frame.
     :param line: two pixels of the upright frame, without lens distortion.
-    :raises UsageError: the line is too short, or farther from upright than any tilt of a camera explains.
+    :raises UsageError: the line is too short, or farther from upright than any tilt of a camera
+        explains.
     """
     a, b = np.array(line, float)
     if np.linalg.norm(a - b) < _SHORTEST_PX:
@@ -50,11 +53,14 @@ def upright_transform_in_view(
     line: tuple[NDArray[np.float64], NDArray[np.float64]],
     direction: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return the rigid transform (4, 4) of the world after which a line in an orthographic view is upright.
+    """Return the rigid transform (4, 4) of the world after which a line in an orthographic view is
+    upright.
 
-    :param line: two points (3,) on the line, metres, world; how far away they are in the view does not matter.
+    :param line: two points (3,) on the line, metres, world; how far away they are in the view does
+        not matter.
     :param direction: (3,) in which the view looks, world.
-    :raises UsageError: the view is none from a side, or the line is too short or too far from upright.
+    :raises UsageError: the view is none from a side, or the line is too short or too far from
+        upright.
     """
     direction = np.asarray(direction, float)
     if not abs(direction @ UP) < np.sin(_SIDE) * np.linalg.norm(direction):
@@ -77,7 +83,8 @@ def _transform(motion: Motion, body: Body, normal: NDArray[np.float64]) -> NDArr
     angle = np.arcsin(np.clip(abs(UP @ normal), 0.0, 1.0))
     if angle > _LARGEST:
         raise UsageError(
-            f"the line is {np.degrees(angle):.0f} degrees from upright; draw it along something upright, such as a "
+            f"the line is {np.degrees(angle):.0f} degrees from upright; draw it along something "
+            "upright, such as a "
             "door or a wall's edge"
         )
     turn = shortest_turn(u / np.linalg.norm(u), UP)

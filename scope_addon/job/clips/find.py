@@ -10,11 +10,15 @@ from pathlib import Path
 from ...footage import FOOTAGE_SUFFIXES, VIDEO_SUFFIXES, is_sequence, pictures_in
 
 OVERLAY = ".overlay"  # precedes the suffix of an overlay, which is not footage
-_PERSON = re.compile(r"(.+)\.person[0-9]+")  # as person_paths names the results of one of several people
+# as person_paths names the results of one of several people
+_PERSON = re.compile(r"(.+)\.person[0-9]+")
 
 
-def find_clips(folder: Path, out: Path, *, recursive: bool, several_people: bool) -> dict[str, Path]:
-    """Return the clips in ``folder`` by the name of their results, without suffix, in alphabetical order of the files.
+def find_clips(
+    folder: Path, out: Path, *, recursive: bool, several_people: bool
+) -> dict[str, Path]:
+    """Return the clips in ``folder`` by the name of their results, without suffix, in alphabetical
+    order of the files.
 
     :param out: output folder, whose files are not footage.
     :param recursive: include subfolders.
@@ -27,13 +31,18 @@ def find_clips(folder: Path, out: Path, *, recursive: bool, several_people: bool
         relative = path.relative_to(folder)
         short = path.is_file() and stems[_stem(folder, path)] == 1
         names[path] = (relative.with_suffix("") if short else relative).as_posix()
-    while full := _full_names_of_shared(folder, names, several_people):  # a full name may be another clip's short one
+    # a full name may be another clip's short one
+    while full := _full_names_of_shared(folder, names, several_people):
         names |= full
     return {name: path for path, name in names.items()}
 
 
-def _full_names_of_shared(folder: Path, names: dict[Path, str], several_people: bool) -> dict[Path, str]:
-    """Return full names for clips whose short name is also used by another clip, or by one person's result of it."""
+def _full_names_of_shared(
+    folder: Path, names: dict[Path, str], several_people: bool
+) -> dict[Path, str]:
+    """Return full names for clips whose short name is also used by another clip, or by one person's
+    result of it.
+    """
     folded = {path: name.casefold() for path, name in names.items()}
     counts = Counter(folded.values())
     full = {}
@@ -45,14 +54,19 @@ def _full_names_of_shared(folder: Path, names: dict[Path, str], several_people: 
 
 
 def _stem(folder: Path, path: Path) -> str:
-    """Return the name that must be unique among clips; case-insensitive, as many file systems are."""
+    """Return the name that must be unique among clips; case-insensitive, as many file systems
+    are.
+    """
     return path.relative_to(folder).with_suffix("").as_posix().casefold()
 
 
-def _footage_below(folder: Path, out: Path, recursive: bool, above: tuple[Path, ...] = ()) -> list[Path]:
+def _footage_below(
+    folder: Path, out: Path, recursive: bool, above: tuple[Path, ...] = ()
+) -> list[Path]:
     """Return the videos, pictures and picture sequences in a folder.
 
-    :param above: the folders that lead to it, to which links are not followed: that would never end.
+    :param above: the folders that lead to it, to which links are not followed: that would never
+        end.
     """
     above = (*above, folder.resolve())
     found: list[Path] = []
@@ -65,7 +79,8 @@ def _footage_below(folder: Path, out: Path, recursive: bool, above: tuple[Path, 
                 found.append(path)
             elif recursive and path.resolve() not in above:
                 found += _footage_below(path, out, recursive, above)
-        # Pipes are skipped, because opening one would block; a broken link is kept, to be reported as a failed clip.
+        # Pipes are skipped, because opening one would block; a broken link is kept, to be reported
+        # as a failed clip.
         elif suffix in FOOTAGE_SUFFIXES and (path.is_file() or not path.exists()):
             found.append(path)
     return found

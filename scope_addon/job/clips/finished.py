@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The record that a process of a batch leaves beside its clip's results when they are complete.
 
-A batch that is killed before it has written its report does not know what its processes have finished. The record has
-the clip's key in its name, and the process's report with the sizes and times of the files, so that files which
-something else has written since do not count. The batch removes the record once its report contains the clip.
+A batch that is killed before it has written its report does not know what its processes have
+finished. The record has the clip's key in its name, and the process's report with the sizes and
+times of the files, so that files which something else has written since do not count. The batch
+removes the record once its report contains the clip.
 """
 
 from __future__ import annotations
@@ -46,7 +47,8 @@ def write_finished(file: Path, report: dict[str, Any]) -> None:
 
 
 def read_finished(file: Path, out: Path) -> dict[str, Any] | None:
-    """Return the report of a process whose results are still as it has left them; None if there is no such record.
+    """Return the report of a process whose results are still as it has left them; None if there is
+    no such record.
 
     :param out: output folder, in which the results have to be.
     """
@@ -64,10 +66,14 @@ def read_finished(file: Path, out: Path) -> dict[str, Any] | None:
 
 
 def remove_finished(out: Path, name: str) -> None:
-    """Remove the records of a clip, of whatever key. This reads the whole folder; for one key, unlink its file."""
+    """Remove the records of a clip, of whatever key. This reads the whole folder; for one key,
+    unlink its file.
+    """
     target = out / name
     with suppress(OSError):
-        for path in target.parent.glob(f".{glob.escape(target.name)}.finished-{'[0-9a-f]' * _KEY}.json"):
+        for path in target.parent.glob(
+            f".{glob.escape(target.name)}.finished-{'[0-9a-f]' * _KEY}.json"
+        ):
             path.unlink(missing_ok=True)
 
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Processes that each capture one clip, and that end when their parent does or when they are stopped."""
+"""Processes that each capture one clip, and that end when their parent does or when they are
+stopped.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,8 @@ from typing import IO, Any
 from ..parent import GRACE_S
 
 STOPPED = 130  # exit status of a process that was stopped, or not started any more
-# Ctrl-C on a terminal must reach the batch only, which stops its clips: a second signal would interrupt their clean-up.
+# Ctrl-C on a terminal must reach the batch only, which stops its clips: a second signal would
+# interrupt their clean-up.
 _NEW_GROUP = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
 _OWN_GROUP: dict[str, Any] = {"creationflags": _NEW_GROUP} if _NEW_GROUP else {"process_group": 0}
 _GRACE_S = GRACE_S + 3.0  # time for a clip to clean up after it is stopped
@@ -23,14 +26,18 @@ class ClipProcesses:
     """Runs processes for several threads at once."""
 
     def __init__(self) -> None:
-        self._running: dict[subprocess.Popen[str], IO[str]] = {}  # process to its stdin, whose closing ends the process
+        # process to its stdin, whose closing ends the process
+        self._running: dict[subprocess.Popen[str], IO[str]] = {}
         self._start_lock = threading.Lock()
         self._stopped = False
 
-    def run(self, arguments: list[str], wanted: Callable[[], bool] | None = None) -> tuple[int, str, str]:
+    def run(
+        self, arguments: list[str], wanted: Callable[[], bool] | None = None
+    ) -> tuple[int, str, str]:
         """Run a process and return its exit status, stdout and stderr.
 
-        :param wanted: asked twice a second; the process is stopped when it returns False. If None, it is not asked.
+        :param wanted: asked twice a second; the process is stopped when it returns False. If None,
+            it is not asked.
         :raises OSError: the process cannot be started.
         """
         with self._start_lock:  # so that stop() knows every process
@@ -52,7 +59,9 @@ class ClipProcesses:
             self._running[process] = lifeline
         try:
             with lifeline:
-                stdout, stderr = _communicate(process, lifeline, wanted) if wanted else process.communicate()
+                stdout, stderr = (
+                    _communicate(process, lifeline, wanted) if wanted else process.communicate()
+                )
         finally:
             del self._running[process]
         return process.returncode, stdout, stderr
@@ -72,7 +81,9 @@ class ClipProcesses:
                 process.kill()
 
 
-def _communicate(process: subprocess.Popen[str], lifeline: IO[str], wanted: Callable[[], bool]) -> tuple[str, str]:
+def _communicate(
+    process: subprocess.Popen[str], lifeline: IO[str], wanted: Callable[[], bool]
+) -> tuple[str, str]:
     """Return stdout and stderr; stop the process when it is not wanted any more."""
     end = None
     while True:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the clips of a batch are captured: a runner takes tasks and yields outcomes. This one uses this machine."""
+"""Where the clips of a batch are captured: a runner takes tasks and yields outcomes. This one uses
+this machine.
+"""
 
 from __future__ import annotations
 
@@ -19,17 +21,19 @@ class Runner(Protocol):
     """Captures clips."""
 
     def outcomes(self, tasks: Iterable[ClipTask]) -> Iterator[dict[str, Entry]]:
-        """Capture clips, and yield the entries of those that are finished by their names, as they come.
+        """Capture clips, and yield the entries of those that are finished by their names, as they
+        come.
 
-        Yields at least once a second, if need be an empty dictionary: a signal delivered to another thread does not
-        wake this one.
+        Yields at least once a second, if need be an empty dictionary: a signal delivered to another
+        thread does not wake this one.
         """
         ...
 
     def stop(self) -> dict[str, Entry]:
         """End what is running, because the batch ends early.
 
-        :return: entries of finished clips by their names, also of those that ended meanwhile and were never yielded.
+        :return: entries of finished clips by their names, also of those that ended meanwhile and
+            were never yielded.
         """
         ...
 
@@ -64,8 +68,12 @@ class LocalRunner:
         pending = set(self._names)
         while pending:
             finished, pending = wait(pending, timeout=_WAIT_S, return_when=FIRST_COMPLETED)
-            # In the order of the clips, which the set of those that have ended together does not have.
-            yield {self._names[future]: future.result() for future in sorted(finished, key=places.__getitem__)}
+            # In the order of the clips, which the set of those that have ended together does not
+            # have.
+            yield {
+                self._names[future]: future.result()
+                for future in sorted(finished, key=places.__getitem__)
+            }
         self._pool.shutdown()
 
     def stop(self) -> dict[str, Entry]:

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Capture one clip of a batch in a process of its own, and describe the outcome for the report.
 
-A task and its outcome consist of plain values, so that another process, or another machine, can do it.
+A task and its outcome consist of plain values, so that another process, or another machine, can do
+it.
 """
 
 from __future__ import annotations
@@ -20,9 +21,11 @@ from ...footage import PICTURE_SUFFIXES
 from .find import OVERLAY
 from .finished import FINISHED_FILE, finished_file, read_finished, remove_finished
 
-SHOWN_COMMAND, STOP_WITH_STDIN = "--shown-command", "--stop-with-stdin"  # options that only a batch passes
+# options that only a batch passes
+SHOWN_COMMAND, STOP_WITH_STDIN = "--shown-command", "--stop-with-stdin"
 WINDOWS, WINDOWS_FOLDER = "--windows", "--windows-folder"  # likewise, only on a cluster
-COUNT = "count"  # value of WINDOWS: capture the clip, or only say into how many windows it can be divided
+# value of WINDOWS: capture the clip, or only say into how many windows it can be divided
+COUNT = "count"
 FINISHED = ("done", "skipped", "no_person")  # statuses of clips that need not be captured again
 DIVIDED = "divided"  # status of a clip that has several
 REPORT = ".report"  # between a clip's name and the suffix of its page
@@ -53,17 +56,22 @@ class CaptureSettings(NamedTuple):
     extras: Extras = NO_EXTRAS
 
     def basis(self, program_version: str) -> str:
-        """Return the part of the clips' keys that is the same for all: program, options, and files that these name.
+        """Return the part of the clips' keys that is the same for all: program, options, and files
+        that these name.
 
         :raises OSError: a file cannot be read.
         """
         values = {k: v for k, v in self.options.items() if k != "--threads"}
-        text = json.dumps([program_version, sorted(values.items()), list(self.suffixes), self.extras])
+        text = json.dumps(
+            [program_version, sorted(values.items()), list(self.suffixes), self.extras]
+        )
         digest = hashlib.sha256(text.encode())
         for value in values.values():
             files = [Path(value)] if value else []  # a body, a calibration, a network
-            files += [path.with_suffix(".json") for path in files if path.suffix == ".onnx"]  # a network's description
-            _add_files(digest, filter(os.path.isfile, files))  # unlike Path's, False for what is too long for a name
+            # a network's description
+            files += [path.with_suffix(".json") for path in files if path.suffix == ".onnx"]
+            # unlike Path's, False for what is too long for a name
+            _add_files(digest, filter(os.path.isfile, files))
         return digest.hexdigest()
 
 
@@ -77,7 +85,8 @@ class ClipTask(NamedTuple):
     :param basis: see `CaptureSettings.basis`.
     :param previous: entry of the previous report, if its files still exist.
     :param final: folder to which the results are moved later; empty if they stay in ``out``.
-    :param windows: `COUNT`, or a range ``FIRST:END`` of windows that are to be observed; empty: the clip is captured.
+    :param windows: `COUNT`, or a range ``FIRST:END`` of windows that are to be observed; empty: the
+        clip is captured.
     :param windows_folder: of a clip that is captured, with windows that were observed before.
     :param key: of the clip, if it is known.
     :param again: capture the clip even if its results are there.
@@ -103,7 +112,8 @@ def capture_clip(
     run: Callable[[list[str]], tuple[int, str, str]],
     threads: int | None = None,
 ) -> Entry:
-    """Capture a clip unless it is finished, and return its entry in the report, also if the clip fails.
+    """Capture a clip unless it is finished, and return its entry in the report, also if the clip
+    fails.
 
     :param program: command that takes ``capture FILE -o OUT --json``.
     :param run: runs a process and returns its exit status, stdout and stderr.
@@ -116,20 +126,28 @@ def capture_clip(
         entry["key"] = task.key or _key(task.basis, footage)
     except OSError as error:
         return failure(task, f"{footage} cannot be read: {error.strerror}")
-    leaves_record = not task.final and not task.windows  # on a cluster, results are moved when they are finished
+    # on a cluster, results are moved when they are finished
+    leaves_record = not task.final and not task.windows
     record = finished_file(out, task.name, entry["key"])
     if (finished := _finished_before(task, entry, record if leaves_record else None)) is not None:
         return finished
     target = out / task.name
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        arguments = [*program, *_arguments(footage, target, task.settings, threads), *_window_arguments(task)]
+        arguments = [
+            *program,
+            *_arguments(footage, target, task.settings, threads),
+            *_window_arguments(task),
+        ]
         if leaves_record:
             remove_finished(out, task.name)
             arguments.append(f"{FINISHED_FILE}={record}")
         if task.final:  # a page about the capture shows its command
             shown = _arguments(footage, Path(task.final) / task.name, task.settings, threads)
-            arguments += [SHOWN_COMMAND, shlex.join([*program, *(each for each in shown if each != STOP_WITH_STDIN)])]
+            arguments += [
+                SHOWN_COMMAND,
+                shlex.join([*program, *(each for each in shown if each != STOP_WITH_STDIN)]),
+            ]
         status, stdout, stderr = run(arguments)
     except OSError as error:
         return entry | failure(task, system_error_message(error))
@@ -139,7 +157,9 @@ def capture_clip(
         return entry | _outcome(report, out)
     if status == NO_PERSON:
         return entry | {"status": "no_person", "outputs": [], "message": _error_message(stderr)}
-    return entry | failure(task, _error_message(stderr) or f"the process ended with status {status}")
+    return entry | failure(
+        task, _error_message(stderr) or f"the process ended with status {status}"
+    )
 
 
 def _finished_before(task: ClipTask, entry: Entry, record: Path | None) -> Entry | None:
@@ -149,9 +169,14 @@ def _finished_before(task: ClipTask, entry: Entry, record: Path | None) -> Entry
     :param record: see `finished`; None if no process leaves one.
     """
     if task.previous and task.previous.get("key") == entry["key"]:
-        return task.previous | {"file": task.file, "status": task.previous["status"].replace("done", "skipped")}
+        return task.previous | {
+            "file": task.file,
+            "status": task.previous["status"].replace("done", "skipped"),
+        }
     report = read_finished(record, Path(task.out)) if record and not task.again else None
-    return None if report is None else entry | _outcome(report, Path(task.out)) | {"status": "skipped"}
+    return (
+        None if report is None else entry | _outcome(report, Path(task.out)) | {"status": "skipped"}
+    )
 
 
 def failure(task: ClipTask, message: str) -> Entry:
@@ -167,8 +192,12 @@ def _outcome(report: dict[str, Any], out: Path) -> Entry:
     return {"status": "done", "outputs": outputs, "report": report}
 
 
-def _arguments(footage: Path, target: Path, settings: CaptureSettings, threads: int | None) -> list[str]:
-    """Return the arguments that capture a clip; ``target`` is the path of its results without suffix."""
+def _arguments(
+    footage: Path, target: Path, settings: CaptureSettings, threads: int | None
+) -> list[str]:
+    """Return the arguments that capture a clip; ``target`` is the path of its results without
+    suffix.
+    """
     arguments = ["capture", str(footage), "--json", "--quiet", STOP_WITH_STDIN]
     for suffix in settings.suffixes:
         arguments += ["-o", f"{target}{suffix}"]
@@ -179,12 +208,15 @@ def _arguments(footage: Path, target: Path, settings: CaptureSettings, threads: 
         arguments += ["--overlay", f"{target}{OVERLAY}{suffix}"]
     given: dict[str, str | None] = {} if threads is None else {"--threads": str(threads)}
     for option, value in (given | settings.options).items():
-        arguments.append(option if value is None else f"{option}={value}")  # one argument: a value may begin with -
+        # one argument: a value may begin with -
+        arguments.append(option if value is None else f"{option}={value}")
     return arguments
 
 
 def _window_arguments(task: ClipTask) -> list[str]:
-    """Return the arguments for a part of a long clip, or for one whose parts were observed before."""
+    """Return the arguments for a part of a long clip, or for one whose parts were observed
+    before.
+    """
     folder = task.windows_folder or (task.out if task.windows not in ("", COUNT) else "")
     given = {WINDOWS: task.windows, WINDOWS_FOLDER: folder}
     return [f"{option}={value}" for option, value in given.items() if value]
@@ -193,7 +225,9 @@ def _window_arguments(task: ClipTask) -> list[str]:
 def _key(basis: str, footage: Path) -> str:
     """Hash the program, the options and the footage."""
     digest = hashlib.sha256(basis.encode())
-    _add_files(digest, filter(Path.is_file, sorted(footage.iterdir())) if footage.is_dir() else [footage])
+    _add_files(
+        digest, filter(Path.is_file, sorted(footage.iterdir())) if footage.is_dir() else [footage]
+    )
     return digest.hexdigest()
 
 
@@ -212,7 +246,9 @@ def file_hash(file: Path) -> str:
 
 
 def _last_object(text: str) -> dict[str, Any] | None:
-    """Return the JSON object on the last line; the lines before it are other output of the program."""
+    """Return the JSON object on the last line; the lines before it are other output of the
+    program.
+    """
     for line in reversed(text.splitlines()):
         if line.startswith("{"):
             try:
@@ -226,5 +262,9 @@ def _last_object(text: str) -> dict[str, Any] | None:
 def _error_message(stderr: str) -> str:
     """Return the error message without the prefix of the program's name."""
     lines = [line.strip() for line in stderr.splitlines() if line.strip()]
-    own = [line.removeprefix("scope: ") for line in lines if line.startswith("scope: ") and "warning:" not in line]
+    own = [
+        line.removeprefix("scope: ")
+        for line in lines
+        if line.startswith("scope: ") and "warning:" not in line
+    ]
     return (own or lines or [""])[-1]

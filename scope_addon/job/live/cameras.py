@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The cameras of this computer with their names and formats.
 
-On Linux from sysfs and Video4Linux, elsewhere as FFmpeg lists them, by DirectShow or AVFoundation, where a camera's
-number is its place in this list. Reading them does not switch a camera on. Elsewhere than on Linux, the list has no
-formats: for these, FFmpeg has to open a camera, which is done for one camera, in a process of its own (`formats`).
+On Linux from sysfs and Video4Linux, elsewhere as FFmpeg lists them, by DirectShow or AVFoundation,
+where a camera's number is its place in this list. Reading them does not switch a camera on.
+Elsewhere than on Linux, the list has no formats: for these, FFmpeg has to open a camera, which is
+done for one camera, in a process of its own (`formats`).
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ from ...live.sources.system_cameras import camera_names, camera_with_modes
 NAMES, DEVICES = Path("/sys/class/video4linux"), Path("/dev")
 LONGEST_NAME = 60  # characters
 _MAX_CAMERAS, _MAX_FORMATS, _MAX_SIZES = 64, 16, 64
-# Of linux/videodev2.h: the requests, the structures' layouts, and the two constants that are needed.
+# Of linux/videodev2.h: the requests, the structures' layouts, and the two constants that are
+# needed.
 _QUERYCAP, _ENUM_FMT, _ENUM_FRAMESIZES = 0x80685600, 0xC0405602, 0xC02C564A
 _CAPABILITY, _FORMAT, _SIZE = "16s32s32sIII12x", "III32sI16x", "III6I8x"
 _CAPTURE = 1  # V4L2_CAP_VIDEO_CAPTURE and V4L2_BUF_TYPE_VIDEO_CAPTURE
@@ -36,7 +38,9 @@ Ioctl = Callable[[int, int, bytearray], Any]
 
 @dataclass(frozen=True)
 class Camera:
-    """A camera: its number, its name as it tells it, and what it offers, such as ``MJPG 1920×1080``."""
+    """A camera: its number, its name as it tells it, and what it offers, such as ``MJPG
+    1920×1080``.
+    """
 
     number: int
     name: str
@@ -45,10 +49,14 @@ class Camera:
     @property
     def label(self) -> str:
         """A line for a list, which begins with the number."""
-        return f"{self.number}: {self.name}" + (f" ({', '.join(self.formats)})" if self.formats else "")
+        return f"{self.number}: {self.name}" + (
+            f" ({', '.join(self.formats)})" if self.formats else ""
+        )
 
 
-def list_cameras(names: Path = NAMES, devices: Path = DEVICES, ioctl: Ioctl | None = None) -> list[Camera]:
+def list_cameras(
+    names: Path = NAMES, devices: Path = DEVICES, ioctl: Ioctl | None = None
+) -> list[Camera]:
     """Return the cameras in the order of their numbers; what cannot be read is left out.
 
     :param ioctl: of devices; None: the system's.
@@ -56,13 +64,18 @@ def list_cameras(names: Path = NAMES, devices: Path = DEVICES, ioctl: Ioctl | No
     if ioctl is None:
         if not sys.platform.startswith("linux"):
             return [
-                Camera(number, _shown(name)) for number, name in enumerate(camera_names(sys.platform)[:_MAX_CAMERAS])
+                Camera(number, _shown(name))
+                for number, name in enumerate(camera_names(sys.platform)[:_MAX_CAMERAS])
             ]
         import fcntl
 
         ioctl = fcntl.ioctl
     with suppress(OSError):
-        numbers = sorted(int(m[1]) for entry in os.listdir(names) if (m := re.fullmatch(r"video(\d{1,3})", entry)))
+        numbers = sorted(
+            int(m[1])
+            for entry in os.listdir(names)
+            if (m := re.fullmatch(r"video(\d{1,3})", entry))
+        )
         entries = ((n, f"video{n}") for n in numbers[:_MAX_CAMERAS])
         found = (_camera(n, names / entry / "name", devices / entry, ioctl) for n, entry in entries)
         return [camera for camera in found if camera is not None]
@@ -70,7 +83,8 @@ def list_cameras(names: Path = NAMES, devices: Path = DEVICES, ioctl: Ioctl | No
 
 
 def camera_with_formats(source: str) -> Camera:
-    """Return a camera with its formats, for which it is opened on Windows and macOS: not in Blender's process.
+    """Return a camera with its formats, for which it is opened on Windows and macOS: not in
+    Blender's process.
 
     :param source: as `camera_source` gives it.
     :raises VideoError: it does not exist.
@@ -80,13 +94,19 @@ def camera_with_formats(source: str) -> Camera:
         for camera in list_cameras():
             if camera.number == number:
                 return camera
-        raise VideoError(f"camera {number} does not exist; connect a camera, or choose a stream or a file")
+        raise VideoError(
+            f"camera {number} does not exist; connect a camera, or choose a stream or a file"
+        )
     name, modes = camera_with_modes(number, sys.platform)
-    return Camera(number, _shown(name), tuple(_shown(text) for text in described(modes)[:_MAX_FORMATS]))
+    return Camera(
+        number, _shown(name), tuple(_shown(text) for text in described(modes)[:_MAX_FORMATS])
+    )
 
 
 def camera_source(text: str) -> str | None:
-    """Return the number or device that a text begins with, which may be a label; None if it is not a camera."""
+    """Return the number or device that a text begins with, which may be a label; None if it is not
+    a camera.
+    """
     match = re.match(r"(\d{1,3}|/dev/video\d{1,3})\s*(?::.*)?$", text.strip(), re.S | re.ASCII)
     return match[1] if match else None
 
@@ -97,7 +117,9 @@ def camera_number(source: str) -> int:
 
 
 def _camera(number: int, name: Path, device: Path, ioctl: Ioctl) -> Camera | None:
-    """Return a camera; None for a node that gives no pictures, such as that of a camera's metadata."""
+    """Return a camera; None for a node that gives no pictures, such as that of a camera's
+    metadata.
+    """
     try:
         shown = _printable(name.read_bytes())
     except OSError:
@@ -150,6 +172,8 @@ def _printable(name: bytes) -> str:
 
 
 def _shown(name: str) -> str:
-    """Return a text without what could disturb a list: control and formatting characters, great length."""
+    """Return a text without what could disturb a list: control and formatting characters, great
+    length.
+    """
     text = "".join(c for c in name if c.isprintable())
     return text.strip()[:LONGEST_NAME] or "camera"

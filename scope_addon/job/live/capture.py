@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The worker's side of a live capture: poses as messages, and a recording from when the parent asks for it."""
+"""The worker's side of a live capture: poses as messages, and a recording from when the parent asks
+for it.
+"""
 
 from __future__ import annotations
 
@@ -27,9 +29,11 @@ MOTION = "person{}.npz"  # from 1 on
 
 
 def capture_live(request: LiveRequest, job_folder: Path, send: Send, commands: Commands) -> None:
-    """Capture until the source ends or the parent stops it; send poses, and at the end the recording, if there is one.
+    """Capture until the source ends or the parent stops it; send poses, and at the end the
+    recording, if there is one.
 
-    :raises ScopeError: an option is invalid, the source cannot be read, or nobody was seen in the recording.
+    :raises ScopeError: an option is invalid, the source cannot be read, or nobody was seen in the
+        recording.
     """
     from ....solver.loaders.body_file import load_body
     from ...live.clock import Clock
@@ -58,7 +62,10 @@ def capture_live(request: LiveRequest, job_folder: Path, send: Send, commands: C
         saved = recording.save()
         warnings = save_footage(footage) if footage else []
     camera = recording.camera
-    facts = {"camera": camera.source if camera else "", "fps": {"total": report["poses_per_second"]}}
+    facts = {
+        "camera": camera.source if camera else "",
+        "fps": {"total": report["poses_per_second"]},
+    }
     send("result", motions=[path.name for path in saved], report={**facts, "warnings": warnings})
 
 
@@ -85,7 +92,12 @@ class _Recorder:
     """Keeps poses from when the parent asks for it; ``recording`` is None before."""
 
     def __init__(
-        self, paths: Sequence[Path], body: Body, source: Source, commands: Commands, footage: Footage | None = None
+        self,
+        paths: Sequence[Path],
+        body: Body,
+        source: Source,
+        commands: Commands,
+        footage: Footage | None = None,
     ) -> None:
         self._footage = footage
         self._paths, self._body, self._source, self._commands = paths, body, source, commands
@@ -102,7 +114,9 @@ class _Recorder:
         """Keep a pose if one is asked for."""
         if self.recording is None and self._is_due(pose) and self._people is not None:
             # A file keeps its times, so that its pictures and the poses belong together.
-            self.recording = PeopleRecording(self._paths, self._body, self._source, from_zero=not self._source.ends)
+            self.recording = PeopleRecording(
+                self._paths, self._body, self._source, from_zero=not self._source.ends
+            )
             self.recording.origin = self._footage.origin if self._footage is not None else None
             self.recording.begin(*self._people)
         if self.recording is not None:
@@ -114,7 +128,9 @@ class _Recorder:
             self._footage.add(picture)
 
     def _is_due(self, pose: LivePose) -> bool:
-        """Whether the recording begins with a pose: none from before the first picture that is kept."""
+        """Whether the recording begins with a pose: none from before the first picture that is
+        kept.
+        """
         if self._footage is None:
             return self._commands.recording.is_set()
         return self._footage.origin is not None and pose.index >= self._footage.origin[0]

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Asking a camera for its formats, in a process of its own that ends with the answer, or when it takes too long.
+"""Asking a camera for its formats, in a process of its own that ends with the answer, or when it
+takes too long.
 
-On Windows and macOS, FFmpeg loads the camera's driver for it, whose defects then end that process and nothing else.
+On Windows and macOS, FFmpeg loads the camera's driver for it, whose defects then end that process
+and nothing else.
 """
 
 from __future__ import annotations
@@ -28,7 +30,11 @@ def _is_shown(value: object) -> bool:
 
 
 def _are_formats(value: object) -> bool:
-    return isinstance(value, list) and len(value) <= _MAX_FORMATS and all(_is_shown(text) for text in value)
+    return (
+        isinstance(value, list)
+        and len(value) <= _MAX_FORMATS
+        and all(_is_shown(text) for text in value)
+    )
 
 
 _FIELDS: Fields = {
@@ -40,7 +46,9 @@ _FIELDS: Fields = {
 class FormatsProcess(WorkerProcess):
     """The question to one camera. Call ``answer`` regularly; ``close`` ends the process at once."""
 
-    def __init__(self, source: str, job_folder: Path, python: Sequence[str], script: Path = START_SCRIPT) -> None:
+    def __init__(
+        self, source: str, job_folder: Path, python: Sequence[str], script: Path = START_SCRIPT
+    ) -> None:
         """Start the process; see `WorkerProcess`.
 
         :param source: as `camera_source` gives it.
@@ -57,17 +65,21 @@ class FormatsProcess(WorkerProcess):
         """
         for message in self.poll():
             if message["event"] == "result":
-                return Camera(camera_number(self.source), message["name"], tuple(message["formats"]))
+                return Camera(
+                    camera_number(self.source), message["name"], tuple(message["formats"])
+                )
         if time.monotonic() - self._began_s > ANSWER_S:
             raise WorkerFailedError(
-                f"camera {self.source} has not reported its formats within {ANSWER_S:.0f} s; if the system asks "
+                f"camera {self.source} has not reported its formats within {ANSWER_S:.0f} s; if "
+                "the system asks "
                 "for permission to use it, answer, and try again"
             )
         return None
 
     def _cause_of_end(self) -> str:
         return (
-            f"camera {self.source} cannot be asked for its formats; check that it is plugged in, and that this program"
+            f"camera {self.source} cannot be asked for its formats; check that it is plugged in, "
+            "and that this program"
             " may use cameras"
         )
 

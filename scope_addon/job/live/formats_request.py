@@ -20,7 +20,9 @@ class FormatsRequest(LineRequest):
 
         :raises UsageError: it is neither.
         """
-        if not isinstance(formats_of, str) or not re.fullmatch(r"(/dev/video)?[0-9]{1,3}", formats_of):
+        if not isinstance(formats_of, str) or not re.fullmatch(
+            r"(/dev/video)?[0-9]{1,3}", formats_of
+        ):
             raise UsageError("a request for formats needs the number of a camera")
         self.source = formats_of
 

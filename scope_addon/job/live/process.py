@@ -52,7 +52,8 @@ class ShownPose:
     person: int  # 0 for the first
     frame: int
     presence: str  # one of `PRESENCES`
-    rotations: NDArray[np.float64]  # (K+1, 4) w, x, y, z: the pelvis relative to the world, the others to their parents
+    # (K+1, 4) w, x, y, z: the pelvis relative to the world, the others to their parents
+    rotations: NDArray[np.float64]
     pelvis: NDArray[np.float64]  # (3,) metres, world
     betas: NDArray[np.float64]  # (P,)
 
@@ -92,7 +93,10 @@ class LiveProcess(WorkerProcess):
         :raises WorkerFailedError: it cannot be used.
         """
         # Taken out one by one: the reading thread may be about to store a pose in this dictionary.
-        found = [parse_pose(self._newest.pop(person), joints, coefficients) for person in sorted(self._newest)]
+        found = [
+            parse_pose(self._newest.pop(person), joints, coefficients)
+            for person in sorted(self._newest)
+        ]
         return [pose for pose in found if pose is not None]
 
     def _keep(self, line: bytes) -> None:

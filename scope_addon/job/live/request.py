@@ -21,14 +21,19 @@ class LiveRequest(LineRequest):
 
         :param live: camera, stream or file.
         :param online: whether the network may be used.
-        :raises UsageError: an option does not exist, or its value has the wrong type or is none of the choices.
+        :raises UsageError: an option does not exist, or its value has the wrong type or is none of
+            the choices.
         """
         if not isinstance(live, str) or not isinstance(online, bool):
-            raise UsageError("a live capture's request needs a source, and whether the network may be used")
+            raise UsageError(
+                "a live capture's request needs a source, and whether the network may be used"
+            )
         self.source, self.online = live, online
         self.values: dict[str, Any] = checked_values(values, Place.LIVE_WORKER)
 
     def to_json(self) -> str:
         """Return the request as one line of JSON."""
-        values = {name: str(v) if hasattr(v, "__fspath__") else v for name, v in self.values.items()}
+        values = {
+            name: str(v) if hasattr(v, "__fspath__") else v for name, v in self.values.items()
+        }
         return json.dumps({"live": self.source, "online": self.online, **values})

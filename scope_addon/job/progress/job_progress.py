@@ -9,7 +9,8 @@ from collections.abc import Callable, Mapping
 
 from ...capture.stages.clock import COMPILING, FINDING
 
-# Share of the total time that each stage of a capture takes, in order; measured on clips of 5 to 10 seconds.
+# Share of the total time that each stage of a capture takes, in order; measured on clips of 5 to 10
+# seconds.
 STAGES = {
     "starting": 0.06,
     FINDING: 0.76,
@@ -34,11 +35,16 @@ _MAX_MARKS = 512
 class JobProgress:
     """Convert the worker's progress messages to what the panel shows."""
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic, earlier: Mapping[str, float] | None = None) -> None:
+    def __init__(
+        self,
+        clock: Callable[[], float] = time.monotonic,
+        earlier: Mapping[str, float] | None = None,
+    ) -> None:
         """Begin at 0.
 
         :param clock: returns the time in seconds.
-        :param earlier: seconds for each frame of the stages of an earlier capture of the same kind, if there was one.
+        :param earlier: seconds for each frame of the stages of an earlier capture of the same kind,
+            if there was one.
         """
         self._clock = clock
         self._earlier = dict(earlier or {})
@@ -47,11 +53,13 @@ class JobProgress:
         self._marks: list[tuple[float, int]] = []  # of this stage: times, and what was done then
         self._repeated = False  # whether a stage runs a second time
         self._people = 1  # whom the stages after finding them run for, one after the other
-        self._reached: dict[str, tuple[float, float]] = {}  # of each stage: its share that is done, and seconds for it
+        # of each stage: its share that is done, and seconds for it
+        self._reached: dict[str, tuple[float, float]] = {}
         self.seconds: dict[str, float] = {}  # of each stage that has ended
         self.frames = 0  # of the footage, as far as known
         self.stage, self.done, self.total = "starting", 0, 0
-        self.fraction = 0.0  # of the whole job, 0..1; it never decreases, although stages repeat for each person
+        # of the whole job, 0..1; it never decreases, although stages repeat for each person
+        self.fraction = 0.0
 
     def update(self, stage: str, done: int, total: int) -> None:
         """Take one progress message of the worker: ``done`` of ``total``, which is 0 if unknown."""
@@ -85,17 +93,20 @@ class JobProgress:
     def frames_per_second(self) -> float | None:
         """Speed of the current stage; None until it can be measured."""
         elapsed, frames = self._clock() - self._stage_start, self.done - self._stage_first
-        is_measured = self.total > 1 and frames > 0 and elapsed > 0.5 and self.stage not in FIRST_ONLY
+        is_measured = (
+            self.total > 1 and frames > 0 and elapsed > 0.5 and self.stage not in FIRST_ONLY
+        )
         return frames / elapsed if is_measured else None
 
     @property
     def seconds_left(self) -> float | None:
         """Estimated remaining time of the job; None until it is known to about a half.
 
-        It is what the stage still takes at its own speed, and what those after it took in an earlier capture of the
-        same kind, or else their usual part of the time that finding the person takes. Of several people, the last
-        stages are less regular: there it may be off by another 4 % of the job. The time before a stage's first
-        frame, as for loading the networks, says nothing about what is left.
+        It is what the stage still takes at its own speed, and what those after it took in an
+        earlier capture of the same kind, or else their usual part of the time that finding the
+        person takes. Of several people, the last stages are less regular: there it may be off by
+        another 4 % of the job. The time before a stage's first frame, as for loading the networks,
+        says nothing about what is left.
         """
         if self.stage not in STAGES or self.stage == "starting":
             return None
@@ -111,12 +122,16 @@ class JobProgress:
 
     def _spent(self, stage: str) -> float:
         """Return the seconds of a stage so far, for all people."""
-        return self.seconds.get(stage, 0.0) + (self._clock() - self._stage_start if stage == self.stage else 0.0)
+        return self.seconds.get(stage, 0.0) + (
+            self._clock() - self._stage_start if stage == self.stage else 0.0
+        )
 
     def _left_of_everybody(self, stage: str) -> float | None:
-        """Return what a stage still takes for all people: as expected, or as it took for those who have it behind them.
+        """Return what a stage still takes for all people: as expected, or as it took for those who
+        have it behind them.
 
-        The latter counts only without an earlier capture, which also knows what is done between two people.
+        The latter counts only without an earlier capture, which also knows what is done between two
+        people.
         """
         done, seconds = self._reached.get(stage, (0.0, 0.0))
         if done * self._people >= 1.0 and not self._earlier:
@@ -128,10 +143,13 @@ class JobProgress:
         if self.total > 0 and (speed := self._steady_speed()) is not None:
             return max(0, self.total - self.done) / speed
         expected = self._expected(self.stage) if self._earlier and self.stage != FINDING else None
-        return None if expected is None else max(0.0, expected - (self._clock() - self._stage_start))
+        return (
+            None if expected is None else max(0.0, expected - (self._clock() - self._stage_start))
+        )
 
     def _steady_speed(self) -> float | None:
-        """Return the speed of the stage in the last third of its time so far; None if it is not steady yet.
+        """Return the speed of the stage in the last third of its time so far; None if it is not
+        steady yet.
 
         The first third does not count: the networks' first frames take longer.
         """
@@ -140,7 +158,10 @@ class JobProgress:
         if now - start < _MEASURED_S or self.done - first < _MEASURED_STEPS:
             return None
         third = (now - start) / 3.0
-        marks = [self._marks[bisect_right(self._marks, (start + k * third, 1 << 60)) - 1][1] for k in (1, 2)]
+        marks = [
+            self._marks[bisect_right(self._marks, (start + k * third, 1 << 60)) - 1][1]
+            for k in (1, 2)
+        ]
         before, after = marks[1] - marks[0], self.done - marks[1]
         if min(before, after) <= 0 or max(before, after) > _STEADY * min(before, after):
             return None
@@ -168,7 +189,9 @@ class JobProgress:
         if self.stage in FIRST_ONLY:
             stage = translate("{stage} (first capture only)").format(stage=stage)
         if self.total > 0:
-            stage = translate("{stage}, {done} of {total}").format(stage=stage, done=self.done, total=self.total)
+            stage = translate("{stage}, {done} of {total}").format(
+                stage=stage, done=self.done, total=self.total
+            )
         lines = [stage]
         speed, left = [], []
         if rate := self.frames_per_second:

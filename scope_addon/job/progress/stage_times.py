@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How long each stage of the last captures took, by the kind of capture, for the remaining time of the next one."""
+"""How long each stage of the last captures took, by the kind of capture, for the remaining time of
+the next one.
+"""
 
 from __future__ import annotations
 
@@ -23,12 +25,15 @@ _LONGEST_S = 86_400.0  # that a stage may take for a frame
 
 
 def kind_of(values: Mapping[str, Any]) -> str:
-    """Return the kind of a capture with these options: those of one kind take about as long for each frame."""
+    """Return the kind of a capture with these options: those of one kind take about as long for
+    each frame.
+    """
     return " ".join(f"{name}={values[name]}" for name in _SETTINGS if name in values)
 
 
 def load_stage_times(folder: Path, kind: str) -> dict[str, float]:
-    """Return the seconds for each frame of every stage of the last capture of a kind; empty if there was none.
+    """Return the seconds for each frame of every stage of the last capture of a kind; empty if
+    there was none.
 
     :param folder: of the cache.
     """
@@ -46,7 +51,9 @@ def save_stage_times(folder: Path, kind: str, seconds: Mapping[str, float], fram
 
     if frames < 1:
         return
-    kinds = {name: times for name, times in _read(folder).items() if name != kind and _are_times(times)}
+    kinds = {
+        name: times for name, times in _read(folder).items() if name != kind and _are_times(times)
+    }
     kinds[kind] = {stage: duration / frames for stage, duration in seconds.items()}
     with suppress(ScopeError, OSError):
         save_map(folder / _FILE, _WHAT, kinds=dict(list(kinds.items())[-_MAX_KINDS:]))

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The facial expressions of the built-in bodies: how far each moves the vertices of the mesh at rest.
+"""The facial expressions of the built-in bodies: how far each moves the vertices of the mesh at
+rest.
 
-Displacements add to the shape, v̄ + Σ_p β_p shapedirs_p + Σ_k w_k e_k: neither depends on the other.
+Displacements add to the shape, v̄ + Σ_p β_p shapedirs_p + Σ_k w_k e_k: neither depends on the
+other.
 """
 
 from __future__ import annotations
@@ -31,7 +33,9 @@ _FORMS: dict[str, Form] = {
 
 @dataclass(frozen=True)
 class Expression:
-    """One expression: ``vertices`` (n,) that it moves by ``offsets`` (n, 3), metres in the model frame, at weight 1."""
+    """One expression: ``vertices`` (n,) that it moves by ``offsets`` (n, 3), metres in the model
+    frame, at weight 1.
+    """
 
     name: str
     vertices: NDArray[np.intp]
@@ -39,7 +43,8 @@ class Expression:
 
 
 def expressions_of(body: Body) -> tuple[Expression, ...]:
-    """Return the body's expressions in the order of `solver.names.EXPRESSIONS`; none of a user's own body.
+    """Return the body's expressions in the order of `solver.names.EXPRESSIONS`; none of a user's
+    own body.
 
     :raises ModelFileError: the file of the expressions is damaged.
     """
@@ -52,7 +57,8 @@ def expressions_of(body: Body) -> tuple[Expression, ...]:
 
 
 def body_with_mouth(body: Body) -> Body:
-    """Return the body as its face is shown: with teeth and tongue, whose vertices come last, where it has expressions.
+    """Return the body as its face is shown: with teeth and tongue, whose vertices come last, where
+    it has expressions.
 
     :raises ModelFileError: one of the files is damaged.
     """
@@ -78,7 +84,11 @@ def _with_mouth() -> tuple[Expression, ...]:
     count, found, _ = _read()
     joined = zip(found, read_mouth().moves, strict=True)
     return tuple(
-        Expression(e.name, np.concatenate([e.vertices, count + vertices]), np.concatenate([e.offsets, offsets]))
+        Expression(
+            e.name,
+            np.concatenate([e.vertices, count + vertices]),
+            np.concatenate([e.offsets, offsets]),
+        )
         for e, (vertices, offsets) in joined
     )
 
@@ -89,7 +99,9 @@ def _read() -> tuple[int, tuple[Expression, ...], NDArray[np.intp]]:
     count = int(data["vertex_count"])
     with told_to_install():
         if tuple(data["names"]) != EXPRESSIONS:
-            raise ModelFileError(f"{FILE}: names must be those of the {len(EXPRESSIONS)} expressions in their order")
+            raise ModelFileError(
+                f"{FILE}: names must be those of the {len(EXPRESSIONS)} expressions in their order"
+            )
         moves = moves_of(data, count, FILE)
     found = tuple(Expression(name, *each) for name, each in zip(EXPRESSIONS, moves, strict=True))
     return count, found, data["mouth_faces"].astype(np.intp)

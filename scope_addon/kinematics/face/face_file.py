@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Files of the built-in bodies' faces: what each expression moves, and checks of what they hold.
 
-Displacements are sparse: expression k moves ``vertices[starts[k]:starts[k + 1]]`` by as many rows of ``moves``, in
-steps of ``step_m``.
+Displacements are sparse: expression k moves ``vertices[starts[k]:starts[k + 1]]`` by as many rows
+of ``moves``, in steps of ``step_m``.
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ def read_face_file(path: Path, what: str, forms: Mapping[str, Form]) -> dict[str
     """Return the arrays of a file: those of `forms`, and those that `moves_of` takes.
 
     :param what: what the file should have been, for messages.
-    :raises ModelFileError: the file cannot be read, or an array is missing, of another kind or shape, or not finite.
+    :raises ModelFileError: the file cannot be read, or an array is missing, of another kind or
+        shape, or not finite.
     """
     data, wanted = read_npz(path, ModelFileError, what), _MOVES | dict(forms)
     with told_to_install():
@@ -57,12 +58,17 @@ def moves_of(data: Mapping[str, NDArray[Any]], count: int, path: Path) -> tuple[
     """
     starts, vertices, moves = data["starts"].astype(np.intp), data["vertices"], data["moves"]
     if len(vertices) != len(moves):
-        raise ModelFileError(f"{path}: vertices must be as many as moves, but are {len(vertices)} for {len(moves)}")
+        raise ModelFileError(
+            f"{path}: vertices must be as many as moves, but are {len(vertices)} for {len(moves)}"
+        )
     if starts[0] != 0 or starts[-1] != len(moves) or (np.diff(starts) < 0).any():
         raise ModelFileError(f"{path}: starts must rise from 0 to {len(moves)}")
     check_index("vertices", vertices, count, path)
     offsets = float(data["step_m"]) * moves.astype(float)
-    return tuple((vertices[a:b].astype(np.intp), offsets[a:b]) for a, b in zip(starts[:-1], starts[1:], strict=True))
+    return tuple(
+        (vertices[a:b].astype(np.intp), offsets[a:b])
+        for a, b in zip(starts[:-1], starts[1:], strict=True)
+    )
 
 
 @contextmanager

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Teeth and tongue of the built-in bodies: vertices and faces after those of the body, for meshes that show the face.
+"""Teeth and tongue of the built-in bodies: vertices and faces after those of the body, for meshes
+that show the face.
 
-They follow the head, and have their share of every shape coefficient and of every expression. The capture does without
-them: what it measures is the body's skin.
+They follow the head, and have their share of every shape coefficient and of every expression. The
+capture does without them: what it measures is the body's skin.
 """
 
 from __future__ import annotations
@@ -48,7 +49,8 @@ class Mouth:
 
 
 def with_teeth_and_tongue(body: Body) -> Body:
-    """Return a built-in body with teeth and tongue after its own vertices and faces, which stay as they are.
+    """Return a built-in body with teeth and tongue after its own vertices and faces, which stay as
+    they are.
 
     :raises ModelFileError: the file of teeth and tongue is damaged.
     """
@@ -62,7 +64,9 @@ def with_teeth_and_tongue(body: Body) -> Body:
         textured["uv"] = np.concatenate([body.uv, mouth.uv])
         textured["uv_faces"] = np.concatenate([body.uv_faces, mouth.faces + len(body.uv)])
     if body.face_material is not None and body.material_colors is not None:
-        textured["face_material"] = np.concatenate([body.face_material, mouth.face_material + len(body.material_names)])
+        textured["face_material"] = np.concatenate(
+            [body.face_material, mouth.face_material + len(body.material_names)]
+        )
         textured["material_colors"] = np.concatenate([body.material_colors, mouth.material_colors])
     return replace(
         body,
@@ -83,7 +87,11 @@ def read_mouth() -> Mouth:
     :raises ModelFileError: the file is damaged.
     """
     data = read_face_file(FILE, "file of teeth and tongue", _FORMS)
-    count, quads, materials = len(data["v_template"]), len(data["faces"]), len(data["material_names"])
+    count, quads, materials = (
+        len(data["v_template"]),
+        len(data["faces"]),
+        len(data["material_names"]),
+    )
     forms: dict[str, Form] = {
         "shapedirs": ("numbers", (count, 3, 11)),
         "uv": ("numbers", (count, 2)),

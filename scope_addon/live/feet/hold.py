@@ -1,20 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Feet and palms that stay where they rest, without looking ahead.
 
-Contact is estimated as offline (`standing`), from a window that ends with the newest frame, and from the speed at which
-heels and toes move in the image, which no fit can hold back. A point whose probability exceeds `BEGIN` is held where it
-is shown then; the hold ends below `END`, or when the body has moved too far away from it. A foot that stands is often
-taken for the other one while that swings past it: meanwhile, it is let go only after `PASSED_S`, or when it rises. The
-next frame is fitted to these places and to the floor (`Support`), from which the distance of the body follows. The legs
-then bridge what smoothing has left between held feet and their places: they bend, and the rest of the body stays. Where
-a hold begins or ends, what it would change abruptly dies away (`transition`).
+Contact is estimated as offline (`standing`), from a window that ends with the newest frame, and
+from the speed at which heels and toes move in the image, which no fit can hold back. A point whose
+probability exceeds `BEGIN` is held where it is shown then; the hold ends below `END`, or when the
+body has moved too far away from it. A foot that stands is often taken for the other one while that
+swings past it: meanwhile, it is let go only after `PASSED_S`, or when it rises. The next frame is
+fitted to these places and to the floor (`Support`), from which the distance of the body follows.
+The legs then bridge what smoothing has left between held feet and their places: they bend, and the
+rest of the body stays. Where a hold begins or ends, what it would change abruptly dies away
+(`transition`).
 
-A place can be wrong from the beginning, as after a cut of the footage, or where frames are rare and smoothing has not
-yet followed. The fits then stay at that place, too, and bend the body. So a foot that the image shows elsewhere for
-`DISPLACED_S` is let go, and not held for a while.
+A place can be wrong from the beginning, as after a cut of the footage, or where frames are rare and
+smoothing has not yet followed. The fits then stay at that place, too, and bend the body. So a foot
+that the image shows elsewhere for `DISPLACED_S` is let go, and not held for a while.
 
-The places drift towards where the fits have the points, because an error in where a hold began would otherwise tilt the
-body for as long as it lasts: fast while size and floor are being estimated, slowly afterwards.
+The places drift towards where the fits have the points, because an error in where a hold began
+would otherwise tilt the body for as long as it lasts: fast while size and floor are being
+estimated, slowly afterwards.
 """
 
 from __future__ import annotations
@@ -46,12 +49,14 @@ WINDOW_S = 0.6
 SPEED_FRAMES = 3  # at least in the window, from which speeds can be computed
 BEGIN, END = 0.5, 0.3  # probability of contact
 LONGEST_STRETCH_M = 0.15  # between a held point and where the body has it
-EARLY_DRIFT_S, DRIFT_S = 0.5, 3.0  # time constants of the places, while the estimates settle and afterwards
+# time constants of the places, while the estimates settle and afterwards
+EARLY_DRIFT_S, DRIFT_S = 0.5, 3.0
 TRANSITION_HZ = 6.0
 MOVED_M = 0.06  # in the image since the frame before: more than noise of a foot at rest
 SWING_M_S = 0.7  # in the image, of a foot that swings past the other one
 PASSED_S, RISE_M = 0.15, 0.03  # for which, and up to which height, the other one is not let go
-DISPLACED_M, DISPLACED_S = 0.12, 0.3  # of a place from where the image shows the foot, and for how long
+# of a place from where the image shows the foot, and for how long
+DISPLACED_M, DISPLACED_S = 0.12, 0.3
 REHOLD_DELAY_S = 0.5  # after that, in which smoothing has come to where the foot really is
 SOFT_M = 0.005  # the floor raises soles from about this height on
 
@@ -63,7 +68,8 @@ class _Entry:
     time_s: float
     points: NDArray[np.floating[Any]]  # (6, 3) camera frame, metres
     visible: NDArray[np.floating[Any]]  # (6,) 0..1
-    rays: NDArray[np.floating[Any]]  # (4, 2) where the image shows the soles, normalized image coordinates
+    # (4, 2) where the image shows the soles, normalized image coordinates
+    rays: NDArray[np.floating[Any]]
 
 
 class FootHold:
@@ -73,7 +79,9 @@ class FootHold:
         self._body = body
         self._betas: NDArray[np.floating[Any]] | None = None
         self._with_points = body
-        self._visible_parts = [body.joint_names.index(n) for n in (*FOOT_PARTS, "left_wrist", "right_wrist")]
+        self._visible_parts = [
+            body.joint_names.index(n) for n in (*FOOT_PARTS, "left_wrist", "right_wrist")
+        ]
         self.reset()
 
     def reset(self) -> None:
@@ -85,7 +93,8 @@ class FootHold:
         self._moving_s = np.zeros(n)  # since the contact of each point ended
         self._elsewhere_s = np.zeros(n)  # for which the image has shown each point elsewhere
         self._rehold_delay_s = np.zeros(n)  # for which each point is not held yet
-        self._speed: NDArray[np.floating[Any]] = np.zeros(len(SOLES))  # of the soles in the image, m/s
+        # of the soles in the image, m/s
+        self._speed: NDArray[np.floating[Any]] = np.zeros(len(SOLES))
         self._points_world: NDArray[np.floating[Any]] | None = None
         self._shift: NDArray[np.float64] = np.zeros((2, 3))  # of each foot in the last frame, world
         self._transition = Transition(2, TRANSITION_HZ)
@@ -96,14 +105,17 @@ class FootHold:
         """Whether a foot or palm was held in the last frame."""
         return bool(self._is_held.any())
 
-    def support(self, T_world_camera: NDArray[np.float64], soles: NDArray[np.floating[Any]]) -> Support | None:
+    def support(
+        self, T_world_camera: NDArray[np.float64], soles: NDArray[np.floating[Any]]
+    ) -> Support | None:
         """Return what the body stands on in the next frame; None before the first.
 
-        A foot that rested can have taken a step since then, the more so the rarer the frames are. Its place in the
-        image then says so, before the frame is fitted.
+        A foot that rested can have taken a step since then, the more so the rarer the frames are.
+        Its place in the image then says so, before the frame is fitted.
 
         :param T_world_camera: (4, 4) the floor at z = 0.
-        :param soles: (4, 2) where the image of the next frame shows the soles, normalized image coordinates.
+        :param soles: (4, 2) where the image of the next frame shows the soles, normalized image
+            coordinates.
         """
         if not self._window:
             return None
@@ -116,7 +128,9 @@ class FootHold:
         on_floor, stands = contact * by_height, float(by_height[: len(SOLES)].max())
         # Points that are not in contact may be below the floor as well as above it, as on stairs.
         rests = self._is_held * contact
-        return Support((self._anchors - t) @ R, rests, on_floor, on_floor, stands, R[2], -float(t[2]))
+        return Support(
+            (self._anchors - t) @ R, rests, on_floor, on_floor, stands, R[2], -float(t[2])
+        )
 
     def hold(
         self,
@@ -136,9 +150,13 @@ class FootHold:
         if self._betas is None or np.abs(betas - self._betas).max(initial=0.0) > SAME_SHAPE:
             self._betas, self._with_points = betas, with_contact_points(self._body, betas)
         body, pelvis_at_rest = self._with_points, self._with_points.rest_joints(betas)[0]
-        R_parts, t_parts = body.forward_kinematics(frame.rotations, frame.root_cam - pelvis_at_rest, betas)
+        R_parts, t_parts = body.forward_kinematics(
+            frame.rotations, frame.root_cam - pelvis_at_rest, betas
+        )
         points = contact_point_positions(body, R_parts, t_parts)
-        visible = np.clip(frame.joint_confidence[self._visible_parts] / VISIBLE_CONFIDENCE, 0.0, 1.0)
+        visible = np.clip(
+            frame.joint_confidence[self._visible_parts] / VISIBLE_CONFIDENCE, 0.0, 1.0
+        )
         step_s = time_s - self._window[-1].time_s if self._window else 0.0
         self._window.append(_Entry(time_s, points, visible, frame.soles))
         while len(self._window) > SPEED_FRAMES and self._window[0].time_s < time_s - WINDOW_S:
@@ -157,9 +175,13 @@ class FootHold:
         self._transition.advance(step_s)
         self._points_world = points_world
         self._shift = new[1] + self._transition.remainder
-        self._shift[:, 2] += _rise((points_world[: len(SOLES), 2].reshape(2, 2) + self._shift[:, 2:]).min(axis=1))
+        self._shift[:, 2] += _rise(
+            (points_world[: len(SOLES), 2].reshape(2, 2) + self._shift[:, 2:]).min(axis=1)
+        )
         poses = R_parts[None], t_parts[None]
-        return move_feet(body, frame.rotations[None], poses, (self._shift @ R)[None])[0], self._probability
+        return move_feet(body, frame.rotations[None], poses, (self._shift @ R)[None])[
+            0
+        ], self._probability
 
     def _contact(self, up: NDArray[np.float64]) -> NDArray[np.floating[Any]]:
         """Return the contact probability (6,) of the newest frame.
@@ -168,9 +190,12 @@ class FootHold:
         """
         times = np.array([entry.time_s for entry in self._window])
         points, visible, rays = (
-            np.array([getattr(entry, name) for entry in self._window]) for name in ("points", "visible", "rays")
+            np.array([getattr(entry, name) for entry in self._window])
+            for name in ("points", "visible", "rays")
         )
-        contact: NDArray[np.floating[Any]] = resting_probability(points, up, times, np.zeros((len(times), 3)))[-1]
+        contact: NDArray[np.floating[Any]] = resting_probability(
+            points, up, times, np.zeros((len(times), 3))
+        )[-1]
         contact *= visible[-1]
         # Depth is left out: a mean one turns the motion in the image into metres.
         seen = np.concatenate([rays, np.ones((*rays.shape[:2], 1))], axis=2)
@@ -185,16 +210,23 @@ class FootHold:
         places = (self._anchors[:n] - T_world_camera[:3, 3]) @ T_world_camera[:3, :3]
         depth = np.maximum(places[:, 2:], 1e-6)
         away_m = np.linalg.norm(places[:, :2] - newest.rays * depth, axis=1)
-        # Keypoints of heels and toes are not exactly where a foot touches the floor: both must be away.
+        # Keypoints of heels and toes are not exactly where a foot touches the floor: both must be
+        # away.
         is_elsewhere = (
-            (self._is_held[:n] & (newest.visible[:n] > 0.5) & (away_m > DISPLACED_M)).reshape(2, 2).all(axis=1)
+            (self._is_held[:n] & (newest.visible[:n] > 0.5) & (away_m > DISPLACED_M))
+            .reshape(2, 2)
+            .all(axis=1)
         )
-        self._elsewhere_s[:n] = np.where(np.repeat(is_elsewhere, 2), self._elsewhere_s[:n] + step_s, 0.0)
+        self._elsewhere_s[:n] = np.where(
+            np.repeat(is_elsewhere, 2), self._elsewhere_s[:n] + step_s, 0.0
+        )
         is_displaced = self._elsewhere_s > DISPLACED_S
         self._rehold_delay_s = np.where(is_displaced, REHOLD_DELAY_S, self._rehold_delay_s - step_s)
         self._is_held = self._is_held & ~is_displaced
 
-    def _update(self, points_world: NDArray[np.floating[Any]], step_s: float, drift_s: float) -> None:
+    def _update(
+        self, points_world: NDArray[np.floating[Any]], step_s: float, drift_s: float
+    ) -> None:
         """Move the places of holds, and begin and end these."""
         contact = self._probability
         share = (1 - np.exp(-step_s / drift_s)) * (contact > END)
@@ -210,7 +242,9 @@ class FootHold:
         self._is_held = (self._is_held | begins) & stays & ~far
 
     def _is_passed(self, points_world: NDArray[np.floating[Any]]) -> NDArray[np.bool_]:
-        """Return which points (6,) are of a foot that the other one swings past, and may only seem to move."""
+        """Return which points (6,) are of a foot that the other one swings past, and may only seem
+        to move.
+        """
         swings = self._speed.reshape(2, 2).mean(axis=1) > SWING_M_S
         is_passed = np.zeros(len(points_world), bool)
         is_passed[: len(SOLES)] = np.repeat(swings[::-1], 2)
@@ -218,14 +252,17 @@ class FootHold:
         return np.asarray(is_passed & (self._moving_s < PASSED_S) & (rise < RISE_M))
 
     def _away(self, points_world: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
-        """Return by how much each foot (2, 3) is away from where it is held, world; 0 where it is not."""
+        """Return by how much each foot (2, 3) is away from where it is held, world; 0 where it is
+        not.
+        """
         away = (self._anchors - points_world)[: len(SOLES)].reshape(2, 2, 3)
         held = self._is_held[: len(SOLES)].reshape(2, 2, 1)
         return np.asarray((held * away).sum(axis=1) / np.maximum(held.sum(axis=1), 1))
 
 
 def _rise(lowest: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
-    """Return by how much feet (2,) are raised onto the floor, if that is what they stand on, metres.
+    """Return by how much feet (2,) are raised onto the floor, if that is what they stand on,
+    metres.
 
     :param lowest: (2,) height of the lowest sole of each.
     """

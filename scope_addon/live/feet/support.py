@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a body is known to stand on before its next frame is fitted: the floor, and the places where points rest.
+"""What a body is known to stand on before its next frame is fitted: the floor, and the places where
+points rest.
 
 The size of a body in the picture does not tell a squat from a step back, but feet at rest do.
 """
@@ -14,7 +15,8 @@ from numpy.typing import NDArray
 
 from ....solver import Floor, FootContacts, Measurements
 
-AFTER_A_PAUSE = 0.01  # of the floor's weight; three times as much tilts bodies whose distance begins too far
+# of the floor's weight; three times as much tilts bodies whose distance begins too far
+AFTER_A_PAUSE = 0.01
 
 
 @dataclass(frozen=True)
@@ -37,11 +39,15 @@ class Support:
         return replace(
             measurements,
             foot_contacts=FootContacts(points, self.places, self.rests),
-            floor=Floor(points, self.floor_normal, self.floor_offset, self.on_floor, below=self.not_below),
+            floor=Floor(
+                points, self.floor_normal, self.floor_offset, self.on_floor, below=self.not_below
+            ),
         )
 
     def after_a_pause(self) -> Support:
-        """Return what is left of it when points may have moved since: who stood on the floor is not below it now."""
+        """Return what is left of it when points may have moved since: who stood on the floor is not
+        below it now.
+        """
         nothing = np.zeros_like(self.rests)
         not_below = np.full_like(nothing, AFTER_A_PAUSE * self.stands)
         return replace(self, rests=nothing, on_floor=nothing, not_below=not_below)

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Offsets that change abruptly, shown without a jump: what a change would add is taken over, and dies away.
+"""Offsets that change abruptly, shown without a jump: what a change would add is taken over, and
+dies away.
 
-The remainder r of an offset follows r''' = −3ω r'' − 3ω² r' − ω³ r. At a change, the difference of the old and the new
-offset and that of their velocities are added to r and r', so that position, velocity and acceleration continue; with
-c₀ = r, c₁ = r' + ω r and c₂ = (r'' + 2ω r' + ω² r) / 2, a time t later r = (c₀ + c₁ t + c₂ t²) exp(−ω t).
+The remainder r of an offset follows r''' = −3ω r'' − 3ω² r' − ω³ r. At a change, the difference of
+the old and the new offset and that of their velocities are added to r and r', so that position,
+velocity and acceleration continue; with c₀ = r, c₁ = r' + ω r and c₂ = (r'' + 2ω r' + ω² r) / 2, a
+time t later r = (c₀ + c₁ t + c₂ t²) exp(−ω t).
 """
 
 from __future__ import annotations
@@ -33,7 +35,11 @@ class Transition:
     def advance(self, step_s: float) -> None:
         """Let time pass."""
         w, t = self._omega, step_s
-        c0, c1, c2 = self._r, self._v + w * self._r, (self._a + 2 * w * self._v + w * w * self._r) / 2
+        c0, c1, c2 = (
+            self._r,
+            self._v + w * self._r,
+            (self._a + 2 * w * self._v + w * w * self._r) / 2,
+        )
         value, slope, decay = c0 + (c1 + c2 * t) * t, c1 + 2 * c2 * t, np.exp(-w * t)
         self._r, self._v = value * decay, (slope - w * value) * decay
         self._a = (2 * c2 - 2 * w * slope + w * w * value) * decay
@@ -45,7 +51,8 @@ class Transition:
         new: tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]],
         step_s: float,
     ) -> None:
-        """Take over the difference of two courses of the offsets as of the frame before; `advance` comes after it.
+        """Take over the difference of two courses of the offsets as of the frame before; `advance`
+        comes after it.
 
         A long step then leaves time for the difference to die away.
 

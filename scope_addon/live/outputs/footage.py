@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pictures of a live capture as a video, from which a better motion of the same take can be captured afterwards.
+"""The pictures of a live capture as a video, from which a better motion of the same take can be
+captured afterwards.
 
-Every picture that comes is written, also those that the capture drops, at the time at which it came. A thread encodes
-them; if it is too slow, pictures are left out, but neither source nor capture waits. The file is complete or absent.
+Every picture that comes is written, also those that the capture drops, at the time at which it
+came. A thread encodes them; if it is too slow, pictures are left out, but neither source nor
+capture waits. The file is complete or absent.
 """
 
 from __future__ import annotations
@@ -24,7 +26,9 @@ _WAITING = 16  # pictures; at 720p, 44 MB
 
 
 class Footage:
-    """A context in which a video is written; `save` ends it, and leaving it otherwise writes nothing."""
+    """A context in which a video is written; `save` ends it, and leaving it otherwise writes
+    nothing.
+    """
 
     def __init__(self, path: Path, fps: Fraction) -> None:
         self._path, self._fps = path, fps
@@ -70,7 +74,9 @@ class Footage:
     def __enter__(self) -> Footage:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, value: object, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, value: object, trace: TracebackType | None
+    ) -> None:
         self._is_wanted = False
         if self.origin is not None:
             self._end()
@@ -98,6 +104,8 @@ class Footage:
         assert self.origin is not None
         with VideoWriter(temporary, self._fps, width, height, self._path) as writer:
             while (picture := self._waiting.get()) is not None and self._is_wanted:
-                writer.write(picture.image_rgb[:height, :width], picture.timestamp_s - self.origin[1])
+                writer.write(
+                    picture.image_rgb[:height, :width], picture.timestamp_s - self.origin[1]
+                )
             if not self._is_wanted:
                 raise OutputError(f"{self._path} is not written, since the capture failed")

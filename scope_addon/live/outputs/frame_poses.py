@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Poses at the times of their source's frames and in one shape, from poses that smoothing has delayed."""
+"""Poses at the times of their source's frames and in one shape, from poses that smoothing has
+delayed.
+"""
 
 from __future__ import annotations
 
@@ -21,8 +23,9 @@ _SAME_TIME_S, _SAME_SHAPE = 1e-3, 0.01
 def at_frames(poses: Sequence[LivePose], delay_s: float) -> list[LivePose]:
     """Return the poses that the body had in their frames.
 
-    Each given pose is that of a time ``delay_s`` before its frame. At the time of a frame, the pose lies between two of
-    them; what was measured in the frame stays. The last frames, whose poses would have been given later, are left out.
+    Each given pose is that of a time ``delay_s`` before its frame. At the time of a frame, the pose
+    lies between two of them; what was measured in the frame stays. The last frames, whose poses
+    would have been given later, are left out.
 
     :param poses: in the order of their frames, at least one.
     :return: at least one.
@@ -35,7 +38,8 @@ def at_frames(poses: Sequence[LivePose], delay_s: float) -> list[LivePose]:
 
 
 def _between(poses: Sequence[LivePose], k: int, after: int, since: NDArray[np.float64]) -> LivePose:
-    """Return the pose in frame ``k``, before which ``poses[after - 1]`` was given, and ``poses[after]`` was not.
+    """Return the pose in frame ``k``, before which ``poses[after - 1]`` was given, and
+    ``poses[after]`` was not.
 
     :param since: (n,) seconds since each given pose.
     """
@@ -61,13 +65,17 @@ def _between(poses: Sequence[LivePose], k: int, after: int, since: NDArray[np.fl
 
 
 def in_last_shape(poses: Sequence[LivePose], body: Body) -> list[LivePose]:
-    """Return the poses in the shape of the last one, raised or lowered so that their lowest sole stays where it was."""
+    """Return the poses in the shape of the last one, raised or lowered so that their lowest sole
+    stays where it was.
+    """
     final = poses[-1].betas
     out = []
     for pose in poses:
         if np.abs(pose.betas - final).max(initial=0.0) > _SAME_SHAPE:
             rise = _lowest_sole(body, pose, pose.betas) - _lowest_sole(body, pose, final)
-            pose = replace(pose, betas=final, root_cam=pose.root_cam + rise * pose.T_world_camera[2, :3])
+            pose = replace(
+                pose, betas=final, root_cam=pose.root_cam + rise * pose.T_world_camera[2, :3]
+            )
         out.append(pose)
     return out
 
@@ -75,5 +83,11 @@ def in_last_shape(poses: Sequence[LivePose], body: Body) -> list[LivePose]:
 def _lowest_sole(body: Body, pose: LivePose, betas: NDArray[np.floating[Any]]) -> float:
     """Return the height of the lowest sole of a pose in a shape, relative to the camera, metres."""
     with_points = with_contact_points(body, betas)
-    R, t = with_points.forward_kinematics(pose.rotations, pose.root_cam - with_points.rest_joints(betas)[0], betas)
-    return float((contact_point_positions(with_points, R, t)[: len(SOLES)] @ pose.T_world_camera[2, :3]).min())
+    R, t = with_points.forward_kinematics(
+        pose.rotations, pose.root_cam - with_points.rest_joints(betas)[0], betas
+    )
+    return float(
+        (
+            contact_point_positions(with_points, R, t)[: len(SOLES)] @ pose.T_world_camera[2, :3]
+        ).min()
+    )

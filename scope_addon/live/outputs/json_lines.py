@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Poses as lines of JSON on a TCP socket, for several clients.
 
-Each client first gets one line that describes the body, then one line per pose. A client that reads too slowly misses
-poses; it never delays the capture or other clients. At the end, clients get what is queued for them, but the end does
-not wait for those that do not read it.
+Each client first gets one line that describes the body, then one line per pose. A client that reads
+too slowly misses poses; it never delays the capture or other clients. At the end, clients get what
+is queued for them, but the end does not wait for those that do not read it.
 """
 
 from __future__ import annotations
@@ -24,9 +24,11 @@ from .pose_values import values
 VERSION = 1
 MAX_CLIENTS = 16
 _QUEUED_LINES = 2  # per client and person; older ones are dropped
-_SEND_BUFFER_BYTES = 32768  # some eight poses: what the system queues for a slow client is delay as well
+# some eight poses: what the system queues for a slow client is delay as well
+_SEND_BUFFER_BYTES = 32768
 _SEND_TIMEOUT_S = 10.0  # after which a client that reads nothing is disconnected
-_CLOSING_S = 0.4  # for which the end waits for all clients together; with the time for a source, less than a second
+# for which the end waits for all clients together; with the time for a source, less than a second
+_CLOSING_S = 0.4
 
 
 class JsonServer:
@@ -49,7 +51,8 @@ class JsonServer:
         except (OSError, OverflowError) as error:
             reason = getattr(error, "strerror", None) or error
             raise OutputError(
-                f"cannot listen on {address} port {port} ({reason}); choose another --json-port or --listen address"
+                f"cannot listen on {address} port {port} ({reason}); choose another --json-port or "
+                "--listen address"
             ) from error
         self.port: int = self._socket.getsockname()[1]
         self._thread = threading.Thread(target=self._accept, name="scope-live-json", daemon=True)
@@ -98,7 +101,9 @@ class JsonServer:
                 if self._is_over or len(self._clients) >= MAX_CLIENTS:
                     connection.close()
                     continue
-                self._clients.append(_Client(connection, self._header, _QUEUED_LINES * self._people))
+                self._clients.append(
+                    _Client(connection, self._header, _QUEUED_LINES * self._people)
+                )
 
 
 class _Client:
@@ -162,5 +167,6 @@ def description(body: Body) -> dict[str, Any]:
         "body": body.name,
         "joints": list(body.joint_names),
         "parents": [int(parent) for parent in body.parents],
-        "axes": "right-handed, z up, metres; rotations are quaternions w, x, y, z relative to the parent joint",
+        "axes": "right-handed, z up, metres; rotations are quaternions w, x, y, z relative to the "
+        "parent joint",
     }

@@ -18,17 +18,23 @@ class PeopleRecording:
     """Keeps every pose.
 
     :param paths: a file for each person.
-    :param from_zero: whether frame numbers and times begin with 0, rather than with those of the source.
+    :param from_zero: whether frame numbers and times begin with 0, rather than with those of the
+        source.
     """
 
-    def __init__(self, paths: Sequence[Path], body: Body, source: Source, *, from_zero: bool = False) -> None:
+    def __init__(
+        self, paths: Sequence[Path], body: Body, source: Source, *, from_zero: bool = False
+    ) -> None:
         self._recordings = [Recording(path, body, source) for path in paths]
         self._from_zero = from_zero
-        self.origin: tuple[int, float] | None = None  # the frame number and time that become 0, if not the first ones
+        # the frame number and time that become 0, if not the first ones
+        self.origin: tuple[int, float] | None = None
         self._is_over = False
 
     def begin(self, people: LivePeople, size: tuple[int, int]) -> None:
-        """Note where the poses come from; once there are some, those of pictures of another size are left out."""
+        """Note where the poses come from; once there are some, those of pictures of another size
+        are left out.
+        """
         self._is_over = any(recording.first is not None for recording in self._recordings)
         if self._is_over:
             return
@@ -47,8 +53,12 @@ class PeopleRecording:
         :raises OutputError: a file cannot be written.
         """
         seen = [recording for recording in self._recordings if recording.first is not None]
-        origin = self.origin or min((recording.first for recording in seen if recording.first), default=None)
-        return [each.save(origin if self._from_zero else None) for each in seen or self._recordings[:1]]
+        origin = self.origin or min(
+            (recording.first for recording in seen if recording.first), default=None
+        )
+        return [
+            each.save(origin if self._from_zero else None) for each in seen or self._recordings[:1]
+        ]
 
     @property
     def seconds(self) -> float:

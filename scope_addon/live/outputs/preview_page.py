@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The footage of a live capture with the skeletons over it, as a page that a browser on this computer shows.
+"""The footage of a live capture with the skeletons over it, as a page that a browser on this
+computer shows.
 
-The installed OpenCV has no windows. The page is served to this computer alone, under an address that cannot be guessed,
-because it shows what a camera sees. Pictures are drawn and encoded in threads of their own, the newest ones only, and
-only while a browser asks for them; each is the one to which its poses belong, so that they coincide. At the end, the
-newest one is still shown: browsers wait for what follows a picture before they show it.
+The installed OpenCV has no windows. The page is served to this computer alone, under an address
+that cannot be guessed, because it shows what a camera sees. Pictures are drawn and encoded in
+threads of their own, the newest ones only, and only while a browser asks for them; each is the one
+to which its poses belong, so that they coincide. At the end, the newest one is still shown:
+browsers wait for what follows a picture before they show it.
 """
 
 from __future__ import annotations
@@ -53,7 +55,9 @@ class PreviewPage:
     """
 
     def __init__(self, body: Body) -> None:
-        self._bones = [(k, int(p), _color(body.joint_names[k])) for k, p in enumerate(body.parents) if p >= 0]
+        self._bones = [
+            (k, int(p), _color(body.joint_names[k])) for k, p in enumerate(body.parents) if p >= 0
+        ]
         self._session: LiveSession | None = None
         self._pictures: deque[Picture] = deque(maxlen=_MAX_KEPT)
         self._poses: dict[int, LivePose] = {}  # the newest of each person
@@ -69,7 +73,10 @@ class PreviewPage:
         self._server.daemon_threads = True
         self.address = f"http://127.0.0.1:{self._server.server_port}/{token}"
         self._thread = threading.Thread(
-            target=self._server.serve_forever, args=(_POLLING_INTERVAL_S,), name="scope-live-preview", daemon=True
+            target=self._server.serve_forever,
+            args=(_POLLING_INTERVAL_S,),
+            name="scope-live-preview",
+            daemon=True,
         )
         self._thread.start()
 
@@ -123,7 +130,10 @@ class PreviewPage:
                 while not self._is_over.is_set() and self._newest_s() <= shown:
                     self._changed.wait(1.0)
                 poses = list(self._poses.values())
-            picture, newest = self._picture_of(poses), max((pose.timestamp_s for pose in poses), default=-np.inf)
+            picture, newest = (
+                self._picture_of(poses),
+                max((pose.timestamp_s for pose in poses), default=-np.inf),
+            )
             if picture is not None and newest > shown:
                 shown = newest
                 yield self._drawn(picture, poses)
@@ -142,7 +152,9 @@ class PreviewPage:
         height, width = picture.image_rgb.shape[:2]
         scale = min(1.0, LONGER_SIDE / max(height, width))
         size = max(1, round(width * scale)), max(1, round(height * scale))
-        image: NDArray[Any] = np.ascontiguousarray(cv2.resize(picture.image_rgb, size, interpolation=cv2.INTER_AREA))
+        image: NDArray[Any] = np.ascontiguousarray(
+            cv2.resize(picture.image_rgb, size, interpolation=cv2.INTER_AREA)
+        )
         camera = None if self._session is None else self._session.camera
         for pose in poses:
             if camera is not None and pose.presence is not Presence.LOST:
@@ -199,7 +211,10 @@ def _handler(page: PreviewPage, token: str) -> type[BaseHTTPRequestHandler]:
             self.end_headers()
             with page.viewed():
                 for jpeg in page.pictures():
-                    head = f"--{_BOUNDARY}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(jpeg)}\r\n\r\n"
+                    head = (
+                        f"--{_BOUNDARY}\r\nContent-Type: image/jpeg\r\nContent-Length: "
+                        f"{len(jpeg)}\r\n\r\n"
+                    )
                     self.wfile.write(head.encode() + jpeg + b"\r\n")
                 self.wfile.write(f"--{_BOUNDARY}--\r\n".encode())
 

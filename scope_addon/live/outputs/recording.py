@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A live capture as a motion file.
 
-The rows are the source's frames, from the first to the last in which the person was seen. Frames that were dropped, and
-those in which the person was not seen, are filled in and not valid, as in an offline capture. The motion is the one
-that was given live, without its delay. Its world changes a little in the first seconds, so that `world_from_camera`
-does, too; the shape is the final one.
+The rows are the source's frames, from the first to the last in which the person was seen. Frames
+that were dropped, and those in which the person was not seen, are filled in and not valid, as in an
+offline capture. The motion is the one that was given live, without its delay. Its world changes a
+little in the first seconds, so that `world_from_camera` does, too; the shape is the final one.
 """
 
 from __future__ import annotations
@@ -60,7 +60,8 @@ class Recording:
         """
         if not self._poses or self._session is None or self._session.camera is None:
             raise NoPersonError(
-                f"nobody was seen in {self._source.name}, so nothing was recorded; at least one person must be mostly "
+                f"nobody was seen in {self._source.name}, so nothing was recorded; at least one "
+                "person must be mostly "
                 "in the image"
             )
         motion = self.motion(self._session.camera)
@@ -103,7 +104,9 @@ class Recording:
         placed = place_track(self._body, track, given, smoothing=False, path=path)
         contact = np.zeros((T, len(poses[0].contact)))
         contact[rows] = _stacked(poses, "contact")
-        shot = Shot(self._body, camera, path, Lines.none(), self._source.fps, self._size, self._source.name)
+        shot = Shot(
+            self._body, camera, path, Lines.none(), self._source.fps, self._size, self._source.name
+        )
         person = FittedPerson(track, RawMotion.of(track, raw, path), self._body)
         return assemble_motion(shot, person, placed, contact, T_world_frame[0])
 

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Poses in the VMC protocol, as OSC messages over UDP, for virtual production and avatar tools.
 
-The receiver's axes are Unity's: left-handed, x right, y up, z forward. Body models face their z axis with their left
-hand on the x axis, so that the two differ by the sign of x. A rotation's axis, which is a pseudovector, then changes
-the signs of y and z:
+The receiver's axes are Unity's: left-handed, x right, y up, z forward. Body models face their z
+axis with their left hand on the x axis, so that the two differ by the sign of x. A rotation's axis,
+which is a pseudovector, then changes the signs of y and z:
 
     position (x, y, z) -> (−x, y, z)        quaternion (w, x, y, z) -> (w, x, −y, −z)
 
-Rotations are relative to the parent bone, and zero in the T-pose, which is also the body's rest pose. The root stays at
-the origin; the hips move over the floor.
+Rotations are relative to the parent bone, and zero in the T-pose, which is also the body's rest
+pose. The root stays at the origin; the hips move over the floor.
 
 Source: the VMC protocol's specification, "Performer -> Marionette", and Open Sound Control 1.0.
 """
@@ -83,7 +83,8 @@ def parse_address(text: str, people: int = 1) -> tuple[str, int]:
 
 
 class VmcSender:
-    """A context that sends poses to one receiver; UDP neither waits for it nor notices that it is missing.
+    """A context that sends poses to one receiver; UDP neither waits for it nor notices that it is
+    missing.
 
     :param person: whose poses are sent; a receiver shows one person.
     :raises OutputError: the host is unknown.
@@ -94,12 +95,16 @@ class VmcSender:
         try:
             family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
         except (OSError, UnicodeError) as error:
-            raise OutputError(f"{host} is unknown ({error}); give --vmc the receiver's name or address") from error
+            raise OutputError(
+                f"{host} is unknown ({error}); give --vmc the receiver's name or address"
+            ) from error
         self._body, self._address = body, address
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         self._bones = {
-            bone: body.joint_names.index(joint) for bone, joint in BONES.items() if joint in body.joint_names
+            bone: body.joint_names.index(joint)
+            for bone, joint in BONES.items()
+            if joint in body.joint_names
         }
 
     def __enter__(self) -> VmcSender:
@@ -125,13 +130,17 @@ class VmcSender:
         if not pose.is_known:
             return out
         out.append(_message("/VMC/Ext/Root/Pos", "root", *_IDENTITY))
-        rotations = np.concatenate([(R_WORLD_MODEL.T @ pose.R_world_root)[None], pose.rotations[1:]])
+        rotations = np.concatenate(
+            [(R_WORLD_MODEL.T @ pose.R_world_root)[None], pose.rotations[1:]]
+        )
         quaternions = unity_quaternion(rotations)
         rest = self._body.rest_joints(pose.betas) * [-1.0, 1.0, 1.0]
         for bone, joint in self._bones.items():
             parent = self._body.parents[joint]
             place = unity_position(pose.joints[0]) if parent < 0 else rest[joint] - rest[parent]
-            out.append(_message("/VMC/Ext/Bone/Pos", bone, *map(float, (*place, *quaternions[joint]))))
+            out.append(
+                _message("/VMC/Ext/Bone/Pos", bone, *map(float, (*place, *quaternions[joint])))
+            )
         return out
 
 
@@ -144,7 +153,8 @@ def datagrams(messages: list[OscMessage]) -> list[bytes]:
         if size + message.size + 4 > LARGEST_DATAGRAM:
             bundles.append(OscBundleBuilder(IMMEDIATELY))
             size = 16  # of an empty bundle
-        bundles[-1].add_content(cast("Any", message))  # it takes messages too, but its type says bundles alone
+        # it takes messages too, but its type says bundles alone
+        bundles[-1].add_content(cast("Any", message))
         size += message.size + 4
     return [bundle.build().dgram for bundle in bundles]
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where frames come from: a camera, a stream, or a file that is played in real time; and which of them are taken."""
+"""Where frames come from: a camera, a stream, or a file that is played in real time; and which of
+them are taken.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,9 @@ __all__ = ["CAMERA_SIZE", "Picture", "Source", "is_stream", "open_source"]
 
 
 def is_stream(text: str) -> bool:
-    """Return whether the source that a text names is on the network, rather than a camera or a file."""
+    """Return whether the source that a text names is on the network, rather than a camera or a
+    file.
+    """
     return re.match(r"[A-Za-z][\w+.-]+:", text) is not None and "//" in text
 
 
@@ -33,13 +37,17 @@ def open_source(text: str, *, online: bool = True) -> Source:
     if is_stream(text):
         scheme = text.partition(":")[0]
         if scheme.lower() not in SCHEMES:
-            raise VideoError(f"{text}: '{scheme}' is not a kind of stream that can be read; use {', '.join(SCHEMES)}")
+            raise VideoError(
+                f"{text}: '{scheme}' is not a kind of stream that can be read; use "
+                f"{', '.join(SCHEMES)}"
+            )
         if not online:
             raise OfflineError
         return StreamSource(text)
     if not Path(text).exists():
         raise VideoError(
-            f"{text} does not exist; check the path, give a camera as a number such as 0, and a stream with its kind,"
+            f"{text} does not exist; check the path, give a camera as a number such as 0, and a "
+            "stream with its kind,"
             " as in rtsp://192.168.1.20/stream"
         )
     return FileSource(Path(text))

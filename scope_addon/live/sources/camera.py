@@ -23,7 +23,8 @@ from .source import DEFAULT_FPS, Picture
 
 CAMERA_SIZE = (1280, 720)
 _OPEN_ERRORS = {
-    errno.EACCES: "may not be used by this user; on most systems, cameras belong to the group 'video'",
+    errno.EACCES: "may not be used by this user; on most systems, cameras belong to the group "
+    "'video'",
     errno.EPERM: "may not be used by this program, which runs without access to cameras",
     errno.EBUSY: "is used by another program; close that",
     errno.ENODEV: "is not plugged in any more",
@@ -31,7 +32,8 @@ _OPEN_ERRORS = {
 }
 # Of linux/videodev2.h: the request for what a device can do, and where its answer says so.
 _QUERYCAP, _CAPABILITY = 0x80685600, "16s32s32sIII12x"
-_CAPTURE, _OF_THIS_NODE = 1, 1 << 31  # the camera's nodes together can do what the first answer says
+# the camera's nodes together can do what the first answer says
+_CAPTURE, _OF_THIS_NODE = 1, 1 << 31
 
 
 class CameraSource:
@@ -65,8 +67,15 @@ class CameraSource:
                 ok, bgr = capture.read()
                 now_s = clock.now()
                 if not ok or bgr is None:
-                    raise VideoError(f"{self.name} {self._reason_without_images(has_begun=index > 0)}")
-                yield Picture(index, now_s, now_s, cast(NDArray[np.uint8], cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)))
+                    raise VideoError(
+                        f"{self.name} {self._reason_without_images(has_begun=index > 0)}"
+                    )
+                yield Picture(
+                    index,
+                    now_s,
+                    now_s,
+                    cast(NDArray[np.uint8], cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)),
+                )
                 index += 1
         finally:
             capture.release()
@@ -87,7 +96,11 @@ class CameraSource:
     def _require_device(self) -> None:
         if sys.platform.startswith("linux") and not self._path.exists():
             found = sorted(str(p) for p in Path("/dev").glob("video*"))
-            advice = f"choose one of {', '.join(found)}" if found else "connect a camera, or choose a stream or a file"
+            advice = (
+                f"choose one of {', '.join(found)}"
+                if found
+                else "connect a camera, or choose a stream or a file"
+            )
             raise VideoError(f"{self.name} does not exist; {advice}")
 
     def _open(self) -> Any:
@@ -96,10 +109,12 @@ class CameraSource:
         capture = cv2.VideoCapture(self._device)
         if not capture.isOpened():
             raise VideoError(
-                f"{self.name} cannot be opened; check that it is plugged in, that no other program uses it, and that "
+                f"{self.name} cannot be opened; check that it is plugged in, that no other program "
+                "uses it, and that "
                 "this one may use cameras"
             )
-        capture.set(cv2.CAP_PROP_FOURCC, cv2.VideoWriter.fourcc(*"MJPG"))  # uncompressed, USB carries 10 frames/s
+        # uncompressed, USB carries 10 frames/s
+        capture.set(cv2.CAP_PROP_FOURCC, cv2.VideoWriter.fourcc(*"MJPG"))
         capture.set(cv2.CAP_PROP_FRAME_WIDTH, CAMERA_SIZE[0])
         capture.set(cv2.CAP_PROP_FRAME_HEIGHT, CAMERA_SIZE[1])
         capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
@@ -123,7 +138,8 @@ class CameraSource:
 
 
 def device_problem(path: Path, ioctl: Callable[[int, int, bytearray], Any] | None = None) -> str:
-    """Return why a device of Linux cannot be used as a camera, as the end of a sentence; empty if it can.
+    """Return why a device of Linux cannot be used as a camera, as the end of a sentence; empty if
+    it can.
 
     It is only asked what it is, which does not switch it on.
 
@@ -137,7 +153,9 @@ def device_problem(path: Path, ioctl: Callable[[int, int, bytearray], Any] | Non
     try:
         node = os.open(path, os.O_RDWR | os.O_NONBLOCK)
     except OSError as error:
-        return _OPEN_ERRORS.get(error.errno or 0, f"cannot be opened ({(error.strerror or 'unknown').lower()})")
+        return _OPEN_ERRORS.get(
+            error.errno or 0, f"cannot be opened ({(error.strerror or 'unknown').lower()})"
+        )
     try:
         ioctl(node, _QUERYCAP, answer)
     except OSError as error:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The modes of a camera of Windows or macOS, read from what FFmpeg logs about it, and the one to ask for.
+"""The modes of a camera of Windows or macOS, read from what FFmpeg logs about it, and the one to
+ask for.
 
-dshow logs them on request. avfoundation has no such request, but logs them when it refuses a size. Names of drivers and
-pins are in the same text, which is therefore read as if it could be anything.
+dshow logs them on request. avfoundation has no such request, but logs them when it refuses a size.
+Names of drivers and pins are in the same text, which is therefore read as if it could be anything.
 """
 
 from __future__ import annotations
@@ -17,16 +18,24 @@ _SIDES, _HIGHEST_FPS = range(16, 16385), 1000.0
 _FPS = 30.0  # of the mode to ask for, as near as the camera has it
 _NUMBER = r"([0-9.einf+]{1,20})"  # drivers that leave an interval out give infinite rates
 _OF_DSHOW = re.compile(
-    r"  (?:pixel_format=([a-z0-9_]{1,20})|vcodec=([a-z0-9_]{1,20})|unknown compression type (0x[0-9A-F]{1,8}))"
-    rf"  min s=(\d{{1,5}})x(\d{{1,5}}) fps={_NUMBER} max s=(\d{{1,5}})x(\d{{1,5}}) fps={_NUMBER}(?: ?\(|$)",
+    r"  (?:pixel_format=([a-z0-9_]{1,20})|vcodec=([a-z0-9_]{1,20})|unknown compression type "
+    r"(0x[0-9A-F]{1,8}))"
+    rf"  min s=(\d{{1,5}})x(\d{{1,5}}) fps={_NUMBER} max s=(\d{{1,5}})x(\d{{1,5}}) "
+    rf"fps={_NUMBER}(?: ?\(|$)",
     re.ASCII,
 )
-_OF_AVFOUNDATION = re.compile(rf"  (\d{{1,5}})x(\d{{1,5}})@\[{_NUMBER} {_NUMBER}\]fps(?: \(repeated|$)", re.ASCII)
+_OF_AVFOUNDATION = re.compile(
+    rf"  (\d{{1,5}})x(\d{{1,5}})@\[{_NUMBER} {_NUMBER}\]fps(?: "
+    rf"\(repeated|$)",
+    re.ASCII,
+)
 
 
 @dataclass(frozen=True)
 class Mode:
-    """Sizes in pixels and rates in frames/s from the least to the greatest, of one pixel format or codec."""
+    """Sizes in pixels and rates in frames/s from the least to the greatest, of one pixel format or
+    codec.
+    """
 
     format: str  # as FFmpeg names it; empty where it does not tell
     least: tuple[int, int]
@@ -36,12 +45,16 @@ class Mode:
 
     @property
     def fps(self) -> float:
-        """The rate to ask for, frames/s; avfoundation, which does not tell the format, takes none but the greatest."""
+        """The rate to ask for, frames/s; avfoundation, which does not tell the format, takes none
+        but the greatest.
+        """
         return min(max(_FPS, self.least_fps), self.most_fps) if self.format else self.most_fps
 
     def nearest_size(self, size: tuple[int, int]) -> tuple[int, int]:
         """Return the size of this mode that is nearest to another one."""
-        width, height = (min(max(n, a), b) for n, a, b in zip(size, self.least, self.most, strict=True))
+        width, height = (
+            min(max(n, a), b) for n, a, b in zip(size, self.least, self.most, strict=True)
+        )
         return width, height
 
 
@@ -59,7 +72,9 @@ def parse_modes(log: str, device_format: str) -> list[Mode]:
 
 
 def described(modes: list[Mode]) -> list[str]:
-    """Return each pixel format or codec with its largest size; where there are no formats, the sizes, largest first."""
+    """Return each pixel format or codec with its largest size; where there are no formats, the
+    sizes, largest first.
+    """
     largest: dict[str, tuple[int, int]] = {}
     for mode in modes:
         largest[mode.format] = max(largest.get(mode.format, (0, 0)), mode.most, key=math.prod)
@@ -70,7 +85,9 @@ def described(modes: list[Mode]) -> list[str]:
 
 
 def nearest_mode(modes: list[Mode], size: tuple[int, int]) -> Mode | None:
-    """Return the mode whose size is nearest to another one, and of these the one nearest to 30 frames/s."""
+    """Return the mode whose size is nearest to another one, and of these the one nearest to 30
+    frames/s.
+    """
 
     def distance(mode: Mode) -> tuple[float, float]:
         ratio = math.prod(mode.nearest_size(size)) / math.prod(size)
@@ -84,7 +101,15 @@ def _dshow_mode(line: str) -> Mode | None:
         return None
     pixels, codec, unknown, *numbers = match.groups()
     w0, h0, fps0, w1, h1, fps1 = numbers
-    return _checked(Mode(pixels or codec or unknown, (int(w0), int(h0)), (int(w1), int(h1)), _rate(fps0), _rate(fps1)))
+    return _checked(
+        Mode(
+            pixels or codec or unknown,
+            (int(w0), int(h0)),
+            (int(w1), int(h1)),
+            _rate(fps0),
+            _rate(fps1),
+        )
+    )
 
 
 def _avfoundation_mode(line: str) -> Mode | None:
@@ -104,5 +129,7 @@ def _rate(text: str) -> float:
 
 def _checked(mode: Mode) -> Mode | None:
     """Return a mode that a camera can have; None for another."""
-    sides = all(a in _SIDES and b in _SIDES and a <= b for a, b in zip(mode.least, mode.most, strict=True))
+    sides = all(
+        a in _SIDES and b in _SIDES and a <= b for a, b in zip(mode.least, mode.most, strict=True)
+    )
     return mode if sides and 0.0 < mode.least_fps <= mode.most_fps else None

@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which pictures of a stream show what the camera saw: none that lost packets, and none that build on such a picture.
+"""Which pictures of a stream show what the camera saw: none that lost packets, and none that build
+on such a picture.
 
-Most pictures say only what has changed since those before. When one of them is lost or damaged, all later ones are
-wrong where somebody moves, until the next key frame, which needs no other picture.
+Most pictures say only what has changed since those before. When one of them is lost or damaged, all
+later ones are wrong where somebody moves, until the next key frame, which needs no other picture.
 
-FFmpeg says which pictures it has concealed in part, but not which ones build on them. Pictures of which nothing came
-are known by the numbers of the others in H.264; FFmpeg's decoder of H.265 knows them, and gives no picture that builds
-on one. For all codecs but H.264, the demultiplexer of transport streams tells of lost packets: it calls the picture
-corrupt that ended two pictures before the first one after the loss. The one between may be damaged or not, and streams
-that were joined look the same, but continue with a key frame.
+FFmpeg says which pictures it has concealed in part, but not which ones build on them. Pictures of
+which nothing came are known by the numbers of the others in H.264; FFmpeg's decoder of H.265 knows
+them, and gives no picture that builds on one. For all codecs but H.264, the demultiplexer of
+transport streams tells of lost packets: it calls the picture corrupt that ended two pictures before
+the first one after the loss. The one between may be damaged or not, and streams that were joined
+look the same, but continue with a key frame.
 """
 
 from __future__ import annotations
@@ -56,7 +58,9 @@ class Damage:
         self._has_key = self._has_key or packet.is_keyframe
 
     def fail(self, packet: av.Packet[Any]) -> bool:
-        """Note that a packet could not be decoded; return whether a picture is missing therefore."""
+        """Note that a packet could not be decoded; return whether a picture is missing
+        therefore.
+        """
         if self._numbers is not None and not self._numbers.has_picture(bytes(packet)):
             return False
         self._break()
@@ -68,7 +72,9 @@ class Damage:
         return self._until_loss == 1
 
     def is_hidden(self, frames: list[av.VideoFrame]) -> bool:
-        """Return whether the decoder has left out a damaged picture itself, from what it gives for a packet."""
+        """Return whether the decoder has left out a damaged picture itself, from what it gives for
+        a packet.
+        """
         self._waiting += 1 - len(frames)
         if frames and self._delay is None:
             self._delay = self._waiting
@@ -83,7 +89,11 @@ class Damage:
 
         if frame.is_corrupt:
             self._break()
-        elif self._has_key and frame.key_frame and frame.pict_type in (PictureType.I, PictureType.NONE):
+        elif (
+            self._has_key
+            and frame.key_frame
+            and frame.pict_type in (PictureType.I, PictureType.NONE)
+        ):
             self.is_broken = False
         return self.is_broken
 

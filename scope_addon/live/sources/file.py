@@ -10,7 +10,8 @@ from ...capture.media.video import open_video
 from ..clock import Clock
 from .source import Picture
 
-LEAP_S = 2.0  # by which a frame is too late after a computer has slept: what it slept through is not made up for
+# by which a frame is too late after a computer has slept: what it slept through is not made up for
+LEAP_S = 2.0
 
 
 class FileSource:
@@ -36,4 +37,6 @@ class FileSource:
                 clock.sleep(due_s - clock.now())
                 if (late_s := clock.now() - due_s) > LEAP_S:
                     began_s, due_s = began_s + late_s, due_s + late_s
-                yield Picture(frame.index, frame.timestamp_s, max(due_s, clock.now()), frame.image_rgb)
+                yield Picture(
+                    frame.index, frame.timestamp_s, max(due_s, clock.now()), frame.image_rgb
+                )

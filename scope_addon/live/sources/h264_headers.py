@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whether pictures of an H.264 stream are missing, by their numbers.
 
-FFmpeg's decoder says which pictures it has concealed in part. A picture all of whose packets were lost is replaced by
-the one before, and nothing is said of that, or of all those that build on it. But every picture has a ``frame_num``:
-it grows by one after a picture on which others build, and gaps in it are losses, unless the stream announces them or
-has them all the time, as of an encoder that counts otherwise.
+FFmpeg's decoder says which pictures it has concealed in part. A picture all of whose packets were
+lost is replaced by the one before, and nothing is said of that, or of all those that build on it.
+But every picture has a ``frame_num``: it grows by one after a picture on which others build, and
+gaps in it are losses, unless the stream announces them or has them all the time, as of an encoder
+that counts otherwise.
 
-Source: ITU-T H.264, 7.3.1 and 7.3.2.1 (NAL units, sequence parameter sets), 7.3.3 (slice headers), 7.4.3 (frame_num).
+Source: ITU-T H.264, 7.3.1 and 7.3.2.1 (NAL units, sequence parameter sets), 7.3.3 (slice headers),
+7.4.3 (frame_num).
 """
 
 from __future__ import annotations
@@ -28,7 +30,8 @@ _HIGH_PROFILES = (100, 110, 122, 244, 44, 83, 86, 118, 128, 138, 139, 134, 135)
 class FrameNumbers:
     """Follows the numbers of a stream's pictures.
 
-    :param extradata: of the stream: in .mp4 and alike, the parameters and how the length of a NAL unit is stored.
+    :param extradata: of the stream: in .mp4 and alike, the parameters and how the length of a NAL
+        unit is stored.
     """
 
     def __init__(self, extradata: bytes | None = None) -> None:
@@ -55,8 +58,12 @@ class FrameNumbers:
         return False
 
     def has_picture(self, data: bytes) -> bool:
-        """Return whether a packet contains a picture, or part of one, rather than parameters alone."""
-        return any(unit[0] & 31 in (_SLICE, _IDR_SLICE) for unit in islice(self._units(data), _MAX_UNITS))
+        """Return whether a packet contains a picture, or part of one, rather than parameters
+        alone.
+        """
+        return any(
+            unit[0] & 31 in (_SLICE, _IDR_SLICE) for unit in islice(self._units(data), _MAX_UNITS)
+        )
 
     def _is_gap(self, unit: bytes, *, begins: bool) -> bool:
         assert self._bits is not None
@@ -115,7 +122,9 @@ class FrameNumbers:
 
 
 def _skip_colours(bits: _Bits) -> bool:
-    """Skip what a high profile says of colours and scaling; return whether colours are separate pictures."""
+    """Skip what a high profile says of colours and scaling; return whether colours are separate
+    pictures.
+    """
     is_444 = bits.exp_golomb() == 3
     has_planes = is_444 and bits.take(1) == 1
     bits.exp_golomb()  # bit_depth_luma_minus8

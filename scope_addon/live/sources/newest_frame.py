@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads a source in its own thread and keeps the newest frame only: those that come while it is not taken are dropped.
+"""Reads a source in its own thread and keeps the newest frame only: those that come while it is not
+taken are dropped.
 
-Where not every frame can be processed, some are dropped as well so that the others follow each other evenly (`pace`).
+Where not every frame can be processed, some are dropped as well so that the others follow each
+other evenly (`pace`).
 
-An interrupted stream is opened again after a pause, and frame numbers and times continue. Where a server changes the
-resolution while it runs, pictures keep the first one, so that what was estimated from them still holds.
+An interrupted stream is opened again after a pause, and frame numbers and times continue. Where a
+server changes the resolution while it runs, pictures keep the first one, so that what was estimated
+from them still holds.
 
-Frames that the source leaves out because they were damaged on their way are counted, and a sentence says so.
+Frames that the source leaves out because they were damaged on their way are counted, and a sentence
+says so.
 """
 
 from __future__ import annotations
@@ -37,7 +41,8 @@ _CLOSING_S = 0.5  # for which the end of the capture waits for the source to be 
 class NewestFrame:
     """A context in which `take` gives the newest frame.
 
-    :param reconnect_s: pause before an interrupted source is opened again; 0: the capture ends there.
+    :param reconnect_s: pause before an interrupted source is opened again; 0: the capture ends
+        there.
     :param say: called with a sentence at each interruption, from the reading thread.
     :param received: gets every frame, from the reading thread, which it must not delay.
     """
@@ -73,14 +78,16 @@ class NewestFrame:
 
     def __exit__(self, *_: object) -> None:
         self._clock.stopped.set()
-        self._thread.join(_CLOSING_S)  # a read that never returns must not keep the program from ending
+        # a read that never returns must not keep the program from ending
+        self._thread.join(_CLOSING_S)
 
     def now(self) -> float:
         """Return the time of the clock by which frames arrive, in seconds."""
         return self._clock.now()
 
     def take(self) -> Picture | None:
-        """Wait for the next frame and return the newest one; None after the last, or when the clock is stopped.
+        """Wait for the next frame and return the newest one; None after the last, or when the clock
+        is stopped.
 
         The frame before counts as processed.
 
@@ -89,7 +96,8 @@ class NewestFrame:
         with self._changed:
             self._pace.add_duration(self.now() - self._taken_s)
             while self._newest is None and not self._is_over:
-                if self._clock.stopped.is_set():  # the source may be stalled, and its thread with it
+                # the source may be stalled, and its thread with it
+                if self._clock.stopped.is_set():
                     return None
                 self._changed.wait(_POLLING_INTERVAL_S)
             if self._newest is None and self._error is not None:
@@ -118,7 +126,9 @@ class NewestFrame:
         before = self.received
         try:
             # Closing it closes the camera or the connection, on every way out.
-            with closing(cast("Generator[Picture | None, None, None]", self._source.pictures(self._clock))) as pictures:
+            with closing(
+                cast("Generator[Picture | None, None, None]", self._source.pictures(self._clock))
+            ) as pictures:
                 for picture in pictures:
                     if self._clock.stopped.is_set():
                         return True
@@ -133,7 +143,9 @@ class NewestFrame:
             problem = str(error)
         if self._source.ends or self._reconnect_s <= 0:
             if not self.received:
-                raise VideoError(f"{self._source.name} delivered no frames; check that it shows an image")
+                raise VideoError(
+                    f"{self._source.name} delivered no frames; check that it shows an image"
+                )
             return True
         if problem != self._said:  # once, not at every attempt
             self._said = problem
@@ -148,12 +160,19 @@ class NewestFrame:
             if not self.received:
                 self._began_s = 0.0 if self._source.ends else picture.timestamp_s
         index = self._first_index + picture.index
-        time_s = max(picture.timestamp_s - self._began_s, self._last_s + 1e-3 if self.received else 0.0)
+        time_s = max(
+            picture.timestamp_s - self._began_s, self._last_s + 1e-3 if self.received else 0.0
+        )
         if self.received and not is_first:
             self._report_pause(picture.arrived_s - self._arrived_s)
         self._arrived_s = picture.arrived_s
         self._watch(picture)
-        picture = replace(picture, index=index, timestamp_s=time_s, image_rgb=self._in_first_size(picture.image_rgb))
+        picture = replace(
+            picture,
+            index=index,
+            timestamp_s=time_s,
+            image_rgb=self._in_first_size(picture.image_rgb),
+        )
         self._received(picture)
         with self._changed:
             is_due = self._pace.is_due(time_s)
@@ -169,28 +188,43 @@ class NewestFrame:
         if self.now() - self._damage_said_s > DAMAGE_SAID_S:
             self._damage_said_s = self.now()
             self._say(
-                f"data of {self._source.name} was lost or damaged in transmission; damaged images are left out, for at"
+                f"data of {self._source.name} was lost or damaged in transmission; damaged images "
+                "are left out, for at"
                 f" most {DAMAGED_S:g} s each time"
             )
 
     def _report_pause(self, seconds: float) -> None:
-        """Say that nothing came for a while, if the source itself has not noticed: maybe the computer slept."""
+        """Say that nothing came for a while, if the source itself has not noticed: maybe the
+        computer slept.
+        """
         if seconds > STALLED_S:
             self._changed_s += seconds
             self._say(
-                f"nothing came from {self._source.name} for {seconds:.0f} s, as when a computer sleeps; it goes on"
+                f"nothing came from {self._source.name} for {seconds:.0f} s, as when a computer "
+                "sleeps; it goes on"
             )
 
     def _watch(self, picture: Picture) -> None:
-        """Say that a source shows the same picture again and again, as servers do that have lost their camera."""
+        """Say that a source shows the same picture again and again, as servers do that have lost
+        their camera.
+        """
         last, image = self._last_image, picture.image_rgb
         self._last_image = image
         # Some pixels first, which mostly differ.
-        if last is None or not (np.array_equal(last[::16, ::16], image[::16, ::16]) and np.array_equal(last, image)):
+        if last is None or not (
+            np.array_equal(last[::16, ::16], image[::16, ::16]) and np.array_equal(last, image)
+        ):
             self._changed_s, self._is_frozen = picture.arrived_s, False
-        elif picture.arrived_s - self._changed_s > STALLED_S and not self._is_frozen and not self._source.ends:
+        elif (
+            picture.arrived_s - self._changed_s > STALLED_S
+            and not self._is_frozen
+            and not self._source.ends
+        ):
             self._is_frozen = True
-            self._say(f"{self._source.name} has shown the same image for {STALLED_S:g} s; check whether it is frozen")
+            self._say(
+                f"{self._source.name} has shown the same image for {STALLED_S:g} s; check "
+                "whether it is frozen"
+            )
 
     def _in_first_size(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Return a picture in the size of the first one, unless its shape is another one."""

@@ -18,7 +18,9 @@ DEFAULT_FPS = Fraction(30)
 
 @dataclass(frozen=True)
 class Picture:
-    """One frame: its index and time in the source, when it came (seconds of the clock), and the (H, W, 3) RGB image."""
+    """One frame: its index and time in the source, when it came (seconds of the clock), and the (H,
+    W, 3) RGB image.
+    """
 
     index: int
     timestamp_s: float
@@ -30,12 +32,14 @@ class Source(Protocol):
     """A source of frames that can be opened again."""
 
     name: str  # for messages and the motion file
-    ends: bool  # whether the end of its frames is the end of the capture, rather than an interruption
+    # whether the end of its frames is the end of the capture, rather than an interruption
+    ends: bool
     fps: Fraction  # nominal
     focal_35mm: float | None
 
     def pictures(self, clock: Clock) -> Iterator[Picture | None]:
-        """Open the source and yield its frames as they come; their number begins with 0, their time anywhere.
+        """Open the source and yield its frames as they come; their number begins with 0, their time
+        anywhere.
 
         None stands for a frame that was damaged on its way and is left out.
 

@@ -32,9 +32,12 @@ _FORMATS = (
     "nut"
 )
 STALLED_S = 5.0  # without data, after which a stream counts as interrupted
-KEY_FRAME_S = 10.0  # for which a stream that is joined in the middle is left out until its next key frame
-DAMAGED_S = 4.0  # for which damaged pictures are left out, as key frames of most cameras are not farther apart
-UNREADABLE_S = KEY_FRAME_S + STALLED_S  # without a picture, after which a stream counts as interrupted
+# for which a stream that is joined in the middle is left out until its next key frame
+KEY_FRAME_S = 10.0
+# for which damaged pictures are left out, as key frames of most cameras are not farther apart
+DAMAGED_S = 4.0
+# without a picture, after which a stream counts as interrupted
+UNREADABLE_S = KEY_FRAME_S + STALLED_S
 
 
 class StreamSource:
@@ -71,13 +74,21 @@ class StreamSource:
                         yield None
                         continue
                     now_s = clock.now()
-                    yield Picture(index, now_s, now_s, self._image(frame, float(stream.sample_aspect_ratio or 1)))
+                    yield Picture(
+                        index,
+                        now_s,
+                        now_s,
+                        self._image(frame, float(stream.sample_aspect_ratio or 1)),
+                    )
                     index += 1
             except (av.error.FFmpegError, OSError, ValueError) as error:
                 raise VideoError(f"{self.name} was interrupted ({_reason(error)})") from error
 
-    def _frames(self, container: InputContainer, stream: VideoStream, clock: Clock) -> Iterator[av.VideoFrame | None]:
-        """Yield what can be decoded, from the first key frame on; None for a frame that is damaged and left out.
+    def _frames(
+        self, container: InputContainer, stream: VideoStream, clock: Clock
+    ) -> Iterator[av.VideoFrame | None]:
+        """Yield what can be decoded, from the first key frame on; None for a frame that is damaged
+        and left out.
 
         Frames before it continue pictures that never came, and some decoders show them on grey.
 
@@ -92,7 +103,8 @@ class StreamSource:
         held: list[av.VideoFrame] = []  # until it is known whether they are damaged
         for packet in container.demux(stream):
             now_s = clock.now()
-            has_begun = has_begun or packet.is_keyframe or now_s - began_s > KEY_FRAME_S  # streams may have none
+            # streams may have none
+            has_begun = has_begun or packet.is_keyframe or now_s - began_s > KEY_FRAME_S
             frames: list[av.VideoFrame] = []
             if has_begun:
                 damage.observe(packet)
@@ -108,7 +120,10 @@ class StreamSource:
             if frames:
                 seen_s = now_s
             elif now_s - seen_s > UNREADABLE_S:
-                raise VideoError(f"{self.name} was interrupted (no image could be decoded for {UNREADABLE_S:g} s)")
+                raise VideoError(
+                    f"{self.name} was interrupted (no image could be decoded for "
+                    f"{UNREADABLE_S:g} s)"
+                )
             for frame in frames:
                 is_intact = not damage.is_in(frame)
                 damaged_s = None if is_intact else now_s if damaged_s is None else damaged_s
@@ -121,25 +136,34 @@ class StreamSource:
         import av
 
         options = {"protocol_whitelist": _PROTOCOLS, "format_whitelist": _FORMATS}
-        # Without FFmpeg's "nobuffer", which throws away packets that define the format: the first key frame, too.
+        # Without FFmpeg's "nobuffer", which throws away packets that define the format: the first
+        # key frame, too.
         options |= {"flags": "low_delay", "probesize": "500000", "analyzeduration": "1000000"}
         if self._url.startswith("rtsp"):
             options["rtsp_transport"] = "tcp"
         try:
             return av.open(
-                self._url, options=options, container_options=options, timeout=(STALLED_S, STALLED_S), mode="r"
+                self._url,
+                options=options,
+                container_options=options,
+                timeout=(STALLED_S, STALLED_S),
+                mode="r",
             )
         except (av.error.FFmpegError, OSError, ValueError) as error:
             raise VideoError(
-                f"{self.name} cannot be opened ({_reason(error)}); check the address, and whether its server runs"
+                f"{self.name} cannot be opened ({_reason(error)}); check the address, and whether "
+                "its server runs"
             ) from error
 
     def _image(self, frame: av.VideoFrame, aspect: float) -> NDArray[np.uint8]:
-        """Return the frame as it is to be shown; phones send what they film upright as rotated, and may mirror it."""
+        """Return the frame as it is to be shown; phones send what they film upright as rotated, and
+        may mirror it.
+        """
         check_size(Path(self.name), frame.width, frame.height)
         return upright(Path(self.name), rgb(frame), aspect, *orientation(frame))
 
 
 def _reason(error: Exception) -> str:
     text = str(getattr(error, "strerror", None) or error).lower()
-    return f"nothing came for {STALLED_S:g} s" if "immediate exit" in text else text  # as FFmpeg calls a timeout
+    # as FFmpeg calls a timeout
+    return f"nothing came for {STALLED_S:g} s" if "immediate exit" in text else text

@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cameras of Windows and macOS, listed and opened by FFmpeg, so that a camera's number is its place in the list.
+"""Cameras of Windows and macOS, listed and opened by FFmpeg, so that a camera's number is its place
+in the list.
 
-OpenCV opens cameras by numbers of its own there, whose order no list tells. Not tried with cameras of these systems:
-documentation and source text of FFmpeg's dshow and avfoundation are what this follows.
+OpenCV opens cameras by numbers of its own there, whose order no list tells. Not tried with cameras
+of these systems: documentation and source text of FFmpeg's dshow and avfoundation are what this
+follows.
 
-A camera's modes come from FFmpeg's log, which is switched on meanwhile: in a process of its own, never in Blender's.
-dshow loads the camera's driver for it, and runs nothing. avfoundation opens the device, for which macOS asks the user,
-refuses the size that it is asked for, and closes the device before any picture is taken.
+A camera's modes come from FFmpeg's log, which is switched on meanwhile: in a process of its own,
+never in Blender's. dshow loads the camera's driver for it, and runs nothing. avfoundation opens the
+device, for which macOS asks the user, refuses the size that it is asked for, and closes the device
+before any picture is taken.
 """
 
 from __future__ import annotations
@@ -27,22 +30,28 @@ if TYPE_CHECKING:
     from av.device import DeviceInfo
 
 FORMATS = {"win32": "dshow", "darwin": "avfoundation"}  # of FFmpeg, by `sys.platform`
-# What a camera is asked for beside the size: some refuse a rate that they do not have, and others want one to be given.
+# What a camera is asked for beside the size: some refuse a rate that they do not have, and others
+# want one to be given.
 _REQUESTED_MODES: tuple[dict[str, str], ...] = ({"framerate": "30"}, {})
-# What makes each of them log a camera's modes, and refuse to open it. No camera has so small a picture.
+# What makes each of them log a camera's modes, and refuse to open it. No camera has so small a
+# picture.
 _LISTING = {"dshow": {"list_options": "true"}, "avfoundation": {"video_size": "1x1"}}
-_WAITING_S, _GONE_S = 0.002, 5.0  # for the next picture, and without one, after which a camera counts as gone
+# for the next picture, and without one, after which a camera counts as gone
+_WAITING_S, _GONE_S = 0.002, 5.0
 
 
 def camera_names(platform: str) -> list[str]:
-    """Return the names of the cameras, in FFmpeg's order; none where it does not list them, as on Linux."""
+    """Return the names of the cameras, in FFmpeg's order; none where it does not list them, as on
+    Linux.
+    """
     return [_name(device) for device in _devices(platform)]
 
 
 def open_camera(number: int, size: tuple[int, int], platform: str) -> InputContainer:
     """Open a camera of the list.
 
-    :param size: width and height that it is asked for, pixels; it gives another size if it does not have this one.
+    :param size: width and height that it is asked for, pixels; it gives another size if it does not
+        have this one.
     :raises VideoError: it does not exist, or cannot be opened.
     """
     import av
@@ -50,7 +59,9 @@ def open_camera(number: int, size: tuple[int, int], platform: str) -> InputConta
     device, problem = _device(number, platform), ""
     for wanted in _wanted(device, size, platform):
         try:
-            return av.open(_file(device, platform), format=FORMATS[platform], options=wanted, mode="r")
+            return av.open(
+                _file(device, platform), format=FORMATS[platform], options=wanted, mode="r"
+            )
         except (av.error.FFmpegError, OSError, ValueError) as error:
             problem = str(getattr(error, "strerror", None) or error).lower()
     raise VideoError(
@@ -87,13 +98,16 @@ def pictures(container: InputContainer, clock: Clock) -> Iterator[NDArray[np.uin
 
 
 def _wanted(device: DeviceInfo, size: tuple[int, int], platform: str) -> Iterator[dict[str, str]]:
-    """Yield what a camera is asked for, from the best on: the size, then what is nearest to it, then anything."""
+    """Yield what a camera is asked for, from the best on: the size, then what is nearest to it,
+    then anything.
+    """
     for wish in _REQUESTED_MODES:
         yield {"video_size": f"{size[0]}x{size[1]}"} | wish
     if (mode := nearest_mode(_modes(device, platform), size)) is not None:
         width, height = mode.nearest_size(size)
         yield {"video_size": f"{width}x{height}", "framerate": f"{mode.fps:.6f}"}
-        yield {"video_size": f"{width}x{height}"}  # of drivers that report infinite rates, FFmpeg accepts none
+        # of drivers that report infinite rates, FFmpeg accepts none
+        yield {"video_size": f"{width}x{height}"}
     yield from _REQUESTED_MODES
 
 
@@ -102,14 +116,16 @@ def _modes(device: DeviceInfo, platform: str) -> list[Mode]:
 
     kind, level, skips = FORMATS[platform], av.logging.get_level(), av.logging.get_skip_repeated()
     av.logging.set_level(av.logging.INFO)
-    av.logging.set_skip_repeated(False)  # the note of a repetition has no end of line, and spoils the next one
+    # the note of a repetition has no end of line, and spoils the next one
+    av.logging.set_skip_repeated(False)
     try:
         with av.logging.Capture() as log, suppress(av.error.FFmpegError, OSError, ValueError):
             av.open(_file(device, platform), format=kind, options=_LISTING[kind], mode="r").close()
     finally:
         av.logging.set_level(level)
         av.logging.set_skip_repeated(skips)
-    return parse_modes("".join(message for _, _, message in log), kind)  # dshow logs a line in pieces
+    # dshow logs a line in pieces
+    return parse_modes("".join(message for _, _, message in log), kind)
 
 
 def _file(device: DeviceInfo, platform: str) -> str:
@@ -127,7 +143,11 @@ def _device(number: int, platform: str) -> DeviceInfo:
     names = ", ".join(f"{k}: {_name(device)}" for k, device in enumerate(devices))
     raise VideoError(
         f"camera {number} does not exist; "
-        + (f"choose one of {names}" if devices else "connect a camera, or choose a stream or a file")
+        + (
+            f"choose one of {names}"
+            if devices
+            else "connect a camera, or choose a stream or a file"
+        )
     )
 
 
@@ -145,5 +165,7 @@ def _devices(platform: str) -> list[DeviceInfo]:
     with suppress(av.error.FFmpegError, OSError, ValueError):
         found = av.enumerate_input_devices(FORMATS[platform])
     # dshow of older versions does not say what a device gives.
-    cameras = [device for device in found if not device.media_types or "video" in device.media_types]
+    cameras = [
+        device for device in found if not device.media_types or "video" in device.media_types
+    ]
     return [device for device in cameras if not device.description.startswith("Capture screen")]

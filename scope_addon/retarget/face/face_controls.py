@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Expressions on the bones that move a face: which maps are built in, and what a map makes of weights.
+"""Expressions on the bones that move a face: which maps are built in, and what a map makes of
+weights.
 
-Each control is moved and turned along the axes of the face, from rest, by sums over the expressions k:
+Each control is moved and turned along the axes of the face, from rest, by sums over the expressions
+k:
 
     t = length · Σ_k w_k (left, up, forward)_k        ω = Σ_k w_k (pitch, yaw, roll)_k
 
-with lengths as in `FaceFrame`. With R_0 the control's rest rotation and A the face's axes, its channels are
-location R_0ᵀ A t and rotation R_0ᵀ A exp(ω) Aᵀ R_0. A control that an eye looks at is moved instead of turned, about
-that eye.
+with lengths as in `FaceFrame`. With R_0 the control's rest rotation and A the face's axes, its
+channels are location R_0ᵀ A t and rotation R_0ᵀ A exp(ω) Aᵀ R_0. A control that an eye looks at is
+moved instead of turned, about that eye.
 """
 
 from __future__ import annotations
@@ -50,14 +52,17 @@ def has_face_controls(bones: Collection[str]) -> bool:
 
 
 def guess_control_map(bones: Collection[str]) -> ExpressionMap:
-    """Return the built-in map of the rig with these bones, without controls that it lacks; an empty one if none fits.
+    """Return the built-in map of the rig with these bones, without controls that it lacks; an empty
+    one if none fits.
 
     :raises InputError: the map's file is damaged.
     """
     rig = _rig_of(bones)
     if rig is None:
         return ExpressionMap({})
-    return ExpressionMap({}, {bone: amounts for bone, amounts in built_in(rig).controls.items() if bone in bones})
+    return ExpressionMap(
+        {}, {bone: amounts for bone, amounts in built_in(rig).controls.items() if bone in bones}
+    )
 
 
 def control_motions(
@@ -76,7 +81,9 @@ def control_motions(
         if bone not in bones or not any(channels.values()):
             continue
         sums = {
-            channel: np.sum([f * weights[:, place[name]].astype(float) for name, f in factors.items()], axis=0)
+            channel: np.sum(
+                [f * weights[:, place[name]].astype(float) for name, f in factors.items()], axis=0
+            )
             for channel, factors in channels.items()
             if factors
         }
@@ -93,7 +100,9 @@ def _motion(
     """
     rest, still = bones[bone], np.zeros(len(next(iter(sums.values()))))
     to_face = rest.rotation.T @ frame.axes
-    moved, turned = (np.stack([sums.get(name, still) for name in names], axis=1) for names in (MOVED, TURNED))
+    moved, turned = (
+        np.stack([sums.get(name, still) for name in names], axis=1) for names in (MOVED, TURNED)
+    )
     moved = moved * frame.length(bone)
     moves, turns = not sums.keys().isdisjoint(MOVED), not sums.keys().isdisjoint(TURNED)
     eye = pivot(bones, bone)
@@ -108,9 +117,13 @@ def _motion(
 
 
 def _around(
-    eye: NDArray[np.float64], target: NDArray[np.float64], turned: NDArray[np.float64], frame: FaceFrame
+    eye: NDArray[np.float64],
+    target: NDArray[np.float64],
+    turned: NDArray[np.float64],
+    frame: FaceFrame,
 ) -> NDArray[np.float64]:
-    """Return how far (T, 3), in the face's axes, a target moves so that an eye turns; from where it looks at rest.
+    """Return how far (T, 3), in the face's axes, a target moves so that an eye turns; from where it
+    looks at rest.
 
     :param turned: (T, 3) degrees about left, up and forward.
     """
@@ -123,7 +136,9 @@ def _around(
 
 
 def _rig_of(bones: Collection[str]) -> str | None:
-    return next((rig for rig, needed in _RIGS.items() if all(bone in bones for bone in needed)), None)
+    return next(
+        (rig for rig, needed in _RIGS.items() if all(bone in bones for bone in needed)), None
+    )
 
 
 @cache

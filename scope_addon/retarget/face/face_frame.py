@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The face of a rig at rest: its axes, and the lengths in which its controls are moved. In the armature's space.
+"""The face of a rig at rest: its axes, and the lengths in which its controls are moved. In the
+armature's space.
 
-A face that is scaled or turned therefore moves alike: amounts are shares of its own lengths, along its own axes.
+A face that is scaled or turned therefore moves alike: amounts are shares of its own lengths, along
+its own axes.
 """
 
 from __future__ import annotations
@@ -19,7 +21,8 @@ _EYES = (("ORG-eye.L", "ORG-eye.R"), ("eye.L", "eye.R"))
 _MOUTH = (("lips.L", "lips.R"), ("lip_end.L.001", "lip_end.R.001"), ("levator05.L", "levator05.R"))
 _LIDS = (("lid.T.L.002", "lid.B.L.002"),)
 _MIN_LENGTH = 1e-9
-# What a control's name begins with, and the length in which it is moved; all others by the width of the mouth.
+# What a control's name begins with, and the length in which it is moved; all others by the width of
+# the mouth.
 _BY_LIDS = ("lid",)
 _BY_EYES = ("brow", "nose", "cheek.T", "oculi", "levator06")
 
@@ -35,7 +38,9 @@ class RestBone:
 
 @dataclass(frozen=True)
 class FaceFrame:
-    """A face at rest. ``axes`` (3, 3) has the directions left, up and forward, of the person, as columns."""
+    """A face at rest. ``axes`` (3, 3) has the directions left, up and forward, of the person, as
+    columns.
+    """
 
     axes: NDArray[np.float64]
     mouth: float  # width: from corner to corner
@@ -52,7 +57,8 @@ class FaceFrame:
 def measure_face(bones: Mapping[str, RestBone]) -> FaceFrame:
     """Measure a face by its bones at rest.
 
-    Left points from the right eye to the left one, up from the mouth to the eyes, and forward is left × up.
+    Left points from the right eye to the left one, up from the mouth to the eyes, and forward is
+    left × up.
 
     :raises InputError: a bone of the eyes or the mouth is missing, or they are in one place.
     """
@@ -86,5 +92,7 @@ def _pair(
 def _direction(along: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
     length = float(np.linalg.norm(along))
     if not length > _MIN_LENGTH:
-        raise InputError("the bones of the rig's eyes and mouth are in one place; place them in Edit Mode")
+        raise InputError(
+            "the bones of the rig's eyes and mouth are in one place; place them in Edit Mode"
+        )
     return along / length, length

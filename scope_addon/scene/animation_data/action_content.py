@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Restoring the content of an action from an earlier copy of it, in place.
 
-Replacing the action by its copy would be simpler, but a failed operator adds no step to undo: the earlier steps contain
-the action and not the copy, and Blender crashes when one of them is undone.
+Replacing the action by its copy would be simpler, but a failed operator adds no step to undo: the
+earlier steps contain the action and not the copy, and Blender crashes when one of them is undone.
 """
 
 from __future__ import annotations
@@ -17,7 +17,16 @@ from .actions import has_slots, read_whole_keys, write_whole_keys
 from .fcurve_modifiers import read_modifiers, write_modifiers
 
 _SETTINGS = ("use_frame_range", "use_cyclic", "frame_start", "frame_end")
-_CURVE = ("extrapolation", "color_mode", "color", "select", "mute", "lock", "hide", "auto_smoothing")
+_CURVE = (
+    "extrapolation",
+    "color_mode",
+    "color",
+    "select",
+    "mute",
+    "lock",
+    "hide",
+    "auto_smoothing",
+)
 _Curves = dict[tuple[str, int], bpy.types.FCurve]
 
 
@@ -36,7 +45,9 @@ def restore_content(action: bpy.types.Action, copy: bpy.types.Action) -> None:
 
 
 def _owners(action: bpy.types.Action) -> Iterator[tuple[tuple[int, int, int], Any]]:
-    """Yield what has ``fcurves`` and ``groups``, with its place: the action itself, or the channelbag of each slot."""
+    """Yield what has ``fcurves`` and ``groups``, with its place: the action itself, or the
+    channelbag of each slot.
+    """
     if not has_slots():
         yield (0, 0, 0), action
         return
@@ -56,7 +67,9 @@ def _remove_new_containers(action: bpy.types.Action, copy: bpy.types.Action) -> 
     for layer in list(action.layers)[len(copy.layers) :]:
         action.layers.remove(layer)
     places = {place for place, _ in _owners(copy)}
-    for (row, column, _), bag in [(place, bag) for place, bag in _owners(action) if place not in places]:
+    for (row, column, _), bag in [
+        (place, bag) for place, bag in _owners(action) if place not in places
+    ]:
         action.layers[row].strips[column].channelbags.remove(bag)
 
 

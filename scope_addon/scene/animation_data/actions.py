@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reading and writing keyframes in bulk. Only this module depends on how Blender stores them.
 
-Since 4.4 an action holds layers -> strips -> one channelbag per slot, and each animated datablock picks a slot.
-Before, an action held F-curves directly and served one type of datablock; 5.0 removed that older interface.
-Writing whole coordinate arrays is 20 to 30 times faster than one ``keyframe_insert`` per key.
+Since 4.4 an action holds layers -> strips -> one channelbag per slot, and each animated datablock
+picks a slot. Before, an action held F-curves directly and served one type of datablock; 5.0 removed
+that older interface. Writing whole coordinate arrays is 20 to 30 times faster than one
+``keyframe_insert`` per key.
 """
 
 from __future__ import annotations
@@ -28,7 +29,10 @@ _POINTS = ("co", "handle_left", "handle_right")
 _KEY = (
     *((name, 2, np.float32) for name in _POINTS),
     *((name, 1, np.float32) for name in ("amplitude", "back", "period")),
-    *((name, 1, np.int32) for name in ("interpolation", "easing", "type", "handle_left_type", "handle_right_type")),
+    *(
+        (name, 1, np.int32)
+        for name in ("interpolation", "easing", "type", "handle_left_type", "handle_right_type")
+    ),
     *((f"select_{part}", 1, np.bool_) for part in ("control_point", "left_handle", "right_handle")),
 )
 
@@ -44,8 +48,8 @@ class Channels:
     def __init__(self, datablock: bpy.types.ID, action: bpy.types.Action) -> None:
         """Assign ``action`` to ``datablock`` (an object, a shape-key block, a camera's data, ...).
 
-        In a Blender with slots, one action may serve several datablocks; otherwise, the second datablock gets a new
-        action.
+        In a Blender with slots, one action may serve several datablocks; otherwise, the second
+        datablock gets a new action.
         """
         animation = datablock.animation_data or datablock.animation_data_create()
         if has_slots():
@@ -78,7 +82,8 @@ class Channels:
         """Remove the F-curves of some properties."""
         for curve in [curve for curve in self._owner.fcurves if curve.data_path in data_paths]:
             self._owner.fcurves.remove(curve)
-        self._groups = {group.name: group for group in self._owner.groups}  # without those that are empty now
+        # without those that are empty now
+        self._groups = {group.name: group for group in self._owner.groups}
 
     def write(
         self,
@@ -129,7 +134,9 @@ def _channelbag(action: bpy.types.Action, slot: bpy.types.ActionSlot) -> bpy.typ
 
 
 def bone_path(bone_name: str, channel: str) -> str:
-    """Return the RNA path of a pose bone's channel; quotes and backslashes in the name are escaped."""
+    """Return the RNA path of a pose bone's channel; quotes and backslashes in the name are
+    escaped.
+    """
     return f'pose.bones["{bpy.utils.escape_identifier(bone_name)}"].{channel}'
 
 
@@ -177,7 +184,10 @@ def read_keys(curve: bpy.types.FCurve) -> NDArray[np.float32]:
 
 
 def rewrite_keys(
-    curve: bpy.types.FCurve, frames: NDArray[np.float64], values: NDArray[np.float64], interpolation: str = "LINEAR"
+    curve: bpy.types.FCurve,
+    frames: NDArray[np.float64],
+    values: NDArray[np.float64],
+    interpolation: str = "LINEAR",
 ) -> None:
     """Replace the keys of a curve.
 
@@ -193,8 +203,11 @@ def rewrite_keys(
     curve.update()
 
 
-def change_keys(curve: bpy.types.FCurve, frames: NDArray[np.float64], values: NDArray[np.float64]) -> None:
-    """Change the values of a curve's keys at some frames, and add those that are missing; other keys stay as they are.
+def change_keys(
+    curve: bpy.types.FCurve, frames: NDArray[np.float64], values: NDArray[np.float64]
+) -> None:
+    """Change the values of a curve's keys at some frames, and add those that are missing; other
+    keys stay as they are.
 
     As where Blender inserts a key, one within a hundredth of a frame counts as being at the frame.
 
@@ -216,9 +229,11 @@ def change_keys(curve: bpy.types.FCurve, frames: NDArray[np.float64], values: ND
 
 
 def _insert_keys(curve: bpy.types.FCurve, new: NDArray[np.float32]) -> None:
-    """Insert keys (N, 2), frame and value, in linear time: Blender moves all later ones for each key that it inserts.
+    """Insert keys (N, 2), frame and value, in linear time: Blender moves all later ones for each
+    key that it inserts.
 
-    It inserts the first, which the others resemble; all between keys that are smooth, whose handles it changes.
+    It inserts the first, which the others resemble; all between keys that are smooth, whose handles
+    it changes.
     """
     is_smooth = read_whole_keys(curve)["interpolation"].max() >= INTERPOLATION["BEZIER"]
     by_blender, others = np.split(new, [len(new) if is_smooth else 1])
@@ -244,7 +259,9 @@ def read_whole_keys(curve: bpy.types.FCurve) -> dict[str, NDArray[Any]]:
 
 
 def write_whole_keys(curve: bpy.types.FCurve, whole: dict[str, NDArray[Any]]) -> None:
-    """Replace the keys of a curve by those with these properties, in the order of their frames, (T, n) each."""
+    """Replace the keys of a curve by those with these properties, in the order of their frames, (T,
+    n) each.
+    """
     keys = curve.keyframe_points
     keys.clear()
     keys.add(len(whole["co"]))
@@ -254,13 +271,18 @@ def write_whole_keys(curve: bpy.types.FCurve, whole: dict[str, NDArray[Any]]) ->
 
 
 def add_cycles(datablock: bpy.types.ID, offset_curves: set[tuple[str, int]] | None = None) -> None:
-    """Make every curve of a datablock cyclic; its other modifiers stay, after the cycles, which must come first.
+    """Make every curve of a datablock cyclic; its other modifiers stay, after the cycles, which
+    must come first.
 
     :param offset_curves: data paths and indices of the curves to which each cycle adds an offset.
     """
     remove_cycles(datablock)
     for curve in fcurves(datablock):
-        mode = "REPEAT_OFFSET" if (curve.data_path, curve.array_index) in (offset_curves or set()) else "REPEAT"
+        mode = (
+            "REPEAT_OFFSET"
+            if (curve.data_path, curve.array_index) in (offset_curves or set())
+            else "REPEAT"
+        )
         cycles = {"type": "CYCLES", "mode_before": mode, "mode_after": mode}
         write_modifiers(curve, [cycles, *read_modifiers(curve)])
 
@@ -273,20 +295,38 @@ def remove_cycles(datablock: bpy.types.ID) -> None:
 
 
 def nla_strips(datablock: bpy.types.ID) -> list[bpy.types.NlaStrip]:
-    """Return the NLA strips in effect for a datablock; none in Tweak Mode, where one strip plays alone."""
+    """Return the NLA strips in effect for a datablock; none in Tweak Mode, where one strip plays
+    alone.
+    """
     animation = datablock.animation_data
     if animation is None or not animation.use_nla or animation.use_tweak_mode:
         return []
     alone = any(track.is_solo for track in animation.nla_tracks)
-    tracks = [track for track in animation.nla_tracks if (track.is_solo if alone else not track.mute)]
+    tracks = [
+        track for track in animation.nla_tracks if (track.is_solo if alone else not track.mute)
+    ]
     return [strip for track in tracks for strip in track.strips if not strip.mute]
 
 
-def animated_together(armature: bpy.types.Object, root: bpy.types.Object | None) -> list[bpy.types.ID]:
-    """Return an armature with an action, and of its root object and the shape keys of its meshes those that move."""
-    keys = [getattr(obj.data, "shape_keys", None) for obj in armature.children_recursive if obj.type == "MESH"]
-    others = [block for block in dict.fromkeys([root, *keys]) if block is not None and block.library is None]
-    moving = [block for block in others if any(len(curve.keyframe_points) > 1 for curve in fcurves(block))]
+def animated_together(
+    armature: bpy.types.Object, root: bpy.types.Object | None
+) -> list[bpy.types.ID]:
+    """Return an armature with an action, and of its root object and the shape keys of its meshes
+    those that move.
+    """
+    keys = [
+        getattr(obj.data, "shape_keys", None)
+        for obj in armature.children_recursive
+        if obj.type == "MESH"
+    ]
+    others = [
+        block
+        for block in dict.fromkeys([root, *keys])
+        if block is not None and block.library is None
+    ]
+    moving = [
+        block for block in others if any(len(curve.keyframe_points) > 1 for curve in fcurves(block))
+    ]
     return [armature, *moving]
 
 
@@ -309,22 +349,27 @@ def push_to_nla(datablock: bpy.types.ID) -> bpy.types.NlaStrip:
 
 
 def check_not_in_nla(datablock: bpy.types.ID) -> None:
-    """Check that keys that are missing in the action of a datablock are not in its NLA, where they are not read.
+    """Check that keys that are missing in the action of a datablock are not in its NLA, where they
+    are not read.
 
     :raises UsageError: they may be.
     """
     tracks = datablock.animation_data.nla_tracks if datablock.animation_data else ()
     if strips := [strip for track in tracks for strip in track.strips]:
         raise UsageError(
-            f"'{datablock.name}' is animated by the NLA strip '{strips[0].name}', not by an action of its own alone: "
-            "enter Tweak Mode on the strip (Tab), choose its action in the Action Editor again, or bake all strips "
+            f"'{datablock.name}' is animated by the NLA strip '{strips[0].name}', not by an action "
+            "of its own alone: "
+            "enter Tweak Mode on the strip (Tab), choose its action in the Action Editor again, or "
+            "bake all strips "
             "into one action (Bake Action)"
         )
 
 
 @contextmanager
 def nla_as_actions(scene: bpy.types.Scene) -> Iterator[None]:
-    """Bake the NLA of the scene's objects and shape keys to actions for the duration of the block, on whole frames."""
+    """Bake the NLA of the scene's objects and shape keys to actions for the duration of the block,
+    on whole frames.
+    """
     options = anim_utils.BakeOptions(
         only_selected=False,
         do_pose=True,
@@ -340,14 +385,17 @@ def nla_as_actions(scene: bpy.types.Scene) -> Iterator[None]:
         do_custom_props=False,
     )
     blended = [obj for obj in scene.objects if nla_strips(obj)]
-    blocks = {obj.data.shape_keys for obj in scene.objects if obj.type == "MESH" and obj.data.shape_keys}
+    blocks = {
+        obj.data.shape_keys for obj in scene.objects if obj.type == "MESH" and obj.data.shape_keys
+    }
     shaped = [keys for keys in blocks if nla_strips(keys)]
     animations = [datablock.animation_data for datablock in (*blended, *shaped)]
     kept = [(a, a.action, getattr(a, "action_slot", None), a.action_blend_type) for a in animations]
     baked: list[bpy.types.Action] = []
     try:
         frames = range(scene.frame_start, scene.frame_end + 1)
-        for posed in (True, False):  # an object without bones disables do_pose for all objects that share the options
+        # an object without bones disables do_pose for all objects that share the options
+        for posed in (True, False):
             pairs = [(obj, None) for obj in blended if (obj.pose is not None) is posed]
             if pairs:
                 baked += anim_utils.bake_action_objects(pairs, frames=frames, bake_options=options)
@@ -364,8 +412,12 @@ def nla_as_actions(scene: bpy.types.Scene) -> Iterator[None]:
         bpy.data.batch_remove([action for action in baked if action is not None])
 
 
-def _baked_shape_keys(scene: bpy.types.Scene, shaped: list[bpy.types.Key], frames: range) -> list[bpy.types.Action]:
-    """Give shape keys an action each with the values that they show at scene frames; return the actions."""
+def _baked_shape_keys(
+    scene: bpy.types.Scene, shaped: list[bpy.types.Key], frames: range
+) -> list[bpy.types.Action]:
+    """Give shape keys an action each with the values that they show at scene frames; return the
+    actions.
+    """
     shown = {keys: np.empty((len(frames), len(keys.key_blocks)), np.float32) for keys in shaped}
     for row, frame in enumerate(frames if shaped else ()):
         scene.frame_set(frame)
@@ -376,21 +428,33 @@ def _baked_shape_keys(scene: bpy.types.Scene, shaped: list[bpy.types.Key], frame
     for keys, values in shown.items():
         channels = Channels(keys, bpy.data.actions.new(keys.name))
         made.append(channels.action)
-        for name, column in list(zip(keys.key_blocks.keys(), values.T, strict=True))[1:]:  # without the basis
+        # without the basis
+        for name, column in list(zip(keys.key_blocks.keys(), values.T, strict=True))[1:]:
             channels.write(shape_key_path(name), np.array(frames, float), column)
     return made
 
 
 def frame_range(datablocks: Iterable[bpy.types.ID]) -> tuple[float, float] | None:
-    """Return the first and last keyed frame over the datablocks' curves and NLA strips; None without keys.
+    """Return the first and last keyed frame over the datablocks' curves and NLA strips; None
+    without keys.
 
-    Curves of custom properties are ignored unless there are no others: a loop leaves them longer than the motion.
+    Curves of custom properties are ignored unless there are no others: a loop leaves them longer
+    than the motion.
     """
     datablocks = list(datablocks)
-    curves = [curve for datablock in datablocks for curve in fcurves(datablock) if len(curve.keyframe_points)]
+    curves = [
+        curve
+        for datablock in datablocks
+        for curve in fcurves(datablock)
+        if len(curve.keyframe_points)
+    ]
     moving = [curve for curve in curves if not curve.data_path.endswith('"]')] or curves
     spans = [tuple(curve.range()) for curve in moving]
-    spans += [(strip.frame_start, strip.frame_end) for datablock in datablocks for strip in nla_strips(datablock)]
+    spans += [
+        (strip.frame_start, strip.frame_end)
+        for datablock in datablocks
+        for strip in nla_strips(datablock)
+    ]
     if not spans:
         return None
     return min(s[0] for s in spans), max(s[1] for s in spans)

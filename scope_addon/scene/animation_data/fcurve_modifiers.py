@@ -27,7 +27,8 @@ def write_modifiers(curve: bpy.types.FCurve, wanted: list[dict[str, Any]]) -> No
         points = values.get(_POINTS, ())
         for frame, _, _ in points:
             modifier.control_points.add(frame)
-        if points:  # Blender 5.2 can crash when one point's value is assigned; foreach_set calls no update
+        # Blender 5.2 can crash when one point's value is assigned; foreach_set calls no update
+        if points:
             modifier.control_points.foreach_set("min", [low for _, low, _ in points])
             modifier.control_points.foreach_set("max", [high for _, _, high in points])
         for _ in range(2):  # some settings are limited by others

@@ -18,7 +18,9 @@ _WHOLE = 1e-3  # keys this close to a whole frame are put on it
 
 @dataclass(frozen=True)
 class Retiming:
-    """Moves scene frames: ``origin`` stays, and the distance from it is multiplied by ``factor``."""
+    """Moves scene frames: ``origin`` stays, and the distance from it is multiplied by
+    ``factor``.
+    """
 
     origin: float
     factor: float
@@ -28,10 +30,14 @@ class Retiming:
         return self.origin + self.factor * (frame - self.origin)
 
     def frames(self, frames: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
-        """Return where keys (T,) are moved to; those within their precision of a whole frame are put on it."""
+        """Return where keys (T,) are moved to; those within their precision of a whole frame are
+        put on it.
+        """
         moved = self.origin + self.factor * (frames.astype(float) - self.origin)
         whole = np.round(moved)
-        near = np.abs(moved - whole) < np.maximum(_WHOLE, 4 * self.factor * np.spacing(np.abs(frames)))
+        near = np.abs(moved - whole) < np.maximum(
+            _WHOLE, 4 * self.factor * np.spacing(np.abs(frames))
+        )
         return np.where(near, whole, moved)
 
     def span(self, first: int, last: int) -> tuple[int, int]:
@@ -53,13 +59,18 @@ def retime_keys(action: bpy.types.Action, retiming: Retiming) -> None:
 
 def action_strips(animation: bpy.types.AnimData) -> list[bpy.types.NlaStrip]:
     """Return the NLA strips of a datablock that play an action."""
-    return [s for track in animation.nla_tracks for s in track.strips if s.type == "CLIP" and s.action]
+    return [
+        s for track in animation.nla_tracks for s in track.strips if s.type == "CLIP" and s.action
+    ]
 
 
 def retime_strip(strip: bpy.types.NlaStrip, retiming: Retiming) -> None:
-    """Move an NLA strip, with the part of its action that it plays; the action's keys are not moved."""
+    """Move an NLA strip, with the part of its action that it plays; the action's keys are not
+    moved.
+    """
     ends = strip.frame_start, strip.frame_end, strip.action_frame_start, strip.action_frame_end
     start, end, first, last = (retiming.frame(frame) for frame in ends)
-    strip.action_frame_end = max(last, strip.action_frame_start + 1.0)  # Blender keeps the end after the start
+    # Blender keeps the end after the start
+    strip.action_frame_end = max(last, strip.action_frame_start + 1.0)
     strip.action_frame_start, strip.action_frame_end = first, last
     strip.frame_start_raw, strip.frame_end_raw = start, end

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Custom properties of a .blend file, which anybody may have changed: any type, any length, any number.
+"""Custom properties of a .blend file, which anybody may have changed: any type, any length, any
+number.
 
 What is not as this extension writes it is read as if it were not there.
 """
@@ -9,22 +10,33 @@ from __future__ import annotations
 import bpy
 
 LAST_FRAME = 1_048_574  # of Blender's timeline; the first one is its negative
-RATES = 0.01, 32767.0  # the least and the largest frame rate that Blender can store, frames per second
-RATE = "scope_rate"  # custom property of an armature: the scene's frame rate for which its keys were written
+# the least and the largest frame rate that Blender can store, frames per second
+RATES = 0.01, 32767.0
+# custom property of an armature: the scene's frame rate for which its keys were written
+RATE = "scope_rate"
 _LARGEST = 1e9  # of numbers in a list
 
 
-def stored_number(block: bpy.types.ID, name: str, default: float, lowest: float, highest: float) -> float:
-    """Return a number between two others; the default if the property is missing or something else."""
+def stored_number(
+    block: bpy.types.ID, name: str, default: float, lowest: float, highest: float
+) -> float:
+    """Return a number between two others; the default if the property is missing or something
+    else.
+    """
     value = block.get(name)
-    return float(value) if isinstance(value, int | float) and lowest <= value <= highest else default
+    return (
+        float(value) if isinstance(value, int | float) and lowest <= value <= highest else default
+    )
 
 
 def stored_numbers(block: bpy.types.ID, name: str) -> list[float]:
     """Return a list of finite numbers; empty if the property is missing or something else."""
     value = block.get(name)
-    values = value.to_list() if hasattr(value, "to_list") else value  # Blender's own type for lists of numbers
-    if not isinstance(values, list) or not all(isinstance(x, int | float) and abs(x) < _LARGEST for x in values):
+    # Blender's own type for lists of numbers
+    values = value.to_list() if hasattr(value, "to_list") else value
+    if not isinstance(values, list) or not all(
+        isinstance(x, int | float) and abs(x) < _LARGEST for x in values
+    ):
         return []
     return [float(x) for x in values]
 
@@ -41,7 +53,9 @@ def start_frame(armature: bpy.types.Object) -> float:
 
 
 def stored_rate(armature: bpy.types.Object, default: float) -> float:
-    """Return the frame rate for which a captured armature's keys were written; the default if it is not stored."""
+    """Return the frame rate for which a captured armature's keys were written; the default if it is
+    not stored.
+    """
     return stored_number(armature, RATE, default, *RATES)
 
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Frame rates, and the position of each key on Blender's timeline.
 
-Blender stores a rate as the integer ``fps`` over the float ``fps_base``; 29.97 is 30 / 1.001 there, never 29 or 30.
-A pose seen at ``timestamp`` seconds is keyed at ``start_frame + timestamp · rate``, so footage of variable frame rate
-keeps its timing; keys then lie between whole frames.
+Blender stores a rate as the integer ``fps`` over the float ``fps_base``; 29.97 is 30 / 1.001 there,
+never 29 or 30. A pose seen at ``timestamp`` seconds is keyed at ``start_frame + timestamp · rate``,
+so footage of variable frame rate keeps its timing; keys then lie between whole frames.
 """
 
 from __future__ import annotations
@@ -20,12 +20,14 @@ from ...errors import MotionFileError, UsageError
 from .retime import Retiming
 from .stored_values import LAST_FRAME, RATE, RATES, stored_rate, stored_text
 
-# Rates within this tolerance (frames per second) of a standard one are taken to be it: 23.98 is 24 / 1.001.
+# Rates within this tolerance (frames per second) of a standard one are taken to be it: 23.98 is 24
+# / 1.001.
 TOLERANCE = 0.005
 BROADCAST = tuple(Fraction(n * 1000, 1001) for n in (24, 30, 48, 60, 72, 96, 120, 240))
 POLICIES = ("keep", "set")
 RATE_POLICIES = (*POLICIES, "resample")
-_CYCLE = "scope_cycle"  # custom property of an armature: the frame range of the cycle, and that of the scene before it
+# custom property of an armature: the frame range of the cycle, and that of the scene before it
+_CYCLE = "scope_cycle"
 
 
 def blender_rate(frames_per_second: float) -> tuple[int, float]:
@@ -36,7 +38,8 @@ def blender_rate(frames_per_second: float) -> tuple[int, float]:
     lowest, highest = RATES
     if not lowest <= frames_per_second <= highest:
         raise UsageError(
-            f"the frame rate must be between {lowest:g} and {highest:g} frames per second, not {frames_per_second}"
+            f"the frame rate must be between {lowest:g} and {highest:g} frames per second, not "
+            f"{frames_per_second}"
         )
     for rate in BROADCAST:
         if abs(frames_per_second - float(rate)) < TOLERANCE:
@@ -64,7 +67,9 @@ def set_scene_rate(scene: bpy.types.Scene, frames_per_second: float) -> None:
     scene.render.fps, scene.render.fps_base = blender_rate(frames_per_second)
 
 
-def key_frames(timestamps: NDArray[np.float64], rate: float, start_frame: float = 0.0) -> NDArray[np.float64]:
+def key_frames(
+    timestamps: NDArray[np.float64], rate: float, start_frame: float = 0.0
+) -> NDArray[np.float64]:
     """Return the scene frame of each pose: ``start_frame + timestamp · rate``, fractions kept.
 
     Keys within a thousandth of a whole frame are snapped to it, because timestamps are rounded.
@@ -77,14 +82,18 @@ def key_frames(timestamps: NDArray[np.float64], rate: float, start_frame: float 
     """
     timestamps = np.asarray(timestamps, float)
     if not np.isfinite(timestamps).all() or (np.diff(timestamps) <= 0).any():
-        raise MotionFileError("the motion's timestamps must be finite and increasing; capture the video again")
+        raise MotionFileError(
+            "the motion's timestamps must be finite and increasing; capture the video again"
+        )
     frames = start_frame + timestamps * rate
     whole = np.round(frames)
     return np.where(np.abs(frames - whole) < 1e-3, whole, frames)
 
 
 def whole_frames_of(frames: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the whole frames (N,) within the span of keys (T,); the nearest if all keys lie between two of them."""
+    """Return the whole frames (N,) within the span of keys (T,); the nearest if all keys lie
+    between two of them.
+    """
     whole = np.arange(math.ceil(frames[0] - 1e-4), math.floor(frames[-1] + 1e-4) + 1, dtype=float)
     return whole if len(whole) else np.round(frames[:1])
 
@@ -95,7 +104,9 @@ def store_rate(armature: bpy.types.Object, rate: float) -> None:
 
 
 def keyed_rate(armature: bpy.types.Object, scene: bpy.types.Scene) -> float:
-    """Return the frame rate for which an armature's keys were written; older files do not say, and have the scene's."""
+    """Return the frame rate for which an armature's keys were written; older files do not say, and
+    have the scene's.
+    """
     return stored_rate(armature, scene_rate(scene))
 
 
@@ -108,7 +119,9 @@ def set_frame_range(scene: bpy.types.Scene, first: float, last: float) -> None:
 
 
 def play_cycle(scene: bpy.types.Scene, armature: bpy.types.Object, first: int, last: int) -> None:
-    """Set the scene's frame range to a cycle of an armature's motion, and store the range before it."""
+    """Set the scene's frame range to a cycle of an armature's motion, and store the range before
+    it.
+    """
     cycle, before = _stored_ranges(armature)
     if cycle != (scene.frame_start, scene.frame_end):
         before = scene.frame_start, scene.frame_end
@@ -117,7 +130,9 @@ def play_cycle(scene: bpy.types.Scene, armature: bpy.types.Object, first: int, l
 
 
 def retime_cycle(scene: bpy.types.Scene, armature: bpy.types.Object, retiming: Retiming) -> None:
-    """Move the stored cycle with the armature's keys, and the scene's frame range if it is that of the cycle."""
+    """Move the stored cycle with the armature's keys, and the scene's frame range if it is that of
+    the cycle.
+    """
     cycle, before = _stored_ranges(armature)
     if len(cycle) != 2 or len(before) != 2:
         return
@@ -128,7 +143,9 @@ def retime_cycle(scene: bpy.types.Scene, armature: bpy.types.Object, retiming: R
 
 
 def restore_scene_range(scene: bpy.types.Scene, armature: bpy.types.Object) -> None:
-    """Restore the scene's frame range from before the cycle, unless the user has changed it meanwhile."""
+    """Restore the scene's frame range from before the cycle, unless the user has changed it
+    meanwhile.
+    """
     cycle, before = _stored_ranges(armature)
     if _CYCLE in armature:
         del armature[_CYCLE]
@@ -138,8 +155,18 @@ def restore_scene_range(scene: bpy.types.Scene, armature: bpy.types.Object) -> N
 
 def _stored_ranges(armature: bpy.types.Object) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Return the frame range of the cycle and the one before it; both are empty without a cycle."""
-    found = re.fullmatch(r"(-?\d{1,7}) (-?\d{1,7}) (-?\d{1,7}) (-?\d{1,7})", stored_text(armature, _CYCLE), re.ASCII)
+    found = re.fullmatch(
+        r"(-?\d{1,7}) (-?\d{1,7}) (-?\d{1,7}) "
+        r"(-?\d{1,7})",
+        stored_text(armature, _CYCLE),
+        re.ASCII,
+    )
     frames = tuple(int(frame) for frame in found.groups()) if found else ()
-    if not frames or max(map(abs, frames)) > LAST_FRAME or frames[0] > frames[1] or frames[2] > frames[3]:
+    if (
+        not frames
+        or max(map(abs, frames)) > LAST_FRAME
+        or frames[0] > frames[1]
+        or frames[2] > frames[3]
+    ):
         return (), ()
     return frames[:2], frames[2:]

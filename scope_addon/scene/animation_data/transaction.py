@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rolling back work that fails or is cancelled: new datablocks are removed, and changed ones are restored.
+"""Rolling back work that fails or is cancelled: new datablocks are removed, and changed ones are
+restored.
 
-Datablocks are restored in place, never replaced: a failed operator adds no step to undo, and Blender crashes when it
-undoes an earlier step in which another datablock uses one that was replaced since. Removed datablocks cannot be
-restored, so code under a transaction must remove them last.
+Datablocks are restored in place, never replaced: a failed operator adds no step to undo, and
+Blender crashes when it undoes an earlier step in which another datablock uses one that was replaced
+since. Removed datablocks cannot be restored, so code under a transaction must remove them last.
 """
 
 from __future__ import annotations
@@ -18,7 +19,17 @@ from .removal import NewDatablocks
 
 # Kinds of datablock that the work may create; shape keys go with their mesh.
 _KINDS = (
-    *("collections", "objects", "meshes", "armatures", "cameras", "actions", "materials", "movieclips", "images"),
+    *(
+        "collections",
+        "objects",
+        "meshes",
+        "armatures",
+        "cameras",
+        "actions",
+        "materials",
+        "movieclips",
+        "images",
+    ),
     "texts",  # packed motions
 )
 _SCENE = ("frame_start", "frame_end", "frame_preview_start", "frame_preview_end", "camera")
@@ -29,10 +40,11 @@ _RENDER = ("fps", "fps_base", "resolution_x", "resolution_y", "pixel_aspect_x", 
 def all_or_nothing(
     scene: bpy.types.Scene, *objects: bpy.types.Object, keys: Sequence[bpy.types.Key] = ()
 ) -> Iterator[None]:
-    """Roll back new datablocks, scene settings and changes of ``objects`` when the block raises; re-raise.
+    """Roll back new datablocks, scene settings and changes of ``objects`` when the block raises;
+    re-raise.
 
-    :param objects: the block may change their keys, action, parent, transform and custom properties, and the custom
-        properties of their bones.
+    :param objects: the block may change their keys, action, parent, transform and custom
+        properties, and the custom properties of their bones.
     :param keys: shape keys whose keyframes, action and values it may change.
     """
     unique = list(dict.fromkeys(objects))
@@ -69,7 +81,9 @@ class _SavedScene:
         self._active = self._layer.objects.active
         self._mode = self._active.mode if self._active else "OBJECT"
         self._markers = set(scene.timeline_markers.values())
-        self._selected = [obj for obj in self._layer.objects if obj.select_get(view_layer=self._layer)]
+        self._selected = [
+            obj for obj in self._layer.objects if obj.select_get(view_layer=self._layer)
+        ]
 
     def leave_edit_mode(self) -> None:
         """Leave Edit Mode, in which the active object cannot be removed."""
@@ -96,7 +110,9 @@ class _SavedScene:
 
 
 class _SavedTransform:
-    """An object's parent, transform and custom properties, and the custom properties of its bones."""
+    """An object's parent, transform and custom properties, and the custom properties of its
+    bones.
+    """
 
     def __init__(self, obj: bpy.types.Object) -> None:
         self._obj, self._parent = obj, obj.parent
@@ -120,7 +136,9 @@ class _SavedTransform:
 
 
 class _SavedAnimation:
-    """The action assigned to an object or shape keys, and a copy of its content in case the block changes it."""
+    """The action assigned to an object or shape keys, and a copy of its content in case the block
+    changes it.
+    """
 
     def __init__(self, obj: bpy.types.Object | bpy.types.Key) -> None:
         self._obj, data = obj, obj.animation_data

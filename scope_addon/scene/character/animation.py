@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Joint rotations and root motion as keyframes.
 
-With M_i the rest orientation of bone i in armature space (= world), Ω_i = exp(w_i) SMPL's rotation of joint i and
-R_0 the rotation of the root part to the world, Blender's pose channels are
+With M_i the rest orientation of bone i in armature space (= world), Ω_i = exp(w_i) SMPL's rotation
+of joint i and R_0 the rotation of the root part to the world, Blender's pose channels are
 
     i > 0:  B_i = C_i Ω_i C_iᵀ,  C_i = M_iᵀ R_world_model          (so B_i = exp(C_i w_i))
-    root:   B_0 = C_0 (R_world_modelᵀ R_0) C_0ᵀ,  location = J_0(β) + trans − h_0, along the world's axes
+    root:   B_0 = C_0 (R_world_modelᵀ R_0) C_0ᵀ,
+    location = J_0(β) + trans − h_0, along the world's axes
 
 Then the armature deforms bone i by exactly T_i · rest_i⁻¹, which is SMPL's linear blend skinning.
 """
@@ -24,14 +25,18 @@ from .armature import RestPose, rest_orientations
 
 
 def quaternion_from_rotation_vector(rotation_vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Convert rotation vectors (..., 3), radians, to unit quaternions (..., 4) in the order w, x, y, z."""
+    """Convert rotation vectors (..., 3), radians, to unit quaternions (..., 4) in the order w, x,
+    y, z.
+    """
     half = 0.5 * np.linalg.norm(rotation_vectors, axis=-1, keepdims=True)
     # numpy's sinc(x) is sin(πx)/(πx): smooth at zero, where sin(half)/angle would divide by zero.
     return np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * rotation_vectors], axis=-1)
 
 
 def quaternion_product(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return ``a ⊗ b`` (..., 4) of quaternions (w, x, y, z), a and b (..., 4): the rotation b followed by a."""
+    """Return ``a ⊗ b`` (..., 4) of quaternions (w, x, y, z), a and b (..., 4): the rotation b
+    followed by a.
+    """
     aw, ax, ay, az = np.moveaxis(a, -1, 0)
     bw, bx, by, bz = np.moveaxis(b, -1, 0)
     w = aw * bw - ax * bx - ay * by - az * bz
@@ -42,7 +47,9 @@ def quaternion_product(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArra
 
 
 def quaternion_from_matrix(R: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Convert a rotation (3, 3) to a unit quaternion (4,), the eigenvector of Bar-Itzhack's symmetric matrix."""
+    """Convert a rotation (3, 3) to a unit quaternion (4,), the eigenvector of Bar-Itzhack's
+    symmetric matrix.
+    """
     K = np.zeros((4, 4))
     K[0, 0] = np.trace(R)
     K[0, 1:] = K[1:, 0] = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
@@ -52,9 +59,11 @@ def quaternion_from_matrix(R: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def on_one_hemisphere(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Choose the signs of quaternions so that consecutive ones are on one hemisphere; q and −q are equal rotations.
+    """Choose the signs of quaternions so that consecutive ones are on one hemisphere; q and −q are
+    equal rotations.
 
-    Blender interpolates the four components separately: a change of sign would make the bone spin between two keys.
+    Blender interpolates the four components separately: a change of sign would make the bone spin
+    between two keys.
 
     :param quaternions: (T, ..., 4).
     :return: (T, ..., 4).
@@ -72,7 +81,8 @@ def pose_channels(
     """Compute Blender's channels for every frame of a motion.
 
     :param M: (K+1, 3, 3) rest orientations.
-    :return: rotations (T, K+1, 4), w first, on one hemisphere; root locations (T, 3) metres, world axes.
+    :return: rotations (T, K+1, 4), w first, on one hemisphere; root locations (T, 3) metres, world
+        axes.
     """
     w = motion.poses.reshape(len(motion), -1, 3).astype(float)
     C = np.swapaxes(M, 1, 2) @ R_WORLD_MODEL
@@ -93,7 +103,9 @@ def animate_armature(
     rest: RestPose,
     frames: NDArray[np.float64],
 ) -> Channels:
-    """Key every joint's rotation and the root's location at scene ``frames`` (T,), with linear interpolation."""
+    """Key every joint's rotation and the root's location at scene ``frames`` (T,), with linear
+    interpolation.
+    """
     rotations, locations = pose_channels(body, motion, rest, rest_orientations(armature, body))
     channels = Channels(armature, action)
     root = body.joint_names[0]

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The armature: one bone per joint of the body, in the rest pose of the fitted shape.
 
-The object is at the world's origin without rotation or scale, so armature space is the world: z up, metres. The rest
-pose is a T-pose on the floor facing −y. Bone i rests at ``h_i = R_world_model J_i(β) + lift`` with orientation M_i
-(Blender: y along the bone). M_i only determines how the bone is drawn and its local axes; ``animation.py``
-converts SMPL's rotations to those axes.
+The object is at the world's origin without rotation or scale, so armature space is the world: z up,
+metres. The rest pose is a T-pose on the floor facing −y. Bone i rests at ``h_i = R_world_model
+J_i(β) + lift`` with orientation M_i (Blender: y along the bone). M_i only determines how the bone
+is drawn and its local axes; ``animation.py`` converts SMPL's rotations to those axes.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ class RestPose:
 
     joints: NDArray[np.float64]  # (K+1, 3) metres
     tails: NDArray[np.float64]  # (K+1, 3) metres
-    lift: NDArray[np.float64]  # (3,) metres, added to R_world_model · model so that the lowest vertex lies at z = 0
+    # (3,) metres, added to R_world_model · model so that the lowest vertex lies at z = 0
+    lift: NDArray[np.float64]
 
 
 def rest_pose(body: Body, betas: NDArray[np.floating[Any]]) -> RestPose:
@@ -40,8 +41,12 @@ def rest_pose(body: Body, betas: NDArray[np.floating[Any]]) -> RestPose:
     return RestPose(joints, _bone_tails(body, joints, vertices + lift), lift)
 
 
-def _bone_tails(body: Body, joints: NDArray[np.float64], vertices: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the tails (K+1, 3) for display: at a child joint, or at the end of the surface that the bone moves."""
+def _bone_tails(
+    body: Body, joints: NDArray[np.float64], vertices: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the tails (K+1, 3) for display: at a child joint, or at the end of the surface that
+    the bone moves.
+    """
     tails = joints.copy()
     for i, parent in enumerate(body.parents):
         incoming = joints[i] - joints[parent] if parent >= 0 else UP
@@ -51,7 +56,8 @@ def _bone_tails(body: Body, joints: NDArray[np.float64], vertices: NDArray[np.fl
         offsets = joints[children] - joints[i]
         lengths = np.linalg.norm(offsets, axis=1)
         if (lengths > SHORTEST_BONE).any():
-            # Of several children, choose the one straight ahead: the spine at the pelvis, the neck at the chest.
+            # Of several children, choose the one straight ahead: the spine at the pelvis, the neck
+            # at the chest.
             ahead = (offsets @ incoming) / np.maximum(lengths, 1e-9)
             ahead[lengths <= SHORTEST_BONE] = -2.0
             tails[i] = joints[children[ahead.argmax()]]
@@ -62,7 +68,9 @@ def _bone_tails(body: Body, joints: NDArray[np.float64], vertices: NDArray[np.fl
     return tails
 
 
-def build_armature(name: str, body: Body, rest: RestPose, collection: bpy.types.Collection) -> bpy.types.Object:
+def build_armature(
+    name: str, body: Body, rest: RestPose, collection: bpy.types.Collection
+) -> bpy.types.Object:
     """Create an armature object in ``collection`` whose pose bones rotate by quaternions.
 
     The collection must be in the active view layer, because bones can only be created in edit mode.
@@ -98,7 +106,9 @@ def build_armature(name: str, body: Body, rest: RestPose, collection: bpy.types.
 
 
 def rest_orientations(armature: bpy.types.Object, body: Body) -> NDArray[np.float64]:
-    """Return M_i (K+1, 3, 3): bone to armature space at rest, as stored by Blender, orthonormalized."""
+    """Return M_i (K+1, 3, 3): bone to armature space at rest, as stored by Blender,
+    orthonormalized.
+    """
     bones = armature.data.bones
     M = np.array([np.array(bones[name].matrix_local)[:3, :3] for name in body.joint_names], float)
     U, _, Vt = np.linalg.svd(M)

@@ -42,7 +42,9 @@ def build_mesh(
     return obj
 
 
-def colour_faces(mesh: bpy.types.Object, faces: NDArray[np.intp], name: str, color: tuple[float, float, float]) -> None:
+def colour_faces(
+    mesh: bpy.types.Object, faces: NDArray[np.intp], name: str, color: tuple[float, float, float]
+) -> None:
     """Give some faces (n,) of a mesh a matte material of their own, of a linear RGB colour."""
     material = _material(name, np.array([*color, 1.0]))
     mesh.data.materials.append(material)
@@ -66,7 +68,9 @@ def rest_vertices_world(
 
 
 def skin_to_armature(mesh: bpy.types.Object, armature: bpy.types.Object, body: Body) -> None:
-    """Add vertex groups with the body's skin weights and a linear Armature modifier, and set the armature as parent."""
+    """Add vertex groups with the body's skin weights and a linear Armature modifier, and set the
+    armature as parent.
+    """
     joints, weights = body.skin_joints, body.skin_weights
     for k, joint_name in enumerate(body.joint_names):
         group = mesh.vertex_groups.new(name=joint_name)
@@ -85,7 +89,11 @@ def skin_to_armature(mesh: bpy.types.Object, armature: bpy.types.Object, body: B
 def _materials(body: Body) -> list[tuple[str, NDArray[np.float64]]]:
     plain = np.array([0.6, 0.6, 0.6, 1.0])
     names = body.material_names or ("body",)
-    colors = body.material_colors if body.material_colors is not None else np.tile(plain, (len(names), 1))
+    colors = (
+        body.material_colors
+        if body.material_colors is not None
+        else np.tile(plain, (len(names), 1))
+    )
     return list(zip(names, colors, strict=True))
 
 

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The display of bones: rings around the body in a colour for each side, and a bone collection for each side.
+"""The display of bones: rings around the body in a colour for each side, and a bone collection for
+each side.
 
-A ring is a custom shape, so an animator can select a bone outside the body. Exporters ignore it, because the ring's
-object is in no scene.
+A ring is a custom shape, so an animator can select a bone outside the body. Exporters ignore it,
+because the ring's object is in no scene.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ from ....solver.body import Body
 from .armature import RestPose, rest_orientations
 
 RING = "scope_bone_ring"
-# Left blue, right red, as is conventional; brighter than Blender's palettes, which are hard to see on the dark suit.
+# Left blue, right red, as is conventional; brighter than Blender's palettes, which are hard to see
+# on the dark suit.
 SIDES = {"Left": (0.12, 0.56, 1.0), "Right": (1.0, 0.22, 0.16), "Middle": (1.0, 0.76, 0.1)}
 _SELECTED, _ACTIVE = 0.5, 0.8  # shares of white in the colours of selected and active bones
 _RING_POINTS = 32
@@ -30,8 +32,11 @@ def side_of(joint_name: str) -> str:
     return head if head in SIDES else "Middle"
 
 
-def show_bones(armature: bpy.types.Object, body: Body, rest: RestPose, vertices: NDArray[np.float64]) -> None:
-    """Give every bone the colour and collection of its side, and a ring around the surface that it moves.
+def show_bones(
+    armature: bpy.types.Object, body: Body, rest: RestPose, vertices: NDArray[np.float64]
+) -> None:
+    """Give every bone the colour and collection of its side, and a ring around the surface that it
+    moves.
 
     :param vertices: (V, 3) metres, the rest mesh of the fitted shape, world frame.
     """
@@ -56,7 +61,8 @@ def surface_radii(
 ) -> NDArray[np.float64]:
     """Measure the distance of the body's surface from each bone's axis, in the middle of the bone.
 
-    It is the 90 % quantile over the vertices that the bone moves most, in the middle half of its length.
+    It is the 90 % quantile over the vertices that the bone moves most, in the middle half of its
+    length.
 
     :param M: (K+1, 3, 3) rest orientations, y along the bone.
     :param vertices: (V, 3) metres, the rest mesh of the fitted shape, world frame.
@@ -89,7 +95,9 @@ def _color(bone: bpy.types.Bone, color: tuple[float, float, float]) -> None:
 
 
 def _ring() -> bpy.types.Object:
-    """Return a circle of radius 1 normal to the bone's y axis, shared by all captures in the file."""
+    """Return a circle of radius 1 normal to the bone's y axis, shared by all captures in the
+    file.
+    """
     ring = bpy.data.objects.get(RING)
     if ring is not None and ring.type == "MESH" and ring.library is None:
         return ring

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keys of confidence, standard deviation and contact on the bones, and timeline markers at review spans.
+"""Keys of confidence, standard deviation and contact on the bones, and timeline markers at review
+spans.
 
-``confidence`` (0..1) is that of the keypoints in which the bone's rotation is visible. ``sigma_cm`` is the
-standard deviation of its joint's position (`docs/motion_file.md`), where it is known. ``contact`` (0..1) is the
-probability that the heel (on the ankle's bone) or the toes (on the foot's) are at rest on the floor; drivers and
-constraints can use it.
+``confidence`` (0..1) is that of the keypoints in which the bone's rotation is visible. ``sigma_cm``
+is the standard deviation of its joint's position (`docs/motion_file.md`), where it is known.
+``contact`` (0..1) is the probability that the heel (on the ankle's bone) or the toes (on the
+foot's) are at rest on the floor; drivers and constraints can use it.
 """
 
 from __future__ import annotations
@@ -32,20 +33,30 @@ _GAP_S = 0.5  # spans closer than this share a marker
 
 
 def key_measurements(
-    armature: bpy.types.Object, channels: Channels, body: Body, motion: Motion, frames: NDArray[np.float64]
+    armature: bpy.types.Object,
+    channels: Channels,
+    body: Body,
+    motion: Motion,
+    frames: NDArray[np.float64],
 ) -> None:
-    """Key confidence, standard deviation and contact as custom properties of the bones, at scene frames (T,).
+    """Key confidence, standard deviation and contact as custom properties of the bones, at scene
+    frames (T,).
 
     The curves are hidden in the graph editor, where they would obscure those of the rotations.
     """
-    columns = {(name, CONFIDENCE): motion.joint_confidence[:, i] for i, name in enumerate(body.joint_names)}
+    columns = {
+        (name, CONFIDENCE): motion.joint_confidence[:, i] for i, name in enumerate(body.joint_names)
+    }
     columns |= {
-        (name, CONTACT): motion.foot_contact[:, i] for i, name in enumerate(CONTACT_BONES) if name in body.joint_names
+        (name, CONTACT): motion.foot_contact[:, i]
+        for i, name in enumerate(CONTACT_BONES)
+        if name in body.joint_names
     }
     sigma_cm = 100.0 * np.asarray(motion.joint_sigma_m, float)
     columns |= {(name, SIGMA): sigma_cm[:, i] for i, name in enumerate(body.joint_names)}
     for (bone_name, name), values in columns.items():
-        known = np.isfinite(values)  # deviations are unknown in frames that are filled in, and in some motions
+        # deviations are unknown in frames that are filled in, and in some motions
+        known = np.isfinite(values)
         if not known.any():
             continue
         bone, most = armature.pose.bones[bone_name], 1000.0 if name == SIGMA else 1.0
@@ -68,15 +79,16 @@ def add_review_markers(
 ) -> int:
     """Add a timeline marker at the start of each review span; return how many.
 
-    If there are too many spans, the longest get a marker. Its name states the reason: "not seen 12-18".
+    If there are too many spans, the longest get a marker. Its name states the reason: "not seen
+    12-18".
 
     :param prefix: of the marker's name, to distinguish several people.
     :param frames: (T,) scene frame of each pose.
     :param under_floor: (T,) poses with a foot under the floor.
     """
-    spans = sorted(find_review_spans(motion, _GAP_S, under_floor), key=lambda span: span.first - span.last)[
-        :_MAX_MARKERS
-    ]
+    spans = sorted(
+        find_review_spans(motion, _GAP_S, under_floor), key=lambda span: span.first - span.last
+    )[:_MAX_MARKERS]
     there = {(marker.name, marker.frame) for marker in scene.timeline_markers}
     for span in sorted(spans, key=lambda span: span.first):
         first, last = round(float(frames[span.first])), round(float(frames[span.last]))

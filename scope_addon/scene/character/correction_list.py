@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The list of a captured armature's corrections, stored with it so that drawing the panel reads no motion."""
+"""The list of a captured armature's corrections, stored with it so that drawing the panel reads no
+motion.
+"""
 
 from __future__ import annotations
 
@@ -22,9 +24,11 @@ _ENTRY = {"kind": str, "text": str, "joint": str, "first": int, "last": int}
 
 
 def listed_corrections(armature: bpy.types.Object) -> list[dict[str, Any]]:
-    """Return the corrections in their order: ``kind``, ``text``, ``joint``, scene frames ``first`` and ``last``.
+    """Return the corrections in their order: ``kind``, ``text``, ``joint``, scene frames ``first``
+    and ``last``.
 
-    A pin that its joint cannot reach has the distance in ``missed``, with its unit; otherwise, this is empty.
+    A pin that its joint cannot reach has the distance in ``missed``, with its unit; otherwise, this
+    is empty.
 
     A .blend file may be hostile: entries that are something else are left out.
     """
@@ -41,18 +45,24 @@ def listed_corrections(armature: bpy.types.Object) -> list[dict[str, Any]]:
 
 
 def _is_entry(value: object) -> bool:
-    if not isinstance(value, dict) or not all(type(value.get(name)) is kind for name, kind in _ENTRY.items()):
+    if not isinstance(value, dict) or not all(
+        type(value.get(name)) is kind for name, kind in _ENTRY.items()
+    ):
         return False
     return all(-LAST_FRAME <= int(value[name]) <= LAST_FRAME for name in ("first", "last"))
 
 
 def store_corrections(
-    armature: bpy.types.Object, motion: Motion, rate: float, places: dict[Pin, NDArray[np.float64]] | None = None
+    armature: bpy.types.Object,
+    motion: Motion,
+    rate: float,
+    places: dict[Pin, NDArray[np.float64]] | None = None,
 ) -> None:
     """Store the list of a motion's corrections with its armature.
 
     :param rate: scene frames per second.
-    :param places: where edited keys have the pinned joints, (3,) metres in the world; as in the motion if None.
+    :param places: where edited keys have the pinned joints, (3,) metres in the world; as in the
+        motion if None.
     :raises MotionFileError: the motion's corrections are damaged.
     """
     import json
@@ -68,16 +78,26 @@ def store_corrections(
     armature[_LIST] = json.dumps(entries)
 
 
-def _entry(armature: bpy.types.Object, motion: Motion, correction: Correction, rate: float) -> dict[str, Any]:
+def _entry(
+    armature: bpy.types.Object, motion: Motion, correction: Correction, rate: float
+) -> dict[str, Any]:
     """Describe a correction."""
     from ...edit.pins.corrections import Contact, FeetOnFloor, Floor, Interpolation, Pin, Upright
     from .corrections.corrected_keys import scene_frame
 
     whole = int(motion.frames[0]), int(motion.frames[-1])
     if isinstance(correction, Pin):
-        kind, text, span = "PIN", correction.joint.replace("_", " ").title(), (correction.frame,) * 2
+        kind, text, span = (
+            "PIN",
+            correction.joint.replace("_", " ").title(),
+            (correction.frame,) * 2,
+        )
     elif isinstance(correction, Contact):
-        kind, text, span = "CONTACT", f"{correction.foot.title()} Foot Stands", (correction.first, correction.last)
+        kind, text, span = (
+            "CONTACT",
+            f"{correction.foot.title()} Foot Stands",
+            (correction.first, correction.last),
+        )
     elif isinstance(correction, Interpolation):
         kind, text, span = "INTERPOLATION", "Interpolated", (correction.first, correction.last)
     elif isinstance(correction, Upright):
@@ -95,7 +115,9 @@ def _entry(armature: bpy.types.Object, motion: Motion, correction: Correction, r
 
 
 def _missed(motion: Motion, pin: Pin, place: NDArray[np.float64] | None) -> str:
-    """Return how far a joint is from a pin that it cannot reach, with the unit; empty if it is there."""
+    """Return how far a joint is from a pin that it cannot reach, with the unit; empty if it is
+    there.
+    """
     from ...edit.pins.corrected_motion import distance_from_pin
 
     distance = distance_from_pin(motion, pin, place)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Facial expressions as shape keys with ARKit's names, from 0 to 1, and their weights as keyframes."""
+"""Facial expressions as shape keys with ARKit's names, from 0 to 1, and their weights as
+keyframes.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,8 @@ def has_expression_keys(keys: bpy.types.Key) -> bool:
 
 
 def add_expression_keys(mesh: bpy.types.Object, body: Body) -> bool:
-    """Add one key per expression, each at 0, and ``Basis`` if there is none, and make the inside of the mouth dark.
+    """Add one key per expression, each at 0, and ``Basis`` if there is none, and make the inside of
+    the mouth dark.
 
     :return: False if the body has no expressions.
     """
@@ -51,7 +54,8 @@ def key_expressions(
     frames: NDArray[np.float64],
     whole_frames: bool = False,
 ) -> None:
-    """Key the weights of the motion's face; an expression that never changes gets one key, one that never shows none.
+    """Key the weights of the motion's face; an expression that never changes gets one key, one that
+    never shows none.
 
     :param channels: of the mesh's shape keys.
     :param frames: (T,) scene frames.
@@ -72,7 +76,9 @@ def key_expressions(
 
 
 def expression_offsets(mesh: bpy.types.Object) -> dict[str, NDArray[np.float32]]:
-    """Return how far each expression's key moves the vertices (V, 3), by name; none if there are no such keys."""
+    """Return how far each expression's key moves the vertices (V, 3), by name; none if there are no
+    such keys.
+    """
     blocks = mesh.data.shape_keys.key_blocks
     basis = _places(blocks[0])
     return {name: _places(blocks[name]) - basis for name in EXPRESSIONS if name in blocks}

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Converting a captured armature's keys to a clip in numpy and back, for editing.
 
-The inverse of ``animation.py``: Ω_i = C_iᵀ B_i C_i, R_0 = R_world_model C_0ᵀ B_0 C_0, pelvis = location + h_0, in the
-armature's space. The keys are the only source, so undo and manual changes are respected.
+The inverse of ``animation.py``: Ω_i = C_iᵀ B_i C_i, R_0 = R_world_model C_0ᵀ B_0 C_0, pelvis =
+location + h_0, in the armature's space. The keys are the only source, so undo and manual changes
+are respected.
 """
 
 from __future__ import annotations
@@ -21,7 +22,14 @@ from ...edit.clip import Clip, band_limited, sample
 from ...edit.reduce import angles_between, select_position_keys, select_quaternion_keys
 from ...errors import UsageError
 from ...kinematics.axes import R_WORLD_MODEL
-from ..animation_data.actions import bone_path, change_keys, check_not_in_nla, fcurves, read_keys, rewrite_keys
+from ..animation_data.actions import (
+    bone_path,
+    change_keys,
+    check_not_in_nla,
+    fcurves,
+    read_keys,
+    rewrite_keys,
+)
 from ..animation_data.timing import whole_frames_of
 from .animation import on_one_hemisphere
 from .armature import rest_orientations
@@ -29,7 +37,9 @@ from .armature import rest_orientations
 ROTATION, LOCATION = "rotation_quaternion", "location"
 
 
-def read_clip(armature: bpy.types.Object, body: Body, rate: float) -> tuple[Clip, NDArray[np.float64]]:
+def read_clip(
+    armature: bpy.types.Object, body: Body, rate: float
+) -> tuple[Clip, NDArray[np.float64]]:
     """Read the motion from the keys.
 
     If curves have keys at different frames, every frame with a key on any curve is included.
@@ -39,18 +49,25 @@ def read_clip(armature: bpy.types.Object, body: Body, rate: float) -> tuple[Clip
     :raises UsageError: when a bone or its keys are missing.
     """
     curves = _curves(armature, body)
-    frames = np.unique(np.concatenate([read_keys(curve)[:, 0] for bone in curves.values() for curve in bone]))
+    frames = np.unique(
+        np.concatenate([read_keys(curve)[:, 0] for bone in curves.values() for curve in bone])
+    )
     return read_clip_at(armature, body, rate, frames), frames
 
 
-def read_clip_at(armature: bpy.types.Object, body: Body, rate: float, frames: NDArray[np.float64]) -> Clip:
+def read_clip_at(
+    armature: bpy.types.Object, body: Body, rate: float, frames: NDArray[np.float64]
+) -> Clip:
     """Read the motion at scene frames (T,), as interpolated by Blender.
 
     :param rate: scene frames per second.
     :raises UsageError: when a bone or its keys are missing.
     """
     curves = _curves(armature, body)
-    values = {path: np.stack([_values(curve, frames) for curve in bone], axis=1) for path, bone in curves.items()}
+    values = {
+        path: np.stack([_values(curve, frames) for curve in bone], axis=1)
+        for path, bone in curves.items()
+    }
     q = np.stack([values[bone_path(name, ROTATION)] for name in body.joint_names], axis=1)
     B = matrix_from_quaternion(q / np.maximum(np.linalg.norm(q, axis=-1, keepdims=True), 1e-9))
     C = _axes(armature, body)
@@ -65,7 +82,8 @@ def channel_values(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Compute Blender's channels of a clip.
 
-    :return: quaternions (T, K+1, 4) on one hemisphere; root locations (T, 3) in the armature's space.
+    :return: quaternions (T, K+1, 4) on one hemisphere; root locations (T, 3) in the armature's
+        space.
     :raises UsageError: when a bone is missing.
     """
     C = _axes(armature, body)
@@ -75,8 +93,11 @@ def channel_values(
     return on_one_hemisphere(quaternions(B)), clip.root - _root_head(armature, body)
 
 
-def write_clip(armature: bpy.types.Object, body: Body, clip: Clip, frames: NDArray[np.float64]) -> None:
-    """Replace the keys of all bones by the clip's, at scene frames (T,); curves, groups and action are kept.
+def write_clip(
+    armature: bpy.types.Object, body: Body, clip: Clip, frames: NDArray[np.float64]
+) -> None:
+    """Replace the keys of all bones by the clip's, at scene frames (T,); curves, groups and action
+    are kept.
 
     :raises UsageError: when a bone or its keys are missing.
     """
@@ -87,9 +108,14 @@ def write_clip(armature: bpy.types.Object, body: Body, clip: Clip, frames: NDArr
 
 
 def write_keys(
-    armature: bpy.types.Object, body: Body, clip: Clip, frames: NDArray[np.float64], which: NDArray[np.bool_]
+    armature: bpy.types.Object,
+    body: Body,
+    clip: Clip,
+    frames: NDArray[np.float64],
+    which: NDArray[np.bool_],
 ) -> None:
-    """Replace only some keys by the clip's; a curve that has no key at one of these frames gets one.
+    """Replace only some keys by the clip's; a curve that has no key at one of these frames gets
+    one.
 
     :param frames: (T,) scene frames of the clip's keys.
     :param which: (T,) the keys to write.
@@ -98,7 +124,8 @@ def write_keys(
     values = _values_by_path(body, *channel_values(armature, body, clip))
     for path, bone in _curves(armature, body).items():
         new = values[path]
-        if len(bone) == 4:  # the sign of the quaternion that is there, since the keys around it stay
+        # the sign of the quaternion that is there, since the keys around it stay
+        if len(bone) == 4:
             old = np.stack([_values(curve, frames) for curve in bone], axis=1)
             new = new * np.where((new * old).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
         for index, curve in enumerate(bone):
@@ -106,7 +133,8 @@ def write_keys(
 
 
 def bake_whole_frames(armature: bpy.types.Object, body: Body, rate: float) -> tuple[int, int]:
-    """Replace the keys by one on every whole frame of the scene, with a low-pass filter against aliasing.
+    """Replace the keys by one on every whole frame of the scene, with a low-pass filter against
+    aliasing.
 
     :param rate: scene frames per second.
     :return: the number of keys per curve before and after.
@@ -120,7 +148,9 @@ def bake_whole_frames(armature: bpy.types.Object, body: Body, rate: float) -> tu
 
 @dataclass(frozen=True)
 class Reduction:
-    """The result of ``reduce_keys``: numbers of keys, and the largest errors at the frames of the former keys."""
+    """The result of ``reduce_keys``: numbers of keys, and the largest errors at the frames of the
+    former keys.
+    """
 
     before: int
     after: int
@@ -129,7 +159,12 @@ class Reduction:
 
 
 def reduce_keys(
-    armature: bpy.types.Object, body: Body, betas: NDArray[np.floating[Any]], rate: float, angle: float, distance: float
+    armature: bpy.types.Object,
+    body: Body,
+    betas: NDArray[np.floating[Any]],
+    rate: float,
+    angle: float,
+    distance: float,
 ) -> Reduction:
     """Remove the keys that linear interpolation does not need, separately for each bone.
 
@@ -159,7 +194,8 @@ def reduce_keys(
 
 
 def channel_curves(armature: bpy.types.Object, body: Body) -> list[bpy.types.FCurve]:
-    """Return the curves of all bones' rotations and of the root's location, always in the same order.
+    """Return the curves of all bones' rotations and of the root's location, always in the same
+    order.
 
     :raises UsageError: when a bone or its keys are missing.
     """
@@ -185,7 +221,9 @@ def _root_head(armature: bpy.types.Object, body: Body) -> NDArray[np.float64]:
 
 
 def _curves(armature: bpy.types.Object, body: Body) -> dict[str, list[bpy.types.FCurve]]:
-    """Return the curves of every bone's rotation and the root's location by data path, in the order of their index."""
+    """Return the curves of every bone's rotation and the root's location by data path, in the order
+    of their index.
+    """
     _check_bones(armature, body)
     wanted = {bone_path(name, ROTATION): 4 for name in body.joint_names} | {location_path(body): 3}
     found: dict[str, dict[int, bpy.types.FCurve]] = {path: {} for path in wanted}
@@ -195,7 +233,10 @@ def _curves(armature: bpy.types.Object, body: Body) -> dict[str, list[bpy.types.
     missing = [path for path, count in wanted.items() if len(found[path]) != count]
     if missing:
         check_not_in_nla(armature)
-        raise UsageError(f"'{armature.name}' has lost the keys of {missing[0]}; undo their removal, or capture again")
+        raise UsageError(
+            f"'{armature.name}' has lost the keys of {missing[0]}; undo their "
+            "removal, or capture again"
+        )
     return {path: [by_index[i] for i in sorted(by_index)] for path, by_index in found.items()}
 
 
@@ -208,21 +249,25 @@ def _values(curve: bpy.types.FCurve, frames: NDArray[np.float64]) -> NDArray[np.
 
 
 def _check_bones(armature: bpy.types.Object, body: Body) -> None:
-    """Check that an armature has the body's bones, and that the keys that a capture has written rotate them.
+    """Check that an armature has the body's bones, and that the keys that a capture has written
+    rotate them.
 
     :raises UsageError: a bone was renamed or removed, or has another rotation mode.
     """
     for name in body.joint_names:
         if name not in armature.pose.bones:
             raise UsageError(
-                f"'{armature.name}' has no bone '{name}'; if you have renamed it, give it this name again, or choose "
+                f"'{armature.name}' has no bone '{name}'; if you have renamed it, give it this "
+                "name again, or choose "
                 "another armature that Scope captured"
             )
         mode = armature.pose.bones[name].rotation_mode
         if mode != "QUATERNION":
             raise UsageError(
-                f"'{name}' of '{armature.name}' has the rotation mode {mode}, in which its captured keys have no "
-                "effect; change it back to Quaternion (WXYZ), and its keys too if you have converted them"
+                f"'{name}' of '{armature.name}' has the rotation mode {mode}, in which its "
+                "captured keys have no "
+                "effect; change it back to Quaternion (WXYZ), and its keys too if you have "
+                "converted them"
             )
 
 

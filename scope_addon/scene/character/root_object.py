@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Moving root motion from the bones to a separate root object, and back.
 
-The root object is an empty that is animated with the root trajectory. It becomes the parent of the armature, and the
-pelvis keeps the rest of the motion, so what is displayed does not change. An existing parent of a captured armature
-becomes the parent of the empty.
+The root object is an empty that is animated with the root trajectory. It becomes the parent of the
+armature, and the pelvis keeps the rest of the motion, so what is displayed does not change. An
+existing parent of a captured armature becomes the parent of the empty.
 """
 
 from __future__ import annotations
@@ -25,13 +25,17 @@ from ..animation_data.stored_values import stored_numbers
 from .keys import read_clip, write_clip
 
 ROOT_TAG = "scope_root"  # custom property of the empty
-_UNUSED_TRAJECTORY = "scope_path"  # of an empty whose armature stays in place: the trajectory it does not follow
+# of an empty whose armature stays in place: the trajectory it does not follow
+_UNUSED_TRAJECTORY = "scope_path"
 _RIGID = 1e-3  # by how much the determinant of a rigid transform may differ from 1
-_PLACE = "scope_place"  # the armature's transform before it became part of the trajectory: a rigid matrix by rows
+# the armature's transform before it became part of the trajectory: a rigid matrix by rows
+_PLACE = "scope_place"
 
 
 def topmost(armature: bpy.types.Object) -> bpy.types.Object:
-    """Return the armature, or the topmost of its parents below the root object: the child of the root object."""
+    """Return the armature, or the topmost of its parents below the root object: the child of the
+    root object.
+    """
     obj = armature
     while obj.parent is not None and ROOT_TAG not in obj.parent:
         obj = obj.parent
@@ -52,7 +56,8 @@ def parent_to_root_object(
     in_place: bool = False,
     below_parent: bool = False,
 ) -> bpy.types.Object:
-    """Parent the armature to a new empty that follows a trajectory, and replace a former root object.
+    """Parent the armature to a new empty that follows a trajectory, and replace a former root
+    object.
 
     The parent of the former root object becomes that of the new one.
 
@@ -60,7 +65,8 @@ def parent_to_root_object(
     :param positions: (T, 3) metres.
     :param angles: (T,) about the vertical, radians.
     :param in_place: the empty stays at the start of the trajectory, and only stores it.
-    :param below_parent: insert the empty between the armature and its parent, instead of above the topmost parent.
+    :param below_parent: insert the empty between the armature and its parent, instead of above the
+        topmost parent.
     :raises UsageError: when the topmost parent would move along and has another armature below it.
     """
     former = root_object(armature)
@@ -68,7 +74,8 @@ def parent_to_root_object(
     others = [obj for obj in top.children_recursive if obj.type == "ARMATURE" and obj != armature]
     if top != armature and others:
         raise UsageError(
-            f"'{armature.name}' is parented to '{top.name}', and '{others[0].name}' would move along; clear the "
+            f"'{armature.name}' is parented to '{top.name}', and '{others[0].name}' would move "
+            "along; clear the "
             "parent, or keep the root motion in the bones"
         )
     empty = bpy.data.objects.new(f"{armature.name}_root", None)
@@ -95,7 +102,9 @@ def parent_to_root_object(
 
 
 def remove_root_object(armature: bpy.types.Object) -> None:
-    """Remove the root object; the armature gets its former transform and parent and keeps the motion of its bones."""
+    """Remove the root object; the armature gets its former transform and parent and keeps the
+    motion of its bones.
+    """
     top, empty = topmost(armature), root_object(armature)
     if empty is None:
         return
@@ -106,7 +115,9 @@ def remove_root_object(armature: bpy.types.Object) -> None:
 
 
 def parent_transform(obj: bpy.types.Object) -> Matrix:
-    """Return the transform (4, 4) that an object inherits at the current frame; the identity without a parent."""
+    """Return the transform (4, 4) that an object inherits at the current frame; the identity
+    without a parent.
+    """
     if obj.parent is None:
         return Matrix()
     bpy.context.view_layer.update()
@@ -125,7 +136,10 @@ def move_root_motion_to_object(
     """
     clip, frames = read_clip(armature, body, rate)
     if not armature.matrix_basis.median_scale:
-        raise UsageError(f"'{armature.name}' has the scale 0, so its motion cannot be moved; give it another one first")
+        raise UsageError(
+            f"'{armature.name}' has the scale 0, so its motion cannot be moved; give "
+            "it another one first"
+        )
     clip, former = clip_with_root_motion(armature, clip, frames), root_object(armature)
     if former is None:  # the armature's own transform becomes part of the trajectory
         bpy.context.view_layer.update()
@@ -141,12 +155,15 @@ def move_root_motion_to_object(
     positions, angles = floor_trajectory(clip, heading=heading)
     write_clip(armature, body, relative_to_trajectory(clip, positions, angles), frames)
     positions = size * positions + [0.0, 0.0, height]
-    empty = parent_to_root_object(armature, frames, positions, angles, in_place=in_place, below_parent=True)
+    empty = parent_to_root_object(
+        armature, frames, positions, angles, in_place=in_place, below_parent=True
+    )
     empty[_PLACE] = [number for row in place for number in row]
 
 
 def move_root_motion_to_bones(armature: bpy.types.Object, body: Body, rate: float) -> None:
-    """Move the root motion back to the bones and remove the root object. A trajectory not in use is restored too.
+    """Move the root motion back to the bones and remove the root object. A trajectory not in use is
+    restored too.
 
     :param rate: scene frames per second.
     :raises UsageError: when a bone or its keys are missing.
@@ -158,13 +175,19 @@ def move_root_motion_to_bones(armature: bpy.types.Object, body: Body, rate: floa
     remove_root_object(armature)
 
 
-def clip_with_root_motion(armature: bpy.types.Object, clip: Clip, frames: NDArray[np.float64]) -> Clip:
-    """Return the clip including the trajectory stored in its root object, in use or not, in the armature's own space.
+def clip_with_root_motion(
+    armature: bpy.types.Object, clip: Clip, frames: NDArray[np.float64]
+) -> Clip:
+    """Return the clip including the trajectory stored in its root object, in use or not, in the
+    armature's own space.
 
     :param frames: (T,) scene frames of the clip's keys.
     :raises UsageError: the stored trajectory was changed, or is in the NLA.
     """
-    whole, empty = with_trajectory(clip, *removed_root_motion(armature, frames)), root_object(armature)
+    whole, empty = (
+        with_trajectory(clip, *removed_root_motion(armature, frames)),
+        root_object(armature),
+    )
     if empty is None:
         return whole
     return _moved(whole, _place(empty).inverted(), armature.matrix_basis.median_scale)
@@ -187,7 +210,8 @@ def removed_root_motion(
     rows = _unused_trajectory(empty)
     if rows is None:
         raise UsageError(
-            f"the trajectory that '{empty.name}' stores in {_UNUSED_TRAJECTORY} was changed; undo that, or smooth the "
+            f"the trajectory that '{empty.name}' stores in {_UNUSED_TRAJECTORY} was changed; undo "
+            "that, or smooth the "
             "motion, which restores it as captured"
         )
     x, y, angle = (np.interp(frames, rows[:, 0], rows[:, k]) for k in (1, 2, 3))
@@ -203,7 +227,9 @@ def retime_unused_trajectory(empty: bpy.types.Object, retiming: Retiming) -> Non
 
 
 def _unused_trajectory(empty: bpy.types.Object) -> NDArray[np.float64] | None:
-    """Return frame, x, y and angle of a trajectory that is stored but not in use, (T, 4); None if there is none."""
+    """Return frame, x, y and angle of a trajectory that is stored but not in use, (T, 4); None if
+    there is none.
+    """
     numbers = stored_numbers(empty, _UNUSED_TRAJECTORY)
     rows = np.array(numbers[: len(numbers) // 4 * 4]).reshape(-1, 4)
     return rows if 4 * len(rows) == len(numbers) > 0 and (np.diff(rows[:, 0]) > 0).all() else None
@@ -222,7 +248,8 @@ def clip_as_displayed(armature: bpy.types.Object, clip: Clip, frames: NDArray[np
 def _keyed_path(
     armature: bpy.types.Object, empty: bpy.types.Object, frames: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the empty's positions (T, 3), in the armature's units, and angles (T,), radians, at scene frames (T,).
+    """Return the empty's positions (T, 3), in the armature's units, and angles (T,), radians, at
+    scene frames (T,).
 
     :raises UsageError: the empty's keys are in its NLA.
     """
@@ -233,8 +260,12 @@ def _keyed_path(
         keys = read_keys(curve)
         columns[curve.data_path, curve.array_index] = np.interp(frames, keys[:, 0], keys[:, 1])
     columns = {("rotation_euler", 2): np.full(len(frames), empty.rotation_euler.z)} | columns
-    positions = [columns.get(("location", k), np.full(len(frames), empty.location[k])) for k in range(3)]
-    return np.stack(positions, axis=1) / armature.matrix_basis.median_scale, columns["rotation_euler", 2]
+    positions = [
+        columns.get(("location", k), np.full(len(frames), empty.location[k])) for k in range(3)
+    ]
+    return np.stack(positions, axis=1) / armature.matrix_basis.median_scale, columns[
+        "rotation_euler", 2
+    ]
 
 
 def _place(empty: bpy.types.Object) -> Matrix:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The body's shape as shape keys: Shape000 is the first coefficient, and its value is the coefficient itself.
+"""The body's shape as shape keys: Shape000 is the first coefficient, and its value is the
+coefficient itself.
 
-The rest mesh is ``v̄ + Σ_p β_p shapedirs_p`` for any slider setting, and the armature's bones rest at J(β) of the fitted
-shape, so at the fitted values Blender's deformation is exactly SMPL's.
+The rest mesh is ``v̄ + Σ_p β_p shapedirs_p`` for any slider setting, and the armature's bones rest
+at J(β) of the fitted shape, so at the fitted values Blender's deformation is exactly SMPL's.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ def shape_key_name(coefficient: int) -> str:
 
 
 def add_shape_keys(mesh: bpy.types.Object, body: Body, betas: NDArray[np.floating[Any]]) -> None:
-    """Add ``Basis`` (the current mesh: β = 0) and one key per coefficient, each at its fitted value.
+    """Add ``Basis`` (the current mesh: β = 0) and one key per coefficient, each at its fitted
+    value.
 
     :param betas: (P,) the fitted shape.
     :raises MotionFileError: when a coefficient is beyond the limit of Blender's shape keys.
@@ -37,7 +39,8 @@ def add_shape_keys(mesh: bpy.types.Object, body: Body, betas: NDArray[np.floatin
     farthest = float(betas[np.abs(betas).argmax()])
     if abs(farthest) > SLIDER_LIMIT:
         raise MotionFileError(
-            f"the shape coefficient {farthest:.3g} exceeds Blender's limit of ±{SLIDER_LIMIT:g} for shape keys; "
+            f"the shape coefficient {farthest:.3g} exceeds Blender's limit of ±{SLIDER_LIMIT:g} "
+            "for shape keys; "
             "bake the shape into the mesh instead"
         )
     basis = mesh.shape_key_add(name="Basis", from_mix=False)
@@ -68,12 +71,15 @@ def key_shape(
     channels = Channels(mesh.data.shape_keys, action)
     at = frames if per_frame else frames[:1]
     for p, beta in enumerate(betas):
-        channels.write(shape_key_path(shape_key_name(p)), at, np.full(len(at), beta), "CONSTANT", group="Shape")
+        channels.write(
+            shape_key_path(shape_key_name(p)), at, np.full(len(at), beta), "CONSTANT", group="Shape"
+        )
     return channels
 
 
 def mixed_vertices(mesh: bpy.types.Object, without: Container[str] = ()) -> NDArray[np.float32]:
-    """Return the rest vertices (V, 3) at the current slider values: ``basis + Σ_p value_p (key_p − basis)``.
+    """Return the rest vertices (V, 3) at the current slider values: ``basis + Σ_p value_p (key_p −
+    basis)``.
 
     :param without: names of keys that are left out.
     """

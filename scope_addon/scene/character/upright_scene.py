@@ -20,9 +20,14 @@ _LARGEST = 1e9  # of its numbers
 
 
 def turn_camera(
-    camera: bpy.types.Object, armature: bpy.types.Object, transform: NDArray[np.float64], *, to_captured: bool
+    camera: bpy.types.Object,
+    armature: bpy.types.Object,
+    transform: NDArray[np.float64],
+    *,
+    to_captured: bool,
 ) -> None:
-    """Move the capture's camera together with a person; where it was at first if it was not moved since.
+    """Move the capture's camera together with a person; where it was at first if it was not moved
+    since.
 
     :param transform: (4, 4) rigid, of the captured world, in which the armature's keys are.
     :param to_captured: whether the world is then again as it was captured.
@@ -46,22 +51,36 @@ def turn_camera(
 
 def _place(camera: bpy.types.Object) -> list[list[float]]:
     """Return the camera's keys, or without keys its own transform, as exact numbers."""
-    keys = [curve for curve in fcurves(camera) if curve.data_path in ("location", "rotation_quaternion")]
+    keys = [
+        curve for curve in fcurves(camera) if curve.data_path in ("location", "rotation_quaternion")
+    ]
     own = [*camera.location, *camera.rotation_quaternion, *camera.rotation_euler, *camera.scale]
     return [[] if keys else own, *(read_keys(c).ravel().tolist() for c in keys)]
 
 
 def _is_like(place: object, now: list[list[float]]) -> bool:
-    """Whether a place has as many numbers as the present one of each kind, and of keys any pairs of frame and value."""
-    if not isinstance(place, list) or len(place) != len(now) or not all(isinstance(part, list) for part in place):
+    """Whether a place has as many numbers as the present one of each kind, and of keys any pairs of
+    frame and value.
+    """
+    if (
+        not isinstance(place, list)
+        or len(place) != len(now)
+        or not all(isinstance(part, list) for part in place)
+    ):
         return False
-    sizes = len(place[0]) == len(now[0]) and all(len(keys) and len(keys) % 2 == 0 for keys in place[1:])
-    return sizes and all(type(x) in (int, float) and abs(x) < _LARGEST for part in place for x in part)
+    sizes = len(place[0]) == len(now[0]) and all(
+        len(keys) and len(keys) % 2 == 0 for keys in place[1:]
+    )
+    return sizes and all(
+        type(x) in (int, float) and abs(x) < _LARGEST for part in place for x in part
+    )
 
 
 def _put(camera: bpy.types.Object, place: list[list[float]]) -> None:
     """Put the camera where ``_place`` found it."""
-    keys = [curve for curve in fcurves(camera) if curve.data_path in ("location", "rotation_quaternion")]
+    keys = [
+        curve for curve in fcurves(camera) if curve.data_path in ("location", "rotation_quaternion")
+    ]
     if own := place[0]:
         camera.location, camera.rotation_quaternion = own[:3], own[3:7]
         camera.rotation_euler, camera.scale = own[7:10], own[10:13]
@@ -70,14 +89,18 @@ def _put(camera: bpy.types.Object, place: list[list[float]]) -> None:
         rewrite_keys(curve, frames, numbers)
 
 
-def move_camera(camera: bpy.types.Object, armature: bpy.types.Object, transform: NDArray[np.float64]) -> None:
+def move_camera(
+    camera: bpy.types.Object, armature: bpy.types.Object, transform: NDArray[np.float64]
+) -> None:
     """Move the capture's camera, with its keys, together with a person.
 
     :param transform: (4, 4) rigid, of the captured world, in which the armature's keys are.
     """
     bpy.context.view_layer.update()
     world, above = armature.matrix_world, parent_transform(camera)
-    move = above.inverted_safe() @ world @ Matrix(transform.tolist()) @ world.inverted_safe() @ above
+    move = (
+        above.inverted_safe() @ world @ Matrix(transform.tolist()) @ world.inverted_safe() @ above
+    )
     curves = {(c.data_path, c.array_index): c for c in fcurves(camera)}
     wanted = [("location", k) for k in range(3)] + [("rotation_quaternion", k) for k in range(4)]
     if not all(key in curves for key in wanted):

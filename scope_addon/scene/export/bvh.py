@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Biovision hierarchy files (.bvh): y up, centimetres or metres, the T-pose at zero rotation facing +z.
+"""Biovision hierarchy files (.bvh): y up, centimetres or metres, the T-pose at zero rotation facing
++z.
 
-Every joint's axes are those of the model at rest, so offsets are differences of rest joints and rotations are SMPL's.
-The root's channels are its position and rotation in the y-up world; its OFFSET is zero because readers disagree
-on whether position channels are added to it. Blender's own exporter writes z up, which other tools display lying down.
+Every joint's axes are those of the model at rest, so offsets are differences of rest joints and
+rotations are SMPL's. The root's channels are its position and rotation in the y-up world; its
+OFFSET is zero because readers disagree on whether position channels are added to it. Blender's own
+exporter writes z up, which other tools display lying down.
 """
 
 from __future__ import annotations
@@ -15,29 +17,36 @@ from numpy.typing import NDArray
 
 from ..axes import R_GLTF_WORLD
 
-UNITS_PER_METRE = {"cm": 100.0, "m": 1.0}  # the format states no unit; most tools expect centimetres
+# the format states no unit; most tools expect centimetres
+UNITS_PER_METRE = {"cm": 100.0, "m": 1.0}
 
 
 @dataclass(frozen=True)
 class SampledPose:
-    """An armature and its motion at a constant frame rate, world frame (z up), metres. N bones, T frames."""
+    """An armature and its motion at a constant frame rate, world frame (z up), metres. N bones, T
+    frames.
+    """
 
     names: list[str]
     parents: list[int]  # −1 for roots, parents before children
     heads: NDArray[np.float64]  # (N, 3) at rest
     tails: NDArray[np.float64]  # (N, 3) at rest
-    rotations: NDArray[np.float64]  # (T, N, 3, 3) from the rest pose to the pose, both in the world frame
+    # (T, N, 3, 3) from the rest pose to the pose, both in the world frame
+    rotations: NDArray[np.float64]
     joints: NDArray[np.float64]  # (T, N, 3)
     rate: float  # frames per second
 
 
 def bvh_text(pose: SampledPose, unit: str = "cm") -> str:
-    """Return the content of the file; names are without spaces, at which readers would cut them off.
+    """Return the content of the file; names are without spaces, at which readers would cut them
+    off.
 
     :param unit: of its lengths, a key of ``UNITS_PER_METRE``.
     """
     scale = UNITS_PER_METRE[unit]
-    pose = replace(pose, heads=scale * pose.heads, tails=scale * pose.tails, joints=scale * pose.joints)
+    pose = replace(
+        pose, heads=scale * pose.heads, tails=scale * pose.tails, joints=scale * pose.joints
+    )
     pose = replace(pose, names=_words(pose.names))
     children: list[list[int]] = [[] for _ in pose.names]
     for i, parent in enumerate(pose.parents):
@@ -76,7 +85,10 @@ def _joint_lines(children: list[list[int]], pose: SampledPose, i: int, depth: in
     offset = np.zeros(3) if parent < 0 else R_GLTF_WORLD @ (pose.heads[i] - pose.heads[parent])
     position = "6 Xposition Yposition Zposition" if parent < 0 else "3"
     lines = [f"{pad}{'ROOT' if parent < 0 else 'JOINT'} {pose.names[i]}", f"{pad}{{"]
-    lines += [f"{pad}\tOFFSET {_triple(offset)}", f"{pad}\tCHANNELS {position} Zrotation Yrotation Xrotation"]
+    lines += [
+        f"{pad}\tOFFSET {_triple(offset)}",
+        f"{pad}\tCHANNELS {position} Zrotation Yrotation Xrotation",
+    ]
     for child in children[i]:
         lines += _joint_lines(children, pose, child, depth + 1)
     if not children[i]:
@@ -90,13 +102,17 @@ def _triple(v: NDArray[np.float64]) -> str:
 
 
 def _channel_values(pose: SampledPose, order: list[int]) -> NDArray[np.float64]:
-    """Return (T, channels) in the order of the hierarchy, lengths in the unit of ``pose``, angles in degrees."""
+    """Return (T, channels) in the order of the hierarchy, lengths in the unit of ``pose``, angles
+    in degrees.
+    """
     turned, parents = R_GLTF_WORLD @ pose.rotations @ R_GLTF_WORLD.T, np.array(pose.parents)
     local = turned.copy()
     child = parents >= 0
     local[:, child] = np.swapaxes(turned[:, parents[child]], 2, 3) @ turned[:, child]
     angles, positions = euler_zyx_degrees(local), pose.joints @ R_GLTF_WORLD.T
-    columns = [part[:, i] for i in order for part in ((angles,) if child[i] else (positions, angles))]
+    columns = [
+        part[:, i] for i in order for part in ((angles,) if child[i] else (positions, angles))
+    ]
     values: NDArray[np.float64] = np.concatenate(columns, axis=1)
     return values
 
@@ -104,18 +120,21 @@ def _channel_values(pose: SampledPose, order: list[int]) -> NDArray[np.float64]:
 def euler_zyx_degrees(R: NDArray[np.float64]) -> NDArray[np.float64]:
     """Decompose ``R = Rz Ry Rx``, continuously in time where possible.
 
-    At gimbal lock (y = ±90°) x is set to zero; elsewhere, the equivalent angles nearest to the previous frame are
-    chosen.
+    At gimbal lock (y = ±90°) x is set to zero; elsewhere, the equivalent angles nearest to the
+    previous frame are chosen.
 
     :param R: (T, N, 3, 3) rotations of N joints.
     :return: (T, N, 3) angles z, y, x, degrees.
     """
     sin_y = np.clip(-R[..., 2, 0], -1.0, 1.0)
     locked = np.abs(sin_y) > 1.0 - 1e-9
-    z = np.where(locked, np.arctan2(-R[..., 0, 1], R[..., 1, 1]), np.arctan2(R[..., 1, 0], R[..., 0, 0]))
+    z = np.where(
+        locked, np.arctan2(-R[..., 0, 1], R[..., 1, 1]), np.arctan2(R[..., 1, 0], R[..., 0, 0])
+    )
     x = np.where(locked, 0.0, np.arctan2(R[..., 2, 1], R[..., 2, 2]))
     direct = np.degrees(np.stack([z, np.arcsin(sin_y), x], axis=-1))
-    other = direct * [1, -1, 1] + [180.0, 180.0, 180.0]  # the other decomposition of the same rotation
+    # the other decomposition of the same rotation
+    other = direct * [1, -1, 1] + [180.0, 180.0, 180.0]
     both = np.stack([direct, other], axis=2)
     out: NDArray[np.float64] = direct.copy()
     for t in range(1, len(out)):

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether Blender has written a file to its end: some of its writers do not report that a write failed."""
+"""Whether Blender has written a file to its end: some of its writers do not report that a write
+failed.
+"""
 
 from __future__ import annotations
 
@@ -11,18 +13,21 @@ import bpy
 _CRATE = b"PXR-USDC"
 _SECTION = struct.Struct("<16sqq")  # name, start, size
 _ZSTANDARD = b"\x28\xb5\x2f\xfd"
-_TABLE, _TABLE_END = 0x184D2A5E, 0x8F92EAB1  # magic numbers around the table of a seekable Zstandard file
+# magic numbers around the table of a seekable Zstandard file
+_TABLE, _TABLE_END = 0x184D2A5E, 0x8F92EAB1
 _HAS_CHECKSUMS = 0x80
 
 
 def is_whole_crate(path: Path) -> bool:
-    """Return whether a USD crate file has its table of contents, and more than the root of the scene.
-
-    The table is written last and located by the header. The exporter writes the file first without and then with the
+    """Return whether a USD crate file has its table of contents, and more than the root of the
     scene.
 
-    Source: OpenUSD, pxr/usd/usd/crateFile.h: identifier (8 bytes), version (8), offset of the table (8); the table is a
-    count (8) of sections of 32 bytes each; the section of paths begins with their count (8).
+    The table is written last and located by the header. The exporter writes the file first without
+    and then with the scene.
+
+    Source: OpenUSD, pxr/usd/usd/crateFile.h: identifier (8 bytes), version (8), offset of the table
+    (8); the table is a count (8) of sections of 32 bytes each; the section of paths begins with
+    their count (8).
     """
     size = path.stat().st_size
     with path.open("rb") as file:
@@ -59,8 +64,8 @@ def is_whole_blend(path: Path) -> bool:
 def _has_all_frames(path: Path) -> bool:
     """Return whether the compressed parts of a .blend fill the file; True if it is not compressed.
 
-    Source: Zstandard, contrib/seekable_format: the file ends with a frame that lists the compressed and the full size
-    of every other one, their number, a byte of flags and a magic number.
+    Source: Zstandard, contrib/seekable_format: the file ends with a frame that lists the compressed
+    and the full size of every other one, their number, a byte of flags and a magic number.
     """
     size = path.stat().st_size
     with path.open("rb") as file:

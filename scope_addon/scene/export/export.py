@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Exporting captures: .glb, .fbx, .blend, .bvh and .usdc from the scene, .npz from the captured motion.
+"""Exporting captures: .glb, .fbx, .blend, .bvh and .usdc from the scene, .npz from the captured
+motion.
 
-Captures are linked to a temporary scene, so that nothing else of the user's file is exported and the result does not
-depend on selection or visibility. Files are written atomically.
+Captures are linked to a temporary scene, so that nothing else of the user's file is exported and
+the result does not depend on selection or visibility. Files are written atomically.
 """
 
 from __future__ import annotations
@@ -48,9 +49,11 @@ SHAPES = ("auto", "keys", "baked")
 class ExportOptions:
     """Options of ``export``."""
 
-    camera: bool = False  # include the footage's camera in .glb, .fbx and .usdc; .blend always includes it
-    # "keys": morph targets whose value is the coefficient. "baked": a mesh of the fitted shape without morph targets,
-    # for engines that clamp them to 0..1. "auto": keys, but baked in .usdc, as USD importers clamp, also Blender's.
+    # include the footage's camera in .glb, .fbx and .usdc; .blend always includes it
+    camera: bool = False
+    # "keys": morph targets whose value is the coefficient. "baked": a mesh of the fitted shape
+    # without morph targets, for engines that clamp them to 0..1. "auto": keys, but baked in .usdc,
+    # as USD importers clamp, also Blender's.
     shape: str = "auto"
     separate: bool = False  # one file per person, also in formats that can hold several
     bvh_unit: str = "cm"  # of the lengths in .bvh: "cm" or "m"
@@ -63,7 +66,9 @@ class ExportOptions:
         :raises UsageError: when ``shape`` or ``bvh_unit`` is unknown.
         """
         if self.bvh_unit not in UNITS_PER_METRE:
-            raise UsageError(f"bvh_unit must be one of {', '.join(UNITS_PER_METRE)}, but is '{self.bvh_unit}'")
+            raise UsageError(
+                f"bvh_unit must be one of {', '.join(UNITS_PER_METRE)}, but is '{self.bvh_unit}'"
+            )
         if self.shape not in SHAPES:
             raise UsageError(f"shape must be one of {', '.join(SHAPES)}, but is '{self.shape}'")
 
@@ -83,10 +88,12 @@ def export(
     motions: Sequence[Motion] = (),
     options: ExportOptions | None = None,
 ) -> list[Path]:
-    """Write captures in the format of the suffix, to one file, or one per person for .bvh, .npz and on request.
+    """Write captures in the format of the suffix, to one file, or one per person for .bvh, .npz and
+    on request.
 
     :param collections: the captures; by default those of the active scene.
-    :param motions: required for .npz, which holds the captured motion without changes made in the scene.
+    :param motions: required for .npz, which holds the captured motion without changes made in the
+        scene.
     :return: the files written.
     :raises UsageError: when the suffix is unknown, or there is nothing to export.
     :raises OutputError: when a file cannot be written.
@@ -100,13 +107,22 @@ def export(
         return targets
     chosen = list(collections) if collections is not None else captures(bpy.context.scene)
     if not chosen:
-        raise UsageError(f"cannot write {path.name}: the scene holds no capture; capture a video first")
+        raise UsageError(
+            f"cannot write {path.name}: the scene holds no capture; capture a video first"
+        )
     options = options or ExportOptions()
-    rigs = list(dict.fromkeys(obj for c in chosen for obj in c.all_objects if obj.type == "ARMATURE"))
+    rigs = list(
+        dict.fromkeys(obj for c in chosen for obj in c.all_objects if obj.type == "ARMATURE")
+    )
     if not rigs:
-        raise UsageError(f"cannot write {path.name}: the capture's armature was removed; undo that or capture again")
+        raise UsageError(
+            f"cannot write {path.name}: the capture's armature was removed; undo that "
+            "or capture again"
+        )
     if suffix == ".npz":
-        raise UsageError(f"cannot write {path.name}: a motion file holds the captured motion; pass the motions")
+        raise UsageError(
+            f"cannot write {path.name}: a motion file holds the captured motion; pass the motions"
+        )
     targets = person_paths(path, len(rigs), options.separate)
     if len(targets) == 1:
         _write_one(path, chosen, rigs, options)
@@ -123,7 +139,9 @@ def _write_one(
     rigs: Sequence[bpy.types.Object],
     options: ExportOptions,
 ) -> None:
-    """Write these collections over the frame range of all ``rigs``, so that separate files start at the same time."""
+    """Write these collections over the frame range of all ``rigs``, so that separate files start at
+    the same time.
+    """
     suffix = path.suffix.lower()
     take = options.take or (collections[0].name if len(collections) == 1 else path.stem)
     unit = options.unit or unit_of_captures(rigs, bpy.context.scene.unit_settings.scale_length)
@@ -131,20 +149,26 @@ def _write_one(
     is_in_metres = by_scene or abs(unit - 1.0) < 1e-6
     with (
         out_of_edit_mode(collections),
-        nullcontext() if suffix == ".blend" else all_evaluated(collections),  # keeps hidden objects as they are
+        # keeps hidden objects as they are
+        nullcontext() if suffix == ".blend" else all_evaluated(collections),
         scene_of(collections, rigs, options.camera, unit if by_scene else 1.0) as scene,
         external_parents_replaced(scene)
         if suffix == ".glb" or not is_in_metres
         else nullcontext(),  # the exporter of .glb omits children of objects outside the scene
         nullcontext() if is_in_metres else scaled(scene, unit),
-        # The exporter of .glb only reads actions, and so do meshes of the current shape, whose expressions move.
-        actions.nla_as_actions(scene) if suffix == ".glb" or options.bakes(suffix) else nullcontext(),
+        # The exporter of .glb only reads actions, and so do meshes of the current shape, whose
+        # expressions move.
+        actions.nla_as_actions(scene)
+        if suffix == ".glb" or options.bakes(suffix)
+        else nullcontext(),
         baked_meshes(scene) if options.bakes(suffix) else nullcontext(),
         actions_over_scene_range(scene),
     ):
         rig = next((obj for obj in scene.objects if obj.type == "ARMATURE"), None)
         if rig is None:  # none of them can be in this scene
-            raise UsageError(f"cannot write {path.name}: the capture's armature is not in a scene; capture again")
+            raise UsageError(
+                f"cannot write {path.name}: the capture's armature is not in a scene; capture again"
+            )
         writers = {
             ".bvh": lambda temporary: formats.write_bvh(temporary, scene, rig, options.bvh_unit),
             ".glb": lambda temporary: formats.write_glb(temporary, options.camera, take),
@@ -164,7 +188,8 @@ def export_motions(
     export_options: ExportOptions | None = None,
     progress: Progress | None = None,
 ) -> tuple[list[Path], list[str]]:
-    """Build the motions in a temporary scene, write one or more files, and leave the session as it was.
+    """Build the motions in a temporary scene, write one or more files, and leave the session as it
+    was.
 
     The scene has the motion's frame rate and the footage's resolution.
 
@@ -204,7 +229,9 @@ def _remove(result: BuildResult) -> None:
     data = {obj.data for obj in objects}
     owners = [*objects, *(obj.data.shape_keys for obj in objects if obj.type == "MESH")]
     owners += [obj.data for obj in objects if obj.type == "CAMERA"]
-    used = {owner.animation_data.action for owner in owners if owner and owner.animation_data} - {None}
+    used = {owner.animation_data.action for owner in owners if owner and owner.animation_data} - {
+        None
+    }
     materials = {m for block in data for m in getattr(block, "materials", ())}
     shown = {footage for block in data for picture in getattr(block, "background_images", ())
              for footage in (picture.clip, picture.image) if footage}  # fmt: skip
@@ -231,13 +258,23 @@ def _write(path: Path, writer: Callable[[Path], None]) -> None:
 
 
 def _reason(error: RuntimeError | OSError) -> str:
-    """Return the cause in one sentence, and what to do; Blender reports the whole traceback of a failed exporter."""
+    """Return the cause in one sentence, and what to do; Blender reports the whole traceback of a
+    failed exporter.
+    """
     if isinstance(error, OSError) and error.strerror:
         return reason(error)
-    lines = [line for line in str(error).splitlines() if line and not line[0].isspace() and "Location: " not in line]
+    lines = [
+        line
+        for line in str(error).splitlines()
+        if line and not line[0].isspace() and "Location: " not in line
+    ]
     last = lines[-1] if lines else type(error).__name__
     cause = re.sub(r"^(?:\w*Error: )*(?:\[Errno \d+\] )?", "", last)
-    # Blender's own writers give the system's reason, which is "Success" where a library has lost it.
+    # Blender's own writers give the system's reason, which is "Success" where a library has lost
+    # it.
     is_systems = "[Errno " in last or cause in (os.strerror(code) for code in (0, *errno.errorcode))
     cause = "the file could not be written completely" if cause == os.strerror(0) else cause
-    return f"{cause}; {'free some space or choose another folder' if is_systems else 'try another format'}"
+    return (
+        f"{cause}; "
+        f"{'free some space or choose another folder' if is_systems else 'try another format'}"
+    )

@@ -21,8 +21,11 @@ from ..character.shape_keys import mixed_vertices, shape_key_name
 
 @contextmanager
 def temporary_scene(name: str) -> Iterator[bpy.types.Scene]:
-    """Provide an empty scene that is the window's active scene inside the block, and remove it afterwards."""
-    # Edit Mode and the exporters work on a window's scene. Timers have no window, so the first one is used.
+    """Provide an empty scene that is the window's active scene inside the block, and remove it
+    afterwards.
+    """
+    # Edit Mode and the exporters work on a window's scene. Timers have no window, so the first one
+    # is used.
     window = bpy.context.window or bpy.context.window_manager.windows[0]
     with bpy.context.temp_override(window=window):
         before = window.scene
@@ -42,19 +45,28 @@ def scene_of(
     with_camera: bool,
     unit: float = 1.0,
 ) -> Iterator[bpy.types.Scene]:
-    """Provide a scene that contains only these collections, with the frame rate and resolution of the active scene.
+    """Provide a scene that contains only these collections, with the frame rate and resolution of
+    the active scene.
 
     Its frame range is that of the motion of ``rigs``.
 
     :param unit: of the scene, metres.
-    :param with_camera: use the footage's resolution, from which exporters compute the camera's vertical field of view.
+    :param with_camera: use the footage's resolution, from which exporters compute the camera's
+        vertical field of view.
     :raises UsageError: when the motion begins before frame 0.
     """
     source = bpy.context.scene
     with temporary_scene("Capture") as scene:
         for collection in collections:
             scene.collection.children.link(collection)
-        for name in ("fps", "fps_base", "resolution_x", "resolution_y", "pixel_aspect_x", "pixel_aspect_y"):
+        for name in (
+            "fps",
+            "fps_base",
+            "resolution_x",
+            "resolution_y",
+            "pixel_aspect_x",
+            "pixel_aspect_y",
+        ):
             setattr(scene.render, name, getattr(source.render, name))
         scene.unit_settings.scale_length = unit
         for marker in source.timeline_markers:
@@ -62,16 +74,20 @@ def scene_of(
         cameras = [obj for obj in scene.objects if obj.type == "CAMERA"]
         scene.camera = source.camera if source.camera in cameras else next(iter(cameras), None)
         if with_camera and scene.camera is not None:
-            set_resolution(scene, next(c for c in collections if scene.camera in c.all_objects.values()))
+            set_resolution(
+                scene, next(c for c in collections if scene.camera in c.all_objects.values())
+            )
         span = actions.frame_range(list(rigs)) or (source.frame_start, source.frame_end)
         if math.floor(span[0]) < 0:  # a scene starts at 0 or later, so earlier keys would be lost
             raise UsageError(
-                f"the motion begins at frame {math.floor(span[0])}, but exports start at frame 0: move its keys later, "
+                f"the motion begins at frame {math.floor(span[0])}, but exports start at frame 0: "
+                "move its keys later, "
                 "or capture again with a First Frame of 0 or more"
             )
         scene.frame_end = math.ceil(span[1])
         scene.frame_start = math.floor(span[0])
-        # Until the view layer is evaluated once, frame changes do not reach the objects that exporters read.
+        # Until the view layer is evaluated once, frame changes do not reach the objects that
+        # exporters read.
         bpy.context.view_layer.update()
         scene.frame_set(scene.frame_start)
         yield scene
@@ -79,9 +95,11 @@ def scene_of(
 
 
 def unit_of_captures(rigs: Sequence[bpy.types.Object], unit: float) -> float:
-    """Return the metres that a length of 1 stands for in captures, which are built in metres in any scene.
+    """Return the metres that a length of 1 stands for in captures, which are built in metres in any
+    scene.
 
-    In a scene of another unit, the user may have scaled them to their true size in that unit, as a warning suggests.
+    In a scene of another unit, the user may have scaled them to their true size in that unit, as a
+    warning suggests.
 
     :param unit: of the scene, metres.
     """
@@ -95,8 +113,15 @@ def external_parents_replaced(scene: bpy.types.Scene) -> Iterator[None]:
 
     Exporting the parents themselves would include all their other children.
     """
-    children = [obj for obj in scene.objects if obj.parent is not None and obj.parent not in scene.objects.values()]
-    kept = [(o, o.parent, o.parent_type, o.parent_bone, o.matrix_parent_inverse.copy()) for o in children]
+    children = [
+        obj
+        for obj in scene.objects
+        if obj.parent is not None and obj.parent not in scene.objects.values()
+    ]
+    kept = [
+        (o, o.parent, o.parent_type, o.parent_bone, o.matrix_parent_inverse.copy())
+        for o in children
+    ]
     frames = np.arange(scene.frame_start, scene.frame_end + 1)
     trajectories: list[list[Matrix]] = [[] for _ in children]
     for frame in frames if children else ():
@@ -112,7 +137,9 @@ def external_parents_replaced(scene: bpy.types.Scene) -> Iterator[None]:
             channels = actions.Channels(empty, bpy.data.actions.new(empty.name))
             created += [empty, channels.action]
             empty.rotation_mode = "QUATERNION"
-            place, turn, size = (np.array(each) for each in zip(*(m.decompose() for m in trajectory), strict=True))
+            place, turn, size = (
+                np.array(each) for each in zip(*(m.decompose() for m in trajectory), strict=True)
+            )
             channels.write("location", frames, place)
             channels.write("rotation_quaternion", frames, on_one_hemisphere(turn))
             channels.write("scale", frames, size)
@@ -123,13 +150,20 @@ def external_parents_replaced(scene: bpy.types.Scene) -> Iterator[None]:
         yield
     finally:
         for obj, parent, kind, bone, inverse in kept:
-            obj.parent, obj.parent_type, obj.parent_bone, obj.matrix_parent_inverse = parent, kind, bone, inverse
+            obj.parent, obj.parent_type, obj.parent_bone, obj.matrix_parent_inverse = (
+                parent,
+                kind,
+                bone,
+                inverse,
+            )
         bpy.data.batch_remove(created)
 
 
 @contextmanager
 def scaled(scene: bpy.types.Scene, size: float) -> Iterator[None]:
-    """Parent everything in a scene to an empty of a size inside the block; no object has a parent outside the scene."""
+    """Parent everything in a scene to an empty of a size inside the block; no object has a parent
+    outside the scene.
+    """
     tops = [(obj, obj.matrix_parent_inverse.copy()) for obj in scene.objects if obj.parent is None]
     empty = bpy.data.objects.new("Unit", None)
     empty.scale = (size,) * 3
@@ -148,7 +182,9 @@ def scaled(scene: bpy.types.Scene, size: float) -> Iterator[None]:
 
 @contextmanager
 def out_of_edit_mode(collections: Sequence[bpy.types.Collection]) -> Iterator[None]:
-    """Leave Edit Mode inside the block if an object in these collections is edited; the edits would not be written."""
+    """Leave Edit Mode inside the block if an object in these collections is edited; the edits would
+    not be written.
+    """
     edited = any(obj.mode == "EDIT" for collection in collections for obj in collection.all_objects)
     try:
         if edited:
@@ -163,12 +199,20 @@ def out_of_edit_mode(collections: Sequence[bpy.types.Collection]) -> Iterator[No
 def all_evaluated(collections: Sequence[bpy.types.Collection]) -> Iterator[None]:
     """Show all objects in these collections and leave Rest Position inside the block.
 
-    Some exporters ignore the animation of objects hidden in viewports or renders, or in Rest Position.
+    Some exporters ignore the animation of objects hidden in viewports or renders, or in Rest
+    Position.
     """
-    groups = {group for collection in collections for group in (collection, *collection.children_recursive)}
+    groups = {
+        group
+        for collection in collections
+        for group in (collection, *collection.children_recursive)
+    }
     objects = {obj for collection in collections for obj in collection.all_objects}
     hidden = [(each, each.hide_viewport, each.hide_render) for each in (*groups, *objects)]
-    positions = [(armature, armature.pose_position) for armature in {o.data for o in objects if o.type == "ARMATURE"}]
+    positions = [
+        (armature, armature.pose_position)
+        for armature in {o.data for o in objects if o.type == "ARMATURE"}
+    ]
     try:
         for each, _, _ in hidden:
             each.hide_viewport = each.hide_render = False
@@ -186,10 +230,15 @@ def all_evaluated(collections: Sequence[bpy.types.Collection]) -> Iterator[None]
 def actions_over_scene_range(scene: bpy.types.Scene) -> Iterator[None]:
     """Set the frame range of armatures' actions to that of the scene.
 
-    A person who appears late then does so in a separate file too, and exporters include keys between whole frames.
+    A person who appears late then does so in a separate file too, and exporters include keys
+    between whole frames.
     """
-    moving = [obj.animation_data for obj in scene.objects if obj.type == "ARMATURE" and obj.animation_data]
-    extended = [a for a in {data.action for data in moving} if a is not None and not a.use_frame_range]
+    moving = [
+        obj.animation_data for obj in scene.objects if obj.type == "ARMATURE" and obj.animation_data
+    ]
+    extended = [
+        a for a in {data.action for data in moving} if a is not None and not a.use_frame_range
+    ]
     try:
         for action in extended:
             action.use_frame_range = True
@@ -202,9 +251,11 @@ def actions_over_scene_range(scene: bpy.types.Scene) -> Iterator[None]:
 
 @contextmanager
 def baked_meshes(scene: bpy.types.Scene) -> Iterator[None]:
-    """Replace captured bodies by meshes of their current shape inside the block; expressions stay keys.
+    """Replace captured bodies by meshes of their current shape inside the block; expressions stay
+    keys.
 
-    Other meshes, those of a user's rig, keep their shape keys: these are not coefficients of a shape.
+    Other meshes, those of a user's rig, keep their shape keys: these are not coefficients of a
+    shape.
     """
     meshes = [obj for obj in scene.objects if obj.type == "MESH" and obj.data.shape_keys]
     bodies = [obj for obj in meshes if shape_key_name(0) in obj.data.shape_keys.key_blocks]
@@ -242,7 +293,9 @@ def one_person(
     collections: Sequence[bpy.types.Collection],
     name: str,
 ) -> Iterator[list[bpy.types.Collection]]:
-    """Provide collections with the objects of one person inside the block: those of ``collections`` without others'."""
+    """Provide collections with the objects of one person inside the block: those of ``collections``
+    without others'.
+    """
     others = {obj for other in rigs if other != rig for obj in (other, *other.children_recursive)}
     parts = []
     try:

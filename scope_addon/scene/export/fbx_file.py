@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Correcting an FBX file: lengths in centimetres, the format's own unit, time from zero, and the take's name.
+"""Correcting an FBX file: lengths in centimetres, the format's own unit, time from zero, and the
+take's name.
 
-Unreal interprets lengths as centimetres whatever unit the file states. Blender either writes metres or scales every
-object by 100, which becomes the scale of a skeleton's root. Therefore all lengths in the file are multiplied and no
-object is scaled: vertices and shapes, translations and their curves, the translations in bind matrices, and the lengths
-of cameras.
+Unreal interprets lengths as centimetres whatever unit the file states. Blender either writes metres
+or scales every object by 100, which becomes the scale of a skeleton's root. Therefore all lengths
+in the file are multiplied and no object is scaled: vertices and shapes, translations and their
+curves, the translations in bind matrices, and the lengths of cameras.
 
-Blender's exporter starts at the time of the scene's first frame, which is 1/20 s at frame 1 and 20 frames per second,
-and names the take after the scene. It numbers objects at random and writes the time of day; here both are replaced, so
-that the same motion gives the same file.
+Blender's exporter starts at the time of the scene's first frame, which is 1/20 s at frame 1 and 20
+frames per second, and names the take after the scene. It numbers objects at random and writes the
+time of day; here both are replaced, so that the same motion gives the same file.
 
-The file is read and written with the parser and the encoder of Blender's FBX add-on, which need not be enabled.
+The file is read and written with the parser and the encoder of Blender's FBX add-on, which need not
+be enabled.
 """
 
 from __future__ import annotations
@@ -23,7 +25,8 @@ import numpy as np
 
 from ...errors import OutputError
 
-_Node = Any  # the parser's: id, props, props_type (a letter code for each), and elems, the child nodes
+# the parser's: id, props, props_type (a letter code for each), and elems, the child nodes
+_Node = Any
 
 # The encoder's methods by the letter code of a property's type.
 _ADD = {
@@ -48,12 +51,27 @@ _MATRICES = (b"Matrix", b"Transform", b"TransformLink", b"TransformAssociateMode
 _TRANSLATION = slice(12, 15)  # of a matrix's 16 elements
 _SEPARATOR = b"\0\x01"  # between an object's name and its class
 # The moment that Blender's exporter writes as the file's CreationTime.
-_CREATED = {b"Year": 1970, b"Month": 1, b"Day": 1, b"Hour": 10, b"Minute": 0, b"Second": 0, b"Millisecond": 0}
+_CREATED = {
+    b"Year": 1970,
+    b"Month": 1,
+    b"Day": 1,
+    b"Hour": 10,
+    b"Minute": 0,
+    b"Second": 0,
+    b"Millisecond": 0,
+}
 _FIRST_ID = 1_000_000
 _LIMITS = (b"LocalStart", b"LocalStop", b"ReferenceStart", b"ReferenceStop")
 _LENGTHS = (
     *(b"Lcl Translation", b"Size"),
-    *(b"Position", b"InterestPosition", b"NearPlane", b"FarPlane", b"BackPlaneDistance", b"FocusDistance"),
+    *(
+        b"Position",
+        b"InterestPosition",
+        b"NearPlane",
+        b"FarPlane",
+        b"BackPlaneDistance",
+        b"FocusDistance",
+    ),
 )
 
 
@@ -66,9 +84,13 @@ def correct_fbx(path: Path, take: str) -> None:
     try:
         from io_scene_fbx import encode_bin, parse_fbx  # importable after bpy
     except ImportError as error:
-        raise OutputError("this Blender's FBX add-on cannot write centimetres; export .glb instead") from error
+        raise OutputError(
+            "this Blender's FBX add-on cannot write centimetres; export .glb instead"
+        ) from error
     root, version = parse_fbx.parse(str(path))
-    settings = {p.props[0]: p for node in _below(root, b"GlobalSettings") for p in _properties(node)}
+    settings = {
+        p.props[0]: p for node in _below(root, b"GlobalSettings") for p in _properties(node)
+    }
     factor = settings[b"UnitScaleFactor"].props[-1]  # in centimetres
     if factor != 1.0:
         for name in (b"UnitScaleFactor", b"OriginalUnitScaleFactor"):
@@ -82,8 +104,12 @@ def correct_fbx(path: Path, take: str) -> None:
 
 
 def _start_at_zero(root: _Node) -> None:
-    """Subtract the start of the take from the times of all keys and from the take's limits, in place."""
-    stacks = [node for objects in _below(root, b"Objects") for node in _below(objects, b"AnimationStack")]
+    """Subtract the start of the take from the times of all keys and from the take's limits, in
+    place.
+    """
+    stacks = [
+        node for objects in _below(root, b"Objects") for node in _below(objects, b"AnimationStack")
+    ]
     limits = [p for stack in stacks for p in _properties(stack) if p.props[0] in _LIMITS]
     # The format's own ticks, as the exporter has rounded them; it omits a start at 0.
     ticks = next((limit.props[-1] for limit in limits if limit.props[0] == b"LocalStart"), 0)
@@ -99,7 +125,9 @@ def _start_at_zero(root: _Node) -> None:
 
 def _name_take(root: _Node, name: bytes) -> None:
     """Give the only take and its animation stack a name, in place."""
-    for stack in (node for objects in _below(root, b"Objects") for node in _below(objects, b"AnimationStack")):
+    for stack in (
+        node for objects in _below(root, b"Objects") for node in _below(objects, b"AnimationStack")
+    ):
         stack.props[1] = name + stack.props[1][stack.props[1].index(_SEPARATOR) :]
     for takes in _below(root, b"Takes"):
         for current in _below(takes, b"Current"):
@@ -111,13 +139,23 @@ def _name_take(root: _Node, name: bytes) -> None:
 def _number_objects(root: _Node) -> None:
     """Replace the numbers of the document and the objects by their order in the file, in place."""
     listed = [
-        node for top in _below(root, b"Documents", b"Objects") for node in top.elems if node.props_type[:1] == b"L"
+        node
+        for top in _below(root, b"Documents", b"Objects")
+        for node in top.elems
+        if node.props_type[:1] == b"L"
     ]
     number = {node.props[0]: _FIRST_ID + place for place, node in enumerate(listed)}
     holders: list[tuple[_Node, tuple[int, ...]]] = [(node, (0,)) for node in listed]
     poses = (node for node in listed if node.id == b"Pose")
-    holders += [(n, (0,)) for pose in poses for each in _below(pose, b"PoseNode") for n in _below(each, b"Node")]
-    holders += [(link, (1, 2)) for top in _below(root, b"Connections") for link in _below(top, b"C")]
+    holders += [
+        (n, (0,))
+        for pose in poses
+        for each in _below(pose, b"PoseNode")
+        for n in _below(each, b"Node")
+    ]
+    holders += [
+        (link, (1, 2)) for top in _below(root, b"Connections") for link in _below(top, b"C")
+    ]
     for node, places in holders:
         for place in places:
             node.props[place] = number.get(node.props[place], node.props[place])  # 0 is the scene
@@ -126,7 +164,9 @@ def _number_objects(root: _Node) -> None:
 def _set_creation_time(root: _Node) -> None:
     """Set the time of creation to a fixed one, in place."""
     for header in _below(root, b"FBXHeaderExtension"):
-        for part in (part for stamp in _below(header, b"CreationTimeStamp") for part in stamp.elems):
+        for part in (
+            part for stamp in _below(header, b"CreationTimeStamp") for part in stamp.elems
+        ):
             part.props[0] = _CREATED.get(part.id, part.props[0])
 
 
@@ -156,7 +196,9 @@ def _length_holders(node: _Node, translations: set[int]) -> Iterable[_Node]:
 
 
 def _multiply(node: _Node, factor: float, only: slice = slice(None)) -> None:
-    """Multiply a node's doubles, and the selected elements of its arrays of floats and doubles, in place."""
+    """Multiply a node's doubles, and the selected elements of its arrays of floats and doubles, in
+    place.
+    """
     for index, kind in enumerate(node.props_type.decode()):
         if kind == "D":
             node.props[index] *= factor
@@ -166,7 +208,12 @@ def _multiply(node: _Node, factor: float, only: slice = slice(None)) -> None:
 
 def _translation_curves(root: _Node) -> set[int]:
     """Return the ids of the curve nodes that animate a model's translation, and of their curves."""
-    links = [c.props for node in _below(root, b"Connections") for c in _below(node, b"C") if c.props[0] == b"OP"]
+    links = [
+        c.props
+        for node in _below(root, b"Connections")
+        for c in _below(node, b"C")
+        if c.props[0] == b"OP"
+    ]
     nodes = {link[1] for link in links if link[3] == b"Lcl Translation"}
     return nodes | {link[1] for link in links if link[2] in nodes}
 

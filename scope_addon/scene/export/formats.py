@@ -10,7 +10,14 @@ import os
 import re
 import sys
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, nullcontext, redirect_stderr, redirect_stdout, suppress
+from contextlib import (
+    ExitStack,
+    contextmanager,
+    nullcontext,
+    redirect_stderr,
+    redirect_stdout,
+    suppress,
+)
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +35,8 @@ from .glb_times import corrected_key_times
 
 
 def write_glb(path: Path, camera: bool = False, take: str = "Animation") -> None:
-    """Write the active scene as binary glTF: y up, metres, shape keys as morph targets, all motion in one animation.
+    """Write the active scene as binary glTF: y up, metres, shape keys as morph targets, all motion
+    in one animation.
 
     :param take: name of the animation.
     :raises OutputError: Blender cannot write it.
@@ -58,10 +66,12 @@ def write_glb(path: Path, camera: bool = False, take: str = "Animation") -> None
             export_animations=True,
             export_animation_mode="ACTIVE_ACTIONS",
             export_nla_strips_merged_animation_name=take,
-            export_anim_single_armature=False,  # otherwise Blender 4.2 includes other actions of the file
+            # otherwise Blender 4.2 includes other actions of the file
+            export_anim_single_armature=False,
             export_force_sampling=True,
             export_frame_range=True,
-            export_anim_slide_to_zero=True,  # players start at zero and would wait for the first frame
+            # players start at zero and would wait for the first frame
+            export_anim_slide_to_zero=True,
             export_optimize_animation_size=False,
             # Faster, but it hides all animated objects except the first, which then do not move.
             export_optimize_disable_viewport=len(moving) < 2,
@@ -69,7 +79,8 @@ def write_glb(path: Path, camera: bool = False, take: str = "Animation") -> None
 
 
 def write_fbx(path: Path, camera: bool = False, take: str = "Take") -> None:
-    """Write the active scene as FBX: y up, centimetres, objects at scale 1, no leaf bones, every frame keyed from 0 s.
+    """Write the active scene as FBX: y up, centimetres, objects at scale 1, no leaf bones, every
+    frame keyed from 0 s.
 
     :param take: name of the animation.
     :raises OutputError: Blender cannot write it.
@@ -104,7 +115,8 @@ def write_fbx(path: Path, camera: bool = False, take: str = "Take") -> None:
 
 
 def write_usd(path: Path, camera: bool = False) -> None:
-    """Write the active scene as a USD crate: z up, metres, skeleton, blend shapes, preview materials.
+    """Write the active scene as a USD crate: z up, metres, skeleton, blend shapes, preview
+    materials.
 
     :raises OSError: when the file is incomplete.
     :raises OutputError: Blender cannot write it.
@@ -151,7 +163,9 @@ def write_bvh(path: Path, scene: bpy.types.Scene, rig: bpy.types.Object, unit: s
 
     :param unit: of the file's lengths, ``cm`` or ``m``.
     """
-    path.write_text(bvh.bvh_text(sample_armature(scene, rig), unit), encoding="utf-8", errors="replace")
+    path.write_text(
+        bvh.bvh_text(sample_armature(scene, rig), unit), encoding="utf-8", errors="replace"
+    )
 
 
 def sample_armature(scene: bpy.types.Scene, rig: bpy.types.Object) -> bvh.SampledPose:
@@ -178,7 +192,8 @@ def sample_armature(scene: bpy.types.Scene, rig: bpy.types.Object) -> bvh.Sample
         parents=[names.index(bone.parent.name) if bone.parent else -1 for bone in bones],
         heads=rest_world[:, :3, 3],
         tails=tails,
-        rotations=_unscaled(posed[..., :3, :3]) @ np.swapaxes(_unscaled(rest_world[:, :3, :3]), 1, 2),
+        rotations=_unscaled(posed[..., :3, :3])
+        @ np.swapaxes(_unscaled(rest_world[:, :3, :3]), 1, 2),
         joints=posed[..., :3, 3],
         rate=timing.scene_rate(scene),
     )
@@ -192,7 +207,12 @@ def _unscaled(R: NDArray[np.float64]) -> NDArray[np.float64]:
 @contextmanager
 def _without_deformation(scene: bpy.types.Scene) -> Iterator[None]:
     """Disable mesh deformation while only bones are read; it would take most of the time."""
-    modifiers = [m for obj in scene.objects for m in obj.modifiers if m.type == "ARMATURE" and m.show_viewport]
+    modifiers = [
+        m
+        for obj in scene.objects
+        for m in obj.modifiers
+        if m.type == "ARMATURE" and m.show_viewport
+    ]
     for modifier in modifiers:
         modifier.show_viewport = False
     try:
@@ -203,7 +223,9 @@ def _without_deformation(scene: bpy.types.Scene) -> Iterator[None]:
 
 
 class _NullStream(io.TextIOBase):
-    """A null stream that is never closed, because exporters keep log handlers that outlive the call."""
+    """A null stream that is never closed, because exporters keep log handlers that outlive the
+    call.
+    """
 
     def write(self, text: str) -> int:
         """Discard the text."""
@@ -212,10 +234,11 @@ class _NullStream(io.TextIOBase):
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Suppress the output of Blender's importers and exporters: standard output may carry a machine-readable report.
+    """Suppress the output of Blender's importers and exporters: standard output may carry a
+    machine-readable report.
 
-    Blender prints the traceback of one that fails, and USD what it thinks of it; with SCOPE_TRACEBACK set, standard
-    error is left alone.
+    Blender prints the traceback of one that fails, and USD what it thinks of it; with
+    SCOPE_TRACEBACK set, standard error is left alone.
     """
     shows_errors = bool(os.environ.get("SCOPE_TRACEBACK"))
     errors = nullcontext() if shows_errors else redirect_stderr(_NullStream())
@@ -229,7 +252,8 @@ def quiet() -> Iterator[None]:
 @contextmanager
 def _discarded(number: int) -> Iterator[None]:
     """Discard what is written to a file descriptor."""
-    stream = sys.stdout if number == 1 else sys.stderr  # None where it was closed when Python started
+    # None where it was closed when Python started
+    stream = sys.stdout if number == 1 else sys.stderr
     if stream is not None:
         stream.flush()
     try:
@@ -251,13 +275,17 @@ def _discarded(number: int) -> Iterator[None]:
 
 
 def _flush_c_streams() -> None:
-    """Write what C++ code has printed: without a terminal, it stays in the buffers of C until the program ends."""
+    """Write what C++ code has printed: without a terminal, it stays in the buffers of C until the
+    program ends.
+    """
     with suppress(OSError, AttributeError):
         ctypes.CDLL("ucrtbase" if os.name == "nt" else None).fflush(None)
 
 
 def enable_addon(module: str) -> None:
-    """Enable an exporter or importer that is part of Blender, for this session only, if the user has disabled it."""
+    """Enable an exporter or importer that is part of Blender, for this session only, if the user
+    has disabled it.
+    """
     if not addon_utils.check(module)[1]:
         addon_utils.enable(module, default_set=False)
 
@@ -272,10 +300,13 @@ def call_operator(operator: Any, **settings: Any) -> None:
     try:
         known = operator.get_rna_type().properties.keys()
     except KeyError as error:
-        raise OutputError("this Blender was built without the format; use a build from blender.org") from error
+        raise OutputError(
+            "this Blender was built without the format; use a build from blender.org"
+        ) from error
     try:
         operator(**{name: value for name, value in settings.items() if name in known})
     except RuntimeError as error:
-        if re.search(r"^KeyboardInterrupt\b", str(error), re.MULTILINE):  # Blender converts all exceptions to this one
+        # Blender converts all exceptions to this one
+        if re.search(r"^KeyboardInterrupt\b", str(error), re.MULTILINE):
             raise KeyboardInterrupt from None
         raise

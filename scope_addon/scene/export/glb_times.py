@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Correcting the key times of a binary glTF at frame rates such as 29.97.
 
-Blender's exporter computes the rate as ``fps`` times ``fps_base`` instead of fps / fps_base: 29.97 becomes 30.03, and
-the motion drifts from the footage's sound. Therefore a scene is written at its integer ``fps``, and the times in the
-file are scaled afterwards. (Blender's importer has the same error as its exporter.)
+Blender's exporter computes the rate as ``fps`` times ``fps_base`` instead of fps / fps_base: 29.97
+becomes 30.03, and the motion drifts from the footage's sound. Therefore a scene is written at its
+integer ``fps``, and the times in the file are scaled afterwards. (Blender's importer has the same
+error as its exporter.)
 """
 
 from __future__ import annotations
@@ -40,9 +41,15 @@ def _scale_times(path: Path, factor: float) -> None:
     begin = _HEADER + _CHUNK_HEADER
     gltf = json.loads(data[begin : begin + length])
     binary = bytearray(data[begin + length :])
-    for index in {sampler["input"] for animation in gltf.get("animations", ()) for sampler in animation["samplers"]}:
+    for index in {
+        sampler["input"]
+        for animation in gltf.get("animations", ())
+        for sampler in animation["samplers"]
+    }:
         accessor = gltf["accessors"][index]
-        start = gltf["bufferViews"][accessor["bufferView"]].get("byteOffset", 0) + accessor.get("byteOffset", 0)
+        start = gltf["bufferViews"][accessor["bufferView"]].get("byteOffset", 0) + accessor.get(
+            "byteOffset", 0
+        )
         times = np.frombuffer(binary, "<f4", accessor["count"], _CHUNK_HEADER + start)
         times *= np.float32(factor)
         accessor["min"], accessor["max"] = [float(times.min())], [float(times.max())]

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Checking and naming the files of an export. Free of bpy, so that the command line can check its arguments first."""
+"""Checking and naming the files of an export. Free of bpy, so that the command line can check its
+arguments first.
+"""
 
 from __future__ import annotations
 
@@ -18,18 +20,25 @@ def check_output(path: str | Path, suffixes: tuple[str, ...] = SUFFIXES) -> Path
     """Check that a file of a known format can be written to the path, and return it.
 
     :raises UsageError: when the suffix is unknown, or the path is a folder.
-    :raises OutputError: when the folder is missing or not writable, the name is too long, or the path is a folder or a
-        link into a missing folder.
+    :raises OutputError: when the folder is missing or not writable, the name is too long, or the
+        path is a folder or a link into a missing folder.
     """
     path = Path(path)
     if path.suffix.lower() not in suffixes:
         if path.is_dir():
             known = ", ".join(suffixes)
-            raise UsageError(f"cannot write {path}: it is a folder; name a file in it with one of the suffixes {known}")
-        raise UsageError(f"cannot write '{path.name}': its suffix must be one of {', '.join(suffixes)}")
+            raise UsageError(
+                f"cannot write {path}: it is a folder; name a file in it with one of "
+                f"the suffixes {known}"
+            )
+        raise UsageError(
+            f"cannot write '{path.name}': its suffix must be one of {', '.join(suffixes)}"
+        )
     folder = path.parent
     if not folder.is_dir():
-        raise OutputError(f"cannot write {path}: the folder {folder} does not exist; create it or choose another")
+        raise OutputError(
+            f"cannot write {path}: the folder {folder} does not exist; create it or choose another"
+        )
     try:
         path.lstat()
     except OSError as error:
@@ -39,14 +48,20 @@ def check_output(path: str | Path, suffixes: tuple[str, ...] = SUFFIXES) -> Path
         raise OutputError(f"cannot write {path}: a folder of that name exists; choose another name")
     folder = resolve_link(path).parent
     if not folder.is_dir():
-        raise OutputError(f"cannot write {path}: it is a link into {folder}, which does not exist; choose another name")
+        raise OutputError(
+            f"cannot write {path}: it is a link into {folder}, which does not exist; "
+            "choose another name"
+        )
     if not os.access(folder, os.W_OK):
-        raise OutputError(f"cannot write {path}: the folder {folder} is not writable; choose another folder")
+        raise OutputError(
+            f"cannot write {path}: the folder {folder} is not writable; choose another folder"
+        )
     return path
 
 
 def person_paths(path: str | Path, people: int, separate: bool = False) -> list[Path]:
-    """Return one path per person for formats with one person per file: OUT.bvh, or OUT.person1.bvh, OUT.person2.bvh, …
+    """Return one path per person for formats with one person per file: OUT.bvh, or OUT.person1.bvh,
+    OUT.person2.bvh, …
 
     :param separate: also for the other formats.
     """

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Datablocks that are looked up again at every use: undo may have removed or replaced them since the last one."""
+"""Datablocks that are looked up again at every use: undo may have removed or replaced them since
+the last one.
+"""
 
 from __future__ import annotations
 

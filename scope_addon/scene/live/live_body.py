@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A body that is posed as poses come: the armature and mesh of a capture, without keys.
 
-The armature rests at the shape β⁰ that was known first, because bones can only be moved in Edit Mode, while β settles
-in the first seconds. With δ_i = R_world_model (J_i(β) − J_i(β⁰)), M_i the rest orientation of bone i and Ω_i the
-rotation of joint i, the location channels
+The armature rests at the shape β⁰ that was known first, because bones can only be moved in Edit
+Mode, while β settles in the first seconds. With δ_i = R_world_model (J_i(β) − J_i(β⁰)), M_i the
+rest orientation of bone i and Ω_i the rotation of joint i, the location channels
 
     i > 0:  M_iᵀ (I − R_world_model Ω_i R_world_modelᵀ) δ_i
     root:   pelvis − R_0 R_world_modelᵀ δ_0 − h_0, along the world's axes
 
-make Blender deform the mesh of shape β as SMPL does: bone i maps a vertex v to D_i (v − h_i − δ_i) + joint_i. The
-rotation channels are those of ``character/animation.py``.
+make Blender deform the mesh of shape β as SMPL does: bone i maps a vertex v to D_i (v − h_i − δ_i)
++ joint_i. The rotation channels are those of ``character/animation.py``.
 """
 
 from __future__ import annotations
@@ -33,7 +33,9 @@ _MIN_CHANGE = 0.01  # of a shape coefficient that changes the mesh: less than ha
 
 
 class LiveBody:
-    """The objects of one live capture; they are created by the first pose, and again if something removes them."""
+    """The objects of one live capture; they are created by the first pose, and again if something
+    removes them.
+    """
 
     def __init__(self, scene: bpy.types.Scene, name: str, body: Body) -> None:
         self._scene_uid, self._name, self._body = scene.session_uid, name, body
@@ -52,11 +54,15 @@ class LiveBody:
         return self._betas
 
     def show(
-        self, rotations: NDArray[np.float64], pelvis: NDArray[np.float64], betas: NDArray[np.floating[Any]]
+        self,
+        rotations: NDArray[np.float64],
+        pelvis: NDArray[np.float64],
+        betas: NDArray[np.floating[Any]],
     ) -> bool:
         """Pose the body; return whether it was created for this.
 
-        :param rotations: (K+1, 4) w, x, y, z; the root relative to the world, the others to their parents.
+        :param rotations: (K+1, 4) w, x, y, z; the root relative to the world, the others to their
+            parents.
         :param pelvis: (3,) metres, world.
         :param betas: (P,) shape coefficients, of which Blender can show ±10.
         :raises UsageError: it has to be created, and its scene was removed.
@@ -76,13 +82,16 @@ class LiveBody:
             keys.key_blocks.foreach_set("value", np.array([0.0, *betas], np.float32))  # after Basis
             keys.update_tag()
         values, locations = self._channels(rotations, pelvis)
-        rig.pose.bones.foreach_set("rotation_quaternion", values[self._order].astype(np.float32).ravel())
+        rig.pose.bones.foreach_set(
+            "rotation_quaternion", values[self._order].astype(np.float32).ravel()
+        )
         rig.pose.bones.foreach_set("location", locations[self._order].astype(np.float32).ravel())
         rig.update_tag(refresh={"DATA"})
         return created
 
     def rest_at_shape(self) -> None:
-        """Give the armature the rest pose of the shape that is shown, as a capture has it. The pose stays the same.
+        """Give the armature the rest pose of the shape that is shown, as a capture has it. The pose
+        stays the same.
 
         :raises UsageError: its scene was removed.
         """
@@ -118,7 +127,9 @@ class LiveBody:
         layer.objects.active = active or rig
         vertices = body_mesh.rest_vertices_world(body, rest.lift)
         mesh = body_mesh.build_mesh(f"{self._name}_body", body, vertices, collection)
-        bone_display.show_bones(rig, body, rest, body_mesh.rest_vertices_world(body, rest.lift, betas))
+        bone_display.show_bones(
+            rig, body, rest, body_mesh.rest_vertices_world(body, rest.lift, betas)
+        )
         if body.P:
             shape_keys.add_shape_keys(mesh, body, betas)
         body_mesh.skin_to_armature(mesh, rig, body)
@@ -136,7 +147,9 @@ class LiveBody:
     def _channels(
         self, rotations: NDArray[np.float64], pelvis: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the quaternions (K+1, 4) and locations (K+1, 3) of the bones, in the order of the joints."""
+        """Return the quaternions (K+1, 4) and locations (K+1, 3) of the bones, in the order of the
+        joints.
+        """
         self._shown = rotations, pelvis
         values = rotations.copy()
         values[0] = quaternion_product(_Q_MODEL_WORLD, rotations[0])

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The user's rig, posed as poses come: the retargeting of ``rigs/rig_retarget.py`` for one frame, without keys.
+"""The user's rig, posed as poses come: the retargeting of ``rigs/rig_retarget.py`` for one frame,
+without keys.
 
-What does not depend on the pose is measured once, by posing the rig at rest. IK controls of a Rigify rig are not posed:
-its limbs are switched to FK.
+What does not depend on the pose is measured once, by posing the rig at rest. IK controls of a
+Rigify rig are not posed: its limbs are switched to FK.
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ from ..rigs.rig_probe import SWITCHES, at_rest, probe
 from ..rigs.rig_retarget import RetargetOptions, usable_map
 from .datablocks import found
 
-# The proportions are compared again for such a change of a shape coefficient, but not at every pose while these settle.
+# The proportions are compared again for such a change of a shape coefficient, but not at every pose
+# while these settle.
 _MIN_CHANGE, _MIN_PAUSE_S = 0.05, 0.25
 
 
@@ -35,7 +37,11 @@ class LiveRig:
     """A rig that follows one live capture."""
 
     def __init__(
-        self, rig: bpy.types.Object, body: Body, bone_map: BoneMap, options: RetargetOptions | None = None
+        self,
+        rig: bpy.types.Object,
+        body: Body,
+        bone_map: BoneMap,
+        options: RetargetOptions | None = None,
     ) -> None:
         """Measure the rig at rest.
 
@@ -43,16 +49,27 @@ class LiveRig:
         :raises UsageError: when the rig lacks a mapped bone.
         :raises InputError: when the map cannot be used, or a mapped bone does not move.
         """
-        self._rig, self._body, self._options = (rig.name, rig.session_uid), body, options or RetargetOptions()
+        self._rig, self._body, self._options = (
+            (rig.name, rig.session_uid),
+            body,
+            options or RetargetOptions(),
+        )
         self._map = usable_map(None, body, rig, bone_map)
         self._before = [
-            (bone.name, bone.matrix_basis.copy(), {name: bone[name] for name in SWITCHES if name in bone})
+            (
+                bone.name,
+                bone.matrix_basis.copy(),
+                {name: bone[name] for name in SWITCHES if name in bone},
+            )
             for bone in rig.pose.bones
         ]
         self._position = rig.data.pose_position
         try:
             with at_rest(rig):
-                self._skeleton, place = probe(rig, self._map.parts), np.array(rig.matrix_world, float)
+                self._skeleton, place = (
+                    probe(rig, self._map.parts),
+                    np.array(rig.matrix_world, float),
+                )
         except BaseException:
             self.restore()
             raise
@@ -61,9 +78,12 @@ class LiveRig:
         # The pose is one in the world, so the parent's transform is cancelled.
         self._inverse = np.array(parent_transform(topmost(rig)).inverted_safe(), float)
         self._turn = self._inverse[:3, :3] / np.cbrt(np.linalg.det(self._inverse[:3, :3]))
-        # The location channel is linear in the head's offset. Nothing is inverted for each pose: LAPACK's threads wait.
+        # The location channel is linear in the head's offset. Nothing is inverted for each pose:
+        # LAPACK's threads wait.
         self._rest = self._skeleton.heads[self._root]
-        self._location = root_locations(rig, place, self._skeleton, self._root, self._rest + np.eye(3))
+        self._location = root_locations(
+            rig, place, self._skeleton, self._root, self._rest + np.eye(3)
+        )
         self._names, self._places = list[str](), dict[str, int]()  # of all the rig's bones
         self._transfer: Transfer | None = None
         self._betas, self._due_s = np.zeros(body.P), 0.0
@@ -74,11 +94,15 @@ class LiveRig:
         return found("objects", *self._rig)
 
     def show(
-        self, rotations: NDArray[np.float64], pelvis: NDArray[np.float64], betas: NDArray[np.floating[Any]]
+        self,
+        rotations: NDArray[np.float64],
+        pelvis: NDArray[np.float64],
+        betas: NDArray[np.floating[Any]],
     ) -> None:
         """Pose the rig.
 
-        :param rotations: (K+1, 4) w, x, y, z; the root relative to the world, the others to their parents.
+        :param rotations: (K+1, 4) w, x, y, z; the root relative to the world, the others to their
+            parents.
         :param pelvis: (3,) metres, world.
         :param betas: (P,) shape coefficients.
         """
@@ -94,10 +118,14 @@ class LiveRig:
         turns = basis(self._skeleton, self._turn @ pose.rotations)[0]
         self._write(rig, turns, (heads[0] - self._rest) @ self._location)
 
-    def _write(self, rig: bpy.types.Object, turns: NDArray[np.float64], location: NDArray[np.float64]) -> None:
-        """Set the channels of the mapped bones that still exist, each in its own rotation mode; their scale is 1.
+    def _write(
+        self, rig: bpy.types.Object, turns: NDArray[np.float64], location: NDArray[np.float64]
+    ) -> None:
+        """Set the channels of the mapped bones that still exist, each in its own rotation mode;
+        their scale is 1.
 
-        All at once where possible: setting a property of a single bone has every editor that shows it drawn again.
+        All at once where possible: setting a property of a single bone has every editor that shows
+        it drawn again.
 
         :param turns: (B, 3, 3) of the mapped bones.
         :param location: (3,) of the root bone.
@@ -118,7 +146,8 @@ class LiveRig:
             if (bone := bones[name]).rotation_mode == "QUATERNION":
                 quaternions[place] = values[b]
             else:
-                bone.matrix_basis = Matrix(turns[b].tolist()).to_4x4()  # in the bone's own rotation mode
+                # in the bone's own rotation mode
+                bone.matrix_basis = Matrix(turns[b].tolist()).to_4x4()
         bones.foreach_set("rotation_quaternion", quaternions.ravel())
         bones.foreach_set("location", locations.ravel())
         bones.foreach_set("scale", scales.ravel())
@@ -131,7 +160,9 @@ class LiveRig:
         if self._transfer is None or is_due:
             self._betas, self._due_s = np.array(betas, float), now_s + _MIN_PAUSE_S
             feet, travel = self._options.feet, self._options.travel
-            self._transfer = Transfer(self._body, self._betas, self._skeleton, self._map, feet=feet, travel=travel)
+            self._transfer = Transfer(
+                self._body, self._betas, self._skeleton, self._map, feet=feet, travel=travel
+            )
         return self._transfer
 
     def restore(self) -> None:

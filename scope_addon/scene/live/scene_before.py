@@ -29,7 +29,9 @@ class SceneBefore:
 
     def restore(self) -> None:
         """Restore what still exists."""
-        scene = next((scene for scene in bpy.data.scenes if scene.session_uid == self._scene_uid), None)
+        scene = next(
+            (scene for scene in bpy.data.scenes if scene.session_uid == self._scene_uid), None
+        )
         layer = scene.view_layers.get(self._layer) if scene else None
         if layer is None:
             return
@@ -41,5 +43,9 @@ class SceneBefore:
             obj.select_set(obj.name in self._selected, view_layer=layer)
         layer.objects.active = layer.objects.get(self._active)
         is_shown = layer == bpy.context.view_layer
-        if is_shown and layer.objects.active is not None and layer.objects.active.mode != self._mode:
+        if (
+            is_shown
+            and layer.objects.active is not None
+            and layer.objects.active.mode != self._mode
+        ):
             bpy.ops.object.mode_set(mode=self._mode)

@@ -13,20 +13,28 @@ from numpy.typing import NDArray
 
 from ...errors import UsageError
 from ...retarget.expression_map import ExpressionMap, guess_expression_map
-from ...retarget.face.face_controls import ControlMotion, control_motions, guess_control_map, has_face_controls
+from ...retarget.face.face_controls import (
+    ControlMotion,
+    control_motions,
+    guess_control_map,
+    has_face_controls,
+)
 from ...retarget.face.face_frame import RestBone
 from ..animation_data.actions import Channels, bone_path
 from ..animation_data.transaction import all_or_nothing
 from .face_retarget import CapturedExpressions, key_names
 from .rig_action import channel_of_rotation, leave_tweak_mode, mark_written, override_nla, retire
 
-_STILL = 1e-3  # change of a channel, as a share of the bone's length or in radians, below which it is none
+# change of a channel, as a share of the bone's length or in radians, below which it is none
+_STILL = 1e-3
 _CHANNELS = ("location", "rotation_quaternion", "rotation_axis_angle", "rotation_euler")
 
 
 @dataclass(frozen=True)
 class FaceKeys:
-    """The keys of a face: for each of its ``controls``, channels that are not at rest, with values (1, n) or (T, n)."""
+    """The keys of a face: for each of its ``controls``, channels that are not at rest, with values
+    (1, n) or (T, n).
+    """
 
     frames: NDArray[np.float64]  # (T,)
     controls: dict[str, dict[str, NDArray[np.float64]]]
@@ -38,7 +46,9 @@ def has_bone_face(rig: bpy.types.Object) -> bool:
 
 
 def only_bones_move(rig: bpy.types.Object, meshes: Iterable[bpy.types.Object]) -> bool:
-    """Return whether bones move the face of an armature, and no shape keys of its meshes with names that are known."""
+    """Return whether bones move the face of an armature, and no shape keys of its meshes with names
+    that are known.
+    """
     return has_bone_face(rig) and not guess_expression_map(key_names(meshes)).keys
 
 
@@ -48,12 +58,16 @@ def guess_face_bones(rig: bpy.types.Object) -> ExpressionMap:
 
 
 def retarget_face_bones(
-    captured: CapturedExpressions, rig: bpy.types.Object, expression_map: ExpressionMap, name: str = "Face"
+    captured: CapturedExpressions,
+    rig: bpy.types.Object,
+    expression_map: ExpressionMap,
+    name: str = "Face",
 ) -> bpy.types.Action:
-    """Key the face of a rig so that it shows the captured expressions; its other keys stay as they are.
+    """Key the face of a rig so that it shows the captured expressions; its other keys stay as they
+    are.
 
-    They are written to a copy of the rig's action, or to a new one. Its former action is kept in the file, unless
-    retargeting has written it for the same capture and it was not edited.
+    They are written to a copy of the rig's action, or to a new one. Its former action is kept in
+    the file, unless retargeting has written it for the same capture and it was not edited.
 
     :param name: of the captured armature; the action has it after that of the rig.
     :raises UsageError: when the rig has none of the map's controls.
@@ -69,7 +83,9 @@ def retarget_face_bones(
             slot = getattr(rig.animation_data, "action_slot", None)
             rig.animation_data.action = former.copy()
             if slot is not None:
-                same = (s for s in rig.animation_data.action.slots if s.identifier == slot.identifier)
+                same = (
+                    s for s in rig.animation_data.action.slots if s.identifier == slot.identifier
+                )
                 rig.animation_data.action_slot = next(same)
         action = key_face(rig, keys, name)
         rig.data.pose_position = "POSE"
@@ -80,7 +96,9 @@ def retarget_face_bones(
     return action
 
 
-def face_keys(captured: CapturedExpressions, rig: bpy.types.Object, expression_map: ExpressionMap) -> FaceKeys:
+def face_keys(
+    captured: CapturedExpressions, rig: bpy.types.Object, expression_map: ExpressionMap
+) -> FaceKeys:
     """Return the keys of the rig's controls.
 
     A channel that never moves gets one key, one that stays at rest none.
@@ -92,12 +110,15 @@ def face_keys(captured: CapturedExpressions, rig: bpy.types.Object, expression_m
     bones = rig.data.bones
     if not any(control in bones for control in expression_map.controls):
         raise UsageError(
-            f"'{rig.name}' has none of the controls that the expression map moves; guess the expressions again, or "
+            f"'{rig.name}' has none of the controls that the expression map moves; guess the "
+            "expressions again, or "
             "choose another map"
         )
     rest = {
         bone.name: RestBone(
-            np.array(bone.head_local, float), np.array(bone.matrix_local.to_3x3(), float), bone.use_local_location
+            np.array(bone.head_local, float),
+            np.array(bone.matrix_local.to_3x3(), float),
+            bone.use_local_location,
         )
         for bone in bones
     }
@@ -115,7 +136,9 @@ def key_face(rig: bpy.types.Object, keys: FaceKeys, source: str) -> bpy.types.Ac
     for bone, moved in keys.controls.items():
         for path, values in moved.items():
             interpolation = "CONSTANT" if len(values) == 1 else "LINEAR"
-            channels.write(bone_path(bone, path), keys.frames[: len(values)], values, interpolation, group=bone)
+            channels.write(
+                bone_path(bone, path), keys.frames[: len(values)], values, interpolation, group=bone
+            )
     mark_written(channels.action, source)
     return channels.action
 
@@ -128,13 +151,17 @@ def rest_face(rig: bpy.types.Object, keys: FaceKeys) -> None:
 
 
 def _channels(rig: bpy.types.Object, motion: ControlMotion) -> dict[str, NDArray[np.float64]]:
-    """Return the values (T, n) of a control's channels; (1, n) of those that do not move, and none of those at rest."""
+    """Return the values (T, n) of a control's channels; (1, n) of those that do not move, and none
+    of those at rest.
+    """
     bone, found = rig.pose.bones[motion.bone], []
     if motion.locations is not None:
         found.append(("location", motion.locations, np.zeros(3), _STILL * bone.length))
     if motion.rotations is not None:
         name, values = channel_of_rotation(bone.rotation_mode, motion.rotations)
-        found.append((name, values, channel_of_rotation(bone.rotation_mode, np.eye(3)[None])[1][0], _STILL))
+        found.append(
+            (name, values, channel_of_rotation(bone.rotation_mode, np.eye(3)[None])[1][0], _STILL)
+        )
     out = {}
     for name, values, rest, least in found:
         if np.ptp(values, axis=0).max() >= least:

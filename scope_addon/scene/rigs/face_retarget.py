@@ -21,14 +21,17 @@ from .rig_action import leave_tweak_mode, mark_written, override_nla, retire
 
 @dataclass(frozen=True)
 class CapturedExpressions:
-    """The expressions of a captured person: weights (T, 52) in the order of `EXPRESSIONS`, at scene frames (T,)."""
+    """The expressions of a captured person: weights (T, 52) in the order of `EXPRESSIONS`, at scene
+    frames (T,).
+    """
 
     frames: NDArray[np.float64]
     weights: NDArray[np.float64]
 
 
 def captured_expressions(armature: bpy.types.Object) -> CapturedExpressions | None:
-    """Return the expressions that the captured armature's body shows; None if its face was not captured.
+    """Return the expressions that the captured armature's body shows; None if its face was not
+    captured.
 
     :raises UsageError: their keys are in the NLA.
     """
@@ -40,10 +43,18 @@ def captured_expressions(armature: bpy.types.Object) -> CapturedExpressions | No
             check_not_in_nla(keys)
         curves = {curve.data_path: read_keys(curve).astype(float) for curve in fcurves(keys)}
         found = [curves.get(shape_key_path(name)) for name in EXPRESSIONS]
-        longest = max((keyed[:, 0] for keyed in found if keyed is not None and len(keyed)), key=len, default=np.ones(1))
+        longest = max(
+            (keyed[:, 0] for keyed in found if keyed is not None and len(keyed)),
+            key=len,
+            default=np.ones(1),
+        )
         columns = [
-            np.interp(longest, *keyed.T) if keyed is not None and len(keyed) else np.full(len(longest), block.value)
-            for keyed, block in ((k, keys.key_blocks[name]) for k, name in zip(found, EXPRESSIONS, strict=True))
+            np.interp(longest, *keyed.T)
+            if keyed is not None and len(keyed)
+            else np.full(len(longest), block.value)
+            for keyed, block in (
+                (k, keys.key_blocks[name]) for k, name in zip(found, EXPRESSIONS, strict=True)
+            )
         ]
         return CapturedExpressions(longest, np.stack(columns, axis=1))
     return None
@@ -51,7 +62,9 @@ def captured_expressions(armature: bpy.types.Object) -> CapturedExpressions | No
 
 def faces_of(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
     """Return the meshes with shape keys, one of those that share their data."""
-    found = {obj.data: obj for obj in objects if obj.type == "MESH" and obj.data.shape_keys is not None}
+    found = {
+        obj.data: obj for obj in objects if obj.type == "MESH" and obj.data.shape_keys is not None
+    }
     return list(found.values())
 
 
@@ -69,8 +82,9 @@ def retarget_expressions(
 ) -> list[bpy.types.Action]:
     """Key the shape keys of meshes in new actions so that they show the captured expressions.
 
-    A mesh's former action is kept in the file, unless it is an earlier retargeting of the same capture that was not
-    edited. A key that never moves gets a value without keyframes; sliders whose range ends below 1 are widened to it.
+    A mesh's former action is kept in the file, unless it is an earlier retargeting of the same
+    capture that was not edited. A key that never moves gets a value without keyframes; sliders
+    whose range ends below 1 are widened to it.
 
     :param expression_map: None to guess one for each mesh by the names of its keys.
     :param name: of the captured armature; the actions have it after that of the mesh.
@@ -88,7 +102,8 @@ def retarget_expressions(
     if not any(values for _, values in plans):
         meshes = ", ".join(f"'{face.name}'" for face in faces) or "the rig's meshes"
         raise UsageError(
-            f"no shape key of {meshes} is mapped to an expression; name them as ARKit, VRM or Oculus do, or give a map"
+            f"no shape key of {meshes} is mapped to an expression; name them as ARKit, VRM or "
+            "Oculus do, or give a map"
         )
     written = []
     for face in faces:
@@ -104,7 +119,10 @@ def retarget_expressions(
 
 
 def _write(
-    keys: bpy.types.Key, frames: NDArray[np.float64], values: dict[str, NDArray[np.float64]], source: str
+    keys: bpy.types.Key,
+    frames: NDArray[np.float64],
+    values: dict[str, NDArray[np.float64]],
+    source: str,
 ) -> tuple[bpy.types.Action, bpy.types.Action | None]:
     """Write the keys of one mesh; return the new action and the former one."""
     former = keys.animation_data.action if keys.animation_data else None

@@ -19,9 +19,11 @@ from ..animation_data.retime import Retiming, retime_keys
 from ..animation_data.stored_values import stored_text
 from ..character.animation import on_one_hemisphere
 
-# Custom properties of an action: the checksum of its keys when they were written, and the captured armature's name.
+# Custom properties of an action: the checksum of its keys when they were written, and the captured
+# armature's name.
 _CHECKSUM, _SOURCE = "scope_keys", "scope_keys_of"
-_OFFSETS = {"location": 0.0, "scale": 1.0}  # channels of a bone beside its rotation, and their values at rest
+# channels of a bone beside its rotation, and their values at rest
+_OFFSETS = {"location": 0.0, "scale": 1.0}
 
 
 @dataclass(frozen=True)
@@ -30,7 +32,8 @@ class BoneKeys:
 
     bone: str
     rotations: NDArray[np.float64]  # (T, 3, 3) relative to parent and rest pose
-    locations: NDArray[np.float64] | None = None  # (T, 3) in the axes of the location channel; None: not keyed
+    # (T, 3) in the axes of the location channel; None: not keyed
+    locations: NDArray[np.float64] | None = None
 
     def basis(self, t: int) -> Matrix:
         """Return the bone's ``matrix_basis`` of one frame."""
@@ -56,7 +59,8 @@ def root_locations(
     world = place[:3, :3]
     moved: NDArray[np.float64] = (heads - skeleton.heads[root]) @ np.linalg.inv(world).T
     bone = rig.pose.bones[skeleton.names[root]].bone
-    if bone.use_local_location:  # not by the bone's axes in the world, which a scale of three factors shears
+    # not by the bone's axes in the world, which a scale of three factors shears
+    if bone.use_local_location:
         moved = moved @ np.array(bone.matrix_local.to_3x3(), float)
     return moved
 
@@ -79,10 +83,17 @@ def write_action(
     for key in keys:
         if key.locations is not None:
             channels.write(bone_path(key.bone, "location"), frames, key.locations, group=key.bone)
-    below = {curve.data_path for strip in nla_strips(rig) if strip.action for curve in fcurves_of(strip.action)}
+    below = {
+        curve.data_path
+        for strip in nla_strips(rig)
+        if strip.action
+        for curve in fcurves_of(strip.action)
+    }
     for key in keys:
         for channel, value in _OFFSETS.items():
-            if (path := bone_path(key.bone, channel)) in below and (channel != "location" or key.locations is None):
+            if (path := bone_path(key.bone, channel)) in below and (
+                channel != "location" or key.locations is None
+            ):
                 channels.write(path, frames[:1], np.full((1, 3), value), "CONSTANT", group=key.bone)
     mark_written(action, source)
     return action
@@ -99,14 +110,17 @@ def mark_written(action: bpy.types.Action, source: str = "") -> None:
 
 
 def follow_renaming(names: dict[str, str]) -> None:
-    """Remember the new names of captured armatures, by their former ones, with the actions that have their motion."""
+    """Remember the new names of captured armatures, by their former ones, with the actions that
+    have their motion.
+    """
     for action in bpy.data.actions:
         if action.library is None and (name := names.get(source_of(action))):
             action[_SOURCE] = name
 
 
 def clear_offsets(rig: bpy.types.Object, bones: Iterable[str]) -> None:
-    """Undo what the pose moves and scales bones by; retargeting only turns them, and measured them without it.
+    """Undo what the pose moves and scales bones by; retargeting only turns them, and measured them
+    without it.
 
     Cannot fail.
     """
@@ -122,16 +136,20 @@ def leave_tweak_mode(animated: bpy.types.ID) -> None:
 
 
 def override_nla(animation: bpy.types.AnimData) -> None:
-    """Make the active action replace the NLA tracks below it for its bones, whatever the former action's blending."""
+    """Make the active action replace the NLA tracks below it for its bones, whatever the former
+    action's blending.
+    """
     animation.action_blend_type, animation.action_influence = "REPLACE", 1.0
     for track in animation.nla_tracks:
         track.is_solo = False  # a solo track would silence the action
 
 
 def retire(former: bpy.types.Action | None, source: str) -> None:
-    """Keep the rig's former action in the file, unless it is an earlier retargeting that was not edited.
+    """Keep the rig's former action in the file, unless it is an earlier retargeting that was not
+    edited.
 
-    :param source: name of the captured armature whose motion the rig has now; that of another one is kept.
+    :param source: name of the captured armature whose motion the rig has now; that of another one
+        is kept.
     """
     if former is None:
         return
@@ -156,7 +174,9 @@ def is_retargeted(action: bpy.types.Action) -> bool:
 
 
 def source_of(action: bpy.types.Action) -> str:
-    """Return the name of the captured armature whose motion retargeting has written to the action; empty if unknown."""
+    """Return the name of the captured armature whose motion retargeting has written to the action;
+    empty if unknown.
+    """
     return stored_text(action, _SOURCE)
 
 
@@ -170,7 +190,9 @@ def _checksum(action: bpy.types.Action) -> str:
 
 
 def channel_of_rotation(mode: str, R: NDArray[np.float64]) -> tuple[str, NDArray[np.float64]]:
-    """Return the data path and the values (T, n) of rotations (T, 3, 3) in a bone's rotation mode."""
+    """Return the data path and the values (T, n) of rotations (T, 3, 3) in a bone's rotation
+    mode.
+    """
     if mode == "QUATERNION":
         return "rotation_quaternion", on_one_hemisphere(quaternion_from_matrix(R))
     if mode == "AXIS_ANGLE":
@@ -180,6 +202,10 @@ def channel_of_rotation(mode: str, R: NDArray[np.float64]) -> tuple[str, NDArray
         return "rotation_axis_angle", np.concatenate([2 * np.arctan2(size, q[:, :1]), axis], axis=1)
     values, before = np.empty((len(R), 3)), None
     for t, matrix in enumerate(R):
-        euler = Matrix(matrix.tolist()).to_euler(mode, before) if before else Matrix(matrix.tolist()).to_euler(mode)
+        euler = (
+            Matrix(matrix.tolist()).to_euler(mode, before)
+            if before
+            else Matrix(matrix.tolist()).to_euler(mode)
+        )
         values[t], before = euler, euler
     return "rotation_euler", values

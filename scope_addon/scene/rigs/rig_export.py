@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Exporting the user's own rig: from a rig file, in place of the captured body, or from the scene."""
+"""Exporting the user's own rig: from a rig file, in place of the captured body, or from the
+scene.
+"""
 
 from __future__ import annotations
 
@@ -41,12 +43,13 @@ def export_on_rig(
     options: RigExportOptions,
     footage: Path | None = None,
 ) -> tuple[list[Path], list[str]]:
-    """Retarget every person's motion to a copy of the rig, write one or more files, and leave the session as it was.
+    """Retarget every person's motion to a copy of the rig, write one or more files, and leave the
+    session as it was.
 
     :return: the files written, and the warnings.
     :raises InputError: when the rig cannot be used; see ``load_rig``.
-    :raises UsageError: when the choice of armature is ambiguous, a suffix unknown, or the expression map is not for
-        the rig's meshes.
+    :raises UsageError: when the choice of armature is ambiguous, a suffix unknown, or the
+        expression map is not for the rig's meshes.
     :raises OutputError: when a file cannot be written.
     """
     for path in paths:
@@ -60,31 +63,52 @@ def export_on_rig(
             rig = load_rig(source, result.collection)
             bones = rig_bone_map(source, rig)
             if number == 1 and any(c <= 0.5 for c in bones.confidence.values()):
-                warnings.append(f"the bones of '{rig.name}' were guessed from its rest pose alone; check the result")
+                warnings.append(
+                    f"the bones of '{rig.name}' were guessed from its rest pose alone; "
+                    "check the result"
+                )
             if len(motions) > 1:
                 if travel is None:
-                    travel = common_travel(body, [each.motion.betas for each in result.people], rig, bones)
+                    travel = common_travel(
+                        body, [each.motion.betas for each in result.people], rig, bones
+                    )
                 rig.name = f"{rig.name}_person{number}"
             betas, rate = person.motion.betas, result.frame_rate
             faces = faces_of(with_meshes(rig, bpy.context.scene.objects))
-            retargeting = RetargetOptions(root=options.root, face=_face_of_bones(rig, faces, source), travel=travel)
-            warnings += retarget(person.armature, body, betas, rig, bones, rate, retargeting).warnings
-            warnings += _retarget_face(person.armature, faces, source, bones_move_it=retargeting.face is not None)
-        bpy.data.batch_remove([obj for person in result.people for obj in (person.armature, person.mesh)])
+            retargeting = RetargetOptions(
+                root=options.root, face=_face_of_bones(rig, faces, source), travel=travel
+            )
+            warnings += retarget(
+                person.armature, body, betas, rig, bones, rate, retargeting
+            ).warnings
+            warnings += _retarget_face(
+                person.armature, faces, source, bones_move_it=retargeting.face is not None
+            )
+        bpy.data.batch_remove(
+            [obj for person in result.people for obj in (person.armature, person.mesh)]
+        )
         for path in paths:
             written += export(path, [result.collection], options=options.export)
     return written, warnings
 
 
-def _face_of_bones(rig: bpy.types.Object, faces: Sequence[bpy.types.Object], source: RigSource) -> ExpressionMap | None:
-    """Return the expression map if bones move the rig's face; a guess is made only where no shape keys do."""
+def _face_of_bones(
+    rig: bpy.types.Object, faces: Sequence[bpy.types.Object], source: RigSource
+) -> ExpressionMap | None:
+    """Return the expression map if bones move the rig's face; a guess is made only where no shape
+    keys do.
+    """
     if source.expression_map is not None:
         return source.expression_map if source.expression_map.controls else None
     return guess_face_bones(rig) if only_bones_move(rig, faces) else None
 
 
 def _retarget_face(
-    armature: bpy.types.Object, faces: Sequence[bpy.types.Object], source: RigSource, *, bones_move_it: bool
+    armature: bpy.types.Object,
+    faces: Sequence[bpy.types.Object],
+    source: RigSource,
+    *,
+    bones_move_it: bool,
 ) -> list[str]:
     """Retarget the captured expressions, if there are any, to the rig's meshes; return warnings.
 
@@ -114,12 +138,18 @@ def export_rig(path: Path, rig: bpy.types.Object, options: ExportOptions) -> lis
     """
     action = rig.animation_data.action if rig.animation_data else None
     unit = bpy.context.scene.unit_settings.scale_length
-    options = replace(options, take=options.take or (action.name if action else rig.name), unit=unit)
-    collection, parts = bpy.data.collections.new(rig.name), with_meshes(rig, bpy.context.scene.objects)
+    options = replace(
+        options, take=options.take or (action.name if action else rig.name), unit=unit
+    )
+    collection, parts = (
+        bpy.data.collections.new(rig.name),
+        with_meshes(rig, bpy.context.scene.objects),
+    )
     try:
         for obj in parts:
             below = obj.children_recursive
-            if rig not in below or set(below) <= set(parts):  # a parent of other objects would export them as well
+            # a parent of other objects would export them as well
+            if rig not in below or set(below) <= set(parts):
                 collection.objects.link(obj)
         return export(path, [collection], options=options)
     finally:

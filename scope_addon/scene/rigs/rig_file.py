@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Loading the user's rig from a .blend, .fbx or glTF file: one armature and the meshes that it deforms."""
+"""Loading the user's rig from a .blend, .fbx or glTF file: one armature and the meshes that it
+deforms.
+"""
 
 from __future__ import annotations
 
@@ -20,10 +22,11 @@ from ..export.export_states import temporary_scene
 from .rig_probe import at_rest, probe
 from .rig_retarget import guess_bone_map
 
-# Kinds of datablock that a file or a capture may contain, users before the datablocks that they use. Scenes are removed
-# by ``temporary_scene``.
+# Kinds of datablock that a file or a capture may contain, users before the datablocks that they
+# use. Scenes are removed by ``temporary_scene``.
 _KINDS = (
-    "collections", "objects", "meshes", "armatures", "curves", "cameras", "lights", "metaballs", "lattices", "actions",
+    "collections", "objects", "meshes", "armatures", "curves", "cameras", "lights", "metaballs",
+    "lattices", "actions",
     "materials", "node_groups", "textures", "images", "movieclips", "texts", "worlds", "libraries",
 )  # fmt: skip
 
@@ -54,13 +57,27 @@ def load_rig(source: RigSource, collection: bpy.types.Collection) -> bpy.types.O
 def _check_finite(path: Path, rig: bpy.types.Object) -> None:
     matrices = [rig.matrix_world, *(bone.matrix_local for bone in rig.data.bones)]
     if not all(math.isfinite(value) for matrix in matrices for row in matrix for value in row):
-        raise InputError(f"{path}: bones of '{rig.name}' have positions that are not numbers; export the rig again")
+        raise InputError(
+            f"{path}: bones of '{rig.name}' have positions that are not numbers; "
+            "export the rig again"
+        )
 
 
-def with_meshes(rig: bpy.types.Object, objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
-    """Return the rig, those of the objects that are meshes deformed by it, and the parents of these."""
+def with_meshes(
+    rig: bpy.types.Object, objects: Iterable[bpy.types.Object]
+) -> list[bpy.types.Object]:
+    """Return the rig, those of the objects that are meshes deformed by it, and the parents of
+    these.
+    """
     widgets = {bone.custom_shape for bone in rig.pose.bones}
-    keep = [rig, *(obj for obj in objects if obj.type == "MESH" and obj not in widgets and _moved_by(obj, rig))]
+    keep = [
+        rig,
+        *(
+            obj
+            for obj in objects
+            if obj.type == "MESH" and obj not in widgets and _moved_by(obj, rig)
+        ),
+    ]
     for obj in keep:
         while obj.parent is not None and obj.parent not in keep:
             keep.append(obj.parent)
@@ -71,14 +88,19 @@ def with_meshes(rig: bpy.types.Object, objects: Iterable[bpy.types.Object]) -> l
 def check_rig(source: RigSource, *, fingers: bool = True) -> None:
     """Check, before a capture, that a motion can be retargeted to the rig.
 
-    :param fingers: whether the motion will include fingers; otherwise, those of the rig are not checked.
+    :param fingers: whether the motion will include fingers; otherwise, those of the rig are not
+        checked.
     :raises InputError: when the rig cannot be loaded, or its bones cannot be mapped or rotated.
     :raises UsageError: when the choice of armature is ambiguous, or none has the given name.
     """
     with temporary_datablocks(), temporary_scene("Checking a rig") as scene:
         rig = load_rig(source, scene.collection)
         bones = rig_bone_map(source, rig)
-        moved = {b: part for b, part in bones.parts.items() if fingers or part.partition("_")[2] not in PHALANGES}
+        moved = {
+            b: part
+            for b, part in bones.parts.items()
+            if fingers or part.partition("_")[2] not in PHALANGES
+        }
         with at_rest(rig):
             probe(rig, moved)
 
@@ -91,12 +113,16 @@ def rig_bone_map(source: RigSource, rig: bpy.types.Object) -> BoneMap:
     found = source.bone_map or guess_bone_map(rig)
     missing = [name for name in found.parts if name not in rig.data.bones]
     if missing:
-        raise InputError(f"{source.path}: the bone map's '{missing[0]}' is not a bone of '{rig.name}'; correct the map")
+        raise InputError(
+            f"{source.path}: the bone map's '{missing[0]}' is not a bone of "
+            f"'{rig.name}'; correct the map"
+        )
     try:
         found.check()
     except InputError as error:
         raise InputError(
-            f"{source.path}: the bone map of '{rig.name}' could not be guessed ({error}); give one with --bone-map"
+            f"{source.path}: the bone map of '{rig.name}' could not be guessed ({error}); give one "
+            "with --bone-map"
         ) from error
     return found
 
@@ -116,7 +142,9 @@ def _append(path: Path) -> list[bpy.types.Object]:
         with formats.quiet(), bpy.data.libraries.load(str(path), link=False) as (there, here):
             here.objects = list(there.objects)
     except (OSError, RuntimeError) as error:
-        raise InputError(f"{path}: Blender cannot read this file; save it again or choose another") from error
+        raise InputError(
+            f"{path}: Blender cannot read this file; save it again or choose another"
+        ) from error
     return [obj for obj in here.objects if obj is not None]
 
 
@@ -127,13 +155,20 @@ def _import(path: Path) -> list[bpy.types.Object]:
             if path.suffix.lower() == ".fbx":
                 formats.enable_addon("io_scene_fbx")
                 formats.call_operator(
-                    bpy.ops.import_scene.fbx, filepath=str(path), use_anim=False, ignore_leaf_bones=False
+                    bpy.ops.import_scene.fbx,
+                    filepath=str(path),
+                    use_anim=False,
+                    ignore_leaf_bones=False,
                 )
             else:
                 formats.enable_addon("io_scene_gltf2")
-                formats.call_operator(bpy.ops.import_scene.gltf, filepath=str(path), disable_bone_shape=True)
+                formats.call_operator(
+                    bpy.ops.import_scene.gltf, filepath=str(path), disable_bone_shape=True
+                )
     except Exception as error:  # importers written in Python raise any exception on a damaged file
-        raise InputError(f"{path}: Blender cannot import this file; export it again or choose another") from error
+        raise InputError(
+            f"{path}: Blender cannot import this file; export it again or choose another"
+        ) from error
     return [obj for obj in bpy.data.objects if obj.session_uid not in before]
 
 
@@ -145,16 +180,22 @@ def _choose(path: Path, rigs: list[bpy.types.Object], name: str) -> bpy.types.Ob
     :raises UsageError: when there are several, or none has that name.
     """
     if not rigs:
-        raise InputError(f"{path}: there is no armature in this file; choose the file that holds your rig")
+        raise InputError(
+            f"{path}: there is no armature in this file; choose the file that holds your rig"
+        )
     rigs = sorted(rigs, key=lambda rig: rig.name)
     names = ", ".join(f"'{rig.name}'" for rig in rigs)
     if name:
         for rig in rigs:
             if rig.name == name:
                 return rig
-        raise UsageError(f"{path} has no armature '{name}', only {names}; give one of them with --rig-object")
+        raise UsageError(
+            f"{path} has no armature '{name}', only {names}; give one of them with --rig-object"
+        )
     if len(rigs) > 1:
-        raise UsageError(f"{path} has {len(rigs)} armatures, {names}; choose one with --rig-object NAME")
+        raise UsageError(
+            f"{path} has {len(rigs)} armatures, {names}; choose one with --rig-object NAME"
+        )
     return rigs[0]
 
 

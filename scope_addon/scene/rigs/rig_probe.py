@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measuring how the bones of a rig move together, by posing the rig itself.
 
-Each mapped bone is rotated once, and the other bones are observed. Constraints, such as those of Rigify's controls,
-therefore need no special treatment, and no frame of an animation has to be evaluated.
+Each mapped bone is rotated once, and the other bones are observed. Constraints, such as those of
+Rigify's controls, therefore need no special treatment, and no frame of an animation has to be
+evaluated.
 """
 
 from __future__ import annotations
@@ -22,8 +23,10 @@ from ..character.root_object import root_object, topmost
 
 # Rigify's properties: limbs by FK, neck and head with the chest.
 SWITCHES = ("IK_FK", "neck_follow", "head_follow")
-_CARRIER_TOLERANCE = 0.02  # of a head's position relative to its carrier, as a share of their distance
-_MIN_RESPONSE = 0.1  # change of a rotation matrix's entries; the probe changes them by more than 0.3
+# of a head's position relative to its carrier, as a share of their distance
+_CARRIER_TOLERANCE = 0.02
+# change of a rotation matrix's entries; the probe changes them by more than 0.3
+_MIN_RESPONSE = 0.1
 _CHECKED_FRAMES, _MAX_DEVIATION = 5, np.radians(20)
 
 
@@ -31,24 +34,35 @@ def probe(rig: bpy.types.Object, parts: dict[str, str]) -> Skeleton:
     """Measure the mapped bones at rest and their dependencies; the rig must be ``at_rest``.
 
     :param parts: bone name -> body part.
-    :raises InputError: when a bone does not rotate, the pelvis does not move, or the rig's scale is 0.
+    :raises InputError: when a bone does not rotate, the pelvis does not move, or the rig's scale is
+        0.
     """
     names = list(parts)
     rest = _matrices(rig, names)
     if min(map(abs, rig.matrix_world.to_scale())) < 1e-9:
-        raise InputError(f"'{rig.name}' is scaled to 0; give it a size (S, or Scale in the sidebar)")
+        raise InputError(
+            f"'{rig.name}' is scaled to 0; give it a size (S, or Scale in the sidebar)"
+        )
     follows, carried = _dependencies(rig, parts, rest)
-    _check_root_moves(rig, next((bone for bone, part in parts.items() if part == "pelvis"), names[0]))
+    _check_root_moves(
+        rig, next((bone for bone, part in parts.items() if part == "pelvis"), names[0])
+    )
     order: list[int] = []
     while rows := [b for b in range(len(names)) if b not in order]:
-        above = {b: sum(a not in order for a in np.flatnonzero(follows[b] | carried[b])) for b in rows}
+        above = {
+            b: sum(a not in order for a in np.flatnonzero(follows[b] | carried[b])) for b in rows
+        }
         order.append(min(rows, key=above.__getitem__))
     parents, carriers = (_nearest(above[np.ix_(order, order)]) for above in (follows, carried))
     carriers = np.where(carriers < 0, parents, carriers)
     matrices = rest[order]
-    ends = matrices[:, :3, 3] + matrices[:, :3, 1] * [[rig.pose.bones[names[b]].length] for b in order]
+    ends = matrices[:, :3, 3] + matrices[:, :3, 1] * [
+        [rig.pose.bones[names[b]].length] for b in order
+    ]
     ordered = [names[b] for b in order]
-    return Skeleton(ordered, parents, carriers, matrices[:, :3, 3], ends, _rotations(matrices), _floor(rig))
+    return Skeleton(
+        ordered, parents, carriers, matrices[:, :3, 3], ends, _rotations(matrices), _floor(rig)
+    )
 
 
 def _dependencies(
@@ -57,14 +71,16 @@ def _dependencies(
     """Rotate each bone and observe the others.
 
     :param rest: (B, 4, 4) bones to world at rest.
-    :return: (B, B) whether the row's bone rotates with the column's, and whether its head moves with it.
+    :return: (B, B) whether the row's bone rotates with the column's, and whether its head moves
+        with it.
     """
     names = list(parts)
     follows = np.zeros((len(names), len(names)), bool)
     carried = follows.copy()
     heads = rest[:, :3, 3]
     for group in _independent(parts):
-        for k, a in enumerate(group):  # with different angles, to distinguish which bone another one follows
+        # with different angles, to distinguish which bone another one follows
+        for k, a in enumerate(group):
             turn = Quaternion((0.6, 0.48, 0.64), 0.5 + 0.15 * k)
             rig.pose.bones[names[a]].matrix_basis = turn.to_matrix().to_4x4()
         posed = _matrices(rig, names)
@@ -75,8 +91,12 @@ def _dependencies(
             follows[:, a] = np.abs(turned - turned[a]).max(axis=(1, 2)) < 0.02
             away = heads - heads[a]
             expected = away @ turned[a].T
-            off, moved = (np.linalg.norm(expected - now, axis=1) for now in (posed[:, :3, 3] - heads[a], away))
-            carried[:, a] = (off < _CARRIER_TOLERANCE * np.linalg.norm(away, axis=1)) & (off < moved)
+            off, moved = (
+                np.linalg.norm(expected - now, axis=1) for now in (posed[:, :3, 3] - heads[a], away)
+            )
+            carried[:, a] = (off < _CARRIER_TOLERANCE * np.linalg.norm(away, axis=1)) & (
+                off < moved
+            )
             follows[a, a] = carried[a, a] = False
     return follows, carried
 
@@ -100,23 +120,35 @@ def _nearest(above: NDArray[np.bool_]) -> NDArray[np.intp]:
 
 
 def _floor(rig: bpy.types.Object) -> float:
-    """Return the height of the floor: the rig's origin if the rig rests near it, otherwise its lowest bone."""
+    """Return the height of the floor: the rig's origin if the rig rests near it, otherwise its
+    lowest bone.
+    """
     deforming = [bone for bone in rig.data.bones if bone.use_deform] or rig.data.bones
-    lowest = min((rig.matrix_world @ end).z for bone in deforming for end in (bone.head_local, bone.tail_local))
+    lowest = min(
+        (rig.matrix_world @ end).z
+        for bone in deforming
+        for end in (bone.head_local, bone.tail_local)
+    )
     origin = rig.matrix_world.translation.z
     return float(origin if abs(lowest - origin) < 0.3 else lowest)
 
 
 def _check_rotated(rig: bpy.types.Object, names: list[str], turned: NDArray[np.float64]) -> None:
-    """Check that the probe rotated these bones; other bones at rest would seem to follow one that did not.
+    """Check that the probe rotated these bones; other bones at rest would seem to follow one that
+    did not.
 
     :param turned: (B, 3, 3) the rotation of each of these bones.
     :raises InputError: when one did not rotate.
     """
-    blocked = [name for name, R in zip(names, turned, strict=True) if np.abs(R - np.eye(3)).max() < _MIN_RESPONSE]
+    blocked = [
+        name
+        for name, R in zip(names, turned, strict=True)
+        if np.abs(R - np.eye(3)).max() < _MIN_RESPONSE
+    ]
     if blocked:
         raise InputError(
-            f"'{blocked[0]}' of '{rig.name}' does not move when it is rotated: show the rig in the viewport, mute the "
+            f"'{blocked[0]}' of '{rig.name}' does not move when it is rotated: show the rig in the "
+            "viewport, mute the "
             "constraint or driver that controls the bone, or remove it from the list"
         )
 
@@ -128,17 +160,21 @@ def _check_root_moves(rig: bpy.types.Object, name: str) -> None:
     """
     bone, rest = rig.pose.bones[name], _matrices(rig, [name])
     bone.matrix_basis = Matrix.Translation((bone.length,) * 3)
-    moved = np.linalg.norm(np.linalg.solve(np.array(rig.matrix_world), _matrices(rig, [name]) - rest)[0, :3, 3])
+    moved = np.linalg.norm(
+        np.linalg.solve(np.array(rig.matrix_world), _matrices(rig, [name]) - rest)[0, :3, 3]
+    )
     bone.matrix_basis = Matrix()
     if moved > 0.1 * bone.length:
         return
     if bone.bone.use_connect:
         raise InputError(
-            f"'{name}' of '{rig.name}' is connected to '{bone.parent.name}' and cannot move away from it: in Edit "
+            f"'{name}' of '{rig.name}' is connected to '{bone.parent.name}' and cannot move away "
+            "from it: in Edit "
             "Mode, disconnect the bone (Alt P)"
         )
     raise InputError(
-        f"'{name}' of '{rig.name}' does not move when its location changes: mute the constraint or driver that "
+        f"'{name}' of '{rig.name}' does not move when its location changes: mute the constraint or "
+        "driver that "
         "controls the bone, or choose another one for the pelvis in the list"
     )
 
@@ -146,7 +182,8 @@ def _check_root_moves(rig: bpy.types.Object, name: str) -> None:
 def blocked_bones(
     rig: bpy.types.Object, names: list[str], turns: NDArray[np.float64], wanted: NDArray[np.float64]
 ) -> list[str]:
-    """Return warnings about bones that deviate from the motion although they can be rotated, such as a leg with IK.
+    """Return warnings about bones that deviate from the motion although they can be rotated, such
+    as a leg with IK.
 
     :param names: of the B bones.
     :param turns: (T, B, 3, 3) rotations of the channels.
@@ -162,9 +199,12 @@ def blocked_bones(
     blocked = [name for name, angle in zip(names, off, strict=True) if angle > _MAX_DEVIATION]
     if not blocked:
         return []
-    others = {1: "", 2: f" and '{blocked[-1]}'"}.get(len(blocked), f" and {len(blocked) - 1} other bones")
+    others = {1: "", 2: f" and '{blocked[-1]}'"}.get(
+        len(blocked), f" and {len(blocked) - 1} other bones"
+    )
     return [
-        f"'{blocked[0]}'{others} of '{rig.name}' cannot follow the motion: mute the constraints or drivers that "
+        f"'{blocked[0]}'{others} of '{rig.name}' cannot follow the motion: mute the constraints or "
+        "drivers that "
         "control them, such as IK, or put the bones that control them into the list"
     ]
 
@@ -185,7 +225,8 @@ def _rotations(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @contextmanager
 def at_rest(rig: bpy.types.Object) -> Iterator[None]:
-    """Evaluate the rig without animation, pose and root object, with limbs switched to FK, inside the block.
+    """Evaluate the rig without animation, pose and root object, with limbs switched to FK, inside
+    the block.
 
     Everything is restored except the switches and Edit Mode.
     """
@@ -204,7 +245,8 @@ class _RigState:
 
     def __init__(self, rig: bpy.types.Object) -> None:
         self._rig = rig
-        self._shown = bpy.context.scene.collection.objects  # this collection cannot be hidden or excluded
+        # this collection cannot be hidden or excluded
+        self._shown = bpy.context.scene.collection.objects
         self._hidden, self._linked = rig.hide_viewport, rig in self._shown.values()
         self._position = rig.data.pose_position
         self._animation = rig.animation_data

@@ -34,7 +34,15 @@ from ..character.root_object import (
 )
 from .face_bones import face_keys, key_face, rest_face
 from .face_retarget import captured_expressions
-from .rig_action import BoneKeys, clear_offsets, leave_tweak_mode, override_nla, retire, root_locations, write_action
+from .rig_action import (
+    BoneKeys,
+    clear_offsets,
+    leave_tweak_mode,
+    override_nla,
+    retire,
+    root_locations,
+    write_action,
+)
 from .rig_probe import at_rest, blocked_bones, probe
 from .rigify_ik import ik_keys
 
@@ -47,8 +55,10 @@ class RetargetOptions:
 
     feet: bool = True  # place the feet where the body's are
     root: str = "bone"  # where the root motion goes: one of ``ROOTS``
-    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)  # metres, of the rig from the captured person
-    face: ExpressionMap | None = None  # of the bones that move the rig's face; None: it keeps its pose
+    # metres, of the rig from the captured person
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    # of the bones that move the rig's face; None: it keeps its pose
+    face: ExpressionMap | None = None
     travel: float | None = None  # scale of positions on the floor; None: the ratio of leg lengths
 
     def __post_init__(self) -> None:
@@ -64,7 +74,9 @@ class RetargetOptions:
 
 @dataclass(frozen=True)
 class RetargetResult:
-    """The result of ``retarget``: the rig's new action, warnings for the user, and the scale of positions."""
+    """The result of ``retarget``: the rig's new action, warnings for the user, and the scale of
+    positions.
+    """
 
     action: bpy.types.Action
     warnings: list[str]
@@ -90,14 +102,18 @@ def guess_bone_map(rig: bpy.types.Object) -> BoneMap:
     if not bones:
         raise InputError(f"'{rig.name}' has no bones; choose another armature as the rig")
     names = [bone.name for bone in bones]
-    parents = np.array([names.index(bone.parent.name) if bone.parent else -1 for bone in bones], int)
+    parents = np.array(
+        [names.index(bone.parent.name) if bone.parent else -1 for bone in bones], int
+    )
     heads = np.array([rig.matrix_world @ bone.head_local for bone in bones]).reshape(-1, 3)
     found = guess(RestBones(names, parents, heads))
     is_by_name = max(found.confidence.values(), default=0.0) > 0.5
     if not is_by_name or rig.matrix_world.determinant() >= 0.0:
         return found
     # The rig is mirrored: what its bones call left is on its right.
-    return BoneMap({bone: _other_side(part) for bone, part in found.parts.items()}, found.confidence)
+    return BoneMap(
+        {bone: _other_side(part) for bone, part in found.parts.items()}, found.confidence
+    )
 
 
 def _other_side(part: str) -> str:
@@ -115,16 +131,19 @@ def retarget(
     rate: float,
     options: RetargetOptions | None = None,
 ) -> RetargetResult:
-    """Key the mapped bones of ``rig`` in a new action so that it moves like the captured ``source``.
+    """Key the mapped bones of ``rig`` in a new action so that it moves like the captured
+    ``source``.
 
-    The rig's former action is kept in the file, unless it is an earlier retargeting of the same capture that was not
-    edited. Fingers and face keep their pose if they were not captured. The rig leaves Edit Mode, Rest Position and its
-    NLA's Tweak Mode, in which it would not move. Its NLA tracks are kept, below the new action, and its mapped bones
-    lose what the pose moves or scales them by.
+    The rig's former action is kept in the file, unless it is an earlier retargeting of the same
+    capture that was not edited. Fingers and face keep their pose if they were not captured. The rig
+    leaves Edit Mode, Rest Position and its NLA's Tweak Mode, in which it would not move. Its NLA
+    tracks are kept, below the new action, and its mapped bones lose what the pose moves or scales
+    them by.
 
     :param betas: (P,) shape coefficients of the captured person.
     :param rate: scene frames per second.
-    :raises UsageError: when the rig is the source, or lacks a mapped bone or all controls of the face.
+    :raises UsageError: when the rig is the source, or lacks a mapped bone or all controls of the
+        face.
     :raises InputError: when a map cannot be used, or a mapped bone does not move.
     """
     options = options or RetargetOptions()
@@ -132,7 +151,11 @@ def retarget(
     clip, frames = read_clip(source, body, rate)
     clip = clip_as_displayed(source, clip, frames)
     captured = captured_expressions(source) if options.face is not None else None
-    face = face_keys(captured, rig, options.face) if captured is not None and options.face is not None else None
+    face = (
+        face_keys(captured, rig, options.face)
+        if captured is not None and options.face is not None
+        else None
+    )
     leave_tweak_mode(rig)
     with all_or_nothing(bpy.context.scene, rig, topmost(rig)):
         with at_rest(rig):
@@ -141,13 +164,21 @@ def retarget(
             one_floor = not source.get("scope_uneven_ground", False)
             travel = options.travel or leg_ratio(body, betas, skeleton, bone_map)
             pose = Transfer(
-                body, betas, skeleton, bone_map, feet=options.feet, one_floor=one_floor, travel=travel
+                body,
+                betas,
+                skeleton,
+                bone_map,
+                feet=options.feet,
+                one_floor=one_floor,
+                travel=travel,
             ).pose(clip)
             motion = _placed(source, clip, skeleton, place, pose, root, options)
             turns = basis(skeleton, motion.rotations)
             warnings = blocked_bones(rig, skeleton.names, turns, motion.rotations)
             keys = [BoneKeys(name, turns[:, b]) for b, name in enumerate(skeleton.names)]
-            keys[root] = replace(keys[root], locations=root_locations(rig, place, skeleton, root, motion.heads))
+            keys[root] = replace(
+                keys[root], locations=root_locations(rig, place, skeleton, root, motion.heads)
+            )
             keys += ik_keys(rig, keys)
         former = rig.animation_data.action if rig.animation_data else None
         action = write_action(rig, keys, frames, source.name)
@@ -165,11 +196,16 @@ def retarget(
 
 
 def common_travel(
-    body: Body, people_betas: Sequence[NDArray[np.floating[Any]]], rig: bpy.types.Object, bone_map: BoneMap
+    body: Body,
+    people_betas: Sequence[NDArray[np.floating[Any]]],
+    rig: bpy.types.Object,
+    bone_map: BoneMap,
 ) -> float:
-    """Return the scale of positions for several people on copies of one rig: by their mean leg length.
+    """Return the scale of positions for several people on copies of one rig: by their mean leg
+    length.
 
-    With a scale of their own each, people who stand side by side would move apart or into each other.
+    With a scale of their own each, people who stand side by side would move apart or into each
+    other.
 
     :param people_betas: (P,) shape coefficients of each person.
     :raises UsageError: when the rig lacks a mapped bone.
@@ -182,7 +218,9 @@ def common_travel(
     return len(ratios) / sum(1.0 / ratio for ratio in ratios)
 
 
-def usable_map(source: bpy.types.Object | None, body: Body, rig: bpy.types.Object, bone_map: BoneMap) -> BoneMap:
+def usable_map(
+    source: bpy.types.Object | None, body: Body, rig: bpy.types.Object, bone_map: BoneMap
+) -> BoneMap:
     """Return the bone map without the parts that the body lacks.
 
     :param source: the captured armature, if there is one.
@@ -191,11 +229,17 @@ def usable_map(source: bpy.types.Object | None, body: Body, rig: bpy.types.Objec
     """
     bone_map.check()
     if rig == source or rig.type != "ARMATURE":
-        raise UsageError("the rig must be an armature, and not the captured one; choose another armature")
+        raise UsageError(
+            "the rig must be an armature, and not the captured one; choose another armature"
+        )
     missing = [name for name in bone_map.parts if name not in rig.pose.bones]
     if missing:
-        raise UsageError(f"'{rig.name}' has no bone '{missing[0]}'; guess the bones again or correct the list")
-    return BoneMap({bone: part for bone, part in bone_map.parts.items() if part in body.joint_names})
+        raise UsageError(
+            f"'{rig.name}' has no bone '{missing[0]}'; guess the bones again or correct the list"
+        )
+    return BoneMap(
+        {bone: part for bone, part in bone_map.parts.items() if part in body.joint_names}
+    )
 
 
 def _placed(
@@ -207,7 +251,8 @@ def _placed(
     root: int,
     options: RetargetOptions,
 ) -> _PlacedMotion:
-    """Apply the transform of the captured armature, the user's offset and the choice of root motion.
+    """Apply the transform of the captured armature, the user's offset and the choice of root
+    motion.
 
     :param place: (4, 4) the rig's object to world at rest.
     :param root: index of the root bone.
@@ -230,8 +275,8 @@ def _with_source_transform(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
     """Apply the position and rotation of the captured armature in the scene.
 
-    The trajectory of a root object is included in the motion already, but not the transform of its parent. The scale of
-    the armature does not affect the rig.
+    The trajectory of a root object is included in the motion already, but not the transform of its
+    parent. The scale of the armature does not affect the rig.
 
     :param rotations: (T, B, 3, 3) bone to world.
     :param heads: (T, 3) metres.
@@ -245,11 +290,16 @@ def _with_source_transform(
 
 
 def _set_parent(rig: bpy.types.Object, frames: NDArray[np.float64], motion: _PlacedMotion) -> None:
-    """Parent the rig to a root object that follows the trajectory, or remove a former root object."""
+    """Parent the rig to a root object that follows the trajectory, or remove a former root
+    object.
+    """
     top = topmost(rig)
     if motion.trajectory is None:
         remove_root_object(rig)
     else:
         top = parent_to_root_object(rig, frames, *motion.trajectory)
-    if top.parent is not None:  # the keys are in world coordinates, so the parent's transform is cancelled
-        top.matrix_parent_inverse = top.matrix_parent_inverse @ parent_transform(top).inverted_safe()
+    # the keys are in world coordinates, so the parent's transform is cancelled
+    if top.parent is not None:
+        top.matrix_parent_inverse = (
+            top.matrix_parent_inverse @ parent_transform(top).inverted_safe()
+        )

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keys for the IK controls of a generated Rigify rig, so that its IK limbs show the same pose as its FK limbs.
+"""Keys for the IK controls of a generated Rigify rig, so that its IK limbs show the same pose as
+its FK limbs.
 
-Every control of the IK layer gets the transform of its FK counterpart. Blender's IK solver starts from the keyed pose
-of the chain, and stretches the chain's bones where it has to move them. The middle bone, which is no control, is keyed
-as well: the chain then begins at its goal and stays as it is. That bone is a hinge about its X axis, so the base is
-rolled to put both bones of the limb into the hinge's plane. The pole target lies where the solver does not turn it.
+Every control of the IK layer gets the transform of its FK counterpart. Blender's IK solver starts
+from the keyed pose of the chain, and stretches the chain's bones where it has to move them. The
+middle bone, which is no control, is keyed as well: the chain then begins at its goal and stays as
+it is. That bone is a hinge about its X axis, so the base is rolled to put both bones of the limb
+into the hinge's plane. The pole target lies where the solver does not turn it.
 """
 
 from __future__ import annotations
@@ -37,7 +39,8 @@ class _Limb:
 
 
 def ik_keys(rig: bpy.types.Object, keys: list[BoneKeys]) -> list[BoneKeys]:
-    """Return the keys of the IK controls; none for other rigs, and for limbs of which an FK control has no keys.
+    """Return the keys of the IK controls; none for other rigs, and for limbs of which an FK control
+    has no keys.
 
     The rig must be ``at_rest``; it is left posed.
 
@@ -69,7 +72,9 @@ def ik_keys(rig: bpy.types.Object, keys: list[BoneKeys]) -> list[BoneKeys]:
 
 
 def _shown_at_the_mouse(count: int) -> Iterator[int]:
-    """Yield the frames, and show them at the mouse: Blender evaluates the whole rig twice for each, seconds in all."""
+    """Yield the frames, and show them at the mouse: Blender evaluates the whole rig twice for each,
+    seconds in all.
+    """
     manager = bpy.context.window_manager
     manager.progress_begin(0, count)
     try:
@@ -90,18 +95,30 @@ def _limbs(rig: bpy.types.Object) -> list[_Limb]:
                 tuple(f"{name}_fk.{side}" for name in names),
                 tuple(f"{'MCH-' if name == middle else ''}{name}_ik.{side}" for name in names),
                 f"{base}_ik_target.{side}",
-                tuple(name for name in (f"{end}_spin_ik.{side}", f"{end}_heel_ik.{side}") if name in bones),
+                tuple(
+                    name
+                    for name in (f"{end}_spin_ik.{side}", f"{end}_heel_ik.{side}")
+                    if name in bones
+                ),
             )
             switch = bones.get(f"{base}_parent.{side}")
-            if switch is not None and "IK_FK" in switch and {*limb.fk, *limb.ik, limb.pole} <= set(bones.keys()):
+            if (
+                switch is not None
+                and "IK_FK" in switch
+                and {*limb.fk, *limb.ik, limb.pole} <= set(bones.keys())
+            ):
                 found.append(limb)
     return found
 
 
 def _moved(rig: bpy.types.Object, control: str, fk: str) -> Matrix:
-    """Return the pose of a bone that has moved as its FK counterpart has; both may rest in different orientations."""
+    """Return the pose of a bone that has moved as its FK counterpart has; both may rest in
+    different orientations.
+    """
     bones = rig.data.bones
-    return rig.pose.bones[fk].matrix @ bones[fk].matrix_local.inverted() @ bones[control].matrix_local
+    return (
+        rig.pose.bones[fk].matrix @ bones[fk].matrix_local.inverted() @ bones[control].matrix_local
+    )
 
 
 def _match(rig: bpy.types.Object, control: str, fk: str, bases: dict[str, list[Matrix]]) -> None:
@@ -110,17 +127,24 @@ def _match(rig: bpy.types.Object, control: str, fk: str, bases: dict[str, list[M
 
 
 def _hinge(rig: bpy.types.Object, limb: _Limb, bases: dict[str, list[Matrix]]) -> None:
-    """Pose the base and the middle bone so that both point as their FK counterparts do, and place the pole target.
+    """Pose the base and the middle bone so that both point as their FK counterparts do, and place
+    the pole target.
 
-    With L the rest pose of the middle bone relative to the base, and y the bones' direction, the hinge angle b solves
-    yᵀ L Rx(b) y = cos of the limb's angle. Of both solutions, the one with the smaller roll of the base is taken.
+    With L the rest pose of the middle bone relative to the base, and y the bones' direction, the
+    hinge angle b solves yᵀ L Rx(b) y = cos of the limb's angle. Of both solutions, the one with the
+    smaller roll of the base is taken.
     """
     bones = rig.data.bones
     base = _moved(rig, limb.ik[0], limb.fk[0])
     shin = base.inverted() @ _moved(rig, limb.ik[1], limb.fk[1])
     wanted = np.array(shin.to_3x3().normalized().col[1])
-    L = np.array((bones[limb.ik[0]].matrix_local.inverted() @ bones[limb.ik[1]].matrix_local).to_3x3())
-    middle, spread = np.arctan2(L[1, 2], L[1, 1]), np.arccos(np.clip(wanted[1] / np.hypot(L[1, 1], L[1, 2]), -1, 1))
+    L = np.array(
+        (bones[limb.ik[0]].matrix_local.inverted() @ bones[limb.ik[1]].matrix_local).to_3x3()
+    )
+    middle, spread = (
+        np.arctan2(L[1, 2], L[1, 1]),
+        np.arccos(np.clip(wanted[1] / np.hypot(L[1, 1], L[1, 2]), -1, 1)),
+    )
     found = []
     for bend in (middle + spread, middle - spread):
         has = L @ (0.0, np.cos(bend), np.sin(bend))
@@ -136,10 +160,21 @@ def _hinge(rig: bpy.types.Object, limb: _Limb, bases: dict[str, list[Matrix]]) -
     _place_pole(rig, limb, base, bases)
 
 
-def _place_pole(rig: bpy.types.Object, limb: _Limb, base: Matrix, bases: dict[str, list[Matrix]]) -> None:
-    """Place the pole target before the middle joint, where the base's axis points that the solver turns towards it."""
+def _place_pole(
+    rig: bpy.types.Object, limb: _Limb, base: Matrix, bases: dict[str, list[Matrix]]
+) -> None:
+    """Place the pole target before the middle joint, where the base's axis points that the solver
+    turns towards it.
+    """
     posed = rig.pose.bones
-    angle = next((c.pole_angle for c in posed[limb.ik[1]].constraints if c.type == "IK" and c.pole_subtarget), 0.0)
+    angle = next(
+        (
+            c.pole_angle
+            for c in posed[limb.ik[1]].constraints
+            if c.type == "IK" and c.pole_subtarget
+        ),
+        0.0,
+    )
     axis = np.array(base.to_3x3()) @ (np.cos(angle), 0.0, np.sin(angle))
     first, middle, last = (np.array(posed[name].head) for name in limb.fk[:3])
     line = last - first
@@ -153,8 +188,14 @@ def _place_pole(rig: bpy.types.Object, limb: _Limb, base: Matrix, bases: dict[st
 def _set(rig: bpy.types.Object, name: str, matrix: Matrix, bases: dict[str, list[Matrix]]) -> None:
     """Pose a control at a matrix in the armature's space, and append its channels to ``bases``."""
     bone, above = rig.pose.bones[name], rig.pose.bones[name].parent
-    matrices = {"parent_matrix": above.matrix, "parent_matrix_local": above.bone.matrix_local} if above else {}
-    bone.matrix_basis = bone.bone.convert_local_to_pose(matrix, bone.bone.matrix_local, invert=True, **matrices)
+    matrices = (
+        {"parent_matrix": above.matrix, "parent_matrix_local": above.bone.matrix_local}
+        if above
+        else {}
+    )
+    bone.matrix_basis = bone.bone.convert_local_to_pose(
+        matrix, bone.bone.matrix_local, invert=True, **matrices
+    )
     bases.setdefault(name, []).append(bone.matrix_basis.copy())
 
 

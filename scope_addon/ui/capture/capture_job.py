@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A capture, from the button to the finished scene. ``step`` advances it and never waits for the worker.
+"""A capture, from the button to the finished scene. ``step`` advances it and never waits for the
+worker.
 
 The modal operator calls ``step`` on a timer; scripts and tests call it in a loop.
 """
@@ -65,7 +66,9 @@ class CaptureJob:
             # Blender 4.2 has no such attribute; its Python is isolated as well.
             python = python or [sys.executable, *getattr(bpy.app, "python_args", ("-I",))]
             folder = self._cache.new_job_folder()
-            self._worker = WorkerProcess(self._request, folder, self._cache.kernels, python, START_SCRIPT)
+            self._worker = WorkerProcess(
+                self._request, folder, self._cache.kernels, python, START_SCRIPT
+            )
 
     @property
     def worker(self) -> WorkerProcess | None:
@@ -92,7 +95,8 @@ class CaptureJob:
         if self._captured is None:
             self._listen()
             return True
-        if not self._building:  # built in the next step, so that the panel can show this stage first
+        # built in the next step, so that the panel can show this stage first
+        if not self._building:
             self._building = True
             self.progress.update(BUILDING, 0, 0)
             return True
@@ -112,7 +116,9 @@ class CaptureJob:
                 self._show_preview(message)
             elif message["event"] == "result":
                 self._result, self._result_s = message, time.monotonic()
-        if self._result is None or (self._worker.alive and time.monotonic() - self._result_s < _ENDING_S):
+        if self._result is None or (
+            self._worker.alive and time.monotonic() - self._result_s < _ENDING_S
+        ):
             return  # its files are moved once they are closed
         self._worker.wait(0.0)
         self._captured = self._cache.keep(
@@ -169,7 +175,9 @@ def build_capture(
     store_motions(result, [content for _, content in contents], body)
     if options.frame_rate == "keep" and len(motions[0]) > 1:
         warnings += rate_warnings(result.frame_rate, float(motions[0].mocap_framerate))
-    report = dict(report, warnings=[display_text(warning) for warning in warnings + result.warnings])
+    report = dict(
+        report, warnings=[display_text(warning) for warning in warnings + result.warnings]
+    )
     show_result(result.collection.scope_result, footage, report, result)
     scene.scope.capture = result.collection
     return result
@@ -178,8 +186,8 @@ def build_capture(
 def capture_request(scene: bpy.types.Scene) -> JobRequest:
     """Make the request to the worker from the scene's settings and the preferences.
 
-    :raises UsageError: the scene is linked, no footage, calibration or body file is chosen, or the captured part is
-        empty.
+    :raises UsageError: the scene is linked, no footage, calibration or body file is chosen, or the
+        captured part is empty.
     :raises VideoError: the footage does not exist.
     """
     settings = scene.scope
@@ -209,7 +217,10 @@ def chosen_values(scene: bpy.types.Scene) -> dict[str, Any]:
     if values["body"] == "file":
         path = settings.body_file or (chosen.body_file if chosen else "")
         if not path:
-            raise UsageError("no body file is chosen; choose one here or in the preferences, or use the built-in body")
+            raise UsageError(
+                "no body file is chosen; choose one here or in the preferences, or "
+                "use the built-in body"
+            )
         values["body"] = bpy.path.abspath(path)
     return values
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that choose footage, capture it in the background and cancel, and the state of the running job."""
+"""Operators that choose footage, capture it in the background and cancel, and the state of the
+running job.
+"""
 
 from __future__ import annotations
 
@@ -120,7 +122,11 @@ class SCOPE_OT_capture(JobOperator):
 
     def start(self, context: bpy.types.Context) -> bool:
         """Start the job; return whether that worked."""
-        state.message, state.scene_uid, state.started = "", context.scene.session_uid, time.monotonic()
+        state.message, state.scene_uid, state.started = (
+            "",
+            context.scene.session_uid,
+            time.monotonic(),
+        )
         # Imported here: it loads numba and numpy, which would slow down the start of Blender.
         try:
             from .capture_job import CaptureJob
@@ -136,7 +142,9 @@ class SCOPE_OT_capture(JobOperator):
         return True
 
     def step(self, context: bpy.types.Context) -> set[str] | None:
-        """Advance the job, and show its progress; return None while it is running, and then the outcome."""
+        """Advance the job, and show its progress; return None while it is running, and then the
+        outcome.
+        """
         job = state.job
         assert job is not None
         outcome = self._advance()
@@ -146,11 +154,14 @@ class SCOPE_OT_capture(JobOperator):
             delay_s = now_s - self._drawn_s
             self._pause_s = 5.0 * delay_s if delay_s > 1.5 * self.timer_s else DRAWN_EVERY_S
         is_due = shown[0] != self._shown[0] or now_s - self._drawn_s >= self._pause_s
-        # Drawing costs time in which Blender does not react: without a graphics card 0.1 s, and more on a busy machine.
+        # Drawing costs time in which Blender does not react: without a graphics card 0.1 s, and
+        # more on a busy machine.
         if shown != self._shown and is_due:
             self._shown, self._drawn_s, self._pause_s = shown, now_s, 0.0
             context.workspace.status_text_set(
-                iface_("Scope: {progress}   (Esc over the Scope panel to cancel)", progress=progress)
+                iface_(
+                    "Scope: {progress}   (Esc over the Scope panel to cancel)", progress=progress
+                )
             )
             redraw_sidebars()
         return outcome
@@ -227,7 +238,9 @@ class SCOPE_OT_keep_capturing(bpy.types.Operator):
 
 
 class SCOPE_PT_stop_capture(bpy.types.Panel):
-    """The question before a capture that has run for a while is stopped. Escape closes it, and the capture goes on."""
+    """The question before a capture that has run for a while is stopped. Escape closes it, and the
+    capture goes on.
+    """
 
     bl_idname = "SCOPE_PT_stop_capture"
     bl_space_type = "VIEW_3D"
@@ -254,7 +267,9 @@ class SCOPE_PT_stop_capture(bpy.types.Panel):
 
 
 def ask_to_stop() -> None:
-    """Open the question. In Blender's own, its Cancel beside our answer would leave open what is cancelled."""
+    """Open the question. In Blender's own, its Cancel beside our answer would leave open what is
+    cancelled.
+    """
     bpy.ops.wm.call_panel(name=SCOPE_PT_stop_capture.bl_idname, keep_open=False)
 
 

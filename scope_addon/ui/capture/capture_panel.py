@@ -76,7 +76,9 @@ class SCOPE_PT_capture(Tab, bpy.types.Panel):
             draw_text(context, layout.box(), state.message, "ERROR")
 
 
-def _draw_progress(context: bpy.types.Context, layout: bpy.types.UILayout, progress: JobProgress) -> None:
+def _draw_progress(
+    context: bpy.types.Context, layout: bpy.types.UILayout, progress: JobProgress
+) -> None:
     layout.progress(text=f"{100 * progress.fraction:.0f} %", factor=progress.fraction)
     if icon := preview_picture.icon_id():
         layout.template_icon(icon_value=icon, scale=10.0)
@@ -188,7 +190,8 @@ def _draw_frame_rate(context: bpy.types.Context, layout: bpy.types.UILayout) -> 
     was = keyed_for(scene)
     if was:
         text = iface_(
-            "The scene's frame rate was changed from {was:.5g} to {now:.5g}, which changed the motion's speed; "
+            "The scene's frame rate was changed from {was:.5g} to {now:.5g}, which changed the "
+            "motion's speed; "
             "importing an FBX file does that",
             was=was,
             now=scene.render.fps / scene.render.fps_base,
@@ -234,10 +237,16 @@ class SCOPE_PT_figures(Tab, bpy.types.Panel):
         _draw_figures(context, self.layout, context.scene.scope.result)
 
 
-def _draw_figures(context: bpy.types.Context, layout: bpy.types.UILayout, result: bpy.types.PropertyGroup) -> None:
-    """Draw footage, people, frames and error. A .blend file written by the command line has no figures."""
+def _draw_figures(
+    context: bpy.types.Context, layout: bpy.types.UILayout, result: bpy.types.PropertyGroup
+) -> None:
+    """Draw footage, people, frames and error. A .blend file written by the command line has no
+    figures.
+    """
     column = layout.column(align=True)
-    column.label(text=display_text(Path(result.footage).name) or result.collection.name, icon="FILE_MOVIE")
+    column.label(
+        text=display_text(Path(result.footage).name) or result.collection.name, icon="FILE_MOVIE"
+    )
     people = people_of(result.collection)
     column.label(
         text=people_text(len(people)) if people else "The captured person was deleted",
@@ -246,7 +255,9 @@ def _draw_figures(context: bpy.types.Context, layout: bpy.types.UILayout, result
     if not result.frames:
         return
     seconds = result.frames / result.frames_per_second if result.frames_per_second else 0.0
-    frames = iface_("{count} frame" if result.frames == 1 else "{count} frames", count=result.frames)
+    frames = iface_(
+        "{count} frame" if result.frames == 1 else "{count} frames", count=result.frames
+    )
     if seconds:
         from ...job.progress.job_progress import duration
 
@@ -256,16 +267,22 @@ def _draw_figures(context: bpy.types.Context, layout: bpy.types.UILayout, result
         error = iface_("Reprojection error {pixels:.1f} px", pixels=result.reprojection_px)
         draw_text(context, column, error, "CON_CAMERASOLVER")
         if result.sigma_cm > 0.0:
-            sigma = iface_("Joints ± {sigma:.1f} cm (standard deviation, median)", sigma=result.sigma_cm)
+            sigma = iface_(
+                "Joints ± {sigma:.1f} cm (standard deviation, median)", sigma=result.sigma_cm
+            )
             draw_text(context, column, sigma, "EMPTY_ARROWS")
         if result.heights:
             draw_text(context, column, iface_("Height {heights}", heights=result.heights), "USER")
         draw_text(context, column, iface_("Lens: {lens}", lens=result.camera), "CAMERA_DATA")
     if result.execution:
-        draw_text(context, column, iface_("Networks on {processor}", processor=result.execution), "MEMORY")
+        draw_text(
+            context, column, iface_("Networks on {processor}", processor=result.execution), "MEMORY"
+        )
 
 
-def _draw_warning(context: bpy.types.Context, box: bpy.types.UILayout, warning: bpy.types.PropertyGroup) -> None:
+def _draw_warning(
+    context: bpy.types.Context, box: bpy.types.UILayout, warning: bpy.types.PropertyGroup
+) -> None:
     """Draw a warning, and for each of its spans a button that goes to the first frame."""
     draw_text(context, box, warning.text, "ERROR")
     if warning.spans:
@@ -276,7 +293,9 @@ def _draw_warning(context: bpy.types.Context, box: bpy.types.UILayout, warning: 
 
 
 def first_frame(span: str) -> int | None:
-    """Return the first frame of a span: 12 of ``12-18``, -3 of ``-3-4``; None if the text is none."""
+    """Return the first frame of a span: 12 of ``12-18``, -3 of ``-3-4``; None if the text is
+    none.
+    """
     found = re.fullmatch(r"(-?\d{1,7})(--?\d{1,7})?", span, re.ASCII)
     return int(found.group(1)) if found else None
 
@@ -288,15 +307,28 @@ def _split(layout: bpy.types.UILayout) -> bpy.types.UILayout:
     return layout
 
 
-def draw_text(context: bpy.types.Context, layout: bpy.types.UILayout, text: str, icon: str = "NONE") -> None:
+def draw_text(
+    context: bpy.types.Context, layout: bpy.types.UILayout, text: str, icon: str = "NONE"
+) -> None:
     """Draw a sentence, wrapped to the width of the sidebar."""
     import textwrap  # not while Blender starts
 
     scale = context.preferences.system.ui_scale
-    width = max(20, int((context.region.width / scale - 60) / _PIXELS_PER_CHARACTER)) if context.region else 40
+    width = (
+        max(20, int((context.region.width / scale - 60) / _PIXELS_PER_CHARACTER))
+        if context.region
+        else 40
+    )
     column = layout.column(align=True)
     for index, line in enumerate(textwrap.wrap(text, width)):
         column.label(text=line, icon=icon if index == 0 or icon == "NONE" else "BLANK1")
 
 
-CLASSES = (SCOPE_PT_capture, SCOPE_PT_person, SCOPE_PT_scene, SCOPE_PT_result, SCOPE_PT_warnings, SCOPE_PT_figures)
+CLASSES = (
+    SCOPE_PT_capture,
+    SCOPE_PT_person,
+    SCOPE_PT_scene,
+    SCOPE_PT_result,
+    SCOPE_PT_warnings,
+    SCOPE_PT_figures,
+)

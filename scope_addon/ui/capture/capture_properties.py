@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The settings that the panel shows, stored with each scene, and results, stored with each capture's collection."""
+"""The settings that the panel shows, stored with each scene, and results, stored with each
+capture's collection.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +45,8 @@ class SCOPE_PG_result(bpy.types.PropertyGroup):
     frames: IntProperty()
     valid_frames: IntProperty()
     reprojection_px: FloatProperty()
-    sigma_cm: FloatProperty()  # standard deviation of the joints' positions, median; 0 where it is not known
+    # standard deviation of the joints' positions, median; 0 where it is not known
+    sigma_cm: FloatProperty()
     heights: StringProperty()  # of the people, such as "1.74 m ± 0.09"
     frames_per_second: FloatProperty()
     footage_rate: FloatProperty()  # frames per second of the footage; 0 for a picture
@@ -61,15 +64,24 @@ class SCOPE_PG_result(bpy.types.PropertyGroup):
 
 @with_options(Place.PANEL)
 class SCOPE_PG_settings(bpy.types.PropertyGroup):
-    """The settings of a capture: the footage, the declared options of the panel, and the capture that is shown."""
+    """The settings of a capture: the footage, the declared options of the panel, and the capture
+    that is shown.
+    """
 
-    footage: StringProperty(subtype="FILE_PATH", options=PATH_OPTIONS, update=_clear_message, **_FOOTAGE)
+    footage: StringProperty(
+        subtype="FILE_PATH", options=PATH_OPTIONS, update=_clear_message, **_FOOTAGE
+    )
     footage_text: path_text("footage", **_FOOTAGE)
     capture: PointerProperty(
-        name="Capture", type=bpy.types.Collection, description="Capture whose result the panel shows"
+        name="Capture",
+        type=bpy.types.Collection,
+        description="Capture whose result the panel shows",
     )
     capture_index: IntProperty(
-        name="Capture", get=shown_index, set=show_index, description="Capture whose result the panel shows"
+        name="Capture",
+        get=shown_index,
+        set=show_index,
+        description="Capture whose result the panel shows",
     )
     no_result: PointerProperty(type=SCOPE_PG_result)  # stays empty
 
@@ -91,6 +103,8 @@ def attach() -> None:
 
 
 def detach() -> None:
-    """Remove the settings and results; their values stay in a .blend file until it is saved without the extension."""
+    """Remove the settings and results; their values stay in a .blend file until it is saved without
+    the extension.
+    """
     del bpy.types.Scene.scope
     del bpy.types.Collection.scope_result

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The captures of a scene: its collections with a capture's mark, each of which stores its own result.
+"""The captures of a scene: its collections with a capture's mark, each of which stores its own
+result.
 
-The result is stored with the collection, so it is saved, undone, appended, linked, renamed and deleted with it.
+The result is stored with the collection, so it is saved, undone, appended, linked, renamed and
+deleted with it.
 """
 
 from __future__ import annotations
@@ -19,18 +21,24 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 CAPTURE = "scope_capture"  # custom property that ``scene.build`` gives to a capture's collection
-# Widths in pixels at a scale of 1: what surrounds a row of the list in the sidebar, an icon, and what the text may be.
+# Widths in pixels at a scale of 1: what surrounds a row of the list in the sidebar, an icon, and
+# what the text may be.
 _AROUND, _ICON, _DEFAULT_WIDTH = 62.0, 22.0, 260.0
-_PADDING, _WIDE = 10.0, 340.0  # of a text; of a sidebar with room for the words beside the number of people
+# of a text; of a sidebar with room for the words beside the number of people
+_PADDING, _WIDE = 10.0, 340.0
 
 
 def captures_of(scene: bpy.types.Scene) -> list[bpy.types.Collection]:
     """Return the captures of a scene, the last added last."""
-    return [collection for collection in scene.collection.children_recursive if CAPTURE in collection]
+    return [
+        collection for collection in scene.collection.children_recursive if CAPTURE in collection
+    ]
 
 
 def shown_capture(scene: bpy.types.Scene) -> bpy.types.Collection | None:
-    """Return the capture that is selected in the list; the last one if the selected one was removed."""
+    """Return the capture that is selected in the list; the last one if the selected one was
+    removed.
+    """
     found = captures_of(scene)
     if scene.scope.capture in found:
         chosen: bpy.types.Collection = scene.scope.capture
@@ -49,9 +57,11 @@ def people_text(count: int) -> str:
 
 
 def shown_index(settings: bpy.types.PropertyGroup) -> int:
-    """Return the shown capture's index among the file's collections; -1 if there is none. Blender's list asks for it.
+    """Return the shown capture's index among the file's collections; -1 if there is none. Blender's
+    list asks for it.
 
-    The index changes with every collection that is added, removed or renamed; the stored pointer does not.
+    The index changes with every collection that is added, removed or renamed; the stored pointer
+    does not.
     """
     shown = shown_capture(settings.id_data)
     return next((index for index, each in enumerate(bpy.data.collections) if each == shown), -1)
@@ -65,12 +75,20 @@ def show_index(settings: bpy.types.PropertyGroup, index: int) -> None:
 
 
 def _make_active(capture: bpy.types.Collection) -> None:
-    """Make a person of the shown capture active, so that the sections below act on what is shown."""
+    """Make a person of the shown capture active, so that the sections below act on what is
+    shown.
+    """
     context = bpy.context
     layer = context.view_layer
-    people = [person for person in people_of(capture) if layer is not None and is_in_layer(layer, person)]
+    people = [
+        person for person in people_of(capture) if layer is not None and is_in_layer(layer, person)
+    ]
     active = layer.objects.active if people else None
-    if not people or captured_armature(context) in people or (active is not None and active.mode != "OBJECT"):
+    if (
+        not people
+        or captured_armature(context) in people
+        or (active is not None and active.mode != "OBJECT")
+    ):
         return
     for obj in context.selected_objects:
         obj.select_set(False)
@@ -79,7 +97,8 @@ def _make_active(capture: bpy.types.Collection) -> None:
 
 
 def elided(text: str, width: float, measure: Callable[[str], float]) -> str:
-    """Return a text that fits into a width, without its middle if need be: the beginning and end tell names apart.
+    """Return a text that fits into a width, without its middle if need be: the beginning and end
+    tell names apart.
 
     :param measure: returns the width of a text.
     """
@@ -110,10 +129,13 @@ class SCOPE_OT_show_capture(bpy.types.Operator):
     name: StringProperty(name="Name", description="Name of the capture's collection")
 
     @classmethod
-    def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
+    def description(
+        cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties
+    ) -> str:
         """Return the whole name, which the list may have no room for, and where to change it.
 
-        Blender opens the text field of an entry on a double click, and hands a button no second click.
+        Blender opens the text field of an entry on a double click, and hands a button no second
+        click.
         """
         return f"{properties.name}\n{tip_('Rename it with Object > Motion Capture > Rename Take')}"
 
@@ -140,7 +162,8 @@ class SCOPE_UL_captures(bpy.types.UIList):
         _settings: bpy.types.PropertyGroup,
         _active_property: str,
     ) -> None:
-        """Draw one capture: its name, its people, and whether it has warnings; grey without an armature.
+        """Draw one capture: its name, its people, and whether it has warnings; grey without an
+        armature.
 
         A name that is too long is drawn without its middle, and whole in its tooltip.
         """
@@ -161,7 +184,9 @@ class SCOPE_UL_captures(bpy.types.UIList):
         else:
             cell = row.row(align=True)
             cell.alignment = "LEFT"
-            cell.operator("scope.show_capture", text=name, translate=False, emboss=False, icon=icon).name = item.name
+            cell.operator(
+                "scope.show_capture", text=name, translate=False, emboss=False, icon=icon
+            ).name = item.name
         details = row.row(align=True)
         details.label(text=text, translate=False, icon="OUTLINER_OB_ARMATURE" if people else "NONE")
         details.label(text="", icon="ERROR" if people and len(result.warnings) else "BLANK1")
@@ -169,7 +194,9 @@ class SCOPE_UL_captures(bpy.types.UIList):
     def filter_items(
         self, context: bpy.types.Context, data: bpy.types.BlendData, property_name: str
     ) -> tuple[list[int], list[int]]:
-        """Show only the captures of the scene, and of these the ones whose name contains the typed filter."""
+        """Show only the captures of the scene, and of these the ones whose name contains the typed
+        filter.
+        """
         shown, typed = captures_of(context.scene), self.filter_name.lower()
         flags = [
             self.bitflag_filter_item if each in shown and typed in each.name.lower() else 0
@@ -184,7 +211,13 @@ def draw_captures(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
     if count > 1:
         rows = {"rows": min(count, 3), "maxrows": 5, "sort_lock": True}
         layout.template_list(
-            "SCOPE_UL_captures", "", bpy.data, "collections", context.scene.scope, "capture_index", **rows
+            "SCOPE_UL_captures",
+            "",
+            bpy.data,
+            "collections",
+            context.scene.scope,
+            "capture_index",
+            **rows,
         )
 
 

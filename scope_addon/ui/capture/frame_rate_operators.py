@@ -22,7 +22,8 @@ DRIFT_WARNING = "the background image drifts"
 
 
 def rate_warnings(scene_rate: float, rate: float, what: str = "footage") -> list[str]:
-    """Return the warning that a scene keeps another frame rate than a motion has, and where its keys lie, if so.
+    """Return the warning that a scene keeps another frame rate than a motion has, and where its
+    keys lie, if so.
 
     :param scene_rate: frames per second of the scene.
     :param rate: frames per second of the motion; 0 for a still image.
@@ -34,7 +35,8 @@ def rate_warnings(scene_rate: float, rate: float, what: str = "footage") -> list
     is_whole = apart > 1.5 and abs(apart - round(apart)) < _WHOLE
     lie = f"are {round(apart)} frames apart" if is_whole else "lie between frames"
     return [
-        f"{RATE_WARNING} {scene_rate:.5g} frames/s, the {what} has {rate:.5g}: keys {lie}; Match Frame Rate changes "
+        f"{RATE_WARNING} {scene_rate:.5g} frames/s, the {what} has {rate:.5g}: keys {lie}; Match "
+        "Frame Rate changes "
         "the scene's rate and moves them"
     ]
 
@@ -46,9 +48,11 @@ def differs(scene: bpy.types.Scene) -> bool:
 
 
 def keyed_for(scene: bpy.types.Scene) -> float:
-    """Return the frame rate that the shown capture was keyed for, if the scene has another one since; otherwise 0.
+    """Return the frame rate that the shown capture was keyed for, if the scene has another one
+    since; otherwise 0.
 
-    Blender's importer of FBX files, for example, sets the scene's frame rate, which changes the speed of all keys.
+    Blender's importer of FBX files, for example, sets the scene's frame rate, which changes the
+    speed of all keys.
     """
     now = scene.render.fps / scene.render.fps_base
     capture = shown_capture(scene)
@@ -57,23 +61,31 @@ def keyed_for(scene: bpy.types.Scene) -> float:
 
 
 class SCOPE_OT_match_frame_rate(ReportingOperator):
-    """Set the scene to the motion's frame rate. Captures keep their speed, other animation keeps its frames"""
+    """Set the scene to the motion's frame rate. Captures keep their speed, other animation keeps
+    its frames
+    """
 
     bl_idname = "scope.match_frame_rate"
     bl_label = "Match Frame Rate"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Require a capture with a frame rate, and that everything to move is stored in this file."""
+        """Require a capture with a frame rate, and that everything to move is stored in this
+        file.
+        """
         scene = context.scene
         if scene.scope.result.footage_rate <= 0:
             cls.poll_message_set(tip_("The scene contains no captured video or imported motion"))
             return False
-        linked = next((block for block in [scene, *captured_people(context)] if _library(block)), None)
+        linked = next(
+            (block for block in [scene, *captured_people(context)] if _library(block)), None
+        )
         library = _library(linked) if linked is not None else None
         if linked is not None and library is not None:
             name, file = linked.name, library.filepath
-            cls.poll_message_set(tip_("'{name}' is linked from {file}: make it local", name=name, file=file))
+            cls.poll_message_set(
+                tip_("'{name}' is linked from {file}: make it local", name=name, file=file)
+            )
             return False
         return True
 
@@ -101,7 +113,8 @@ class SCOPE_OT_match_frame_rate(ReportingOperator):
         _update_results(scene, rate, keyed, warnings)
         if other_animation(scene, people, rigs):
             return rpt_(
-                "The scene has {rate:.5g} frames/s; animation that was not captured plays {factor:.3g} times as fast",
+                "The scene has {rate:.5g} frames/s; animation that was not captured plays "
+                "{factor:.3g} times as fast",
                 rate=rate,
                 factor=rate / former,
             )
@@ -138,7 +151,10 @@ def _update_results(
     from ...scene.match_rate import retimed_spans
 
     for collection in scene.collection.children_recursive:
-        result, person = collection.scope_result, next((p for p in keyed if holds(collection, p)), None)
+        result, person = (
+            collection.scope_result,
+            next((p for p in keyed if holds(collection, p)), None),
+        )
         if person is None:
             continue
         shown = result.warnings
@@ -148,7 +164,9 @@ def _update_results(
             elif shown[index].spans:
                 shown[index].spans = retimed_spans(shown[index].spans, person, rate, keyed[person])
         if not person.get("scope_resampled"):  # which has keys on every frame
-            for text in rate_warnings(rate, result.footage_rate, "footage" if result.footage else "motion"):
+            for text in rate_warnings(
+                rate, result.footage_rate, "footage" if result.footage else "motion"
+            ):
                 shown.add().text = sentence(text)
     for text in dict.fromkeys(warnings):
         scene.scope.result.warnings.add().text = sentence(text)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What captures of footage and live captures share in Blender's window: a job that a timer advances, until it ends."""
+"""What captures of footage and live captures share in Blender's window: a job that a timer
+advances, until it ends.
+"""
 
 from __future__ import annotations
 
@@ -12,10 +14,14 @@ from ..view.sidebar import is_over_tab, redraw_sidebars_twice
 
 
 class JobOperator(bpy.types.Operator):
-    """An operator that starts a job, and continues on a timer while Blender stays usable. Not registered."""
+    """An operator that starts a job, and continues on a timer while Blender stays usable. Not
+    registered.
+    """
 
     timer_s: float  # between two steps
-    job_state: Any  # with the running ``job``, whose ``cancelled`` is set by the operator that cancels, and ``message``
+    # with the running ``job``, whose ``cancelled`` is set by the operator that cancels, and
+    # ``message``
+    job_state: Any
 
     if TYPE_CHECKING:  # implemented by each operator
 
@@ -23,7 +29,9 @@ class JobOperator(bpy.types.Operator):
             """Start the job; return whether that worked."""
 
         def step(self, context: bpy.types.Context) -> set[str] | None:
-            """Advance the job, and show its state; return None while it runs, and then the operator's outcome."""
+            """Advance the job, and show its state; return None while it runs, and then the
+            operator's outcome.
+            """
 
         def ask_to_cancel(self) -> None:
             """Call the operator that cancels."""
@@ -94,7 +102,9 @@ class JobOperator(bpy.types.Operator):
 
 
 def clear_status_bar() -> None:
-    """Clear the status bar in every workspace, because each has its own text and the user may have switched."""
+    """Clear the status bar in every workspace, because each has its own text and the user may have
+    switched.
+    """
     for workspace in bpy.data.workspaces:
         with bpy.context.temp_override(workspace=workspace):  # Blender sets only the context's text
             workspace.status_text_set(None)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The preview of the current frame as an icon for the panel; it is not a datablock, so no .blend file contains it."""
+"""The preview of the current frame as an icon for the panel; it is not a datablock, so no .blend
+file contains it.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The result of a capture as the panel shows it: figures, and warnings with the scene frames to review."""
+"""The result of a capture as the panel shows it: figures, and warnings with the scene frames to
+review.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,9 @@ from ..reporting import sentence
 _MAX_SPANS = 12  # number of buttons
 
 
-def show_result(shown: bpy.types.PropertyGroup, footage: str, report: dict[str, Any], result: BuildResult) -> None:
+def show_result(
+    shown: bpy.types.PropertyGroup, footage: str, report: dict[str, Any], result: BuildResult
+) -> None:
     """Fill the properties that the result panel shows.
 
     :param shown: the properties, which are overwritten.
@@ -30,10 +34,14 @@ def show_result(shown: bpy.types.PropertyGroup, footage: str, report: dict[str, 
     shown.valid_frames = int(sum(p.motion.valid.sum() for p in result.people))
     residuals = np.concatenate([p.motion.residual_px[p.motion.valid] for p in result.people])
     shown.reprojection_px = float(residuals.mean()) if residuals.size else 0.0
-    sigmas = np.concatenate([np.ravel(np.asarray(p.motion.joint_sigma_m, float)) for p in result.people])
+    sigmas = np.concatenate(
+        [np.ravel(np.asarray(p.motion.joint_sigma_m, float)) for p in result.people]
+    )
     sigmas = sigmas[np.isfinite(sigmas)]
     shown.sigma_cm = 100.0 * float(np.median(sigmas)) if sigmas.size else 0.0
-    shown.heights = ", ".join(_height(person) for person in report.get("per_person", ()) if "height_m" in person)
+    shown.heights = ", ".join(
+        _height(person) for person in report.get("per_person", ()) if "height_m" in person
+    )
     shown.frames_per_second = float(report.get("fps", {}).get("total", 0.0))
     first = result.people[0].motion
     shown.footage_rate = first.mocap_framerate if len(first) > 1 else 0.0
@@ -46,12 +54,17 @@ def show_result(shown: bpy.types.PropertyGroup, footage: str, report: dict[str, 
         _add_warning(shown, sentence(str(line), first.source))
     for index, person in enumerate(result.people):
         whose = "" if len(result.people) == 1 else f"person {index + 1}: "
-        for reason, spans in frame_warnings(person.motion, person.frames, person.under_floor).items():
+        for reason, spans in frame_warnings(
+            person.motion, person.frames, person.under_floor
+        ).items():
             _add_warning(shown, sentence(whose + REASONS[reason]), spans)
 
 
-def frame_warnings(motion: Motion, frames: NDArray[np.float64], under_floor: NDArray[np.bool_]) -> dict[str, str]:
-    """Return the review spans of a motion in scene frames, by reason; at most the longest ``_MAX_SPANS`` of each.
+def frame_warnings(
+    motion: Motion, frames: NDArray[np.float64], under_floor: NDArray[np.bool_]
+) -> dict[str, str]:
+    """Return the review spans of a motion in scene frames, by reason; at most the longest
+    ``_MAX_SPANS`` of each.
 
     :param frames: (T,) scene frame of each pose.
     :param under_floor: (T,) poses with a foot under the floor.
@@ -64,7 +77,9 @@ def frame_warnings(motion: Motion, frames: NDArray[np.float64], under_floor: NDA
 
 
 def _height(person: dict[str, Any]) -> str:
-    """Return a stature with its standard deviation, where that is known, from the report about a person."""
+    """Return a stature with its standard deviation, where that is known, from the report about a
+    person.
+    """
     sigma_m = person.get("height_sigma_m")
     if sigma_m is None:
         return f"{person['height_m']:.2f} m"

@@ -11,7 +11,9 @@ from ..reporting import ReportingOperator, rpt_, tip_
 
 
 def animated_armature(context: bpy.types.Context) -> bpy.types.Object | None:
-    """Return the active rig with captured motion, or else the active captured armature; None without one."""
+    """Return the active rig with captured motion, or else the active captured armature; None
+    without one.
+    """
     active = context.view_layer.objects.active if context.view_layer else None
     return active if active is not None and active.get(PERSON) else captured_armature(context)
 
@@ -21,30 +23,39 @@ class ActionOperator(ReportingOperator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Require an armature with captured motion, which is stored in this file and has an action."""
+        """Require an armature with captured motion, which is stored in this file and has an
+        action.
+        """
         armature = animated_armature(context)
         if armature is None:
             cls.poll_message_set(tip_("Select the armature of a capture first"))
             return False
         if armature.library is not None:
             file = armature.library.filepath
-            cls.poll_message_set(tip_("'{name}' is linked from {file}: make it local", name=armature.name, file=file))
+            cls.poll_message_set(
+                tip_("'{name}' is linked from {file}: make it local", name=armature.name, file=file)
+            )
             return False
         if armature.animation_data is None or armature.animation_data.action is None:
             name = armature.name
-            cls.poll_message_set(tip_("'{name}' has no action; choose one in the Action Editor", name=name))
+            cls.poll_message_set(
+                tip_("'{name}' has no action; choose one in the Action Editor", name=name)
+            )
             return False
         return True
 
 
 class SCOPE_OT_push_to_nla(ActionOperator):
-    """Move the motion to a new track of the Nonlinear Animation editor, where takes are mixed and repeated"""
+    """Move the motion to a new track of the Nonlinear Animation editor, where takes are mixed and
+    repeated
+    """
 
     bl_idname = "scope.push_to_nla"
     bl_label = "Push to NLA"
 
     def work(self, context: bpy.types.Context) -> str:
-        """Add the track, and those of the root object and of the face, which the motion's strips are moved with.
+        """Add the track, and those of the root object and of the face, which the motion's strips
+        are moved with.
 
         :raises UsageError: the armature is in Tweak Mode.
         """
@@ -57,10 +68,13 @@ class SCOPE_OT_push_to_nla(ActionOperator):
         moved = animated_together(armature, root_object(armature))
         for block in moved:
             if block.animation_data.use_tweak_mode:
-                raise UsageError(f"'{block.name}' is in the NLA's Tweak Mode; leave it (key Tab) first")
+                raise UsageError(
+                    f"'{block.name}' is in the NLA's Tweak Mode; leave it (key Tab) first"
+                )
         strip, *_ = [push_to_nla(block) for block in moved]
         return rpt_(
-            "'{strip}' is now a strip of {armature}'s NLA; to edit its keys, enter Tweak Mode (key Tab)",
+            "'{strip}' is now a strip of {armature}'s NLA; to edit its keys, enter Tweak Mode (key "
+            "Tab)",
             strip=strip.name,
             armature=armature.name,
         )
@@ -83,7 +97,9 @@ class SCOPE_OT_rename_take(ReportingOperator):
             return False
         if collection.library is not None:
             file = collection.library.filepath
-            cls.poll_message_set(tip_("The capture is linked from {file}: make it local", file=file))
+            cls.poll_message_set(
+                tip_("The capture is linked from {file}: make it local", file=file)
+            )
             return False
         return True
 
@@ -113,16 +129,26 @@ class SCOPE_OT_rename_take(ReportingOperator):
 
 
 def _rename(collection: bpy.types.Collection, name: str) -> None:
-    """Rename a capture, and its objects, their data and actions whose names begin with the capture's."""
+    """Rename a capture, and its objects, their data and actions whose names begin with the
+    capture's.
+    """
     from ...scene.rigs.rig_action import follow_renaming
 
     former = collection.name
-    armatures = {obj.name: obj for obj in collection.all_objects if obj.type == "ARMATURE" and obj.library is None}
+    armatures = {
+        obj.name: obj
+        for obj in collection.all_objects
+        if obj.type == "ARMATURE" and obj.library is None
+    }
     blocks: list[bpy.types.ID] = [collection]
     for obj in collection.all_objects:
         data = [obj, obj.data, getattr(obj.data, "shape_keys", None)]
         blocks += [block for block in data if block is not None]
-        blocks += [block.animation_data.action for block in data if block is not None and block.animation_data]
+        blocks += [
+            block.animation_data.action
+            for block in data
+            if block is not None and block.animation_data
+        ]
     for block in dict.fromkeys(block for block in blocks if block is not None):
         if block.library is None and block.name.startswith(former):
             block.name = name + block.name.removeprefix(former)

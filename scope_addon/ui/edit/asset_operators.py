@@ -11,22 +11,29 @@ from ..reporting import rpt_
 from .action_operators import ActionOperator, animated_armature
 
 
-def _offered_catalogs(_operator: bpy.types.Operator, _context: bpy.types.Context, typed: str) -> list[str]:
-    """Return the asset catalogs whose paths contain what was typed so far, for Blender to suggest."""
+def _offered_catalogs(
+    _operator: bpy.types.Operator, _context: bpy.types.Context, typed: str
+) -> list[str]:
+    """Return the asset catalogs whose paths contain what was typed so far, for Blender to
+    suggest.
+    """
     from ...scene.action_asset import catalogs
 
     return sorted(path for path in catalogs() if typed.lower() in path.lower())
 
 
 class SCOPE_OT_mark_asset(ActionOperator):
-    """Mark the captured motion as an asset with a preview image of its pose, for other files' Asset Browser"""
+    """Mark the captured motion as an asset with a preview image of its pose, for other files' Asset
+    Browser
+    """
 
     bl_idname = "scope.mark_asset"
     bl_label = "Mark as Asset"
 
     author: StringProperty(name="Author", description="Who made this asset")
     description_text: StringProperty(
-        name="Description", description="Description of the asset; the footage and its duration if left empty"
+        name="Description",
+        description="Description of the asset; the footage and its duration if left empty",
     )
     catalog: StringProperty(
         name="Catalog",
@@ -36,7 +43,8 @@ class SCOPE_OT_mark_asset(ActionOperator):
     current_pose: BoolProperty(
         name="Preview of Current Frame",
         default=False,
-        description="Show the pose of the current frame in the preview image, instead of the first one that needs no "
+        description="Show the pose of the current frame in the preview image, instead of the first "
+        "one that needs no "
         "review",
         options={"SKIP_SAVE"},
     )
@@ -67,7 +75,10 @@ class SCOPE_OT_mark_asset(ActionOperator):
         mark_action(action, AssetDetails(self.author.strip(), description, self.catalog.strip()))
         set_preview(action, armature, self._frame(context, armature))
         if not bpy.data.filepath:
-            return rpt_("'{action}' is an asset of this file; save the file in an asset library", action=action.name)
+            return rpt_(
+                "'{action}' is an asset of this file; save the file in an asset library",
+                action=action.name,
+            )
         return rpt_("'{action}' is now an asset", action=action.name)
 
     def _frame(self, context: bpy.types.Context, armature: bpy.types.Object) -> float:
@@ -91,7 +102,9 @@ class SCOPE_OT_mark_asset(ActionOperator):
 
 
 def _captured(armature: bpy.types.Object) -> bpy.types.Object:
-    """Return the captured armature whose motion an armature has; the armature itself if that is unknown."""
+    """Return the captured armature whose motion an armature has; the armature itself if that is
+    unknown.
+    """
     person = armature.get(PERSON)
     return person if isinstance(person, bpy.types.Object) else armature
 

@@ -22,7 +22,10 @@ if TYPE_CHECKING:
 
 
 def edit_clip(
-    armature: bpy.types.Object, body: Body, rate: float, change: Callable[[Clip, NDArray[np.float64]], Clip]
+    armature: bpy.types.Object,
+    body: Body,
+    rate: float,
+    change: Callable[[Clip, NDArray[np.float64]], Clip],
 ) -> None:
     """Replace the keys of a captured armature on the same frames.
 
@@ -36,7 +39,9 @@ def edit_clip(
 
 
 def may_edit(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    """Return whether there is a captured armature whose keys are stored in this file; if not, say why."""
+    """Return whether there is a captured armature whose keys are stored in this file; if not, say
+    why.
+    """
     armature = captured_armature(context)
     if armature is None:
         cls.poll_message_set(tip_("Select the armature of a capture first"))
@@ -45,7 +50,8 @@ def may_edit(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     if library is not None:
         cls.poll_message_set(
             tip_(
-                "'{name}' or its motion is linked from {file}, so changes would be lost: make both local (Object > "
+                "'{name}' or its motion is linked from {file}, so changes would be lost: make both "
+                "local (Object > "
                 "Relations > Make Local > All) or edit them in that file",
                 name=armature.name,
                 file=library.filepath,
@@ -56,7 +62,9 @@ def may_edit(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
 
 
 class EditOperator(ReportingOperator):
-    """An operator that edits the keys of the active capture; if it fails, the keys are unchanged. Not registered."""
+    """An operator that edits the keys of the active capture; if it fails, the keys are unchanged.
+    Not registered.
+    """
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -65,7 +73,9 @@ class EditOperator(ReportingOperator):
 
     if TYPE_CHECKING:  # implemented by each operator
 
-        def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+        def edit(
+            self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
+        ) -> str:
             """Change the keys and return a message for the user, which may be empty."""
 
     def work(self, context: bpy.types.Context) -> str:
@@ -103,7 +113,10 @@ class SpanOperator(EditOperator):
         from ...errors import UsageError
 
         if self.end < self.start:
-            raise UsageError(f"the span ends in frame {self.end}, before it begins in frame {self.start}; swap them")
+            raise UsageError(
+                f"the span ends in frame {self.end}, before it begins in frame "
+                f"{self.start}; swap them"
+            )
         return super().work(context)
 
     def default_span(self, scene: bpy.types.Scene) -> tuple[int, int]:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Operators that edit the motion of a capture: smoothing and root motion.
 
-Both rewrite the keys of the active capture's armature; smoothing starts from the captured motion, which the .blend file
-stores. Neither uses the footage. Edits that the motion keeps are in ``pins/kept_edits.py``.
+Both rewrite the keys of the active capture's armature; smoothing starts from the captured motion,
+which the .blend file stores. Neither uses the footage. Edits that the motion keeps are in
+``pins/kept_edits.py``.
 """
 
 from __future__ import annotations
@@ -21,7 +22,9 @@ if TYPE_CHECKING:
 
 
 class SCOPE_OT_smooth(EditOperator):
-    """Smooth the captured motion again, more or less strongly. Keeps corrections, discards other changes"""
+    """Smooth the captured motion again, more or less strongly. Keeps corrections, discards other
+    changes
+    """
 
     bl_idname = "scope.smooth"
     bl_label = "Smooth Motion"
@@ -32,10 +35,13 @@ class SCOPE_OT_smooth(EditOperator):
         min=0.0,
         soft_max=4.0,
         max=20.0,
-        description="0 keeps every frame as captured, 1 is the default of a capture, higher values smooth more",
+        description="0 keeps every frame as captured, 1 is the default of a capture, higher values "
+        "smooth more",
     )
 
-    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+    def edit(
+        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
+    ) -> str:
         """Replace the keys by those of the captured motion, smoothed."""
         from ...edit.pins.corrected_motion import uncorrected
         from ...edit.smooth import smoothed
@@ -84,17 +90,26 @@ class SCOPE_OT_root_motion(EditOperator):
         description="Where the root motion is stored",
     )
     heading: BoolProperty(
-        name="With Heading", default=True, description="Include the rotation about the vertical axis in the root motion"
+        name="With Heading",
+        default=True,
+        description="Include the rotation about the vertical axis in the root motion",
     )
 
-    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+    def edit(
+        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
+    ) -> str:
         """Change all keys."""
-        from ...scene.character.root_object import move_root_motion_to_bones, move_root_motion_to_object
+        from ...scene.character.root_object import (
+            move_root_motion_to_bones,
+            move_root_motion_to_object,
+        )
 
         if self.mode == "BONES":
             move_root_motion_to_bones(armature, body, rate)
         else:
-            move_root_motion_to_object(armature, body, rate, in_place=self.mode == "IN_PLACE", heading=self.heading)
+            move_root_motion_to_object(
+                armature, body, rate, in_place=self.mode == "IN_PLACE", heading=self.heading
+            )
         return ""
 
 

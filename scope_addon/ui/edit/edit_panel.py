@@ -34,7 +34,11 @@ class SCOPE_PT_edit(Tab, bpy.types.Panel):
         column.operator("scope.refloor", icon="TRIA_DOWN_BAR")
         layout.label(text="Root Motion")
         row = layout.row(align=True)
-        for text, mode in (("In Bones", "BONES"), ("On Object", "OBJECT"), ("In Place", "IN_PLACE")):
+        for text, mode in (
+            ("In Bones", "BONES"),
+            ("On Object", "OBJECT"),
+            ("In Place", "IN_PLACE"),
+        ):
             row.operator("scope.root_motion", text=text).mode = mode
         layout.label(text="Keys", text_ctxt=CONTEXT)
         column = layout.column(align=True)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that change which keys a captured motion has: loop, key reduction, baking to a frame rate."""
+"""Operators that change which keys a captured motion has: loop, key reduction, baking to a frame
+rate.
+"""
 
 from __future__ import annotations
 
@@ -44,18 +46,23 @@ class SCOPE_OT_loop(SpanOperator):
         default=0.05,
         min=0.0,
         soft_max=0.5,
-        description="Mean distance in metres by which the joints must move within the cycle; 0 also loops a person who "
+        description="Mean distance in metres by which the joints must move within the cycle; 0 "
+        "also loops a person who "
         "stays still",
     )
     repeat: BoolProperty(
-        name="Repeat", default=True, description="Repeat the curves; each cycle starts where the previous one ended"
+        name="Repeat",
+        default=True,
+        description="Repeat the curves; each cycle starts where the previous one ended",
     )
 
     def default_span(self, scene: bpy.types.Scene) -> tuple[int, int]:
         """Return the span to suggest without a preview range: the scene's frame range."""
         return scene.frame_start, scene.frame_end
 
-    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+    def edit(
+        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
+    ) -> str:
         """Replace the keys by those of the closed cycle."""
         from ...edit.clip import Clip
         from ...edit.loop import best_cycle, close_cycle
@@ -67,7 +74,9 @@ class SCOPE_OT_loop(SpanOperator):
         clip, frames = read_clip(armature, body, rate)
         clip = clip_with_root_motion(armature, clip, frames)
         betas = betas_of(armature, body)
-        cycle = best_cycle(clip, body, betas, self.start / rate, self.end / rate, self.shortest, self.movement)
+        cycle = best_cycle(
+            clip, body, betas, self.start / rate, self.end / rate, self.shortest, self.movement
+        )
         closed: Clip = close_cycle(clip, cycle, self.blend)
         first, last = float(frames[cycle.first]), float(frames[cycle.last])
         write_clip(armature, body, closed, frames[cycle.first : cycle.last + 1])
@@ -105,14 +114,19 @@ class SCOPE_OT_reduce_keys(EditOperator):
         description="Maximum position error of the pelvis in millimetres",
     )
 
-    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+    def edit(
+        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
+    ) -> str:
         """Remove keys bone by bone."""
         from ...scene.character.keys import reduce_keys
 
         betas = betas_of(armature, body)
-        found = reduce_keys(armature, body, betas, rate, math.radians(self.degrees), self.millimetres / 1000.0)
+        found = reduce_keys(
+            armature, body, betas, rate, math.radians(self.degrees), self.millimetres / 1000.0
+        )
         return rpt_(
-            "Reduced {before} key to {after}; maximum error {angle:.2f} degrees for bones, {distance:.1f} mm for joints"
+            "Reduced {before} key to {after}; maximum error {angle:.2f} degrees for bones, "
+            "{distance:.1f} mm for joints"
             if found.before == 1
             else "Reduced {before} keys to {after}; maximum error {angle:.2f} degrees for bones, "
             "{distance:.1f} mm for joints",
@@ -138,7 +152,9 @@ class SCOPE_OT_bake_rate(EditOperator):
         description="Frame rate of the keys; 0: one key on each frame of the scene",
     )
 
-    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+    def edit(
+        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
+    ) -> str:
         """Replace all keys; at the scene's frame rate, they are on whole frames."""
         from ...edit.clip import resample
         from ...scene.character.keys import bake_whole_frames, read_clip, write_clip
@@ -151,7 +167,9 @@ class SCOPE_OT_bake_rate(EditOperator):
         else:
             before, after = bake_whole_frames(armature, body, rate)
         return rpt_(
-            "Replaced {before} key by {after}" if before == 1 else "Replaced {before} keys by {after}",
+            "Replaced {before} key by {after}"
+            if before == 1
+            else "Replaced {before} keys by {after}",
             before=before,
             after=after,
         )

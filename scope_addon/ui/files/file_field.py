@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fields for files, and file browsers that show at first only what fits.
 
-Blender draws a folder beside every path, which opens a browser that shows all files. A field is therefore drawn as a
-text of the same value, with a button of our own. Every browser's filter can be switched off in its header.
+Blender draws a folder beside every path, which opens a browser that shows all files. A field is
+therefore drawn as a text of the same value, with a button of our own. Every browser's filter can be
+switched off in its header.
 """
 
 from __future__ import annotations
@@ -30,11 +31,14 @@ _FILTERS = {  # by the name of the setting
 
 
 class FootageBrowser:
-    """Properties of an operator that asks for footage: the browser shows folders, pictures and videos of any suffix."""
+    """Properties of an operator that asks for footage: the browser shows folders, pictures and
+    videos of any suffix.
+    """
 
     filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
     filter_glob: StringProperty(default=FOOTAGE, options={"HIDDEN", "SKIP_SAVE"})
-    filter_movie: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})  # what Blender knows as such, too
+    # what Blender knows as such, too
+    filter_movie: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
     filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
 
     def ask(self, context: bpy.types.Context) -> set[str]:
@@ -45,9 +49,11 @@ class FootageBrowser:
 
 
 def present(path: str) -> str:
-    """Return a setting's file for the browser to begin with; empty where Blender's usual folder is better.
+    """Return a setting's file for the browser to begin with; empty where Blender's usual folder is
+    better.
 
-    It is if the file is gone, and if it is the sample clip, beside which are only the extension's own files.
+    It is if the file is gone, and if it is the sample clip, beside which are only the extension's
+    own files.
     """
     file = Path(bpy.path.abspath(path))
     # Path.is_file raises where a name is too long, or a folder cannot be read.
@@ -55,7 +61,8 @@ def present(path: str) -> str:
 
 
 def stored_path(context: bpy.types.Context, path: str) -> str:
-    """Return how a setting of the scene stores a chosen file: relative to the .blend file if the user prefers that.
+    """Return how a setting of the scene stores a chosen file: relative to the .blend file if the
+    user prefers that.
 
     Blender's own button beside a path does the same.
     """
@@ -70,7 +77,8 @@ def stored_path(context: bpy.types.Context, path: str) -> str:
 def path_text(path: str, **keywords: Any) -> Any:
     """Return the text property of a path property, which stores nothing itself.
 
-    :param path: name of the path property in the same group. That of the text is the same with ``_text`` after it.
+    :param path: name of the path property in the same group. That of the text is the same with
+        ``_text`` after it.
     :param keywords: of the property.
     """
 
@@ -78,7 +86,8 @@ def path_text(path: str, **keywords: Any) -> Any:
         return display_text(getattr(settings, path))
 
     def put(settings: bpy.types.PropertyGroup, text: str) -> None:
-        if text == get(settings):  # nothing was typed: of a name that is not UTF-8, the text is not the name
+        # nothing was typed: of a name that is not UTF-8, the text is not the name
+        if text == get(settings):
             return
         is_quoted = len(text) > 1 and text[0] == text[-1] == '"'  # as Windows copies a path
         setattr(settings, path, text[1:-1] if is_quoted else text)
@@ -91,7 +100,9 @@ def text_name(path: str) -> str:
     return path + _TEXT
 
 
-def draw_file(layout: bpy.types.UILayout, settings: Any, path: str, **keywords: Any) -> bpy.types.UILayout:
+def draw_file(
+    layout: bpy.types.UILayout, settings: Any, path: str, **keywords: Any
+) -> bpy.types.UILayout:
     """Draw the field of a path and the button that chooses a file; return their row.
 
     :param path: name of the path property in ``settings``, which has a ``path_text`` of it.
@@ -104,7 +115,10 @@ def draw_file(layout: bpy.types.UILayout, settings: Any, path: str, **keywords: 
         return row
     button = row.operator("scope.choose_file", text="", icon="FILEBROWSER")
     is_preferences = isinstance(settings, bpy.types.AddonPreferences)
-    button.owner, button.setting = "preferences" if is_preferences else settings.path_from_id(), path
+    button.owner, button.setting = (
+        "preferences" if is_preferences else settings.path_from_id(),
+        path,
+    )
     return row
 
 
@@ -119,7 +133,8 @@ class SCOPE_OT_choose_file(bpy.types.Operator):
     filter_glob: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
     filter_movie: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})  # what Blender knows as such, too
     filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
-    owner: StringProperty(options={"HIDDEN", "SKIP_SAVE"})  # has the setting: scope, scope_live, preferences
+    # has the setting: scope, scope_live, preferences
+    owner: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
     setting: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -127,7 +142,10 @@ class SCOPE_OT_choose_file(bpy.types.Operator):
         settings = self._settings(context)
         if settings is None:
             return {"CANCELLED"}
-        self.filepath, self.filter_glob = present(getattr(settings, self.setting)), _FILTERS[self.setting]
+        self.filepath, self.filter_glob = (
+            present(getattr(settings, self.setting)),
+            _FILTERS[self.setting],
+        )
         self.filter_movie = self.filter_glob == _VIDEOS
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
@@ -148,7 +166,9 @@ class SCOPE_OT_choose_file(bpy.types.Operator):
         """Return what has the setting; None if nothing has."""
         addon = context.preferences.addons.get(__package__.rpartition(".scope_addon")[0])
         of_addon = addon.preferences if addon else None
-        owner = of_addon if self.owner == "preferences" else getattr(context.scene, self.owner, None)
+        owner = (
+            of_addon if self.owner == "preferences" else getattr(context.scene, self.owner, None)
+        )
         return owner if self.setting in _FILTERS and hasattr(owner, self.setting) else None
 
 

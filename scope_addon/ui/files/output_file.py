@@ -13,7 +13,8 @@ from ...errors import UsageError
 def output_file(typed: str, suffix: str) -> Path:
     """Return the path of a file to write, with its suffix.
 
-    :param typed: as the user has entered it; ``//`` at its beginning is the folder of the .blend file.
+    :param typed: as the user has entered it; ``//`` at its beginning is the folder of the .blend
+        file.
     :param suffix: with its dot.
     :raises UsageError: the file has no name, or is beside a .blend file that was never saved.
     """
@@ -21,6 +22,7 @@ def output_file(typed: str, suffix: str) -> Path:
         raise UsageError("the file has no name; enter one")
     if typed.startswith("//") and not bpy.data.filepath:
         raise UsageError(
-            f"'{typed}' is relative to this .blend file, which was never saved; save it, or choose a folder"
+            f"'{typed}' is relative to this .blend file, which was never saved; save it, or choose "
+            "a folder"
         )
     return Path(bpy.path.ensure_ext(bpy.path.abspath(typed), suffix))

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The button that asks the chosen camera for its formats, and what the cameras have answered so far.
+"""The button that asks the chosen camera for its formats, and what the cameras have answered so
+far.
 
-A process of its own asks, since FFmpeg loads the camera's driver for it on Windows and macOS. A timer waits for it.
+A process of its own asks, since FFmpeg loads the camera's driver for it on Windows and macOS. A
+timer waits for it.
 """
 
 from __future__ import annotations
@@ -46,7 +48,9 @@ class SCOPE_OT_camera_formats(bpy.types.Operator):
         python = [sys.executable, *getattr(bpy.app, "python_args", ("-I",))]
         try:
             if (source := camera_source(typed)) is None:
-                raise UsageError(f"'{typed.strip()}' is not a camera; enter its number, 0 for the first")
+                raise UsageError(
+                    f"'{typed.strip()}' is not a camera; enter its number, 0 for the first"
+                )
             state.asking = FormatsProcess(source, cache().new_job_folder(), python)
         except (ScopeError, OSError) as error:
             state.message = sentence(error)
@@ -58,7 +62,9 @@ class SCOPE_OT_camera_formats(bpy.types.Operator):
 
 
 def step() -> float | None:
-    """See whether the camera has answered; return in how many seconds to call again. A timer calls this."""
+    """See whether the camera has answered; return in how many seconds to call again. A timer calls
+    this.
+    """
     from ....solver.errors import ScopeError
 
     asking = state.asking

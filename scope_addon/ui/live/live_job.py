@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A live capture, from the button to the last pose or the recorded keys. ``step`` never waits for the worker.
+"""A live capture, from the button to the last pose or the recorded keys. ``step`` never waits for
+the worker.
 
 The modal operator calls ``step`` on a timer; tests call it in a loop.
 """
@@ -79,20 +80,27 @@ class LiveJob:
         self._scene_uid = scene.session_uid
         self._request = live_request(scene)
         self._is_stream = scene.scope_live.source == "STREAM"
-        self._kept = self._request.values["keep_footage"]  # the video of a recording, if it is wanted
+        # the video of a recording, if it is wanted
+        self._kept = self._request.values["keep_footage"]
         self._footage = self._request.source if scene.scope_live.source == "FILE" else ""
         self._scene_body = load_body(self._request.values["body"])
-        names = [f"Live {number + 1}" if number else "Live" for number in range(self._request.values["live_people"])]
+        names = [
+            f"Live {number + 1}" if number else "Live"
+            for number in range(self._request.values["live_people"])
+        ]
         self._bodies = [LiveBody(scene, name, self._scene_body) for name in names]
         self._before = SceneBefore()
         self._rig = live_rig(scene, self._scene_body) if scene.scope_live.with_rig else None
         self._result: dict[str, Any] | None = None  # the recording's message
         self._last_pose_s = self._notice_s = self._stopped_s = self._result_s = time.monotonic()
-        self.created = self._was_created = False  # whether the last step, or one before, created the body
+        # whether the last step, or one before, created the body
+        self.created = self._was_created = False
         # Blender 4.2 has no such attribute; its Python is isolated as well.
         python = python or [sys.executable, *getattr(bpy.app, "python_args", ("-I",))]
         folders = cache()
-        self._worker = LiveProcess(self._request, folders.new_job_folder(), folders.kernels, python, START_SCRIPT)
+        self._worker = LiveProcess(
+            self._request, folders.new_job_folder(), folders.kernels, python, START_SCRIPT
+        )
 
     @property
     def worker(self) -> LiveProcess:
@@ -113,7 +121,11 @@ class LiveJob:
     @property
     def countdown_s(self) -> int:
         """Whole seconds until the recording begins; 0 if none is about to begin."""
-        return 0 if self._record_at_s is None else max(math.ceil(self._record_at_s - time.monotonic()), 1)
+        return (
+            0
+            if self._record_at_s is None
+            else max(math.ceil(self._record_at_s - time.monotonic()), 1)
+        )
 
     def record(self, countdown_s: float = 0.0) -> None:
         """Keep the poses for ``stop``, from the end of a countdown on."""
@@ -121,12 +133,18 @@ class LiveJob:
         self._record_if_due()
 
     def _record_if_due(self) -> None:
-        if self._record_at_s is not None and time.monotonic() >= self._record_at_s and not self.finishing:
+        if (
+            self._record_at_s is not None
+            and time.monotonic() >= self._record_at_s
+            and not self.finishing
+        ):
             self._record_at_s, self.recording = None, True
             self._worker.record()
 
     def stop(self) -> None:
-        """End the capture; ``step`` returns False when all is done. Without a recording, the last pose stays."""
+        """End the capture; ``step`` returns False when all is done. Without a recording, the last
+        pose stays.
+        """
         self.finishing, self._stopped_s = True, time.monotonic()
         if self.recording:
             self._worker.stop()
@@ -171,7 +189,11 @@ class LiveJob:
             self.stop()  # what was recorded is written
         self._record_if_due()
         self._listen()
-        poses = [] if self.finishing else self._worker.newest_poses(self._scene_body.K + 1, self._scene_body.P)
+        poses = (
+            []
+            if self.finishing
+            else self._worker.newest_poses(self._scene_body.K + 1, self._scene_body.P)
+        )
         if poses:
             self._show(scene, poses)
         if self._result is None:
@@ -201,7 +223,8 @@ class LiveJob:
         """Show the newest pose of each person."""
         self.poses += 1
         self._last_pose_s = time.monotonic()
-        self.status.presence = min((pose.presence for pose in poses), key=PRESENCES.index)  # of whoever is seen best
+        # of whoever is seen best
+        self.status.presence = min((pose.presence for pose in poses), key=PRESENCES.index)
         if self.status.notice and self._last_pose_s - self._notice_s > NOTICE_S:
             self.status.notice = ""
         if bpy.context.scene != scene:  # in another one nobody sees it
@@ -231,24 +254,33 @@ class LiveJob:
             for body in self._bodies:
                 body.rest_at_shape()
             armature = self._bodies[0].armature
-            if self._rig is not None and armature is not None and scene.scope_retarget.captured == "hide":
+            if (
+                self._rig is not None
+                and armature is not None
+                and scene.scope_retarget.captured == "hide"
+            ):
                 hide(armature, bpy.context.view_layer)
 
     def _build(self, scene: bpy.types.Scene, result: dict[str, Any]) -> None:
-        """Write the recording's keys, as a capture of footage does, and remove the body that followed."""
+        """Write the recording's keys, as a capture of footage does, and remove the body that
+        followed.
+        """
         self._worker.wait(0.0)
         paths = [self._worker.job_folder / Path(name).name for name in result["motions"]]
         contents = [(path, path.read_bytes()) for path in paths]
         body, options = self._request.values["body"], build_options(scene)
         if self._kept and Path(self._kept).is_file():
-            self._footage = scene.scope.footage = str(self._kept)  # Capture then captures the take once more
+            # Capture then captures the take once more
+            self._footage = scene.scope.footage = str(self._kept)
         built = build_capture(scene, contents, body, self._footage, result["report"], options)
         self._remove_bodies()
         if self._rig is not None and self._rig.rig is not None:
             self._rig.restore()
             try:
                 with window_shows(scene):
-                    self.warnings = retarget_to_chosen_rig(bpy.context, built.people[0].armature).warnings
+                    self.warnings = retarget_to_chosen_rig(
+                        bpy.context, built.people[0].armature
+                    ).warnings
             except ScopeError as error:  # the recording is there, and can be retargeted later
                 self.warnings = [str(error)]
         self._worker.close()
@@ -261,9 +293,13 @@ def live_rig(scene: bpy.types.Scene, body: Body) -> LiveRig:
     """
     settings = scene.scope_retarget
     if settings.rig is None or not is_in_layer(bpy.context.view_layer, settings.rig):
-        raise UsageError("no rig of this scene's view layer is chosen; choose one, or switch off Rig Follows")
+        raise UsageError(
+            "no rig of this scene's view layer is chosen; choose one, or switch off Rig Follows"
+        )
     if settings.rig.library is not None:
-        raise UsageError(f"'{settings.rig.name}' is linked; make an override of it, or switch off Rig Follows")
+        raise UsageError(
+            f"'{settings.rig.name}' is linked; make an override of it, or switch off Rig Follows"
+        )
     bones = listed_map(settings) if len(settings.pairs) else guess_bone_map(settings.rig)
     return LiveRig(settings.rig, body, bones, retarget_options(settings))
 
@@ -274,7 +310,10 @@ def kept_footage(scene: bpy.types.Scene) -> Path:
     :raises UsageError: the .blend file was never saved.
     """
     if not bpy.data.filepath:
-        raise UsageError("the footage is written beside the .blend file; save that first, or switch off Keep Footage")
+        raise UsageError(
+            "the footage is written beside the .blend file; save that first, or "
+            "switch off Keep Footage"
+        )
     folder, stem = Path(bpy.data.filepath).parent, bpy.path.clean_name(scene.scope.take or "Live")
     return folder / f"{stem} {time.strftime('%Y-%m-%d %H.%M.%S')}.mp4"
 
@@ -282,7 +321,8 @@ def kept_footage(scene: bpy.types.Scene) -> Path:
 def live_request(scene: bpy.types.Scene) -> LiveRequest:
     """Make the request to the worker from the scene's settings and the preferences.
 
-    :raises UsageError: no source or body file is chosen, or the source is a stream, and Blender is not to go online.
+    :raises UsageError: no source or body file is chosen, or the source is a stream, and Blender is
+        not to go online.
     :raises VideoError: the video does not exist.
     """
     settings = scene.scope_live
@@ -296,19 +336,27 @@ def live_request(scene: bpy.types.Scene) -> LiveRequest:
     elif settings.source == "STREAM":
         source = settings.stream.strip()
         if "://" not in source:
-            raise UsageError("no stream is given; enter its address, such as rtsp://192.168.1.20/stream")
+            raise UsageError(
+                "no stream is given; enter its address, such as rtsp://192.168.1.20/stream"
+            )
         if not bpy.app.online_access:
             raise OfflineError
         online, source = True, with_login(source)
     else:
         source = camera_source(settings.camera) or ""
         if not source:
-            raise UsageError(f"'{settings.camera.strip()}' is not a camera; enter its number, 0 for the first")
+            raise UsageError(
+                f"'{settings.camera.strip()}' is not a camera; enter its number, 0 for the first"
+            )
     names = {option.name for option in options_at(Place.LIVE_WORKER)}
     values = {name: value for name, value in chosen_values(scene).items() if name in names}
     values["body"] = chosen_body(values)
     if settings.keep_footage and settings.source != "FILE":
         values["keep_footage"] = str(kept_footage(scene))
     return LiveRequest(
-        source, online=online, **values, live_quality=settings.quality.lower(), live_people=settings.people
+        source,
+        online=online,
+        **values,
+        live_quality=settings.quality.lower(),
+        live_people=settings.people,
     )

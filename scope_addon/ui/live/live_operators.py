@@ -47,7 +47,9 @@ class SCOPE_OT_live(JobOperator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Refuse to run without a window, whose timer applies the poses."""
-        self.report({"ERROR"}, "Live capture needs Blender's window; in a shell, use ./scripts/live")
+        self.report(
+            {"ERROR"}, "Live capture needs Blender's window; in a shell, use ./scripts/live"
+        )
         return {"CANCELLED"}
 
     def start(self, context: bpy.types.Context) -> bool:
@@ -83,7 +85,9 @@ class SCOPE_OT_live(JobOperator):
         if not running:
             for warning in job.warnings:
                 self.report({"WARNING"}, sentence(warning))
-            self.report({"INFO"}, "Live capture recorded" if job.recording else "Live capture stopped")
+            self.report(
+                {"INFO"}, "Live capture recorded" if job.recording else "Live capture stopped"
+            )
             return {"FINISHED"}
         if job.created:
             hide_startup_cube(context)
@@ -96,7 +100,8 @@ class SCOPE_OT_live(JobOperator):
         status = job.status
         seconds = (status.recorded_s, round(job.quiet_s), job.countdown_s)
         panel = (status.presence, round(status.rate), status.notice, seconds)
-        if panel != self._shown:  # drawing the same again costs time in which Blender does not react
+        # drawing the same again costs time in which Blender does not react
+        if panel != self._shown:
             self._shown = panel
             redraw_sidebars()
         return None
@@ -156,7 +161,9 @@ class SCOPE_OT_record_live(_RunningOperator):
 
 
 class SCOPE_OT_stop_live(_RunningOperator):
-    """Stop the live capture. What was recorded is written as keyframes; otherwise the last pose stays"""
+    """Stop the live capture. What was recorded is written as keyframes; otherwise the last pose
+    stays
+    """
 
     bl_idname = "scope.stop_live"
     bl_label = "Stop"
@@ -190,14 +197,24 @@ class SCOPE_OT_cancel_live(bpy.types.Operator):
 def play_scene(context: bpy.types.Context) -> None:
     """Play the scene's animation from the frame at which a recording begins, if that is wanted."""
     scene = context.scene
-    if scene.scope_live.with_scene and context.screen is not None and not context.screen.is_animation_playing:
+    if (
+        scene.scope_live.with_scene
+        and context.screen is not None
+        and not context.screen.is_animation_playing
+    ):
         scene.frame_set(int(scene.scope.start_frame))
         bpy.ops.screen.animation_play()
 
 
 def stop_scene(context: bpy.types.Context) -> None:
-    """Stop the animation that `play_scene` began; one that the user plays meanwhile stops as well."""
-    if context.scene.scope_live.with_scene and context.screen is not None and context.screen.is_animation_playing:
+    """Stop the animation that `play_scene` began; one that the user plays meanwhile stops as
+    well.
+    """
+    if (
+        context.scene.scope_live.with_scene
+        and context.screen is not None
+        and context.screen.is_animation_playing
+    ):
         bpy.ops.screen.animation_cancel(restore_frame=False)
 
 

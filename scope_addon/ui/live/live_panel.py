@@ -52,7 +52,12 @@ class SCOPE_PT_live(Tab, bpy.types.Panel):
             row.operator("scope.live", icon="PLAY")
         else:
             text = "Recording" if job.recording else str(job.countdown_s or "Record")
-            row.operator("scope.record_live", text=text, icon="REC", depress=job.recording or bool(job.countdown_s))
+            row.operator(
+                "scope.record_live",
+                text=text,
+                icon="REC",
+                depress=job.recording or bool(job.countdown_s),
+            )
             row.operator("scope.stop_live", icon="SNAP_FACE")
             row.operator("scope.cancel_live", text="", icon="CANCEL")
             _draw_status(context, layout)
@@ -84,10 +89,14 @@ def _draw_status(context: bpy.types.Context, layout: bpy.types.UILayout) -> None
     else:
         draw_text(context, layout, _speed(status.rate, status.latency_ms))
         if status.presence != "seen":
-            text = iface_("Nobody is seen" if status.presence == "lost" else "Not seen for a moment")
+            text = iface_(
+                "Nobody is seen" if status.presence == "lost" else "Not seen for a moment"
+            )
             draw_text(context, layout, text, "INFO")
     if job.recording:
-        draw_text(context, layout, iface_("Recorded: {seconds:.1f} s", seconds=status.recorded_s), "REC")
+        draw_text(
+            context, layout, iface_("Recorded: {seconds:.1f} s", seconds=status.recorded_s), "REC"
+        )
 
 
 def _speed(rate: float, latency_ms: float) -> str:

@@ -20,11 +20,17 @@ def _forget_message(_settings: bpy.types.PropertyGroup, _context: bpy.types.Cont
     state.message = ""
 
 
-def _cameras(_settings: bpy.types.PropertyGroup, _context: bpy.types.Context, typed: str) -> list[str]:
-    """Return the cameras whose number or name contains what was typed, with formats where these are known."""
+def _cameras(
+    _settings: bpy.types.PropertyGroup, _context: bpy.types.Context, typed: str
+) -> list[str]:
+    """Return the cameras whose number or name contains what was typed, with formats where these are
+    known.
+    """
     from ...job.live.cameras import list_cameras
 
-    told = {(camera.number, camera.name): camera for camera in state.cameras.values() if camera.formats}
+    told = {
+        (camera.number, camera.name): camera for camera in state.cameras.values() if camera.formats
+    }
     labels = [told.get((c.number, c.name), c).label for c in list_cameras()]
     return [label for label in labels if typed.lower() in label.lower()]
 
@@ -60,16 +66,20 @@ class SCOPE_PG_live(bpy.types.PropertyGroup):
         update=_forget_message,
         search=_cameras,
         search_options={"SUGGESTION"},
-        description="Number of the camera, 0 for the first; on Linux also its device, such as /dev/video2",
+        description="Number of the camera, 0 for the first; on Linux also its device, such as "
+        "/dev/video2",
     )
     stream: StringProperty(
         name="Address",
         options=set(),
         update=_keep_login,
-        description="Address of the stream, such as rtsp://192.168.1.20/stream; name and password in it are kept until "
+        description="Address of the stream, such as rtsp://192.168.1.20/stream; name and password "
+        "in it are kept until "
         "Blender ends, and never saved",
     )
-    file: StringProperty(subtype="FILE_PATH", options=PATH_OPTIONS, update=_forget_message, **_VIDEO)
+    file: StringProperty(
+        subtype="FILE_PATH", options=PATH_OPTIONS, update=_forget_message, **_VIDEO
+    )
     file_text: path_text("file", **_VIDEO)
     with_rig: BoolProperty(
         name="Rig Follows",
@@ -89,7 +99,8 @@ class SCOPE_PG_live(bpy.types.PropertyGroup):
         name="Keep Footage",
         default=False,
         options=set(),
-        description="Write the recorded images of a camera or stream as a video beside the .blend file, from which a "
+        description="Write the recorded images of a camera or stream as a video beside the .blend "
+        "file, from which a "
         "more accurate motion of the same take can be captured",
     )
     with_scene: BoolProperty(

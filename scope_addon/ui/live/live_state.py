@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The running live capture, the message of the last one, and what cameras have told. Never saved."""
+"""The running live capture, the message of the last one, and what cameras have told. Never
+saved.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Changing the corrections of a captured armature: in its motion, in its keys and in the list for the panel."""
+"""Changing the corrections of a captured armature: in its motion, in its keys and in the list for
+the panel.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +44,8 @@ def change_corrections(
 
     :param rate: scene frames per second.
     :param change: returns the new corrections for the present ones.
-    :param added: the one that this adds; a pin or an edit holds even if edited keys differ from the motion.
+    :param added: the one that this adds; a pin or an edit holds even if edited keys differ from the
+        motion.
     :param rise: metres by which all keys are raised, which is an edit of its own.
     :return: the corrected motion.
     :raises UsageError: the motion is no longer there, or keys are missing.
@@ -54,7 +57,9 @@ def change_corrections(
     compiled_solver.load()
     before = motion_of(armature)
     after = with_corrections(before, body, change(corrections_of(before)))
-    keys = rewrite_changed_keys(armature, body, rate, (before, after), stored_keys(armature), added, rise)
+    keys = rewrite_changed_keys(
+        armature, body, rate, (before, after), stored_keys(armature), added, rise
+    )
     set_motion_of(armature, after, keys.to_bytes() if len(keys.times) else b"")
     store_corrections(armature, after, rate, pinned_places(armature, body, rate, after))
     return after
@@ -67,10 +72,12 @@ def change_world(
     change: Callable[[tuple[Correction, ...]], tuple[Correction, ...]],
     rise: float = 0.0,
 ) -> None:
-    """Change the upright line or floor of everybody that the same camera has captured, and move the camera with them.
+    """Change the upright line or floor of everybody that the same camera has captured, and move the
+    camera with them.
 
     :param rate: scene frames per second.
-    :param change: returns the new corrections for the present ones, and changes the same of everybody.
+    :param change: returns the new corrections for the present ones, and changes the same of
+        everybody.
     :param rise: metres by which the keys of this person are raised.
     :raises UsageError: the root motion is on an object, or keys are missing.
     """
@@ -92,16 +99,22 @@ def change_world(
     turn = (np.eye(4) if now is None else now) @ np.linalg.inv(np.eye(4) if was is None else was)
     with all_or_nothing(scene, *together[1:], *cameras):
         for person in together:
-            change_corrections(person, body_of(person), rate, change, rise=rise if person == armature else 0.0)
+            change_corrections(
+                person, body_of(person), rate, change, rise=rise if person == armature else 0.0
+            )
         for camera in cameras:
             turn_camera(camera, armature, turn, to_captured=now is None)
 
 
 def without_kinds(corrections: tuple[Correction, ...], kinds: set[str]) -> tuple[Correction, ...]:
-    """Return the corrections without those that move the world; the list calls them ``UPRIGHT`` and ``FLOOR``."""
+    """Return the corrections without those that move the world; the list calls them ``UPRIGHT`` and
+    ``FLOOR``.
+    """
     from ...edit.pins.corrections import Floor, Upright, removed
 
-    return removed(corrections, tuple(cls for cls in (Upright, Floor) if cls.__name__.upper() in kinds))
+    return removed(
+        corrections, tuple(cls for cls in (Upright, Floor) if cls.__name__.upper() in kinds)
+    )
 
 
 def shown_frame(scene: bpy.types.Scene, armature: bpy.types.Object, motion: Motion) -> int:
@@ -112,16 +125,23 @@ def shown_frame(scene: bpy.types.Scene, armature: bpy.types.Object, motion: Moti
     from ...scene.animation_data.timing import scene_rate
     from ...scene.character.corrections.corrected_keys import source_frame
 
-    return source_frame(armature, motion, scene.frame_current + scene.frame_subframe, scene_rate(scene))
+    return source_frame(
+        armature, motion, scene.frame_current + scene.frame_subframe, scene_rate(scene)
+    )
 
 
 def pin_at(
-    context: bpy.types.Context, armature: bpy.types.Object, motion: Motion, joint: str, place: tuple[Any, bool, float]
+    context: bpy.types.Context,
+    armature: bpy.types.Object,
+    motion: Motion,
+    joint: str,
+    place: tuple[Any, bool, float],
 ) -> Pin:
     """Return a pin at the scene's current frame.
 
-    :param place: the joint's position in the scene (3,); whether it was placed in the view of the capture's camera; and
-        the seconds over which the correction fades out. A pin in the image needs the camera where it was captured.
+    :param place: the joint's position in the scene (3,); whether it was placed in the view of the
+        capture's camera; and the seconds over which the correction fades out. A pin in the image
+        needs the camera where it was captured.
     :raises UsageError: the current frame is outside of the motion.
     """
     import numpy as np

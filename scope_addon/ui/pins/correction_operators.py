@@ -6,14 +6,27 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
+from bpy.props import (
+    BoolProperty,
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    StringProperty,
+)
 
 from ...scene.animation_data.stored_values import LAST_FRAME
 from ...scene.character.correction_list import listed_corrections
 from ..captured_person import motion_of
 from ..edit.edit_base import EditOperator, SpanOperator
 from ..reporting import iface_, rpt_
-from .corrected_person import CorrectionOperator, change_corrections, change_world, pin_at, without_kinds
+from .corrected_person import (
+    CorrectionOperator,
+    change_corrections,
+    change_world,
+    pin_at,
+    without_kinds,
+)
 
 if TYPE_CHECKING:
     from ....solver.body import Body
@@ -21,17 +34,22 @@ if TYPE_CHECKING:
 
 _NOW = -LAST_FRAME  # the first frame that Blender allows; stands for the current one
 
-# Of the last pin. Blender does not show what an operator reports that another one has called, so that one shows these.
+# Of the last pin. Blender does not show what an operator reports that another one has called, so
+# that one shows these.
 last_pin_warnings: list[str] = []
 
 
 def _pin_warnings(armature: bpy.types.Object, body: Body, joint: str, frame: int) -> list[str]:
-    """Return what to warn of after a pin in a scene frame: that its joint cannot reach it, feet under the floor."""
+    """Return what to warn of after a pin in a scene frame: that its joint cannot reach it, feet
+    under the floor.
+    """
     return [*filter(None, (_unreached(armature, joint, frame), floor_warning(armature, body)))]
 
 
 def floor_warning(armature: bpy.types.Object, body: Body) -> str:
-    """Return the message about feet that corrections have put under the floor; empty if there are none."""
+    """Return the message about feet that corrections have put under the floor; empty if there are
+    none.
+    """
     from ...edit.pins.under_floor import feet_under_floor
 
     motion = motion_of(armature)
@@ -41,7 +59,8 @@ def floor_warning(armature: bpy.types.Object, body: Body) -> str:
     return rpt_(
         "The corrections put a foot up to {depth:.0f} cm under the floor: move the pin up"
         if len(motion) == 1
-        else "The corrections put a foot up to {depth:.0f} cm under the floor in {count} of {total} frames: "
+        else "The corrections put a foot up to {depth:.0f} cm under the floor in {count} of "
+        "{total} frames: "
         "move the pin up",
         depth=100 * depth,
         count=count,
@@ -50,11 +69,14 @@ def floor_warning(armature: bpy.types.Object, body: Body) -> str:
 
 
 def _unreached(armature: bpy.types.Object, joint: str, frame: int) -> str:
-    """Return the message about a joint that cannot reach its pin in a scene frame; empty if it does."""
+    """Return the message about a joint that cannot reach its pin in a scene frame; empty if it
+    does.
+    """
     for entry in listed_corrections(armature):
         if entry["joint"] == joint and abs(entry["first"] - frame) <= 1 and entry["missed"]:
             return rpt_(
-                "{joint} cannot reach the pin and stays {distance} away: move the pin closer, or pin the pelvis too",
+                "{joint} cannot reach the pin and stays {distance} away: move the pin closer, or "
+                "pin the pelvis too",
                 joint=iface_(entry["text"]),
                 distance=entry["missed"],
             )
@@ -67,17 +89,27 @@ class SCOPE_OT_add_pin(EditOperator):
     bl_idname = "scope.add_pin"
     bl_label = "Add Pin"
 
-    joint: StringProperty(name="Joint", default="left_wrist", description="Name of the joint's bone")
+    joint: StringProperty(
+        name="Joint", default="left_wrist", description="Name of the joint's bone"
+    )
     location: FloatVectorProperty(
-        name="Location", subtype="TRANSLATION", unit="LENGTH", description="Where the joint is in that frame"
+        name="Location",
+        subtype="TRANSLATION",
+        unit="LENGTH",
+        description="Where the joint is in that frame",
     )
     frame: IntProperty(
-        name="Frame", default=_NOW, min=_NOW, description="Scene frame; the current one if left out", options={"HIDDEN"}
+        name="Frame",
+        default=_NOW,
+        min=_NOW,
+        description="Scene frame; the current one if left out",
+        options={"HIDDEN"},
     )
     in_image: BoolProperty(
         name="In the Image",
         default=False,
-        description="Pin the joint only in the camera's image; its distance from the camera is free, except the "
+        description="Pin the joint only in the camera's image; its distance from the camera is "
+        "free, except the "
         "pelvis's",
     )
     reach: FloatProperty(
@@ -89,7 +121,9 @@ class SCOPE_OT_add_pin(EditOperator):
         description="Seconds before and after the frame over which the correction fades out",
     )
 
-    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+    def edit(
+        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
+    ) -> str:
         """Add the pin and change the keys around it."""
         from ...edit.pins.corrections import added
 
@@ -118,7 +152,9 @@ class CorrectSpanOperator(CorrectionOperator, SpanOperator):
         def correction(self, first: int, last: int) -> Correction:
             """Return the correction of these frames of the footage."""
 
-    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+    def edit(
+        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
+    ) -> str:
         """Add the correction and change the keys."""
         from ...edit.pins.corrections import added
         from ...scene.character.corrections.corrected_keys import source_frame, whole_span
@@ -190,9 +226,13 @@ class SCOPE_OT_remove_correction(CorrectionOperator):
     bl_idname = "scope.remove_correction"
     bl_label = "Remove Correction"
 
-    index: IntProperty(name="Number", default=-1, min=-1, description="Counted from 0; -1 removes all")
+    index: IntProperty(
+        name="Number", default=-1, min=-1, description="Counted from 0; -1 removes all"
+    )
 
-    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+    def edit(
+        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
+    ) -> str:
         """Remove it and change the keys back.
 
         :raises UsageError: there is no correction of this number.
@@ -201,19 +241,31 @@ class SCOPE_OT_remove_correction(CorrectionOperator):
 
         count = len(listed_corrections(armature))
         if self.index >= count:
-            raise UsageError(f"there is no correction {self.index}; '{armature.name}' has {count}, counted from 0")
+            raise UsageError(
+                f"there is no correction {self.index}; '{armature.name}' has {count}, "
+                "counted from 0"
+            )
         kinds = [entry["kind"] for entry in listed_corrections(armature)]
         removed = set(kinds if self.index < 0 else kinds[self.index : self.index + 1])
         if shared := removed & {"UPRIGHT", "FLOOR"}:  # which others of the capture have too
-            change_world(context.scene, armature, rate, lambda present: without_kinds(present, shared))
+            change_world(
+                context.scene, armature, rate, lambda present: without_kinds(present, shared)
+            )
         if removed - shared:
             change_corrections(
                 armature,
                 body,
                 rate,
-                lambda present: tuple(c for k, c in enumerate(present) if self.index >= 0 and k != self.index),
+                lambda present: tuple(
+                    c for k, c in enumerate(present) if self.index >= 0 and k != self.index
+                ),
             )
         return ""
 
 
-CLASSES = (SCOPE_OT_add_pin, SCOPE_OT_foot_stands, SCOPE_OT_exchange_sides, SCOPE_OT_remove_correction)
+CLASSES = (
+    SCOPE_OT_add_pin,
+    SCOPE_OT_foot_stands,
+    SCOPE_OT_exchange_sides,
+    SCOPE_OT_remove_correction,
+)

@@ -22,7 +22,9 @@ _ICONS = {
 
 
 class SCOPE_PT_corrections(Tab, bpy.types.Panel):
-    """Pins, feet that stand, exchanged sides, kept edits, the upright line and the floor of the selected person."""
+    """Pins, feet that stand, exchanged sides, kept edits, the upright line and the floor of the
+    selected person.
+    """
 
     bl_idname = "SCOPE_PT_corrections"
     bl_label = "Corrections"
@@ -51,9 +53,16 @@ class SCOPE_PT_corrections(Tab, bpy.types.Panel):
         column = layout.box().column(align=True)
         for index, entry in enumerate(listed):
             row = column.row(align=True)
-            span = str(entry["first"]) if entry["first"] == entry["last"] else f"{entry['first']}–{entry['last']}"
+            span = (
+                str(entry["first"])
+                if entry["first"] == entry["last"]
+                else f"{entry['first']}–{entry['last']}"
+            )
             cells = row.split(factor=0.68, align=True)
-            cells.label(text=entry["text"], icon="ERROR" if entry["missed"] else _ICONS.get(entry["kind"], "DOT"))
+            cells.label(
+                text=entry["text"],
+                icon="ERROR" if entry["missed"] else _ICONS.get(entry["kind"], "DOT"),
+            )
             cells.operator("scope.go_to_frame", text=span).frame = entry["first"]
             row.operator("scope.remove_correction", text="", icon="X", emboss=False).index = index
         if len(listed) > 1:

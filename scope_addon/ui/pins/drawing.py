@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Drawing over the viewport, in pixels of its region, and the viewport that a tool was started in."""
+"""Drawing over the viewport, in pixels of its region, and the viewport that a tool was started
+in.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,11 @@ _ANGLES = [2 * math.pi * k / 20 for k in range(20)]
 def viewport_of(pointer: int) -> tuple[bpy.types.Area, bpy.types.Region] | None:
     """Return the viewport at an address and its main region; see `viewport_at`."""
     found = viewport_at(pointer)
-    region = next((region for region in found[1].regions if region.type == "WINDOW"), None) if found else None
+    region = (
+        next((region for region in found[1].regions if region.type == "WINDOW"), None)
+        if found
+        else None
+    )
     return (found[1], region) if found is not None and region is not None else None
 
 

@@ -20,7 +20,9 @@ _SAME_M = 0.002
 
 
 class SCOPE_OT_floor_here(CorrectionOperator):
-    """In this frame, a foot rests on the floor: move the capture and its camera up or down until it does"""
+    """In this frame, a foot rests on the floor: move the capture and its camera up or down until it
+    does
+    """
 
     bl_idname = "scope.floor_here"
     bl_label = "Floor Here"
@@ -36,7 +38,9 @@ class SCOPE_OT_floor_here(CorrectionOperator):
         description="Which foot rests on the floor",
     )
 
-    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+    def edit(
+        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
+    ) -> str:
         """Move everybody of the capture, and the camera."""
         from ...edit.pins.corrections import Floor, added
         from ...scene.character.corrections.corrected_keys import heights_of_foot
@@ -54,7 +58,9 @@ class SCOPE_OT_floor_here(CorrectionOperator):
 
 
 def _others_under_floor(motion: Motion, body: Body) -> str:
-    """Return the message about feet that are now under the floor in other frames; empty if there are none."""
+    """Return the message about feet that are now under the floor in other frames; empty if there
+    are none.
+    """
     from ...kinematics.foot_skin import UNDER_FLOOR_M, depth_under_floor
 
     depth = depth_under_floor(motion, body)
@@ -62,7 +68,8 @@ def _others_under_floor(motion: Motion, body: Body) -> str:
     if not under.any():
         return ""
     return rpt_(
-        "A foot is up to {depth:.0f} cm under this floor in {count} of {total} frames: press Floor Here in a frame in "
+        "A foot is up to {depth:.0f} cm under this floor in {count} of {total} frames: press Floor "
+        "Here in a frame in "
         "which it rests on the floor, or use Snap Feet to Floor",
         depth=100 * depth.max(),
         count=int(under.sum()),

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Edits of keys that the motion keeps like corrections: interpolated frames, swapped sides, feet on the floor.
+"""Edits of keys that the motion keeps like corrections: interpolated frames, swapped sides, feet on
+the floor.
 
 Where the motion is lost, as in old .blend files without their cache, they edit the keys only.
 """
@@ -36,7 +37,9 @@ class KeptSpanOperator(CorrectSpanOperator):
         def change(self, body: Body, rate: float) -> Callable[[Clip, NDArray[np.float64]], Clip]:
             """Return the edit of keys whose motion is lost, for ``edit_clip``."""
 
-    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+    def edit(
+        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
+    ) -> str:
         """Edit the keys, and keep that with the motion."""
         if _has_motion(armature):
             return super().edit(context, armature, body, rate)
@@ -73,7 +76,9 @@ class SCOPE_OT_swap_sides(ExchangeOperator, KeptSpanOperator):
         """Return the swap of keys."""
         from ...edit.spans import swap_sides
 
-        return lambda clip, _: swap_sides(clip, body, self.start / rate, self.end / rate, self.limbs)
+        return lambda clip, _: swap_sides(
+            clip, body, self.start / rate, self.end / rate, self.limbs
+        )
 
 
 class SCOPE_OT_refloor(CorrectionOperator):
@@ -85,26 +90,36 @@ class SCOPE_OT_refloor(CorrectionOperator):
     level: BoolProperty(
         name="Level the World",
         default=False,
-        description="Rotate the motion so that all foot contacts are level, after which the camera no longer matches",
+        description="Rotate the motion so that all foot contacts are level, after which the camera "
+        "no longer matches",
     )
     lift: BoolProperty(
-        name="Lift Sunken Feet", default=True, description="Raise the frames in which a foot is below the floor"
+        name="Lift Sunken Feet",
+        default=True,
+        description="Raise the frames in which a foot is below the floor",
     )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Require a motion with one floor: on stairs, everything below their middle would be raised to it."""
+        """Require a motion with one floor: on stairs, everything below their middle would be raised
+        to it.
+        """
         if not super().poll(context):
             return False
         armature = captured_armature(context)
         if armature is not None and armature.get("scope_uneven_ground", False):
             cls.poll_message_set(
-                tip_("This motion was captured on uneven ground, where feet rest at any height: use Floor Here")
+                tip_(
+                    "This motion was captured on uneven ground, where feet rest at any height: "
+                    "use Floor Here"
+                )
             )
             return False
         return True
 
-    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+    def edit(
+        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
+    ) -> str:
         """Edit all keys, and keep that with the motion."""
         from ...edit.pins.corrections import FeetOnFloor, added
         from ...scene.character.corrections.edited_keys import floored
@@ -112,7 +127,12 @@ class SCOPE_OT_refloor(CorrectionOperator):
         feet = FeetOnFloor(self.level, self.lift)
         if not _has_motion(armature):
             betas = betas_of(armature, body)
-            edit_clip(armature, body, rate, lambda clip, frames: floored(armature, body, betas, (clip, frames), feet))
+            edit_clip(
+                armature,
+                body,
+                rate,
+                lambda clip, frames: floored(armature, body, betas, (clip, frames), feet),
+            )
             return ""
         change_corrections(armature, body, rate, lambda present: added(present, feet), feet)
         if warning := floor_warning(armature, body):

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tool that pins limbs with the mouse: drag a handle to where the joint is in the picture, or in space.
+"""The tool that pins limbs with the mouse: drag a handle to where the joint is in the picture, or
+in space.
 
-The handles are in every viewport of the file, so that what is dragged beside the footage can be checked, and dragged
-again, in the view from the side.
+The handles are in every viewport of the file, so that what is dragged beside the footage can be
+checked, and dragged again, in the view from the side.
 """
 
 from __future__ import annotations
@@ -26,9 +27,16 @@ from .pointer import Pointer
 _SIDED = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "foot")
 HANDLES = ("head", "pelvis", *(f"{side}_{name}" for side in ("left", "right") for name in _SIDED))
 _RADIUS, _NEAR, _MOVED = 6.0, 16.0, 3.0  # pixels
-_FREE, _HOVERED, _PINNED, _LINE = (1.0, 1.0, 1.0, 0.8), (1.0, 0.8, 0.2, 1.0), (0.9, 0.2, 0.2, 1.0), (1.0, 0.8, 0.2, 0.9)
+_FREE, _HOVERED, _PINNED, _LINE = (
+    (1.0, 1.0, 1.0, 0.8),
+    (1.0, 0.8, 0.2, 1.0),
+    (0.9, 0.2, 0.2, 1.0),
+    (1.0, 0.8, 0.2, 0.9),
+)
 _MISSED = (1.0, 0.5, 0.1, 1.0)
-_HELP = "Drag a handle to where the joint is.  Scrub or play to go to other frames.  Esc or Enter: done"
+_HELP = (
+    "Drag a handle to where the joint is.  Scrub or play to go to other frames.  Esc or Enter: done"
+)
 
 
 class _Session:
@@ -44,7 +52,9 @@ class _Session:
         self.start: tuple[float, float] = (0.0, 0.0)
         self.mouse: tuple[float, float] = (0.0, 0.0)
         self.pointer = Pointer()
-        self._handler = bpy.types.SpaceView3D.draw_handler_add(_draw, (self,), "WINDOW", "POST_PIXEL")
+        self._handler = bpy.types.SpaceView3D.draw_handler_add(
+            _draw, (self,), "WINDOW", "POST_PIXEL"
+        )
 
     def follow(self, active: bpy.types.Object | None) -> None:
         """Show the handles of the active person, whom a click on the body may have changed."""
@@ -70,13 +80,17 @@ def is_running() -> bool:
 
 
 def detach() -> None:
-    """Remove the handles: Blender drops a modal operator whose class is unregistered without calling ``cancel``."""
+    """Remove the handles: Blender drops a modal operator whose class is unregistered without
+    calling ``cancel``.
+    """
     if _running is not None:
         _running.end()
 
 
 class SCOPE_OT_pin_limb(bpy.types.Operator):
-    """Drag handles on the body to where the joints are in this frame; the motion around is solved again"""
+    """Drag handles on the body to where the joints are in this frame; the motion around is solved
+    again
+    """
 
     bl_idname = "scope.pin_limb"
     bl_label = "Pin Limbs"
@@ -145,7 +159,9 @@ class SCOPE_OT_pin_limb(bpy.types.Operator):
         self._session.end()
         context.workspace.status_text_set(None)
 
-    def _drop(self, context: bpy.types.Context, area: bpy.types.Area, region: bpy.types.Region) -> None:
+    def _drop(
+        self, context: bpy.types.Context, area: bpy.types.Area, region: bpy.types.Region
+    ) -> None:
         """Pin the dragged joint under the mouse, which is a step to undo of its own."""
         from bpy_extras.view3d_utils import location_3d_to_region_2d, region_2d_to_location_3d
 
@@ -161,16 +177,22 @@ class SCOPE_OT_pin_limb(bpy.types.Operator):
             return
         screen = at + Vector(session.mouse) - Vector(session.start)
         location = region_2d_to_location_3d(region, view, screen, was)
-        if (person := bpy.data.objects[session.armature]) != captured_armature(context):  # something else was selected
+        # something else was selected
+        if (person := bpy.data.objects[session.armature]) != captured_armature(context):
             context.view_layer.objects.active = person
-        in_image = view.view_perspective == "CAMERA" and context.scene.camera == camera_of(context.scene)
+        in_image = view.view_perspective == "CAMERA" and context.scene.camera == camera_of(
+            context.scene
+        )
         try:
-            bpy.ops.scope.add_pin("EXEC_DEFAULT", True, joint=joint, location=location, in_image=in_image)
+            bpy.ops.scope.add_pin(
+                "EXEC_DEFAULT", True, joint=joint, location=location, in_image=in_image
+            )
         except RuntimeError as error:
             self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
             return
         for warning in last_pin_warnings:
-            self.report({"WARNING"}, warning)  # in Blender's log: its status bar shows the tool's text in place of it
+            # in Blender's log: its status bar shows the tool's text in place of it
+            self.report({"WARNING"}, warning)
         if last_pin_warnings:
             context.workspace.status_text_set("  ".join(last_pin_warnings))
 
@@ -223,26 +245,36 @@ def _draw(session: _Session) -> None:
     armature, space = bpy.data.objects.get(session.armature), context.space_data
     if armature is None or context.area is None or context.region_data is None:
         return
-    if space.local_view and not armature.evaluated_get(context.view_layer.depsgraph).local_view_get(space):
+    if space.local_view and not armature.evaluated_get(context.view_layer.depsgraph).local_view_get(
+        space
+    ):
         return  # only evaluated objects know in which local views they are
     here = context.area.as_pointer() == session.area
     frame, scale = context.scene.frame_current, context.preferences.system.ui_scale
     pins = [e for e in listed_corrections(armature) if e["kind"] == "PIN" and e["first"] == frame]
-    missed = {e["joint"]: e["missed"] for e in pins}  # how far away the joint stays; empty where it does not
+    # how far away the joint stays; empty where it does not
+    missed = {e["joint"]: e["missed"] for e in pins}
     gpu.state.blend_set("ALPHA")
     for name, place in _joint_positions(session).items():
         at = location_3d_to_region_2d(context.region, context.region_data, place)
         if at is None:
             continue
         if here and name == session.dragged:
-            target = (at[0] + session.mouse[0] - session.start[0], at[1] + session.mouse[1] - session.start[1])
+            target = (
+                at[0] + session.mouse[0] - session.start[0],
+                at[1] + session.mouse[1] - session.start[1],
+            )
             draw_line([tuple(at), target], _LINE)
             draw_disc(target, 1.4 * _RADIUS * scale, _HOVERED)
         color = _FREE if name not in missed else _MISSED if missed[name] else _PINNED
         if name == session.hovered:
             color = _HOVERED
         draw_disc(tuple(at), (1.3 if name == session.hovered else 1.0) * _RADIUS * scale, color)
-        label = iface_(name.replace("_", " ").title()) if here and name in (session.hovered, session.dragged) else ""
+        label = (
+            iface_(name.replace("_", " ").title())
+            if here and name in (session.hovered, session.dragged)
+            else ""
+        )
         if label or missed.get(name):
             blf.enable(0, blf.SHADOW)  # over light footage
             blf.shadow(0, 5, 0.0, 0.0, 0.0, 0.9)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that correct what is upright in the world, by a line in the footage or in a view from the side."""
+"""Operators that correct what is upright in the world, by a line in the footage or in a view from
+the side.
+"""
 
 from __future__ import annotations
 
@@ -21,10 +23,12 @@ if TYPE_CHECKING:
     from ....solver.body import Body
 
 _HELP = (
-    "Draw a line along something upright: a door or post in the footage, or a standing person in a side view.  "
+    "Draw a line along something upright: a door or post in the footage, or a standing person in a "
+    "side view.  "
     "Esc: cancel"
 )
-_NAVIGATION = ("MIDDLEMOUSE", "WHEEL", "TRACKPAD", "NUMPAD")  # how the types of events begin that move a view
+# how the types of events begin that move a view
+_NAVIGATION = ("MIDDLEMOUSE", "WHEEL", "TRACKPAD", "NUMPAD")
 
 
 class SCOPE_OT_set_upright(CorrectionOperator):
@@ -33,10 +37,16 @@ class SCOPE_OT_set_upright(CorrectionOperator):
     bl_idname = "scope.set_upright"
     bl_label = "Set Upright"
 
-    start: FloatVectorProperty(name="Start", size=2, description="Pixel of the footage, from its top left")
-    end: FloatVectorProperty(name="End", size=2, description="Pixel of the footage, from its top left")
+    start: FloatVectorProperty(
+        name="Start", size=2, description="Pixel of the footage, from its top left"
+    )
+    end: FloatVectorProperty(
+        name="End", size=2, description="Pixel of the footage, from its top left"
+    )
 
-    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+    def edit(
+        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
+    ) -> str:
         """Move everybody of the capture, and the camera."""
         from ...edit.pins.corrections import Upright, added
         from ...edit.pins.upright import upright_transform
@@ -49,18 +59,29 @@ class SCOPE_OT_set_upright(CorrectionOperator):
 
 
 class SCOPE_OT_set_upright_in_view(CorrectionOperator):
-    """Turn the capture and its camera so that a line in an orthographic view from a side is upright"""
+    """Turn the capture and its camera so that a line in an orthographic view from a side is
+    upright
+    """
 
     bl_idname = "scope.set_upright_in_view"
     bl_label = "Set Upright in View"
 
-    start: FloatVectorProperty(name="Start", size=3, subtype="TRANSLATION", description="Point of the scene")
-    end: FloatVectorProperty(name="End", size=3, subtype="TRANSLATION", description="Point of the scene")
+    start: FloatVectorProperty(
+        name="Start", size=3, subtype="TRANSLATION", description="Point of the scene"
+    )
+    end: FloatVectorProperty(
+        name="End", size=3, subtype="TRANSLATION", description="Point of the scene"
+    )
     direction: FloatVectorProperty(
-        name="Direction", size=3, default=(0.0, 1.0, 0.0), description="Direction of the scene in which the view looks"
+        name="Direction",
+        size=3,
+        default=(0.0, 1.0, 0.0),
+        description="Direction of the scene in which the view looks",
     )
 
-    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float) -> str:
+    def edit(
+        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
+    ) -> str:
         """Move everybody of the capture, and the camera."""
         import numpy as np
 
@@ -80,14 +101,18 @@ class SCOPE_OT_set_upright_in_view(CorrectionOperator):
 
 @dataclass
 class _Line:
-    """The line that is drawn: its ends in pixels of a region, and the address of the region's viewport."""
+    """The line that is drawn: its ends in pixels of a region, and the address of the region's
+    viewport.
+    """
 
     ends: list[tuple[float, float]] = field(default_factory=list)
     area: int = 0
 
 
 class SCOPE_OT_upright_line(bpy.types.Operator):
-    """Draw a line along something upright, in the footage or a side view; it rotates the capture and its camera"""
+    """Draw a line along something upright, in the footage or a side view; it rotates the capture
+    and its camera
+    """
 
     bl_idname = "scope.upright_line"
     bl_label = "Upright Line"
@@ -97,9 +122,16 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
         """Require a viewport in which the line can be drawn."""
         space = context.space_data
         areas = context.window.screen.areas if context.window else ()
-        if space is None or space.type != "VIEW_3D" or not any(_takes_line(context.scene, area) for area in areas):
+        if (
+            space is None
+            or space.type != "VIEW_3D"
+            or not any(_takes_line(context.scene, area) for area in areas)
+        ):
             cls.poll_message_set(
-                tip_("Press Compare with Footage or switch to an orthographic side view; the line is drawn there")
+                tip_(
+                    "Press Compare with Footage or switch to an orthographic side view; the line "
+                    "is drawn there"
+                )
             )
             return False
         return may_edit(cls, context)
@@ -108,7 +140,9 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
         """Wait for the line."""
         self._line = _Line()
         self._pointer = Pointer()
-        self._handler = bpy.types.SpaceView3D.draw_handler_add(_draw, (self._line,), "WINDOW", "POST_PIXEL")
+        self._handler = bpy.types.SpaceView3D.draw_handler_add(
+            _draw, (self._line,), "WINDOW", "POST_PIXEL"
+        )
         context.workspace.status_text_set(iface_(_HELP))
         context.window.cursor_modal_set("CROSSHAIR")
         context.window_manager.modal_handler_add(self)
@@ -122,7 +156,11 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
             self.cancel(context)
             return {"CANCELLED"}
         if not line.ends:
-            area = _area_at(context, x, y) if event.type == "LEFTMOUSE" and event.value == "PRESS" else None
+            area = (
+                _area_at(context, x, y)
+                if event.type == "LEFTMOUSE" and event.value == "PRESS"
+                else None
+            )
             if area is not None:
                 line.area = area.as_pointer()
                 _, region = viewport_of(line.area) or (None, None)
@@ -149,7 +187,9 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
         context.window.cursor_modal_restore()
         redraw_viewport(self._line.area)
 
-    def _finish(self, context: bpy.types.Context, area: bpy.types.Area, region: bpy.types.Region) -> None:
+    def _finish(
+        self, context: bpy.types.Context, area: bpy.types.Area, region: bpy.types.Region
+    ) -> None:
         """Set what is upright, which is a step to undo of its own."""
         from bpy_extras.view3d_utils import region_2d_to_origin_3d, region_2d_to_vector_3d
 
@@ -160,7 +200,9 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
         directions = [region_2d_to_vector_3d(region, view, at) for at in ends]
         try:
             if view.view_perspective == "CAMERA":
-                rays = [origin + 3.0 * along for origin, along in zip(origins, directions, strict=True)]
+                rays = [
+                    origin + 3.0 * along for origin, along in zip(origins, directions, strict=True)
+                ]
                 start, end = _pixels(context, rays)
                 bpy.ops.scope.set_upright("EXEC_DEFAULT", True, start=start, end=end)
             else:
@@ -172,18 +214,28 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
 
 
 def _takes_line(scene: bpy.types.Scene, area: bpy.types.Area) -> bool:
-    """Return whether an area shows the footage through the capture's camera, or an orthographic view."""
+    """Return whether an area shows the footage through the capture's camera, or an orthographic
+    view.
+    """
     if area.type != "VIEW_3D":
         return False
     perspective = area.spaces.active.region_3d.view_perspective
-    through_camera = perspective == "CAMERA" and scene.camera is not None and scene.camera == camera_of(scene)
+    through_camera = (
+        perspective == "CAMERA" and scene.camera is not None and scene.camera == camera_of(scene)
+    )
     return perspective == "ORTHO" or through_camera
 
 
 def _area_at(context: bpy.types.Context, x: int, y: int) -> bpy.types.Area | None:
-    """Return the area under the mouse, unless it takes no line or a sidebar, toolbar or header is there."""
+    """Return the area under the mouse, unless it takes no line or a sidebar, toolbar or header is
+    there.
+    """
     for area in context.window.screen.areas:
-        shown = [r for r in area.regions if r.width > 1 and 0 <= x - r.x < r.width and 0 <= y - r.y < r.height]
+        shown = [
+            r
+            for r in area.regions
+            if r.width > 1 and 0 <= x - r.x < r.width and 0 <= y - r.y < r.height
+        ]
         if shown and all(r.type == "WINDOW" for r in shown) and _takes_line(context.scene, area):
             return area
     return None

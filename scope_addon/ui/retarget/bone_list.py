@@ -43,10 +43,14 @@ def listed_map(settings: bpy.types.PropertyGroup) -> BoneMap:
     from ...retarget.bone_map import BoneMap
 
     pairs = [pair for pair in settings.pairs if pair.bone and pair.part]
-    return BoneMap({pair.bone: pair.part for pair in pairs}, {pair.bone: pair.confidence for pair in pairs})
+    return BoneMap(
+        {pair.bone: pair.part for pair in pairs}, {pair.bone: pair.confidence for pair in pairs}
+    )
 
 
 def common_prefix(bones: list[str]) -> str:
-    """Return what all names begin with, up to a separator, such as ``mixamorig:``; empty if there is nothing."""
+    """Return what all names begin with, up to a separator, such as ``mixamorig:``; empty if there
+    is nothing.
+    """
     shared = os.path.commonprefix(bones) if len(bones) > 1 else ""
     return shared[: 1 + max(shared.rfind(separator) for separator in ":_. ")]

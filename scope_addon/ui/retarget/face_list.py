@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The list of expressions of the chosen face: a mesh with shape keys, or a rig whose bones move the face."""
+"""The list of expressions of the chosen face: a mesh with shape keys, or a rig whose bones move the
+face.
+"""
 
 from __future__ import annotations
 
@@ -29,18 +31,24 @@ def has_targets(face: bpy.types.Object | None) -> bool:
 
 def target_names(face: bpy.types.Object) -> list[str]:
     """Return the names of a face's shape keys or bones."""
-    return list((face.data.bones if face.type == "ARMATURE" else face.data.shape_keys.key_blocks).keys())
+    return list(
+        (face.data.bones if face.type == "ARMATURE" else face.data.shape_keys.key_blocks).keys()
+    )
 
 
 def face_of_rig(rig: bpy.types.Object) -> bpy.types.Object | None:
-    """Return the rig if its bones move its face, and no shape keys of its meshes with names that are known."""
+    """Return the rig if its bones move its face, and no shape keys of its meshes with names that
+    are known.
+    """
     from ...scene.rigs.face_bones import only_bones_move
     from ...scene.rigs.face_retarget import faces_of
     from ...scene.rigs.rig_file import with_meshes
 
     if not bones_move(rig):
         return None
-    return rig if only_bones_move(rig, faces_of(with_meshes(rig, bpy.context.scene.objects))) else None
+    return (
+        rig if only_bones_move(rig, faces_of(with_meshes(rig, bpy.context.scene.objects))) else None
+    )
 
 
 def guessed_map(face: bpy.types.Object) -> ExpressionMap:
@@ -53,12 +61,16 @@ def guessed_map(face: bpy.types.Object) -> ExpressionMap:
 
 
 def listed_or_guessed(settings: bpy.types.PropertyGroup) -> ExpressionMap:
-    """Return the list as a map or, if it is empty, the map that the names of the chosen face suggest."""
+    """Return the list as a map or, if it is empty, the map that the names of the chosen face
+    suggest.
+    """
     return listed_expressions(settings) if len(settings.face_pairs) else guessed_map(settings.face)
 
 
 def fill_expressions(settings: bpy.types.PropertyGroup, expression_map: ExpressionMap) -> None:
-    """Fill the list with a map, one entry for each expression of a shape key or of a control's channel."""
+    """Fill the list with a map, one entry for each expression of a shape key or of a control's
+    channel.
+    """
     settings.face_pairs.clear()
     entries = [(key, SHAPE_KEY, factors) for key, factors in expression_map.keys.items()]
     entries += [
@@ -74,7 +86,9 @@ def fill_expressions(settings: bpy.types.PropertyGroup, expression_map: Expressi
 
 
 def listed_expressions(settings: bpy.types.PropertyGroup) -> ExpressionMap:
-    """Return the list as a map; entries without a shape key or control, or without an expression, are left out."""
+    """Return the list as a map; entries without a shape key or control, or without an expression,
+    are left out.
+    """
     from ...retarget.expression_map import ExpressionMap
 
     out = ExpressionMap({})

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that retarget captured expressions to a face, and that guess, edit, save and load the expression map."""
+"""Operators that retarget captured expressions to a face, and that guess, edit, save and load the
+expression map.
+"""
 
 from __future__ import annotations
 
@@ -27,13 +29,17 @@ class _FaceOperator(ReportingOperator):
         """Require a mesh with shape keys, or a rig whose face is known, in the view layer."""
         face = context.scene.scope_retarget.face
         if not has_targets(face):
-            cls.poll_message_set(tip_("Choose a mesh with shape keys, or a rig with face controls, first"))
+            cls.poll_message_set(
+                tip_("Choose a mesh with shape keys, or a rig with face controls, first")
+            )
             return False
         return is_in_view_layer(cls, context, face)
 
 
 class SCOPE_OT_guess_expressions(_FaceOperator):
-    """Assign the face's shape keys, named as by ARKit, Oculus or VRM, or the controls of a known rig to expressions"""
+    """Assign the face's shape keys, named as by ARKit, Oculus or VRM, or the controls of a known
+    rig to expressions
+    """
 
     bl_idname = "scope.guess_expressions"
     bl_label = "Guess Expressions"
@@ -49,20 +55,25 @@ class SCOPE_OT_guess_expressions(_FaceOperator):
         found = guessed_map(settings.face)
         if not found.keys and not found.controls:
             raise UsageError(
-                f"no shape key of '{settings.face.name}' has a name of ARKit, Oculus or VRM; add entries to the list"
+                f"no shape key of '{settings.face.name}' has a name of ARKit, Oculus or VRM; add "
+                "entries to the list"
             )
         fill_expressions(settings, found)
         if found.controls:
             return rpt_("Found {count} controls; check the list", count=len(found.controls))
         count = len(found.keys)
         return rpt_(
-            "Found {count} shape key; check the list" if count == 1 else "Found {count} shape keys; check the list",
+            "Found {count} shape key; check the list"
+            if count == 1
+            else "Found {count} shape keys; check the list",
             count=count,
         )
 
 
 class SCOPE_OT_retarget_face(_FaceOperator):
-    """Transfer the captured expressions to the mesh's shape keys or the rig's face, as a new action"""
+    """Transfer the captured expressions to the mesh's shape keys or the rig's face, as a new
+    action
+    """
 
     bl_idname = "scope.retarget_face"
     bl_label = "Retarget Face"
@@ -73,11 +84,13 @@ class SCOPE_OT_retarget_face(_FaceOperator):
         if not super().poll(context):
             return False
         face = context.scene.scope_retarget.face
-        library = face.library if face.type == "ARMATURE" else face.data.library  # of what is animated
+        # of what is animated
+        library = face.library if face.type == "ARMATURE" else face.data.library
         if library is not None:
             cls.poll_message_set(
                 tip_(
-                    "'{mesh}' is linked from {file}, so its keyframes would not be saved in this file: make it local",
+                    "'{mesh}' is linked from {file}, so its keyframes would not be saved in this "
+                    "file: make it local",
                     mesh=face.name,
                     file=library.filepath,
                 )
@@ -91,7 +104,8 @@ class SCOPE_OT_retarget_face(_FaceOperator):
     def work(self, context: bpy.types.Context) -> str:
         """Write the keys.
 
-        :raises UsageError: the person's face was not captured, or no shape key or control is mapped.
+        :raises UsageError: the person's face was not captured, or no shape key or control is
+            mapped.
         """
         from ...errors import UsageError
         from ...scene.rigs.face_bones import retarget_face_bones
@@ -101,7 +115,9 @@ class SCOPE_OT_retarget_face(_FaceOperator):
         assert source is not None  # checked by poll
         captured = captured_expressions(source)
         if captured is None:
-            raise UsageError(f"the face of '{source.name}' was not captured; capture again with Face")
+            raise UsageError(
+                f"the face of '{source.name}' was not captured; capture again with Face"
+            )
         chosen = listed_or_guessed(settings)
         if bones_move(settings.face):
             action = retarget_face_bones(captured, settings.face, chosen, source.name)
@@ -109,7 +125,11 @@ class SCOPE_OT_retarget_face(_FaceOperator):
             (action,) = retarget_expressions(captured, [settings.face], chosen, source.name)
         if not len(settings.face_pairs):
             fill_expressions(settings, chosen)
-        return rpt_("'{mesh}' is now animated by the action '{action}'", mesh=settings.face.name, action=action.name)
+        return rpt_(
+            "'{mesh}' is now animated by the action '{action}'",
+            mesh=settings.face.name,
+            action=action.name,
+        )
 
 
 class SCOPE_OT_save_expression_map(_FaceOperator, SaveMapOperator):
@@ -146,7 +166,9 @@ class SCOPE_OT_edit_expression_pair(_FaceOperator):
     bl_idname = "scope.edit_expression_pair"
     bl_label = "Edit Expression Map"
 
-    action: EnumProperty(items=(("ADD", "Add", "Add an entry"), ("REMOVE", "Remove", "Remove the selected entry")))
+    action: EnumProperty(
+        items=(("ADD", "Add", "Add an entry"), ("REMOVE", "Remove", "Remove the selected entry"))
+    )
 
     def work(self, context: bpy.types.Context) -> str:
         """Change the list."""

@@ -23,7 +23,9 @@ class SCOPE_UL_expression_pairs(bpy.types.UIList):
         _settings_with_active: bpy.types.PropertyGroup,
         _active_property: str,
     ) -> None:
-        """Draw one entry: expression, and shape key or control with its channel; see `SCOPE_UL_bone_pairs`."""
+        """Draw one entry: expression, and shape key or control with its channel; see
+        `SCOPE_UL_bone_pairs`.
+        """
         from ....solver.names import EXPRESSIONS
 
         known = _is_known(settings.face, item)
@@ -35,13 +37,18 @@ class SCOPE_UL_expression_pairs(bpy.types.UIList):
         row.alert = not known
         row.label(text=item.key, translate=False)
         if item.channel != SHAPE_KEY:
-            row.label(text=item.bl_rna.properties["channel"].enum_items[item.channel].name, text_ctxt=CONTEXT)
+            row.label(
+                text=item.bl_rna.properties["channel"].enum_items[item.channel].name,
+                text_ctxt=CONTEXT,
+            )
         if not known:
             row.label(text="", icon="ERROR")
 
 
 class SCOPE_PT_retarget_face(Tab, bpy.types.Panel):
-    """Retargeting of captured expressions to shape keys of the user's mesh, or to the bones of a rig's face."""
+    """Retargeting of captured expressions to shape keys of the user's mesh, or to the bones of a
+    rig's face.
+    """
 
     bl_idname = "SCOPE_PT_retarget_face"
     bl_parent_id = "SCOPE_PT_retarget"
@@ -62,7 +69,9 @@ class SCOPE_PT_retarget_face(Tab, bpy.types.Panel):
         row = row.row(align=True)
         row.enabled = len(settings.face_pairs) > 0
         row.operator("scope.edit_expression_pair", text="", icon="REMOVE").action = "REMOVE"
-        layout.template_list("SCOPE_UL_expression_pairs", "", settings, "face_pairs", settings, "face_active", rows=5)
+        layout.template_list(
+            "SCOPE_UL_expression_pairs", "", settings, "face_pairs", settings, "face_active", rows=5
+        )
         for pair in settings.face_pairs[settings.face_active : settings.face_active + 1]:
             column = layout.column(align=True)
             column.prop(pair, "expression", text="", placeholder="Expression", icon="SHAPEKEY_DATA")
@@ -71,7 +80,9 @@ class SCOPE_PT_retarget_face(Tab, bpy.types.Panel):
                 column.prop_search(pair, "key", settings.face.data, "bones", text="")
                 column.prop(pair, "channel", text="")
             else:
-                column.prop_search(pair, "key", settings.face.data.shape_keys, "key_blocks", text="")
+                column.prop_search(
+                    pair, "key", settings.face.data.shape_keys, "key_blocks", text=""
+                )
             column.alert = False
             column.prop(pair, "factor")
         layout.operator("scope.retarget_face", icon="SHAPEKEY_DATA")
@@ -79,9 +90,15 @@ class SCOPE_PT_retarget_face(Tab, bpy.types.Panel):
 
 def _is_known(face: bpy.types.Object | None, pair: bpy.types.PropertyGroup) -> bool:
     """Return whether the chosen face has the shape key or the control of an entry."""
-    if face is None or not has_targets(face) or (face.type == "ARMATURE") == (pair.channel == SHAPE_KEY):
+    if (
+        face is None
+        or not has_targets(face)
+        or (face.type == "ARMATURE") == (pair.channel == SHAPE_KEY)
+    ):
         return False
-    return pair.key in (face.data.bones if face.type == "ARMATURE" else face.data.shape_keys.key_blocks)
+    return pair.key in (
+        face.data.bones if face.type == "ARMATURE" else face.data.shape_keys.key_blocks
+    )
 
 
 CLASSES = (SCOPE_UL_expression_pairs, SCOPE_PT_retarget_face)

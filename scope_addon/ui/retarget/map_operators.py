@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What operators on the bone map and on the expression map share: their poll, their files, and editing their lists."""
+"""What operators on the bone map and on the expression map share: their poll, their files, and
+editing their lists.
+"""
 
 from __future__ import annotations
 
@@ -12,13 +14,18 @@ from ...scene.datablock_names import is_in_layer
 from ..reporting import ReportingOperator, rpt_, tip_
 
 
-def is_in_view_layer(cls: type[bpy.types.Operator], context: bpy.types.Context, chosen: bpy.types.Object) -> bool:
-    """Return whether an object that was chosen can be animated here: one that is deleted stays chosen."""
+def is_in_view_layer(
+    cls: type[bpy.types.Operator], context: bpy.types.Context, chosen: bpy.types.Object
+) -> bool:
+    """Return whether an object that was chosen can be animated here: one that is deleted stays
+    chosen.
+    """
     if is_in_layer(context.view_layer, chosen):
         return True
     cls.poll_message_set(
         tip_(
-            "'{rig}' is not in the scene's view layer: add it to the scene, or enable its collection in the Outliner",
+            "'{rig}' is not in the scene's view layer: add it to the scene, or enable its "
+            "collection in the Outliner",
             rig=chosen.name,
         )
     )
@@ -42,10 +49,13 @@ class SaveMapOperator(MapFileOperator):
 
     bl_options = {"REGISTER"}  # it changes a file only, so there is nothing to undo
 
-    check_existing: BoolProperty(default=True, options={"HIDDEN"})  # the file browser asks before it overwrites
+    # the file browser asks before it overwrites
+    check_existing: BoolProperty(default=True, options={"HIDDEN"})
 
     def check(self, context: bpy.types.Context) -> bool:
-        """Add the suffix while the name is typed, so that the file browser sees which file would be overwritten."""
+        """Add the suffix while the name is typed, so that the file browser sees which file would be
+        overwritten.
+        """
         path: str = bpy.path.ensure_ext(self.filepath, ".json")
         changed, self.filepath = path != self.filepath, path
         return bool(changed)
@@ -85,7 +95,8 @@ class LoadMapOperator(MapFileOperator):
 
 
 def edit_list(action: str, pairs: Any, active: int) -> int:
-    """Add an entry to a list's collection, or remove the active one; return which one is active then.
+    """Add an entry to a list's collection, or remove the active one; return which one is active
+    then.
 
     :param action: ``ADD`` or ``REMOVE``.
     """

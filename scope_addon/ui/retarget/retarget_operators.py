@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that retarget a captured motion to the user's rig, and that guess, edit, save and load the bone map."""
+"""Operators that retarget a captured motion to the user's rig, and that guess, edit, save and load
+the bone map.
+"""
 
 from __future__ import annotations
 
@@ -48,12 +50,17 @@ class SCOPE_OT_guess_bones(_RigOperator):
         fill_list(context.scene.scope_retarget, found)
         count = len(found.parts)
         return rpt_(
-            "Found {count} bone; check the list" if count == 1 else "Found {count} bones; check the list", count=count
+            "Found {count} bone; check the list"
+            if count == 1
+            else "Found {count} bones; check the list",
+            count=count,
         )
 
 
 class SCOPE_OT_retarget(_RigOperator):
-    """Transfer the captured motion to your rig, as a new action. One of the same capture is replaced if unchanged"""
+    """Transfer the captured motion to your rig, as a new action. One of the same capture is
+    replaced if unchanged
+    """
 
     bl_idname = "scope.retarget"
     bl_label = "Retarget"
@@ -67,7 +74,8 @@ class SCOPE_OT_retarget(_RigOperator):
         if rig.library is not None:
             cls.poll_message_set(
                 tip_(
-                    "'{rig}' is linked from {file}, so its motion would not be saved in this file: make an override of "
+                    "'{rig}' is linked from {file}, so its motion would not be saved in this file: "
+                    "make an override of "
                     "it (Object > Library Override > Make)",
                     rig=rig.name,
                     file=rig.library.filepath,
@@ -76,7 +84,10 @@ class SCOPE_OT_retarget(_RigOperator):
             return False
         if captured_armature(context) is None:
             cls.poll_message_set(
-                tip_("Several people are captured: select the armature of the one whose motion to retarget")
+                tip_(
+                    "Several people are captured: select the armature of the one whose motion to "
+                    "retarget"
+                )
                 if captured_people(context)
                 else tip_("The scene contains no capture yet")
             )
@@ -94,7 +105,8 @@ class SCOPE_OT_retarget(_RigOperator):
         return rpt_(
             "'{rig}' is now animated by the action '{action}'"
             if settings.root == "in-place"  # where it has no path to scale
-            else "'{rig}' is now animated by the action '{action}', with positions on the floor scaled by {scale:.3f}",
+            else "'{rig}' is now animated by the action '{action}', with positions on the floor "
+            "scaled by {scale:.3f}",
             rig=settings.rig.name,
             action=result.action.name,
             scale=result.travel,
@@ -136,13 +148,17 @@ def retarget_to_chosen_rig(context: bpy.types.Context, source: bpy.types.Object)
 
 
 def face_map(settings: bpy.types.PropertyGroup) -> ExpressionMap | None:
-    """Return the expression map if the chosen face is the rig's own, which its bones move; otherwise None."""
+    """Return the expression map if the chosen face is the rig's own, which its bones move;
+    otherwise None.
+    """
     if settings.face is None or settings.face != settings.rig or not bones_move(settings.face):
         return None
     return listed_or_guessed(settings)
 
 
-def retarget_options(settings: bpy.types.PropertyGroup, face: ExpressionMap | None = None) -> RetargetOptions:
+def retarget_options(
+    settings: bpy.types.PropertyGroup, face: ExpressionMap | None = None
+) -> RetargetOptions:
     """Return the options of the settings.
 
     :param face: the expression map of the bones that move the rig's face, if any.
@@ -151,7 +167,9 @@ def retarget_options(settings: bpy.types.PropertyGroup, face: ExpressionMap | No
 
     offset = _SIDE_OFFSET_M if settings.captured == "beside" else (0.0, 0.0, 0.0)
     travel = settings.travel or None
-    return RetargetOptions(feet=settings.feet, root=settings.root, offset=offset, face=face, travel=travel)
+    return RetargetOptions(
+        feet=settings.feet, root=settings.root, offset=offset, face=face, travel=travel
+    )
 
 
 class SCOPE_OT_save_bone_map(_RigOperator, SaveMapOperator):
@@ -188,7 +206,9 @@ class SCOPE_OT_edit_bone_pair(_RigOperator):
     bl_idname = "scope.edit_bone_pair"
     bl_label = "Edit Bone Map"
 
-    action: EnumProperty(items=(("ADD", "Add", "Add an entry"), ("REMOVE", "Remove", "Remove the selected entry")))
+    action: EnumProperty(
+        items=(("ADD", "Add", "Add an entry"), ("REMOVE", "Remove", "Remove the selected entry"))
+    )
 
     def work(self, context: bpy.types.Context) -> str:
         """Change the list."""
@@ -199,7 +219,9 @@ class SCOPE_OT_edit_bone_pair(_RigOperator):
 
 
 def _select_only(context: bpy.types.Context, rig: bpy.types.Object) -> None:
-    """Make the rig the active and the only selected object, because a hidden object cannot be selected."""
+    """Make the rig the active and the only selected object, because a hidden object cannot be
+    selected.
+    """
     active = context.view_layer.objects.active
     if active is not None and active.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")

@@ -25,8 +25,8 @@ class SCOPE_UL_bone_pairs(bpy.types.UIList):
     ) -> None:
         """Draw one entry: part, bone, and a question mark if the guess is uncertain.
 
-        Labels leave room for long names; the chosen entry is edited below the list. Blender's further arguments,
-        ``index`` and ``flt_flag``, are optional and left out.
+        Labels leave room for long names; the chosen entry is edited below the list. Blender's
+        further arguments, ``index`` and ``flt_flag``, are optional and left out.
         """
         rig = settings.rig
         known = rig is not None and item.bone in rig.data.bones
@@ -67,7 +67,9 @@ class SCOPE_PT_retarget(Tab, bpy.types.Panel):
         row = row.row(align=True)
         row.enabled = len(settings.pairs) > 0
         row.operator("scope.edit_bone_pair", text="", icon="REMOVE").action = "REMOVE"
-        layout.template_list("SCOPE_UL_bone_pairs", "", settings, "pairs", settings, "active", rows=5)
+        layout.template_list(
+            "SCOPE_UL_bone_pairs", "", settings, "pairs", settings, "active", rows=5
+        )
         for pair in settings.pairs[settings.active : settings.active + 1]:
             column = layout.column(align=True)
             column.prop(pair, "part", text="", placeholder="Body Part", icon="ARMATURE_DATA")

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The settings of retargeting: the rig and the bone map, the face and the expression map. Stored with the scene."""
+"""The settings of retargeting: the rig and the bone map, the face and the expression map. Stored
+with the scene.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,9 @@ from bpy.props import (
 from ..translations import CONTEXT
 
 
-def offered_parts(_pair: bpy.types.PropertyGroup | None, _context: bpy.types.Context, typed: str) -> list[str]:
+def offered_parts(
+    _pair: bpy.types.PropertyGroup | None, _context: bpy.types.Context, typed: str
+) -> list[str]:
     """Return the body parts whose names contain what was typed so far, for Blender to suggest."""
     from ...retarget.bone_map import PARTS
 
@@ -29,12 +33,18 @@ class SCOPE_PG_bone_pair(bpy.types.PropertyGroup):
 
     bone: StringProperty(name="Bone", description="Bone of your rig")
     part: StringProperty(
-        name="Body Part", search=offered_parts, description="Part of the captured body that this bone follows"
+        name="Body Part",
+        search=offered_parts,
+        description="Part of the captured body that this bone follows",
     )
-    confidence: FloatProperty(name="Confidence", min=0.0, max=1.0, description="Confidence of the guess")
+    confidence: FloatProperty(
+        name="Confidence", min=0.0, max=1.0, description="Confidence of the guess"
+    )
 
 
-def offered_expressions(_pair: bpy.types.PropertyGroup | None, _context: bpy.types.Context, typed: str) -> list[str]:
+def offered_expressions(
+    _pair: bpy.types.PropertyGroup | None, _context: bpy.types.Context, typed: str
+) -> list[str]:
     """Return the expressions whose names contain what was typed so far, for Blender to suggest."""
     from ....solver.names import EXPRESSIONS
 
@@ -42,16 +52,31 @@ def offered_expressions(_pair: bpy.types.PropertyGroup | None, _context: bpy.typ
 
 
 class SCOPE_PG_expression_pair(bpy.types.PropertyGroup):
-    """One shape key of the user's mesh, or channel of a rig's control, and an expression that it follows."""
+    """One shape key of the user's mesh, or channel of a rig's control, and an expression that it
+    follows.
+    """
 
-    key: StringProperty(name="Shape Key or Control", description="Shape key of your mesh, or bone of your rig's face")
+    key: StringProperty(
+        name="Shape Key or Control",
+        description="Shape key of your mesh, or bone of your rig's face",
+    )
     channel: EnumProperty(
         name="Channel",
         items=(
             ("key", "Shape Key", "Value of a shape key", 0),
-            ("left", "Left", "Moves to the person's left, relative to mouth width, eye distance or lid gap", 1),
+            (
+                "left",
+                "Left",
+                "Moves to the person's left, relative to mouth width, eye distance or lid gap",
+                1,
+            ),
             ("up", "Up", "Moves up, relative to mouth width, eye distance or lid gap", 2),
-            ("forward", "Forward", "Moves forward, relative to mouth width, eye distance or lid gap", 3),
+            (
+                "forward",
+                "Forward",
+                "Moves forward, relative to mouth width, eye distance or lid gap",
+                3,
+            ),
             ("pitch", "Pitch", "Turns down, in degrees", 4),
             ("yaw", "Yaw", "Turns to the person's left, in degrees", 5),
             ("roll", "Roll", "Turns with the left side up, in degrees", 6),
@@ -61,7 +86,9 @@ class SCOPE_PG_expression_pair(bpy.types.PropertyGroup):
         description="How a control follows the expression, along the axes of the rig's face",
     )
     expression: StringProperty(
-        name="Expression", search=offered_expressions, description="Captured expression that this entry follows"
+        name="Expression",
+        search=offered_expressions,
+        description="Captured expression that this entry follows",
     )
     factor: FloatProperty(
         name="Factor",
@@ -70,7 +97,8 @@ class SCOPE_PG_expression_pair(bpy.types.PropertyGroup):
         max=180.0,
         soft_min=-10.0,
         soft_max=10.0,
-        description="Value where the expression is 1: at most 10, or 180 degrees; several expressions add up",
+        description="Value where the expression is 1: at most 10, or 180 degrees; several "
+        "expressions add up",
     )
 
 
@@ -86,7 +114,8 @@ def _is_armature(_settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> b
 
 
 def _list_bones_of_new_rig(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
-    """Replace the bone list of another rig by a guess; keep that of the same rig, or of one with the same bones.
+    """Replace the bone list of another rig by a guess; keep that of the same rig, or of one with
+    the same bones.
 
     A rig whose bones move its face becomes the face as well, unless another one is chosen.
     """
@@ -109,7 +138,9 @@ def _list_bones_of_new_rig(settings: bpy.types.PropertyGroup, _context: bpy.type
 
 
 def _list_keys_of_new_face(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
-    """Replace the expression list of another face by a guess; keep that of one with the same shape keys or bones."""
+    """Replace the expression list of another face by a guess; keep that of one with the same shape
+    keys or bones.
+    """
     from .face_list import fill_expressions, guessed_map, has_targets, target_names
 
     if not has_targets(settings.face):
@@ -133,7 +164,8 @@ class SCOPE_PG_retarget(bpy.types.PropertyGroup):
         update=_list_bones_of_new_rig,
         description="Armature to animate with the captured motion",
     )
-    listed_bones: StringProperty(options={"HIDDEN"})  # names of all bones of the rig that the list is for
+    # names of all bones of the rig that the list is for
+    listed_bones: StringProperty(options={"HIDDEN"})
     pairs: CollectionProperty(type=SCOPE_PG_bone_pair)
     active: IntProperty()
     face: PointerProperty(
@@ -141,15 +173,18 @@ class SCOPE_PG_retarget(bpy.types.PropertyGroup):
         type=bpy.types.Object,
         poll=_is_face,
         update=_list_keys_of_new_face,
-        description="Mesh with shape keys, or rig whose bones move its face, to animate with the captured expressions",
+        description="Mesh with shape keys, or rig whose bones move its face, to animate with the "
+        "captured expressions",
     )
-    listed_keys: StringProperty(options={"HIDDEN"})  # names of all shape keys or bones that the list is for
+    # names of all shape keys or bones that the list is for
+    listed_keys: StringProperty(options={"HIDDEN"})
     face_pairs: CollectionProperty(type=SCOPE_PG_expression_pair)
     face_active: IntProperty()
     feet: BoolProperty(
         name="Feet on the Floor",
         default=True,
-        description="Lock feet that are in contact, scaled to the rig, and keep them above the floor",
+        description="Lock feet that are in contact, scaled to the rig, and keep them above the "
+        "floor",
     )
     travel: FloatProperty(
         name="Travel Scale",
@@ -157,14 +192,20 @@ class SCOPE_PG_retarget(bpy.types.PropertyGroup):
         min=0.0,
         soft_max=10.0,
         precision=3,
-        description="Scale of positions on the floor. 0: the ratio of leg lengths, so that steps fit the rig. Several "
+        description="Scale of positions on the floor. 0: the ratio of leg lengths, so that steps "
+        "fit the rig. Several "
         "people who touch or meet need the same value for all their rigs",
     )
     root: EnumProperty(
         name="Root Motion",
         items=(
             ("bone", "In Bones", "The pelvis moves through the scene", 0),
-            ("object", "On Object", "An empty carries position and heading, the rig moves relative to it", 1),
+            (
+                "object",
+                "On Object",
+                "An empty carries position and heading, the rig moves relative to it",
+                1,
+            ),
             ("in-place", "In Place", "No root motion: the character stays in place", 2),
         ),
         default="bone",
@@ -178,7 +219,8 @@ class SCOPE_PG_retarget(bpy.types.PropertyGroup):
             ("keep", "Overlap", "Show both in the same place", 2),
         ),
         default="hide",
-        translation_context=CONTEXT,  # Blender's own translations are too long for three buttons in a row
+        # Blender's own translations are too long for three buttons in a row
+        translation_context=CONTEXT,
         description="How the captured person is shown after retargeting",
     )
 

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A viewport that shows a capture over its footage, and a second one beside it that shows the capture from its side.
+"""A viewport that shows a capture over its footage, and a second one beside it that shows the
+capture from its side.
 
-Views are not part of what Blender undoes and saves with a scene, so this state is read from the viewports themselves.
+Views are not part of what Blender undoes and saves with a scene, so this state is read from the
+viewports themselves.
 """
 
 from __future__ import annotations
@@ -22,14 +24,19 @@ from .viewports import viewport_at, viewports
 _MIN_SIDE = 0.3  # of the viewport's width
 _DRAWN_AFTER_S = 0.2
 _SIDE_TILT = math.radians(5.0)
-_SENSOR_MM = 72.0  # a viewport shows the distance times this over its focal length, across its longer side
+# a viewport shows the distance times this over its focal length, across its longer side
+_SENSOR_MM = 72.0
 _had_bones: dict[int, bool] = {}  # by viewport: whether it showed bones before the comparison
 
 
 def camera_of(scene: bpy.types.Scene) -> bpy.types.Object | None:
     """Return the camera of the scene's last capture; None if there is none."""
     collection = scene.scope.result.collection
-    return next((o for o in collection.all_objects if o.type == "CAMERA"), None) if collection else None
+    return (
+        next((o for o in collection.all_objects if o.type == "CAMERA"), None)
+        if collection
+        else None
+    )
 
 
 def is_looking_through(context: bpy.types.Context) -> bool:
@@ -45,11 +52,14 @@ def looks_through(scene: bpy.types.Scene, space: bpy.types.SpaceView3D) -> bool:
     return scene.camera is not None and scene.camera == camera_of(scene)
 
 
-def begin(context: bpy.types.Context, area: bpy.types.Area, collection: bpy.types.Collection) -> None:
+def begin(
+    context: bpy.types.Context, area: bpy.types.Area, collection: bpy.types.Collection
+) -> None:
     """Show a capture over its footage in a viewport, without bones, which would cover the body."""
     space = area.spaces.active
     _show_alone(context, area, collection)
-    _had_bones.setdefault(space.as_pointer(), space.overlay.show_bones)  # not again where another capture was compared
+    # not again where another capture was compared
+    _had_bones.setdefault(space.as_pointer(), space.overlay.show_bones)
     space.overlay.show_bones = False
     # In local view, Blender keeps the camera of the capture that was compared before.
     space.camera = context.scene.camera
@@ -62,7 +72,8 @@ def begin(context: bpy.types.Context, area: bpy.types.Area, collection: bpy.type
 def end(window: bpy.types.Window, area: bpy.types.Area) -> None:
     """Show the scene in a viewport again as before the comparison."""
     space = area.spaces.active
-    space.overlay.show_bones = _had_bones.pop(space.as_pointer(), True)  # unknown after the file was opened again
+    # unknown after the file was opened again
+    space.overlay.show_bones = _had_bones.pop(space.as_pointer(), True)
     unfit_frame(space)
     with _in(window, area):
         if space.local_view:
@@ -74,7 +85,9 @@ def end(window: bpy.types.Window, area: bpy.types.Area) -> None:
 
 
 def end_others(scene: bpy.types.Scene, shown: bpy.types.Collection) -> None:
-    """End every comparison of a capture other than the shown one: its footage would be behind the wrong body."""
+    """End every comparison of a capture other than the shown one: its footage would be behind the
+    wrong body.
+    """
     for window, area in viewports():
         if _compares_another(scene, area.spaces.active, shown):
             end(window, area)
@@ -83,7 +96,9 @@ def end_others(scene: bpy.types.Scene, shown: bpy.types.Collection) -> None:
 
 
 def _close_later(side: bpy.types.Area) -> None:
-    """Close the side view when no operator runs: Blender crashes when a running one's context was closed."""
+    """Close the side view when no operator runs: Blender crashes when a running one's context was
+    closed.
+    """
     pointer = side.as_pointer()
 
     def close() -> None:
@@ -95,8 +110,12 @@ def _close_later(side: bpy.types.Area) -> None:
         bpy.app.timers.register(close, first_interval=_DRAWN_AFTER_S)
 
 
-def _compares_another(scene: bpy.types.Scene, space: bpy.types.SpaceView3D, shown: bpy.types.Collection) -> bool:
-    """Return whether a viewport looks through the camera of a capture of the scene that is not the shown one."""
+def _compares_another(
+    scene: bpy.types.Scene, space: bpy.types.SpaceView3D, shown: bpy.types.Collection
+) -> bool:
+    """Return whether a viewport looks through the camera of a capture of the scene that is not the
+    shown one.
+    """
     camera = space.camera
     if not space.local_view or space.region_3d.view_perspective != "CAMERA" or camera is None:
         return False
@@ -106,7 +125,10 @@ def _compares_another(scene: bpy.types.Scene, space: bpy.types.SpaceView3D, show
 
 def side_area(screen: bpy.types.Screen) -> bpy.types.Area | None:
     """Return the viewport with the side view; None if there is none."""
-    return next((area for area in screen.areas if area.type == "VIEW_3D" and _is_side(area.spaces.active)), None)
+    return next(
+        (area for area in screen.areas if area.type == "VIEW_3D" and _is_side(area.spaces.active)),
+        None,
+    )
 
 
 def is_side_view(context: bpy.types.Context) -> bool:
@@ -125,7 +147,11 @@ def open_side_view(context: bpy.types.Context, area: bpy.types.Area) -> None:
     window, screen = context.window, context.window.screen
     before = {each.as_pointer() for each in screen.areas}
     # What the sidebar and the toolbar leave is shared equally.
-    covered = sum(region.width for region in area.regions if region.type in ("TOOLS", "UI") and region.width > 1)
+    covered = sum(
+        region.width
+        for region in area.regions
+        if region.type in ("TOOLS", "UI") and region.width > 1
+    )
     factor = max(_MIN_SIDE, (1.0 - covered / max(1, area.width)) / 2.0)
     width = factor * area.width
     with _in(window, area):
@@ -145,7 +171,9 @@ def open_side_view(context: bpy.types.Context, area: bpy.types.Area) -> None:
     view = space.region_3d
     view.view_perspective = "ORTHO"
     # Slightly from above: in an orthographic view that is level, Blender draws no floor.
-    turn = _side_rotation(camera.matrix_world).to_quaternion() @ Quaternion((1.0, 0.0, 0.0), -_SIDE_TILT)
+    turn = _side_rotation(camera.matrix_world).to_quaternion() @ Quaternion(
+        (1.0, 0.0, 0.0), -_SIDE_TILT
+    )
     view.view_rotation = turn
     shown = side_extent(space.lock_object, people, np.array(turn.to_matrix()))
     view.view_distance = _span(shown, width / max(1, area.height)) * space.lens / _SENSOR_MM
@@ -153,7 +181,8 @@ def open_side_view(context: bpy.types.Context, area: bpy.types.Area) -> None:
 
 
 def _span(shown: tuple[float, float], aspect: float) -> float:
-    """Return what a viewport must show across its longer side for a width and height, metres, to fit.
+    """Return what a viewport must show across its longer side for a width and height, metres, to
+    fit.
 
     :param aspect: width divided by height of the viewport.
     """
@@ -184,7 +213,8 @@ def _fit_later(area: bpy.types.Area) -> None:
 
 
 def _side_rotation(camera: Matrix) -> Matrix:
-    """Return the rotation (3, 3) of a view that is level and looks to the right of where a camera looks.
+    """Return the rotation (3, 3) of a view that is level and looks to the right of where a camera
+    looks.
 
     :param camera: (4, 4) world from camera, whose z points backwards.
     """
@@ -197,8 +227,12 @@ def _side_rotation(camera: Matrix) -> Matrix:
     return Matrix((up.cross(back), up, back)).transposed()
 
 
-def _show_alone(context: bpy.types.Context, area: bpy.types.Area, collection: bpy.types.Collection) -> None:
-    """Show only the capture in local view, because other objects could hide the footage or the body."""
+def _show_alone(
+    context: bpy.types.Context, area: bpy.types.Area, collection: bpy.types.Collection
+) -> None:
+    """Show only the capture in local view, because other objects could hide the footage or the
+    body.
+    """
     from ...scene.visibility import show
 
     selected, active = context.selected_objects, context.view_layer.objects.active
@@ -208,7 +242,8 @@ def _show_alone(context: bpy.types.Context, area: bpy.types.Area, collection: bp
         if area.spaces.active.local_view:
             bpy.ops.view3d.localview(frame_selected=False)
         bpy.ops.object.select_all(action="DESELECT")
-        for obj in list(collection.all_objects):  # copied, because hiding and showing invalidates the iterator
+        # copied, because hiding and showing invalidates the iterator
+        for obj in list(collection.all_objects):
             if "scope_source" in obj:  # it may be hidden because of a retargeted rig
                 show(obj, context.view_layer, temporarily=True)
             obj.select_set(True)

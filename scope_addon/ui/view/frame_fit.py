@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fitting a camera's frame into the part of a viewport that no sidebar or toolbar covers.
 
-Seen through a camera, a viewport of ``w`` × ``h`` pixels at zoom ``z`` shows the sensor ``f · max(w, h)`` pixels long,
-with ``f = (√2 + z / 50)² / 4``, and the offset ``(dx, dy)`` moves the frame by ``-2 f (dx · w, dy · h)`` pixels. A
-sensor that is fitted horizontally or vertically has ``w`` or ``h`` in place of ``max(w, h)``.
+Seen through a camera, a viewport of ``w`` × ``h`` pixels at zoom ``z`` shows the sensor ``f ·
+max(w, h)`` pixels long, with ``f = (√2 + z / 50)² / 4``, and the offset ``(dx, dy)`` moves the
+frame by ``-2 f (dx · w, dy · h)`` pixels. A sensor that is fitted horizontally or vertically has
+``w`` or ``h`` in place of ``max(w, h)``.
 """
 
 from __future__ import annotations
@@ -14,14 +15,22 @@ import bpy
 
 _FILLED = 0.94  # of the visible part
 _ZOOMS = (-30.0, 600.0)  # Blender's limits
-_former: dict[int, tuple[float, tuple[float, float]]] = {}  # by viewport: zoom and offset before the first fit
+# by viewport: zoom and offset before the first fit
+_former: dict[int, tuple[float, tuple[float, float]]] = {}
 
 
 def fit_frame(scene: bpy.types.Scene, area: bpy.types.Area) -> None:
-    """Zoom and move a viewport's camera view so that the whole frame of the scene's camera is visible."""
+    """Zoom and move a viewport's camera view so that the whole frame of the scene's camera is
+    visible.
+    """
     region = next((each for each in area.regions if each.type == "WINDOW"), None)
     camera, space = scene.camera, area.spaces.active
-    if region is None or camera is None or camera.type != "CAMERA" or min(region.width, region.height) < 2:
+    if (
+        region is None
+        or camera is None
+        or camera.type != "CAMERA"
+        or min(region.width, region.height) < 2
+    ):
         return
     left, right, bottom, top = _visible(area, region)
     render = scene.render
@@ -45,8 +54,12 @@ def unfit_frame(space: bpy.types.SpaceView3D) -> None:
         space.region_3d.view_camera_zoom, space.region_3d.view_camera_offset = former
 
 
-def _frame_at_one(fit: str, size: tuple[float, float], region: tuple[int, int]) -> tuple[float, float]:
-    """Return the width and height of the frame, pixels, where the sensor is as long as the viewport."""
+def _frame_at_one(
+    fit: str, size: tuple[float, float], region: tuple[int, int]
+) -> tuple[float, float]:
+    """Return the width and height of the frame, pixels, where the sensor is as long as the
+    viewport.
+    """
     horizontal = fit == "HORIZONTAL" or (fit == "AUTO" and size[0] >= size[1])
     along = {"HORIZONTAL": region[0], "VERTICAL": region[1]}.get(fit, max(region))
     scale = along / (size[0] if horizontal else size[1])
@@ -54,7 +67,9 @@ def _frame_at_one(fit: str, size: tuple[float, float], region: tuple[int, int]) 
 
 
 def _visible(area: bpy.types.Area, region: bpy.types.Region) -> tuple[float, float, float, float]:
-    """Return the left, right, bottom and top of what no other region covers, in pixels of the viewport's region."""
+    """Return the left, right, bottom and top of what no other region covers, in pixels of the
+    viewport's region.
+    """
     left, right, bottom, top = 0.0, float(region.width), 0.0, float(region.height)
     for other in area.regions:
         if min(other.width, other.height) < 2:  # hidden
@@ -69,4 +84,8 @@ def _visible(area: bpy.types.Area, region: bpy.types.Region) -> tuple[float, flo
         elif other.type in ("HEADER", "TOOL_HEADER"):
             bottom = max(bottom, y + other.height)
     wide_enough = right - left > 0.2 * region.width and top - bottom > 0.2 * region.height
-    return (left, right, bottom, top) if wide_enough else (0.0, float(region.width), 0.0, float(region.height))
+    return (
+        (left, right, bottom, top)
+        if wide_enough
+        else (0.0, float(region.width), 0.0, float(region.height))
+    )

@@ -12,7 +12,9 @@ _DRAWN_AFTER_S = 0.3  # a sidebar knows its tabs only after it has been drawn
 
 
 def viewport_of(context: bpy.types.Context) -> bpy.types.Area | None:
-    """Return the context's viewport, or else, as in a menu at the top, the largest of its window."""
+    """Return the context's viewport, or else, as in a menu at the top, the largest of its
+    window.
+    """
     window, area = context.window, context.area
     if window is None or (area is not None and area.type == "VIEW_3D"):
         return area if window is not None else None
@@ -21,7 +23,9 @@ def viewport_of(context: bpy.types.Context) -> bpy.types.Area | None:
 
 
 def show_tab(context: bpy.types.Context) -> None:
-    """Open the tab in the context's viewport, or else in the largest of its window: it shows a capture's progress."""
+    """Open the tab in the context's viewport, or else in the largest of its window: it shows a
+    capture's progress.
+    """
     area = viewport_of(context)
     if area is None:
         return
@@ -39,7 +43,9 @@ def _choose_tab_later(pointer: int) -> None:
 
 
 def _choose_tab(area: bpy.types.Area) -> bool:
-    """Choose the tab in a viewport; False where Blender does not allow it, such as before the sidebar was drawn."""
+    """Choose the tab in a viewport; False where Blender does not allow it, such as before the
+    sidebar was drawn.
+    """
     try:
         for sidebar in _sidebars(area):
             sidebar.active_panel_category = TAB
@@ -66,13 +72,17 @@ def is_over_tab(window: bpy.types.Window, event: bpy.types.Event) -> bool:
 
 
 def redraw_sidebars() -> None:
-    """Redraw the sidebars, but not the viewports, because redrawing a large scene repeatedly is slow."""
+    """Redraw the sidebars, but not the viewports, because redrawing a large scene repeatedly is
+    slow.
+    """
     for region in (sidebar for _, area in viewports() for sidebar in _sidebars(area)):
         region.tag_redraw()
 
 
 def redraw_sidebars_twice() -> None:
-    """Redraw now and again shortly: panels below one whose height changed move only at the second redraw."""
+    """Redraw now and again shortly: panels below one whose height changed move only at the second
+    redraw.
+    """
     redraw_sidebars()
     if not bpy.app.background:
         bpy.app.timers.register(redraw_sidebars, first_interval=_DRAWN_AFTER_S)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Restore the viewport when "Compare with Footage" is undone; views are not part of what Blender undoes."""
+"""Restore the viewport when "Compare with Footage" is undone; views are not part of what Blender
+undoes.
+"""
 
 from __future__ import annotations
 
@@ -43,10 +45,14 @@ def _after(*_: object) -> None:
 
 
 def _leave() -> None:
-    """Leave local view and camera view in the viewports that no longer show a capture through its camera."""
+    """Leave local view and camera view in the viewports that no longer show a capture through its
+    camera.
+    """
     left = False
     for window, area in viewports():
-        if area.as_pointer() in _looked_through and not looks_through(window.scene, area.spaces.active):
+        if area.as_pointer() in _looked_through and not looks_through(
+            window.scene, area.spaces.active
+        ):
             end(window, area)
             left = True
     for window, side in [pair for pair in viewports() if left and pair[1].as_pointer() in _sides]:

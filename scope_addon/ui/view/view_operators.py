@@ -20,12 +20,18 @@ def hide_startup_cube(context: bpy.types.Context) -> None:
     if bpy.data.filepath or cube is None or cube.type != "MESH" or len(cube.data.vertices) != 8:
         return
     modified = cube.animation_data or cube.modifiers or cube.constraints or cube.children
-    if not modified and cube.matrix_world == Matrix.Identity(4) and cube.name in context.view_layer.objects:
+    if (
+        not modified
+        and cube.matrix_world == Matrix.Identity(4)
+        and cube.name in context.view_layer.objects
+    ):
         cube.hide_set(True)
 
 
 def frame_selected(context: bpy.types.Context) -> None:
-    """Frame the selected objects in the context's or the largest viewport, unless it shows a camera's view."""
+    """Frame the selected objects in the context's or the largest viewport, unless it shows a
+    camera's view.
+    """
     area = viewport_of(context)
     if area is None:
         return
@@ -39,7 +45,9 @@ def frame_selected(context: bpy.types.Context) -> None:
 
 
 def show_new_capture(context: bpy.types.Context) -> None:
-    """Show the capture that was just added: the viewports leave the comparison of an earlier one."""
+    """Show the capture that was just added: the viewports leave the comparison of an earlier
+    one.
+    """
     from ...scene.datablock_names import holds
     from ...scene.visibility import hide_again
 
@@ -67,13 +75,20 @@ class SCOPE_OT_look_through(bpy.types.Operator):
             return False
         if camera_of(context.scene) is None:
             cls.poll_message_set(
-                tip_("The scene has no camera of a capture: capture with the option Camera with Footage")
+                tip_(
+                    "The scene has no camera of a capture: capture with the option Camera with "
+                    "Footage"
+                )
             )
             return False
         collection = context.scene.scope.result.collection
-        if not is_looking_through(context) and not _is_shown(collection, context.view_layer.layer_collection):
+        if not is_looking_through(context) and not _is_shown(
+            collection, context.view_layer.layer_collection
+        ):
             name = collection.name
-            cls.poll_message_set(tip_("The collection '{name}' is hidden; show it in the Outliner", name=name))
+            cls.poll_message_set(
+                tip_("The collection '{name}' is hidden; show it in the Outliner", name=name)
+            )
             return False
         return True
 
@@ -88,7 +103,9 @@ class SCOPE_OT_look_through(bpy.types.Operator):
             comparison.end(context.window, context.area)
             if side := comparison.side_area(context.window.screen):
                 comparison.close_side_view(context.window, side)
-            for obj in [obj for obj in scene.scope.result.collection.all_objects if "scope_source" in obj]:
+            for obj in [
+                obj for obj in scene.scope.result.collection.all_objects if "scope_source" in obj
+            ]:
                 hide_again(obj, context.view_layer)
             redraw_sidebars_twice()
             return {"FINISHED"}
@@ -97,7 +114,9 @@ class SCOPE_OT_look_through(bpy.types.Operator):
         camera.hide_viewport = False  # a hidden camera shows no footage
         camera.hide_set(False, view_layer=context.view_layer)
         set_resolution(scene, scene.scope.result.collection)
-        for other in [obj for obj in captured_people(context) if not holds(scene.scope.result.collection, obj)]:
+        for other in [
+            obj for obj in captured_people(context) if not holds(scene.scope.result.collection, obj)
+        ]:
             hide_again(other, context.view_layer)  # it was compared before
         if not bpy.app.background and context.area and context.area.type == "VIEW_3D":
             comparison.begin(context, context.area, scene.scope.result.collection)
@@ -181,7 +200,8 @@ class SCOPE_OT_footage_to_sequencer(ReportingOperator):
             self.report(
                 {"WARNING"},
                 rpt_(
-                    "The scene has {scene:.5g} frames/s and the footage {footage:.5g}: the strip will not stay "
+                    "The scene has {scene:.5g} frames/s and the footage {footage:.5g}: the strip "
+                    "will not stay "
                     "synchronized with the motion",
                     scene=scene_rate(scene),
                     footage=rate,
@@ -191,4 +211,9 @@ class SCOPE_OT_footage_to_sequencer(ReportingOperator):
         return rpt_("The footage is already in the sequencer") if strips[-1] in known else ""
 
 
-CLASSES = (SCOPE_OT_look_through, SCOPE_OT_side_view, SCOPE_OT_go_to_frame, SCOPE_OT_footage_to_sequencer)
+CLASSES = (
+    SCOPE_OT_look_through,
+    SCOPE_OT_side_view,
+    SCOPE_OT_go_to_frame,
+    SCOPE_OT_footage_to_sequencer,
+)

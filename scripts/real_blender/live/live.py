@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Live captures of a network camera in a Blender with a window: start, record, stop, undo, save, reopen, trouble.
+"""Live captures of a network camera in a Blender with a window: start, record, stop, undo, save,
+reopen, trouble.
 
 Usage: ``blender --python live.py -- VIDEO OUT_FOLDER``
 """
@@ -33,7 +34,20 @@ from live.session import (
     state,
 )
 from live.takes import SAVED, captured_again, kept_take, played, recorded
-from shared.session import FOOTAGE, OUT, inventory, invoke, key, picture, run, show_tab, until, use, viewport, workers
+from shared.session import (
+    FOOTAGE,
+    OUT,
+    inventory,
+    invoke,
+    key,
+    picture,
+    run,
+    show_tab,
+    until,
+    use,
+    viewport,
+    workers,
+)
 
 OVER_PANEL = (1174, 300)
 MEASURED_S = 2.0
@@ -48,7 +62,8 @@ def shares(values: list[float]) -> dict[str, float]:
 def measured(seconds: float, what: str) -> Iterator[float]:
     """Measure the timer's gaps, and the time in which the running capture applies a pose.
 
-    The viewport is hidden meanwhile: without a graphics card, one drawing of it takes a second on a busy machine.
+    The viewport is hidden meanwhile: without a graphics card, one drawing of it takes a second on a
+    busy machine.
     """
     job, steps, own, gaps = state().job, [], [], []
     original = job.step
@@ -95,7 +110,8 @@ def prepared() -> Iterator[float]:
     show_tab()
     settings = bpy.context.scene.scope_live
     settings.camera = "99"
-    use(bpy.ops.scope.camera_formats)  # in a process of its own, as it would ask a camera that exists
+    # in a process of its own, as it would ask a camera that exists
+    use(bpy.ops.scope.camera_formats)
     yield from until(lambda: state().asking is None, 60, "an answer about a camera")
     report["camera_formats"] = state().message
     assert "Camera 99 does not exist" in state().message, state().message
@@ -142,7 +158,9 @@ def interrupted(server: subprocess.Popen) -> Iterator[float]:
 
 
 def slept() -> Iterator[float]:
-    """Stop the process for eight seconds, as a computer that sleeps does: a sentence, and the body follows again."""
+    """Stop the process for eight seconds, as a computer that sleeps does: a sentence, and the body
+    follows again.
+    """
     worker = state().job.worker
     os.kill(worker.pid, signal.SIGSTOP)
     yield 8.0
@@ -165,7 +183,9 @@ def cancelled(before: dict) -> Iterator[float]:
 
 
 def closed(how: str) -> Iterator[float]:
-    """Close another Blender, or let it crash, while live: the camera is left at once, and no worker runs."""
+    """Close another Blender, or let it crash, while live: the camera is left at once, and no worker
+    runs.
+    """
     script = str(Path(__file__).resolve().parents[1] / "shared" / "closed.py")
     other = subprocess.Popen(["blender", "--python", script, "--", FOOTAGE, str(OUT), how, ADDRESS])
     yield from until(lambda: other.poll() is not None, 400, "the other Blender to end")
@@ -219,7 +239,9 @@ def stopped() -> Iterator[float]:
 
 def rig_pose() -> list[tuple[float, ...]]:
     """Return the channels of the rig."""
-    return [(*bone.location, *bone.rotation_quaternion) for bone in bpy.data.objects["rig"].pose.bones]
+    return [
+        (*bone.location, *bone.rotation_quaternion) for bone in bpy.data.objects["rig"].pose.bones
+    ]
 
 
 def disabled() -> Iterator[float]:

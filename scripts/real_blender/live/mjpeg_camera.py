@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A network camera on this computer: JPEG pictures at 30 per second, there and back again and again.
+"""A network camera on this computer: JPEG pictures at 30 per second, there and back again and
+again.
 
-Usage: ``mjpeg_camera.py FOLDER PORT CLIENTS``. The file CLIENTS is there once clients can come. A line is added to it
-when one has come, and when one has left: "came" or "left", and the time (seconds of the system's monotonic clock).
+Usage: ``mjpeg_camera.py FOLDER PORT CLIENTS``. The file CLIENTS is there once clients can come. A
+line is added to it when one has come, and when one has left: "came" or "left", and the time
+(seconds of the system's monotonic clock).
 """
 
 from __future__ import annotations
@@ -46,7 +48,10 @@ def main(folder: str, port: str, clients: str) -> None:
             began = time.monotonic()
             try:
                 for index, picture in enumerate(itertools.cycle(pictures)):
-                    head = f"--frame\r\nContent-Type: image/jpeg\r\nContent-Length: {len(picture)}\r\n\r\n"
+                    head = (
+                        f"--frame\r\nContent-Type: image/jpeg\r\nContent-Length: "
+                        f"{len(picture)}\r\n\r\n"
+                    )
                     self.wfile.write(head.encode() + picture + b"\r\n")
                     time.sleep(max(0.0, began + index / RATE - time.monotonic()))
             except OSError:

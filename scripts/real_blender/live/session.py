@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shared code of the live captures in a Blender with a window: the network camera, and what runs."""
+"""Shared code of the live captures in a Blender with a window: the network camera, and what
+runs.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +16,8 @@ from shared.session import OUT, addon, until, use
 
 ADDRESS, PORT = "http://127.0.0.1:8099/video", "8099"
 CLIENTS = OUT / "live_clients.txt"
-# What ends at once takes tenths of a second on an idle machine, and a drawing or two on a busy one; what waits for one
-# of the product's own time limits takes five seconds.
+# What ends at once takes tenths of a second on an idle machine, and a drawing or two on a busy one;
+# what waits for one of the product's own time limits takes five seconds.
 GONE_S = 4.0
 report: dict = {}
 
@@ -41,13 +43,20 @@ def camera() -> Generator[float, None, subprocess.Popen]:
 
 def clients() -> list[tuple[str, float]]:
     """Return what the camera says of its clients: "came" or "left", and when."""
-    return [(what, float(when)) for what, when in map(str.split, CLIENTS.read_text("utf-8").splitlines())]
+    return [
+        (what, float(when))
+        for what, when in map(str.split, CLIENTS.read_text("utf-8").splitlines())
+    ]
 
 
 def connection_closed(began: float, what: str) -> Iterator[float]:
     """Check, by asking the camera, that nobody looked at it for long after something happened."""
-    yield from until(lambda: clients()[-1][0] == "left", 30, f"the connection to be closed after {what}")
-    report.setdefault("connection_closed_s", {})[what] = seconds = round(clients()[-1][1] - began, 2)
+    yield from until(
+        lambda: clients()[-1][0] == "left", 30, f"the connection to be closed after {what}"
+    )
+    report.setdefault("connection_closed_s", {})[what] = seconds = round(
+        clients()[-1][1] - began, 2
+    )
     assert seconds < GONE_S, f"the connection was closed {seconds} s after {what}"
 
 
@@ -68,7 +77,9 @@ def gone(worker, what: str) -> Iterator[float]:
     began = time.monotonic()
     yield from until(lambda: not worker.alive, GONE_S, f"the process to end after {what}")
     report.setdefault("gone_s", {})[what] = round(time.monotonic() - began, 2)
-    assert not worker.job_folder.exists() or state().job is not None, f"{worker.job_folder} is left after {what}"
+    assert not worker.job_folder.exists() or state().job is not None, (
+        f"{worker.job_folder} is left after {what}"
+    )
 
 
 def moving() -> Iterator[float]:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Recorded takes in a Blender with a window: undone, smoothed, saved, reopened, and captured again from footage."""
+"""Recorded takes in a Blender with a window: undone, smoothed, saved, reopened, and captured again
+from footage.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,17 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from live.session import ADDRESS, begin, captures, connection_closed, moving, plays, report, start, state
+from live.session import (
+    ADDRESS,
+    begin,
+    captures,
+    connection_closed,
+    moving,
+    plays,
+    report,
+    start,
+    state,
+)
 from shared.session import FOOTAGE, OUT, addon, captured, invoke, picture, until, use
 
 SAVED, TAKE = OUT / "live.blend", OUT / "live_take.blend"
@@ -77,7 +89,9 @@ def take() -> dict:
 
 
 def kept_take() -> Iterator[float]:
-    """Save the smoothed take, open it again, and smooth it again: keys and captured motion are those of before."""
+    """Save the smoothed take, open it again, and smooth it again: keys and captured motion are
+    those of before.
+    """
     bpy.ops.wm.save_as_mainfile(filepath=str(TAKE))
     before = take()
     assert before["keys"] > 24 * 2, before
@@ -96,7 +110,9 @@ def kept_take() -> Iterator[float]:
 
 
 def captured_again() -> Iterator[float]:
-    """Record with Keep Footage, and capture that footage: the same take, in the same place of the timeline."""
+    """Record with Keep Footage, and capture that footage: the same take, in the same place of the
+    timeline.
+    """
     settings = bpy.context.scene.scope_live
     settings.keep_footage, settings.with_scene, settings.countdown_s = True, False, 0
     count = len(captures())
@@ -117,20 +133,24 @@ def captured_again() -> Iterator[float]:
     assert len(captures()) == count + 2, addon().state.message
     again = frames_of(bpy.context.scene.scope.result.collection)
     report["again"] = {"live": live, "again": again, "footage": kept.stat().st_size}
-    # The first live pose may come late on a busy machine; the footage is captured from its first picture on.
+    # The first live pose may come late on a busy machine; the footage is captured from its first
+    # picture on.
     frames = 0.5 * bpy.context.scene.render.fps
     assert again[0] - frames < live[0] < live[1] < again[1] + frames, report["again"]
     settings.keep_footage = False
 
 
 def played() -> Iterator[float]:
-    """Record a video that is played in real time and ends by itself, with its own times; undo that."""
+    """Record a video that is played in real time and ends by itself, with its own times; undo
+    that.
+    """
     settings, count = bpy.context.scene.scope_live, len(captures())
     settings.source, settings.file = "FILE", FOOTAGE
     begin()
     job = state().job
     yield from until(lambda: job.has_body or state().job is None, 300, "the first pose")
-    # On a busy machine, the video may have ended before the button can be pressed: then the last pose stays.
+    # On a busy machine, the video may have ended before the button can be pressed: then the last
+    # pose stays.
     if state().job is not None and not job.finishing:
         use(bpy.ops.scope.record_live)
     yield from until(lambda: state().job is None, 120, "the end of the video")

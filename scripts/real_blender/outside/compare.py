@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Compare the files written by the real Blender with the shell's results: ``compare.py VIDEO WORK_FOLDER PART...``."""
+"""Compare the files written by the real Blender with the shell's results: ``compare.py VIDEO
+WORK_FOLDER PART...``.
+"""
 
 from __future__ import annotations
 
@@ -23,31 +25,42 @@ def apart(a: Path, b: Path) -> dict[str, float]:
 
 def missing(folder: Path, names: list[str]) -> list[str]:
     """Return a message for each file that is missing or empty."""
-    sizes = {name: (folder / name).stat().st_size if (folder / name).is_file() else 0 for name in names}
+    sizes = {
+        name: (folder / name).stat().st_size if (folder / name).is_file() else 0 for name in names
+    }
     return [f"{name} was not written" for name, size in sizes.items() if not size]
 
 
 def written_into_the_extension(work: Path) -> list[str]:
     """Return a message for each file in an installed extension's folder that the zip did not bring.
 
-    The byte code of a module is Python's own, also half of it where a process was killed; no other file may be there,
-    such as a result or compiled kernel.
+    The byte code of a module is Python's own, also half of it where a process was killed; no other
+    file may be there, such as a result or compiled kernel.
     """
     with zipfile.ZipFile(work / "scope.zip") as file:
         shipped = set(file.namelist())
     problems = []
     inside_home = ".config/blender/*/extensions/user_default/scope"
     for folder in [*work.glob(f"home/{inside_home}"), *work.glob(f"homes/*/{inside_home}")]:
-        found = {str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file() and ".pyc" not in p.name}
+        found = {
+            str(p.relative_to(folder))
+            for p in folder.rglob("*")
+            if p.is_file() and ".pyc" not in p.name
+        }
         problems += [f"{name} was written into {folder}" for name in sorted(found - shipped)]
-        problems += [f"{name} is gone from {folder}" for name in sorted(n for n in shipped - found if n[-1] != "/")]
+        problems += [
+            f"{name} is gone from {folder}"
+            for name in sorted(n for n in shipped - found if n[-1] != "/")
+        ]
     return problems
 
 
 def panel(video: Path, out: Path, shell_out: Path, report: dict) -> list[str]:
     """Return the report of the session in the window."""
     report |= json.loads((out / "report.json").read_text("utf-8"))
-    shell(["capture", str(video), "--quality", "fast", "--quiet", "-o", str(shell_out / "panel.npz")])
+    shell(
+        ["capture", str(video), "--quality", "fast", "--quiet", "-o", str(shell_out / "panel.npz")]
+    )
     distance = report["window_from_shell_mm"] = apart(out / "motion.npz", shell_out / "panel.npz")
     problems = missing(out, report["exports"])
     if distance["median"] > 1e3 * TOLERANCE_M:
@@ -69,8 +82,19 @@ def panel(video: Path, out: Path, shell_out: Path, report: dict) -> list[str]:
 
 
 def headless(clips: Path, out: Path, shell_out: Path, report: dict) -> list[str]:
-    """Check Blender's command line: one clip, and a folder with a broken file, an image of a wall and a clip."""
-    arguments = ["batch", str(clips), "--out", str(shell_out / "batch"), "--quality", "fast", "--quiet", "--again"]
+    """Check Blender's command line: one clip, and a folder with a broken file, an image of a wall
+    and a clip.
+    """
+    arguments = [
+        "batch",
+        str(clips),
+        "--out",
+        str(shell_out / "batch"),
+        "--quality",
+        "fast",
+        "--quiet",
+        "--again",
+    ]
     status = shell([*arguments, "--formats", "npz"])
     theirs = json.loads((out / "batch.json").read_text("utf-8"))
     ours = json.loads((shell_out / "batch" / "scope-batch.json").read_text("utf-8"))
@@ -79,13 +103,20 @@ def headless(clips: Path, out: Path, shell_out: Path, report: dict) -> list[str]
         return problems
     fates = [[entry["status"] for entry in batch["files"]] for batch in (ours, theirs)]
     if fates[0] != fates[1] or status != theirs["exit_status"]:
-        problems.append(f"the shell's batch ends with {status}, {fates[0]}; Blender's with {fates[1]}")
+        problems.append(
+            f"the shell's batch ends with {status}, {fates[0]}; Blender's with {fates[1]}"
+        )
     for one, other in zip(ours["files"], theirs["files"], strict=True):
-        said, expected = other.get("message", ""), one.get("message", "").replace(str(clips), "/scope/clips")
+        said, expected = (
+            other.get("message", ""),
+            one.get("message", "").replace(str(clips), "/scope/clips"),
+        )
         if said != expected:
             problems.append(f"of {one['file']} Blender says {said!r} and the shell {expected!r}")
     for name in ("command.npz", "batch/walk.npz"):
-        distance = report[f"{name}_from_shell_mm"] = apart(out / name, shell_out / "batch" / "walk.npz")
+        distance = report[f"{name}_from_shell_mm"] = apart(
+            out / name, shell_out / "batch" / "walk.npz"
+        )
         if distance["median"] > 1e3 * TOLERANCE_M:
             problems.append(f"{name} is not the shell's motion")
     return problems
@@ -101,7 +132,18 @@ def main(video: Path, work: Path, parts: list[str]) -> int:
         problems += panel(video, work / "out", shell_out, report)
     if "headless" in parts:
         problems += headless((work / "clips").resolve(), work / "out", shell_out, report)
-    for part in ("undo", "trouble", "stored", "pins", "details", "live", "first", "startup", "reload", "walk"):
+    for part in (
+        "undo",
+        "trouble",
+        "stored",
+        "pins",
+        "details",
+        "live",
+        "first",
+        "startup",
+        "reload",
+        "walk",
+    ):
         if part in parts:
             report[part] = json.loads((work / "out" / f"{part}.json").read_text("utf-8"))
     print(json.dumps(report, indent=1))

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Crop the pictures of docs/guide.md and docs/live.md (assets/guide) from the screenshots of a real Blender."""
+"""Crop the pictures of docs/guide.md and docs/live.md (assets/guide) from the screenshots of a real
+Blender.
+"""
 
 from pathlib import Path
 

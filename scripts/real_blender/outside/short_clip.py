@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Copy the first seconds of a clip, without encoding it again, and all of it as JPEG pictures.
 
-A capture of the seconds is enough for the parts that try what surrounds a capture; ``mjpeg_camera.py`` serves the
-pictures. Usage: ``short_clip.py CLIP TARGET PICTURES``
+A capture of the seconds is enough for the parts that try what surrounds a capture;
+``mjpeg_camera.py`` serves the pictures. Usage: ``short_clip.py CLIP TARGET PICTURES``
 """
 
 from __future__ import annotations
@@ -24,7 +24,10 @@ def main(clip: str, target: str, pictures: str) -> None:
     with av.open(clip) as source:
         for index, frame in enumerate(source.decode(video=0)):
             width = round(HEIGHT * frame.width / frame.height)
-            cv2.imwrite(str(folder / f"{index:04d}.jpg"), frame.reformat(width, HEIGHT, "bgr24").to_ndarray())
+            cv2.imwrite(
+                str(folder / f"{index:04d}.jpg"),
+                frame.reformat(width, HEIGHT, "bgr24").to_ndarray(),
+            )
 
 
 def copy_beginning(clip: str, target: str) -> None:

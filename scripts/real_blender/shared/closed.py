@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Close Blender, or let it crash, while it captures: ``closed.py -- VIDEO OUT_FOLDER quit|crash [STREAM]``.
+"""Close Blender, or let it crash, while it captures: ``closed.py -- VIDEO OUT_FOLDER quit|crash
+[STREAM]``.
 
-With the address of a stream, it captures that live. The file closed_HOW in OUT_FOLDER says what it did, and live_HOW
-if that was live.
+With the address of a stream, it captures that live. The file closed_HOW in OUT_FOLDER says what it
+did, and live_HOW if that was live.
 """
 
 from __future__ import annotations
@@ -24,7 +25,9 @@ def footage() -> Iterator[float]:
     bpy.context.scene.scope.quality = "BEST"
     bpy.ops.scope.choose_footage(filepath=FOOTAGE)
     use(bpy.ops.scope.capture, "INVOKE_DEFAULT")
-    yield from until(lambda: addon().state.job is None or addon().state.job.progress.done > 5, 300, "the worker")
+    yield from until(
+        lambda: addon().state.job is None or addon().state.job.progress.done > 5, 300, "the worker"
+    )
     return "capturing" if addon().state.job else addon().state.message
 
 
@@ -34,7 +37,9 @@ def stream(address: str) -> Iterator[float]:
     settings = bpy.context.scene.scope_live
     settings.source, settings.stream = "STREAM", address
     use(bpy.ops.scope.live, "INVOKE_DEFAULT")
-    state = sys.modules[addon().__name__.replace("capture.capture_operators", "live.live_state")].state
+    state = sys.modules[
+        addon().__name__.replace("capture.capture_operators", "live.live_state")
+    ].state
     yield from until(lambda: state.job is None or state.job.has_body, 300, "the first pose")
     return "capturing" if state.job else state.message
 

@@ -25,7 +25,9 @@ DATA = (
 
 
 def state() -> State:
-    """Return everything in the file that an operator may change, and the evaluated pose, as a flat table of values."""
+    """Return everything in the file that an operator may change, and the evaluated pose, as a flat
+    table of values.
+    """
     scene = bpy.context.window_manager.windows[0].scene
     view_layer = bpy.context.window_manager.windows[0].view_layer
     view_layer.update()
@@ -34,24 +36,36 @@ def state() -> State:
         about = {
             "parent": obj.parent.name if obj.parent else None,
             "matrix": [round(x, 5) for row in _matrix(obj, view_layer.depsgraph) for x in row],
-            "action": obj.animation_data.action.name if obj.animation_data and obj.animation_data.action else None,
-            "tracks": [[strip.name for strip in track.strips] for track in obj.animation_data.nla_tracks]
+            "action": obj.animation_data.action.name
+            if obj.animation_data and obj.animation_data.action
+            else None,
+            "tracks": [
+                [strip.name for strip in track.strips] for track in obj.animation_data.nla_tracks
+            ]
             if obj.animation_data
             else [],
             "collections": sorted(c.name for c in obj.users_collection),
             "selected": obj.select_get(),
             "hidden": (obj.hide_get(), obj.hide_viewport, obj.hide_render),
-            "properties": {key: _plain(obj[key]) for key in obj.keys() if not key.startswith("scope_")},
-            "ours": _digest({key: _plain(obj[key]) for key in obj.keys() if key.startswith("scope_")}),
+            "properties": {
+                key: _plain(obj[key]) for key in obj.keys() if not key.startswith("scope_")
+            },
+            "ours": _digest(
+                {key: _plain(obj[key]) for key in obj.keys() if key.startswith("scope_")}
+            ),
         }
         if obj.pose is not None:
-            about["pose"] = [round(x, 4) for bone in obj.pose.bones for x in (*bone.head, *bone.tail)]
+            about["pose"] = [
+                round(x, 4) for bone in obj.pose.bones for x in (*bone.head, *bone.tail)
+            ]
             about["mode"] = obj.mode
         found |= {f"object {obj.name_full} {key}": value for key, value in about.items()}
     for kind in DATA[1:]:
         found[kind] = sorted(block.name_full for block in getattr(bpy.data, kind) if block.users)
     for action in bpy.data.actions:
-        found[f"action {action.name_full}"] = _digest(sorted(_keys(curve) for curve in _curves(action)))
+        found[f"action {action.name_full}"] = _digest(
+            sorted(_keys(curve) for curve in _curves(action))
+        )
         found[f"asset {action.name_full}"] = _asset(action)
     for name in ("frame_start", "frame_end", "frame_current"):
         found[name] = getattr(scene, name)
@@ -73,9 +87,12 @@ def state() -> State:
 def _matrix(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Matrix:
     """Return where an object is; Blender does not evaluate those that are hidden.
 
-    Objects of a linked scene that is not in the window yet are evaluated, but do not say so themselves.
+    Objects of a linked scene that is not in the window yet are evaluated, but do not say so
+    themselves.
     """
-    return obj.evaluated_get(depsgraph).matrix_world.copy() if obj.visible_get() else obj.matrix_basis
+    return (
+        obj.evaluated_get(depsgraph).matrix_world.copy() if obj.visible_get() else obj.matrix_basis
+    )
 
 
 def _group(name: str, group: bpy.types.PropertyGroup) -> State:
@@ -122,17 +139,30 @@ def _asset(action: bpy.types.Action) -> object:
     if data is None:
         return None
     pixels = [round(value, 2) for value in preview.image_pixels_float] if preview else []
-    return sorted(tag.name for tag in data.tags), data.author, data.description, data.catalog_id, _digest(pixels)
+    return (
+        sorted(tag.name for tag in data.tags),
+        data.author,
+        data.description,
+        data.catalog_id,
+        _digest(pixels),
+    )
 
 
 def _keys(curve: bpy.types.FCurve) -> tuple[str, int, list[float], list[str]]:
     values = [0.0] * (2 * len(curve.keyframe_points))
     curve.keyframe_points.foreach_get("co", values)
-    return curve.data_path, curve.array_index, [round(v, 4) for v in values], [m.type for m in curve.modifiers]
+    return (
+        curve.data_path,
+        curve.array_index,
+        [round(v, 4) for v in values],
+        [m.type for m in curve.modifiers],
+    )
 
 
 def identities() -> State:
-    """Return which datablocks there are, used or not; undo crashes on one that was replaced without a step to undo."""
+    """Return which datablocks there are, used or not; undo crashes on one that was replaced without
+    a step to undo.
+    """
     return {
         f"identity {kind} {block.session_uid}": block.name_full
         for kind in (*DATA, "scenes", "shape_keys", "sounds")
@@ -142,8 +172,12 @@ def identities() -> State:
 
 def differences(found: State, expected: State) -> list[str]:
     """Name the differences of two states."""
-    different = [key for key in sorted(found.keys() | expected.keys()) if found.get(key) != expected.get(key)]
-    return [f"{key}: {found.get(key)!r:.150} is not {expected.get(key)!r:.150}" for key in different]
+    different = [
+        key for key in sorted(found.keys() | expected.keys()) if found.get(key) != expected.get(key)
+    ]
+    return [
+        f"{key}: {found.get(key)!r:.150} is not {expected.get(key)!r:.150}" for key in different
+    ]
 
 
 def same(found: State, expected: State, when: str) -> None:

@@ -21,7 +21,11 @@ def viewport() -> dict:
     """Return the context of the 3D viewport's main region."""
     window = bpy.context.window_manager.windows[0]
     area = next(a for a in window.screen.areas if a.type == "VIEW_3D")
-    return {"window": window, "area": area, "region": next(r for r in area.regions if r.type == "WINDOW")}
+    return {
+        "window": window,
+        "area": area,
+        "region": next(r for r in area.regions if r.type == "WINDOW"),
+    }
 
 
 def show_tab() -> bool:
@@ -44,17 +48,35 @@ def picture(name: str) -> None:
 
 def key(name: str, place: tuple[int, int] = (500, 400)) -> None:
     """Press a key with the mouse at a place of the screen: by default, over the viewport."""
-    subprocess.run(["xdotool", "mousemove", *map(str, place), "sleep", "0.2", "key", name], check=True)
+    subprocess.run(
+        ["xdotool", "mousemove", *map(str, place), "sleep", "0.2", "key", name], check=True
+    )
 
 
 def click(x: int, y: int) -> None:
-    """Click the left button, in screen pixels from the top left, as slowly as a hand, while Blender keeps running."""
-    steps = ["mousemove", str(x), str(y), "sleep", "0.4", "mousedown", "1", "sleep", "0.1", "mouseup", "1"]
+    """Click the left button, in screen pixels from the top left, as slowly as a hand, while Blender
+    keeps running.
+    """
+    steps = [
+        "mousemove",
+        str(x),
+        str(y),
+        "sleep",
+        "0.4",
+        "mousedown",
+        "1",
+        "sleep",
+        "0.1",
+        "mouseup",
+        "1",
+    ]
     subprocess.Popen(["xdotool", *steps])
 
 
 def press(place: tuple[int, int], happened: Callable[[], bool]) -> Iterator[float]:
-    """Click until something has happened: a busy machine draws late, and a button that is not there takes no click."""
+    """Click until something has happened: a busy machine draws late, and a button that is not there
+    takes no click.
+    """
     for _ in range(6):
         click(*place)
         for _ in range(40):
@@ -78,7 +100,9 @@ def invoke(operator, *arguments, **settings) -> set[str]:
 
 
 def use(operator, *arguments, **settings) -> set[str]:
-    """Call an operator as a button does, with a step to undo, which Blender has only with a window."""
+    """Call an operator as a button does, with a step to undo, which Blender has only with a
+    window.
+    """
     return invoke(operator, *(arguments or ("EXEC_DEFAULT",)), not bpy.app.background, **settings)
 
 
@@ -99,7 +123,17 @@ def captured(seconds: float = 600.0) -> Iterator[float]:
 
 def inventory() -> dict:
     """Return the file's data-blocks, which cancelling must not change."""
-    kinds = ("objects", "meshes", "armatures", "cameras", "actions", "collections", "images", "movieclips", "materials")
+    kinds = (
+        "objects",
+        "meshes",
+        "armatures",
+        "cameras",
+        "actions",
+        "collections",
+        "images",
+        "movieclips",
+        "materials",
+    )
     return {kind: sorted(b.name for b in getattr(bpy.data, kind)) for kind in kinds}
 
 
@@ -132,4 +166,5 @@ def run(steps: Iterator[float]) -> None:
         os._exit(status)  # Blender's own exit can hang
 
     bpy.context.preferences.view.show_splash = False
-    bpy.app.timers.register(advance, first_interval=3.0, persistent=True)  # also when another file is opened
+    # also when another file is opened
+    bpy.app.timers.register(advance, first_interval=3.0, persistent=True)

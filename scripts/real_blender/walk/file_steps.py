@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The steps of the random walk that are not Scope's: what a user does to the file around its operators.
+"""The steps of the random walk that are not Scope's: what a user does to the file around its
+operators.
 
-They keep clear of what crashes Blender 4.3 without Scope: linking from the file that is open; removing the library of
-the scene that the window shows (``bpy.data.libraries.remove`` leaves the window without a scene); deleting a movie clip
-that the viewport shows as a camera's background, after which, at once or after undo, drawing reads the clip's freed
-textures; scenes that share their objects (``scene.new(type="LINK_COPY")``) with undo, and then showing another scene.
+They keep clear of what crashes Blender 4.3 without Scope: linking from the file that is open;
+removing the library of the scene that the window shows (``bpy.data.libraries.remove`` leaves the
+window without a scene); deleting a movie clip that the viewport shows as a camera's background,
+after which, at once or after undo, drawing reads the clip's freed textures; scenes that share their
+objects (``scene.new(type="LINK_COPY")``) with undo, and then showing another scene.
 """
 
 from __future__ import annotations
@@ -51,7 +53,9 @@ class FileSteps:
         count = self.random.choice((1, 1, 2, 5))
         again = self.random.choice((0, 0, 1, count))
         if again:
-            self.next.append(Step(f"redo({again})", lambda: [invoke(bpy.ops.ed.redo) for _ in range(again)][-1]))
+            self.next.append(
+                Step(f"redo({again})", lambda: [invoke(bpy.ops.ed.redo) for _ in range(again)][-1])
+            )
         return Step(f"undo({count})", lambda: [invoke(bpy.ops.ed.undo) for _ in range(count)][-1])
 
     step_undo_again = step_undo_often = step_undo
@@ -59,7 +63,10 @@ class FileSteps:
     def step_save(self) -> Step:
         """Save the file."""
         path = str(self.folder / f"saved{self.random.randrange(3)}.blend")
-        return Step(f"save({path})", lambda: bpy.ops.wm.save_as_mainfile(filepath=path, check_existing=False))
+        return Step(
+            f"save({path})",
+            lambda: bpy.ops.wm.save_as_mainfile(filepath=path, check_existing=False),
+        )
 
     def step_reopen(self) -> Step:
         """Open a saved file."""
@@ -67,19 +74,28 @@ class FileSteps:
         if not saved:
             return self.step_save()
         path, load_ui = str(self.random.choice(saved)), self.random.random() < 0.5
-        return Step(f"open({path}, {load_ui})", lambda: bpy.ops.wm.open_mainfile(filepath=path, load_ui=load_ui))
+        return Step(
+            f"open({path}, {load_ui})",
+            lambda: bpy.ops.wm.open_mainfile(filepath=path, load_ui=load_ui),
+        )
 
     def new_file(self) -> Step:
         """Begin a new file and capture in it."""
-        return Step("new file()", lambda: bpy.ops.wm.read_homefile(load_ui=self.random.random() < 0.5))
+        return Step(
+            "new file()", lambda: bpy.ops.wm.read_homefile(load_ui=self.random.random() < 0.5)
+        )
 
     def step_import_file(self) -> Step:
         """Link or append from a saved file, with or without an override."""
-        saved = sorted(path for path in self.folder.glob("saved*.blend") if str(path) != bpy.data.filepath)
+        saved = sorted(
+            path for path in self.folder.glob("saved*.blend") if str(path) != bpy.data.filepath
+        )
         if not saved:
             return self.step_save()
         path, link = str(self.random.choice(saved)), self.random.random() < 0.5
-        kind = self.random.choice(("objects", "objects", "collections", "scenes", "actions", "armatures", "meshes"))
+        kind = self.random.choice(
+            ("objects", "objects", "collections", "scenes", "actions", "armatures", "meshes")
+        )
 
         def take() -> object:
             with bpy.data.libraries.load(path, link=link) as (there, here):
@@ -106,7 +122,11 @@ class FileSteps:
     def step_rename(self) -> Step:
         """Rename a datablock, also to a name that another one has."""
         kind = self.random.choice(_BLOCKS)
-        return self.on(kind, "rename", lambda block: setattr(block, "name", self.random.choice(["x", "walk", 'a"b\\'])))
+        return self.on(
+            kind,
+            "rename",
+            lambda block: setattr(block, "name", self.random.choice(["x", "walk", 'a"b\\'])),
+        )
 
     def step_delete(self) -> Step:
         """Delete a datablock, as the Outliner does."""
@@ -132,7 +152,11 @@ class FileSteps:
 
     def step_copy(self) -> Step:
         """Copy a collection or an action."""
-        return self.on(self.random.choice(("collections", "actions", "scenes")), "copy", lambda block: block.copy())
+        return self.on(
+            self.random.choice(("collections", "actions", "scenes")),
+            "copy",
+            lambda block: block.copy(),
+        )
 
     def step_purge(self) -> Step:
         """Remove unused datablocks, and those that nothing but a library holds."""
@@ -142,7 +166,10 @@ class FileSteps:
         """Reload, remove or make local what is linked."""
         if not len(bpy.data.libraries):
             return self.step_import_file()
-        index, what = self.random.randrange(len(bpy.data.libraries)), self.random.choice(("reload", "remove", "local"))
+        index, what = (
+            self.random.randrange(len(bpy.data.libraries)),
+            self.random.choice(("reload", "remove", "local")),
+        )
 
         def take() -> object:
             library = bpy.data.libraries[index]
@@ -166,7 +193,9 @@ class FileSteps:
         frame = self.random.randint(-20, 150)
         if frame < 0:
             return Step("play()", lambda: invoke(bpy.ops.screen.animation_play))
-        return Step(f"frame({frame})", lambda: bpy.context.window_manager.windows[0].scene.frame_set(frame))
+        return Step(
+            f"frame({frame})", lambda: bpy.context.window_manager.windows[0].scene.frame_set(frame)
+        )
 
     def step_rate(self) -> Step:
         """Change the frame rate."""
@@ -213,7 +242,9 @@ class FileSteps:
         def take(obj: bpy.types.Object) -> None:
             data = obj.animation_data or obj.animation_data_create()
             if what == "push" and data.action is not None and not data.use_tweak_mode:
-                data.nla_tracks.new().strips.new(data.action.name, int(data.action.frame_range[0]), data.action)
+                data.nla_tracks.new().strips.new(
+                    data.action.name, int(data.action.frame_range[0]), data.action
+                )
                 data.action = None
             elif what in ("tweak", "leave"):
                 if what == "tweak" and data.nla_tracks:
@@ -241,7 +272,9 @@ class FileSteps:
     def step_parent(self) -> Step:
         """Give an object a parent, or none."""
         return self.on(
-            "objects", "parent", lambda obj: setattr(obj, "parent", self.random.choice([None, *bpy.data.objects]))
+            "objects",
+            "parent",
+            lambda obj: setattr(obj, "parent", self.random.choice([None, *bpy.data.objects])),
         )
 
     def step_hide(self) -> Step:
@@ -283,13 +316,17 @@ class FileSteps:
         return self.on("objects", f"bone {what}", take)
 
     def step_repeat(self) -> Step:
-        """Run the last operator again, or change its settings, as the panel Adjust Last Operation does."""
+        """Run the last operator again, or change its settings, as the panel Adjust Last Operation
+        does.
+        """
         what = self.random.choice((bpy.ops.screen.repeat_last, bpy.ops.ed.undo_redo))
         return Step(f"repeat({what.idname_py()})", lambda: invoke(what))
 
     def step_view(self) -> Step:
         """Switch local view, the camera view or a full-screen area."""
-        what = self.random.choice((bpy.ops.view3d.localview, bpy.ops.view3d.view_camera, bpy.ops.view3d.toggle_shading))
+        what = self.random.choice(
+            (bpy.ops.view3d.localview, bpy.ops.view3d.view_camera, bpy.ops.view3d.toggle_shading)
+        )
         return Step(f"view({what.idname_py()})", lambda: use(what))
 
     # Tools
@@ -309,7 +346,8 @@ class FileSteps:
         def take() -> object:
             try:
                 change(getattr(bpy.data, kind)[(name, library)])
-            except (AttributeError, TypeError, ValueError, RuntimeError) as error:  # linked, overridden, in use
+            # linked, overridden, in use
+            except (AttributeError, TypeError, ValueError, RuntimeError) as error:
                 return self.pushed(f"refused: {error}")
             return self.pushed(what)
 

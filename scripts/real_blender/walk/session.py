@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The random walk inside Blender: one step per timer, so that the window is redrawn and other timers run in between.
+"""The random walk inside Blender: one step per timer, so that the window is redrawn and other
+timers run in between.
 
-Usage: ``blender --python session.py -- VIDEO FOLDER SEED STEPS``; ``start.py`` starts it. A traceback that is
-printed or raised between two steps is a failure of the step before. An operator that reports an error is none, unless
-it has changed the file. PyPI's bpy, which has no window and cannot undo, takes the same steps:
-``python session.py -- VIDEO FOLDER SEED STEPS``.
+Usage: ``blender --python session.py -- VIDEO FOLDER SEED STEPS``; ``start.py`` starts it. A
+traceback that is printed or raised between two steps is a failure of the step before. An operator
+that reports an error is none, unless it has changed the file. PyPI's bpy, which has no window and
+cannot undo, takes the same steps: ``python session.py -- VIDEO FOLDER SEED STEPS``.
 """
 
 from __future__ import annotations
@@ -28,14 +29,16 @@ from walk.file_steps import Step
 
 SEED, COUNT = int(ARGUMENTS[2]), int(ARGUMENTS[3])
 PAUSE_S = 0.02
-OPENED_PAUSE_S = 0.5  # Blender crashes when a script chooses a tab before the new file's window is drawn
+# Blender crashes when a script chooses a tab before the new file's window is drawn
+OPENED_PAUSE_S = 0.5
 MAX_OBJECTS = 60  # above which a step begins a new file
 
 
 def everything() -> State:
     """Return everything in the file that may change, and which datablocks there are."""
     scene = bpy.context.window_manager.windows[0].scene
-    scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)  # evaluates what steps have left
+    # evaluates what steps have left
+    scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
     return state() | identities()
 
 
@@ -45,10 +48,11 @@ def objects() -> set[int]:
 
 
 def update_hidden_scenes() -> None:
-    """Rebuild the dependency graphs of the scenes that the window does not show, as Blender does only for that one.
+    """Rebuild the dependency graphs of the scenes that the window does not show, as Blender does
+    only for that one.
 
-    They point to objects that were removed meanwhile. Blender 4.3 reads these when it frees unused drawing data, and
-    crashes, also in a script without Scope.
+    They point to objects that were removed meanwhile. Blender 4.3 reads these when it frees unused
+    drawing data, and crashes, also in a script without Scope.
     """
     shown = bpy.context.window_manager.windows[0].scene
     for scene in bpy.data.scenes:
@@ -61,7 +65,8 @@ def pause_after(step: Step, present: set[int]) -> float:
     """Return for how long to wait after a step before which these objects were present."""
     if step.text.startswith(("open(", "new file(")):
         return OPENED_PAUSE_S
-    if not step.text.startswith("scope.") and present - objects():  # Scope's operators must do without
+    # Scope's operators must do without
+    if not step.text.startswith("scope.") and present - objects():
         update_hidden_scenes()
     return PAUSE_S
 
@@ -119,7 +124,9 @@ class Walk:
         return pause_after(step, present)
 
     def check_printed(self) -> None:
-        """Read what Blender has printed since the last step: handlers, timers and panels print their tracebacks."""
+        """Read what Blender has printed since the last step: handlers, timers and panels print
+        their tracebacks.
+        """
         sys.stdout.flush()
         sys.stderr.flush()
         text = self.printed.read()
@@ -127,7 +134,9 @@ class Walk:
             self.fail(text[text.index("Traceback (most recent call last)") :])
 
     def check_unchanged(self, before: State) -> None:
-        """Fail if the last step has changed the file: undo knows nothing of changes by an operator that failed."""
+        """Fail if the last step has changed the file: undo knows nothing of changes by an operator
+        that failed.
+        """
         told = differences(everything(), before)
         if told:
             self.fail(f"{len(told)} values changed: " + "; ".join(told[:8]))
@@ -161,7 +170,8 @@ faulthandler.enable()
 if bpy.app.background:
     in_module()
 bpy.context.preferences.view.show_splash = False
-bpy.context.preferences.system.vbo_collection_rate = 1  # a second, not a minute, before drawing meets what was deleted
+# a second, not a minute, before drawing meets what was deleted
+bpy.context.preferences.system.vbo_collection_rate = 1
 bpy.context.preferences.filepaths.use_auto_save_temporary_files = False
 walk = Walk()
 bpy.app.timers.register(walk.advance, first_interval=3.0, persistent=True)

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run a random walk over the extension's operators in a Blender with a window, and judge how it ended.
+"""Run a random walk over the extension's operators in a Blender with a window, and judge how it
+ended.
 
-Usage, in the Debian with its own Python, in /scope: ``start.py SEED [STEPS]``. ``session.py`` takes the steps. It
-logs each one before it is taken, so that a crash or a hang names its step; the same seed takes the same steps.
+Usage, in the Debian with its own Python, in /scope: ``start.py SEED [STEPS]``. ``session.py`` takes
+the steps. It logs each one before it is taken, so that a crash or a hang names its step; the same
+seed takes the same steps.
 """
 
 from __future__ import annotations
@@ -45,14 +47,24 @@ def main(seed: int, steps: int) -> int:
             process.send_signal(signal.SIGABRT)  # faulthandler prints where it hangs
             status, ended = process.wait(), f"no end within {LONGEST_S:.0f} s"
     results = FOLDER / "results.json"
-    report = json.loads(results.read_text("utf-8")) if results.is_file() else {"seed": seed, "failures": []}
+    report = (
+        json.loads(results.read_text("utf-8"))
+        if results.is_file()
+        else {"seed": seed, "failures": []}
+    )
     if status and not report["failures"]:
         report["failures"] = [f"Blender ended with {ended}"]
     (OUT / "walk.json").write_text(json.dumps(report))
     if not report["failures"]:
         return 0
     print(f"walk: seed {seed} failed: {ended}; the last steps:")
-    print("\n".join(log.read_text(errors="replace").splitlines()[-SHOWN_STEPS:] if log.is_file() else ["none"]))
+    print(
+        "\n".join(
+            log.read_text(errors="replace").splitlines()[-SHOWN_STEPS:]
+            if log.is_file()
+            else ["none"]
+        )
+    )
     for crash in sorted(FOLDER.glob("*.crash.txt")):
         print(f"{crash.name}:\n{crash.read_text(errors='replace')[-6000:]}")
     if not results.is_file():

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The steps of the random walk: every operator of the extension, its settings and its tools with the mouse."""
+"""The steps of the random walk: every operator of the extension, its settings and its tools with
+the mouse.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,14 @@ from walk.file_steps import FileSteps, Step
 
 TOOLS = ("pin_limb", "upright_line")
 # Cancelled or not, these change what is not undone: the view, the frame.
-UNCHECKED = ("cancel", "go_to_frame", "side_view", "look_through", "add_capture_preset", "import_video")
+UNCHECKED = (
+    "cancel",
+    "go_to_frame",
+    "side_view",
+    "look_through",
+    "add_capture_preset",
+    "import_video",
+)
 
 
 class Steps(FileSteps):
@@ -25,14 +34,20 @@ class Steps(FileSteps):
         """Choose with ``chance``, write files to ``folder``, and capture ``footage``."""
         super().__init__(chance, folder)
         self.footage = shutil.copy(footage, folder)  # the walk never writes beside the original
-        self.kept = folder.parent / "walk_cache"  # of an earlier walk; a capture takes longer than a walk
+        # of an earlier walk; a capture takes longer than a walk
+        self.kept = folder.parent / "walk_cache"
         names = sorted(set(dir(bpy.ops.scope)) - {"documentation"})  # which opens a browser
-        self.operators = [*names, *("export",) * 3, *("import_motion",) * 2]  # which have most variants
+        # which have most variants
+        self.operators = [*names, *("export",) * 3, *("import_motion",) * 2]
 
     def prepare(self) -> None:
-        """Show all panels, capture once, write a motion file, and copy the cache, which steps clear."""
+        """Show all panels, capture once, write a motion file, and copy the cache, which steps
+        clear.
+        """
         for panel in list(bpy.types.Panel.__subclasses__()):
-            if panel.__name__.startswith("SCOPE_PT_") and "DEFAULT_CLOSED" in getattr(panel, "bl_options", ()):
+            if panel.__name__.startswith("SCOPE_PT_") and "DEFAULT_CLOSED" in getattr(
+                panel, "bl_options", ()
+            ):
                 bpy.utils.unregister_class(panel)
                 panel.bl_options = set()
                 bpy.utils.register_class(panel)
@@ -58,7 +73,9 @@ class Steps(FileSteps):
         """Return the next step: half of them are operators of the extension."""
         if self.next:
             return self.next.pop(0)
-        captured = any("scope_source" in obj for obj in bpy.context.window_manager.windows[0].scene.objects)
+        captured = any(
+            "scope_source" in obj for obj in bpy.context.window_manager.windows[0].scene.objects
+        )
         if not captured and self.random.random() < 0.3:
             return self.capture()
         return self.operator() if self.random.random() < 0.5 else self.any_step()
@@ -72,9 +89,13 @@ class Steps(FileSteps):
         if name in TOOLS and not bpy.app.background:
             return self.tool(name)
         settings = self.arguments(name)
-        # Always with a step to undo, as from a button: after a script's changes without one, Blender itself may crash
-        # when it undoes earlier steps.
-        return Step(f"scope.{name}({settings})", lambda: use(operator, **settings), checked=name not in UNCHECKED)
+        # Always with a step to undo, as from a button: after a script's changes without one,
+        # Blender itself may crash when it undoes earlier steps.
+        return Step(
+            f"scope.{name}({settings})",
+            lambda: use(operator, **settings),
+            checked=name not in UNCHECKED,
+        )
 
     def capture(self) -> Step:
         """Capture from the button or from a script; the cache has the result."""
@@ -116,7 +137,9 @@ class Steps(FileSteps):
         return steps
 
     def mouse(self, kind: str, bone: str = "", value: str = "NOTHING") -> Step:
-        """Move the mouse to a bone's head or anywhere over the viewport, or press and release there."""
+        """Move the mouse to a bone's head or anywhere over the viewport, or press and release
+        there.
+        """
         share = self.random.random(), self.random.random()
 
         def take() -> object:
@@ -139,7 +162,10 @@ class Steps(FileSteps):
         """Choose values for some of an operator's properties."""
         found: dict[str, object] = {}
         for prop in getattr(bpy.ops.scope, name).get_rna_type().properties:
-            path = getattr(prop, "subtype", "") in ("FILE_PATH", "DIR_PATH", "FILE_NAME") or "path" in prop.identifier
+            path = (
+                getattr(prop, "subtype", "") in ("FILE_PATH", "DIR_PATH", "FILE_NAME")
+                or "path" in prop.identifier
+            )
             if prop.identifier == "rna_type" or (self.random.random() < 0.4 and not path):
                 continue
             value = self.value(prop, path)
@@ -156,11 +182,21 @@ class Steps(FileSteps):
         span = {"start": first, "end": first + chance.randrange(1, 12)}
         place = [chance.uniform(-0.5, 0.5), chance.uniform(-0.5, 0.5), chance.uniform(0.2, 1.5)]
         values: dict[str, dict[str, object]] = {
-            **dict.fromkeys(("interpolate_span", "swap_sides", "exchange_sides", "foot_stands"), span),
+            **dict.fromkeys(
+                ("interpolate_span", "swap_sides", "exchange_sides", "foot_stands"), span
+            ),
             **dict.fromkeys(("choose_footage", "import_video"), {"filepath": self.footage}),
-            "import_motion": {"filepath": str(folder / "kept.npz"), "directory": "", "body": "SCOPE"},
+            "import_motion": {
+                "filepath": str(folder / "kept.npz"),
+                "directory": "",
+                "body": "SCOPE",
+            },
             "load_bone_map": {"filepath": str(folder / "bones.json")},
-            "choose_file": {"filepath": str(folder / "kept.npz"), "owner": "scope", "setting": "body_file"},
+            "choose_file": {
+                "filepath": str(folder / "kept.npz"),
+                "owner": "scope",
+                "setting": "body_file",
+            },
             "export": {
                 "filepath": str(folder / "made"),
                 "format": chance.choice(("FBX", "GLB", "BVH", "USDC", "NPZ")),
@@ -196,7 +232,10 @@ class Steps(FileSteps):
                 return None
             count = prop.array_length if prop.is_array else 1
             pick = chance.randint if prop.type == "INT" else chance.uniform
-            values = [pick(int(low), int(high)) if prop.type == "INT" else pick(low, high) for _ in range(count)]
+            values = [
+                pick(int(low), int(high)) if prop.type == "INT" else pick(low, high)
+                for _ in range(count)
+            ]
             return values if prop.is_array else values[0]
         if prop.type == "STRING":
             return self.path() if path else chance.choice(["", "left_foot", *self.names("objects")])
@@ -262,8 +301,14 @@ class Steps(FileSteps):
         folders = bpy.utils.preset_paths("scope/capture")
         files = sorted(str(path) for folder in folders for path in Path(folder).glob("*.py"))
         if not files:
-            return Step("scope.add_capture_preset()", lambda: use(bpy.ops.scope.add_capture_preset, name="walk"))
-        settings = {"filepath": self.random.choice(files), "menu_idname": "SCOPE_PT_capture_presets"}
+            return Step(
+                "scope.add_capture_preset()",
+                lambda: use(bpy.ops.scope.add_capture_preset, name="walk"),
+            )
+        settings = {
+            "filepath": self.random.choice(files),
+            "menu_idname": "SCOPE_PT_capture_presets",
+        }
         return Step(f"preset({settings})", lambda: use(bpy.ops.script.execute_preset, **settings))
 
     def step_property(self) -> Step:
@@ -274,7 +319,17 @@ class Steps(FileSteps):
             group, names = self.random.choice(
                 (
                     (scene.scope_retarget, ("feet", "root", "captured", "active")),
-                    (scene.scope, ("frame_rate", "start_frame", "set_frame_range", "with_camera", "shape", "take")),
+                    (
+                        scene.scope,
+                        (
+                            "frame_rate",
+                            "start_frame",
+                            "set_frame_range",
+                            "with_camera",
+                            "shape",
+                            "take",
+                        ),
+                    ),
                 )
             )
             prop = group.bl_rna.properties[self.random.choice(names)]
@@ -288,7 +343,9 @@ class Steps(FileSteps):
         """Disable and enable the extension, as its update does."""
         if self.random.random() < 0.5:
             return self.step_undo()
-        name = next((a.module for a in bpy.context.preferences.addons if a.module.endswith(".scope")), None)
+        name = next(
+            (a.module for a in bpy.context.preferences.addons if a.module.endswith(".scope")), None
+        )
         if name is None:  # in PyPI's bpy
             return self.operator()
 

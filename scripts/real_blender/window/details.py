@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an animator meets around captures, in a Blender with a window: two captures compared, rates, rigs, files.
+"""What an animator meets around captures, in a Blender with a window: two captures compared, rates,
+rigs, files.
 
 Usage: ``blender --python details.py -- VIDEO OUT_FOLDER``
 """
@@ -19,9 +20,23 @@ import bpy
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from shared.session import FOOTAGE, OUT, captured, invoke, key, picture, press, run, show_tab, until, use, viewport
+from shared.session import (
+    FOOTAGE,
+    OUT,
+    captured,
+    invoke,
+    key,
+    picture,
+    press,
+    run,
+    show_tab,
+    until,
+    use,
+    viewport,
+)
 
-# On a screen of 1600 x 1000, of which a laptop of 1366 x 768 shows the first 768 pixels, with two captures in the list.
+# On a screen of 1600 x 1000, of which a laptop of 1366 x 768 shows the first 768 pixels, with two
+# captures in the list.
 FBX_BUTTON, RAW_BUTTON, FOLD = (1090, 453), (1085, 622), 768
 FOLDER_BUTTON = (1252, 128)  # beside the footage
 # Names of files, and by operator which of them the file browser shows at first.
@@ -38,7 +53,8 @@ BROWSERS = (
 )
 STILL, LOW = OUT / "still.npz", OUT / "low.npz"
 FRAMES, RATE = 120, 60.0
-SEARCHED = (  # words, how many of Blender's own entries they find first, the operator after these, and its format
+# words, how many of Blender's own entries they find first, the operator after these, and its format
+SEARCHED = (
     ("motion capture", 2, "import_video", ""),
     ("mocap", 0, "import_video", ""),
     ("video", 1, "import_video", ""),
@@ -64,7 +80,9 @@ def warnings() -> list[str]:
 
 
 def two_captures() -> Iterator[float]:
-    """Capture a clip twice, the second time from the cache, in a scene with another frame rate than the clip."""
+    """Capture a clip twice, the second time from the cache, in a scene with another frame rate than
+    the clip.
+    """
     scene = bpy.context.scene
     scene.render.fps, scene.scope.quality, scene.scope.frame_rate = 20, "FAST", "KEEP"
     bpy.ops.scope.choose_footage(filepath=FOOTAGE)
@@ -72,11 +90,15 @@ def two_captures() -> Iterator[float]:
         scene.scope.take = take
         yield from captured()
         assert scene.scope.result.collection.name == take
-        assert any("keeps its 20 frames/s, the footage has" in text for text in warnings()), warnings()
+        assert any("keeps its 20 frames/s, the footage has" in text for text in warnings()), (
+            warnings()
+        )
 
 
 def compared() -> Iterator[float]:
-    """Compare one capture, then the other, without leaving the first: its own camera, no bones, its own side view."""
+    """Compare one capture, then the other, without leaving the first: its own camera, no bones, its
+    own side view.
+    """
     assert space().overlay.show_bones
     for take in ("first", "second"):
         select(take)
@@ -89,14 +111,22 @@ def compared() -> Iterator[float]:
     picture("30_second_compared")
     use(bpy.ops.scope.side_view)
     yield 1.0
-    followed = [area.spaces.active.lock_object for area in bpy.context.window_manager.windows[0].screen.areas
-                if area.type == "VIEW_3D" and area.spaces.active.lock_object]  # fmt: skip
-    assert [person.name in bpy.data.collections["second"].all_objects for person in followed] == [True], followed
+    followed = [
+        area.spaces.active.lock_object
+        for area in bpy.context.window_manager.windows[0].screen.areas
+        if area.type == "VIEW_3D" and area.spaces.active.lock_object
+    ]
+    assert [person.name in bpy.data.collections["second"].all_objects for person in followed] == [
+        True
+    ], followed
     use(bpy.ops.scope.look_through)
     yield 1.0
     assert space().overlay.show_bones, "the bones are still hidden after two comparisons"
     assert space().local_view is None
-    assert sum(area.type == "VIEW_3D" for area in bpy.context.window_manager.windows[0].screen.areas) == 1
+    assert (
+        sum(area.type == "VIEW_3D" for area in bpy.context.window_manager.windows[0].screen.areas)
+        == 1
+    )
     report["compared"] = "each through its own camera"
 
 
@@ -131,13 +161,17 @@ def shortcut() -> Iterator[float]:
     """Press Shift Alt V over the viewport: compare with the footage, and back."""
     for perspective in ("CAMERA", "PERSP"):
         key("shift+alt+v")
-        yield from until(lambda wanted=perspective: space().region_3d.view_perspective == wanted, 10, perspective)
+        yield from until(
+            lambda wanted=perspective: space().region_3d.view_perspective == wanted, 10, perspective
+        )
         yield 0.5
     report["shortcut"] = "there and back"
 
 
 def searched() -> Iterator[float]:
-    """Find the entries of File > Import and Export with Blender's search, and open the window of each."""
+    """Find the entries of File > Import and Export with Blender's search, and open the window of
+    each.
+    """
     windows = bpy.context.window_manager.windows
     for number, (words, others, operator, form) in enumerate(SEARCHED):
         before = popup()
@@ -155,7 +189,9 @@ def searched() -> Iterator[float]:
             key("Down")
             yield 0.3
         key("Return")
-        yield from until(lambda: len(windows) > 1, 10, f"the window of what is found with {words!r}")
+        yield from until(
+            lambda: len(windows) > 1, 10, f"the window of what is found with {words!r}"
+        )
         yield 0.5
         opened = windows[-1].screen.areas[0].spaces.active.active_operator
         assert opened.bl_idname == f"SCOPE_OT_{operator}", (words, opened.bl_idname)
@@ -173,8 +209,14 @@ def searched() -> Iterator[float]:
 
 
 def file_browsers() -> Iterator[float]:
-    """Open the file browsers: at first they show what fits, and with the filter off, all that there is."""
-    windows, settings, folder = bpy.context.window_manager.windows, bpy.context.scene.scope, OUT / "files"
+    """Open the file browsers: at first they show what fits, and with the filter off, all that there
+    is.
+    """
+    windows, settings, folder = (
+        bpy.context.window_manager.windows,
+        bpy.context.scene.scope,
+        OUT / "files",
+    )
     folder.mkdir()
     for name in FILES:
         shutil.copy(FOOTAGE, folder / name)
@@ -207,7 +249,8 @@ def listed(folder: Path) -> Generator[float, None, list[str]]:
     area = window.screen.areas[0]
     area.spaces.active.params.directory = str(folder).encode()
     found: list[str] = []
-    for _ in range(40):  # the browser reads the folder in the background, and lists it when it is drawn
+    # the browser reads the folder in the background, and lists it when it is drawn
+    for _ in range(40):
         yield 0.25
         region = next(each for each in area.regions if each.type == "WINDOW")
         with bpy.context.temp_override(window=window, area=area, region=region):
@@ -245,7 +288,9 @@ def rigs() -> None:
 
 
 def exported() -> None:
-    """Export a rig and then captures: everything starts at 0 s, has the take's name, and is what was asked for."""
+    """Export a rig and then captures: everything starts at 0 s, has the take's name, and is what
+    was asked for.
+    """
     use(bpy.ops.scope.export, filepath=str(OUT / "rig.bvh"), format="BVH", which="RIG")
     assert "DEF-" in (OUT / "rig.bvh").read_text("utf-8")
     select("first")
@@ -253,12 +298,19 @@ def exported() -> None:
         use(bpy.ops.scope.export, filepath=str(OUT / f"first.{suffix}"), format=kind)
     text = (OUT / "first.bvh").read_text("utf-8")
     assert "DEF-" not in text, "the rig was exported again"
-    longest = max(abs(float(word)) for line in text.splitlines() if "OFFSET" in line for word in line.split()[1:])
+    longest = max(
+        abs(float(word))
+        for line in text.splitlines()
+        if "OFFSET" in line
+        for word in line.split()[1:]
+    )
     assert 20.0 < longest < 100.0, f"a BVH in centimetres has no bone of {longest}"
     content = (OUT / "first.glb").read_bytes()
     glb = json.loads(content[20 : 20 + struct.unpack("<I", content[12:16])[0]])
     assert [animation["name"] for animation in glb["animations"]] == ["first"], glb["animations"]
-    starts = {glb["accessors"][sampler["input"]]["min"][0] for sampler in glb["animations"][0]["samplers"]}
+    starts = {
+        glb["accessors"][sampler["input"]]["min"][0] for sampler in glb["animations"][0]["samplers"]
+    }
     assert starts == {0.0}, starts
     before = set(bpy.data.actions)
     bpy.context.scene.frame_set(1)
@@ -294,7 +346,9 @@ def sequencer() -> None:
 
 
 def imported() -> None:
-    """Import a motion without a cycle, of which no loop can be made, and one with two floors, which is warned of."""
+    """Import a motion without a cycle, of which no loop can be made, and one with two floors, which
+    is warned of.
+    """
     poses, trans = np.zeros((FRAMES, 24, 3)), np.zeros((FRAMES, 3))
     poses[:, 0, 0] = np.pi / 2  # AMASS: z is up
     poses[:, 16, 2] = np.linspace(0.0, 0.8, FRAMES)  # an arm that rises once
@@ -302,7 +356,9 @@ def imported() -> None:
     trans[80:, 2] -= 0.3
     np.savez(LOW, poses=poses.reshape(FRAMES, -1), trans=trans, mocap_framerate=np.array(RATE))
     use(bpy.ops.scope.import_motion, filepath=str(STILL))
-    assert any("keeps its 20 frames/s, the motion has 60" in text for text in warnings()), warnings()
+    assert any("keeps its 20 frames/s, the motion has 60" in text for text in warnings()), (
+        warnings()
+    )
     try:
         use(bpy.ops.scope.loop, start=1, end=40)
     except RuntimeError as error:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Capture from the panel of a Blender with a window, as a person would, and take a screenshot of every state.
+"""Capture from the panel of a Blender with a window, as a person would, and take a screenshot of
+every state.
 
 Usage: ``blender --python panel.py -- VIDEO OUT_FOLDER``
 """
@@ -19,7 +20,20 @@ import numpy as np
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from shared.session import FOOTAGE, OUT, addon, inventory, invoke, key, picture, press, run, show_tab, until, viewport
+from shared.session import (
+    FOOTAGE,
+    OUT,
+    addon,
+    inventory,
+    invoke,
+    key,
+    picture,
+    press,
+    run,
+    show_tab,
+    until,
+    viewport,
+)
 
 # Where the panel's buttons are on a screen of 1600 x 1000, in pixels from its top left.
 FAST_BUTTON, CAPTURE_BUTTON = (1086, 151), (1174, 183)
@@ -38,7 +52,8 @@ def tracked_half() -> bool:
 def clocks() -> np.ndarray:
     """Return the time, and the processor time of Blender's main thread, in seconds.
 
-    The latter is the same on a busy machine: neither the capture nor drawing without a graphics card is part of it.
+    The latter is the same on a busy machine: neither the capture nor drawing without a graphics
+    card is part of it.
     """
     return np.array([time.monotonic(), time.thread_time()])
 
@@ -56,14 +71,19 @@ def cancel_after_the_question() -> Iterator[float]:
         asked.append(invoke_itself(self, context, event))
         return asked[-1]
 
-    yield from until(lambda: time.monotonic() - addon().state.started > ASKS_AFTER_S, 30, "a capture that asks")
+    yield from until(
+        lambda: time.monotonic() - addon().state.started > ASKS_AFTER_S, 30, "a capture that asks"
+    )
     operator.invoke = counted
     keep.execute = lambda self, context: kept.append(True) or keep_itself(self, context)
     for times, answer in enumerate(("Escape", "Keep Capturing", "Return"), 1):
         key("Escape", OVER_PANEL)
-        yield from until(lambda wanted=times: len(asked) == wanted, 20, "the question")  # not if one is still open
+        # not if one is still open
+        yield from until(lambda wanted=times: len(asked) == wanted, 20, "the question")
         yield 2.0
-        assert addon().state.job is not None, "Escape over the panel ended a long capture without a question"
+        assert addon().state.job is not None, (
+            "Escape over the panel ended a long capture without a question"
+        )
         picture("4_question")
         if answer == "Keep Capturing":
             yield from press(KEEP_BUTTON, lambda: bool(kept))
@@ -78,10 +98,17 @@ def cancel_after_the_question() -> Iterator[float]:
 
 
 def frame_covered() -> float:
-    """Return how far the frame of the scene's camera reaches under the sidebar or the toolbar, pixels."""
+    """Return how far the frame of the scene's camera reaches under the sidebar or the toolbar,
+    pixels.
+    """
     area, region, camera = viewport()["area"], viewport()["region"], bpy.context.scene.camera
-    corners = [camera.matrix_world @ corner for corner in camera.data.view_frame(scene=bpy.context.scene)]
-    across = [location_3d_to_region_2d(region, area.spaces.active.region_3d, corner).x for corner in corners]
+    corners = [
+        camera.matrix_world @ corner for corner in camera.data.view_frame(scene=bpy.context.scene)
+    ]
+    across = [
+        location_3d_to_region_2d(region, area.spaces.active.region_3d, corner).x
+        for corner in corners
+    ]
     tools, sidebar = (next(r for r in area.regions if r.type == kind) for kind in ("TOOLS", "UI"))
     return max(tools.x + tools.width - region.x - min(across), max(across) - (sidebar.x - region.x))
 
@@ -89,7 +116,11 @@ def frame_covered() -> float:
 def lowest_skin(armature: bpy.types.Object) -> float:
     """Return the height of the lowest vertex of the body over all frames, metres."""
     scene, lowest = bpy.context.scene, float("inf")
-    body = next(o for o in armature.users_collection[0].objects if o.type == "MESH" and o.find_armature() == armature)
+    body = next(
+        o
+        for o in armature.users_collection[0].objects
+        if o.type == "MESH" and o.find_armature() == armature
+    )
     shown = scene.frame_current
     for frame in range(scene.frame_start, scene.frame_end + 1):
         scene.frame_set(frame)
@@ -134,12 +165,15 @@ def steps() -> Iterator[float]:
     report["mouse_chose"] = scene.scope.quality
     picture("2_footage_chosen")
 
-    scene.scope.quality = "BEST"  # so that it does not end before it is cancelled, and is in no cache for the next one
+    # so that it does not end before it is cancelled, and is in no cache for the next one
+    scene.scope.quality = "BEST"
     before = inventory()
     yield from press(CAPTURE_BUTTON, lambda: addon().state.job is not None)
     worker = addon().state.job.worker
     folder, pid = worker.job_folder, worker.pid
-    yield from until(lambda: addon().state.job is None or addon().state.job.progress.done > 0, 120, "the worker")
+    yield from until(
+        lambda: addon().state.job is None or addon().state.job.progress.done > 0, 120, "the worker"
+    )
     assert addon().state.job is not None, addon().state.message
     os.kill(pid, signal.SIGSTOP)  # until it is cancelled: on a fast machine it would end before
     yield 1.0
@@ -147,7 +181,11 @@ def steps() -> Iterator[float]:
     invoke(bpy.ops.screen.animation_play)
     yield 0.5
     key("Escape")  # over the viewport: stops the playback
-    yield from until(lambda: not bpy.context.window_manager.windows[0].screen.is_animation_playing, 20, "the playback")
+    yield from until(
+        lambda: not bpy.context.window_manager.windows[0].screen.is_animation_playing,
+        20,
+        "the playback",
+    )
     yield 1.0
     report["after_escape_elsewhere"] = {"capturing": addon().state.job is not None}
     yield from cancel_after_the_question()
@@ -165,7 +203,9 @@ def steps() -> Iterator[float]:
     while addon().state.job is not None:
         yield 0.02
         now = clocks()
-        building = addon().state.job is None or addon().state.job.progress.stage == "building the scene"
+        building = (
+            addon().state.job is None or addon().state.job.progress.stage == "building the scene"
+        )
         if not building:
             gaps.append(now - last)
         last = now
@@ -175,9 +215,14 @@ def steps() -> Iterator[float]:
             last = clocks()
     report["capture_s"] = round(time.monotonic() - began, 1)
     report["load_per_core"] = round(os.getloadavg()[0] / (os.cpu_count() or 1), 2)
-    for name, column in zip(("timer_gap_ms", "main_thread_ms"), np.sort(1e3 * np.array(gaps), axis=0).T, strict=True):
+    for name, column in zip(
+        ("timer_gap_ms", "main_thread_ms"), np.sort(1e3 * np.array(gaps), axis=0).T, strict=True
+    ):
         shares = {"median": 0.5, "p99": 0.99, "largest": 1.0}
-        report[name] = {key: round(float(column[int(share * (len(column) - 1))]), 1) for key, share in shares.items()}
+        report[name] = {
+            key: round(float(column[int(share * (len(column) - 1))]), 1)
+            for key, share in shares.items()
+        }
     yield 2.0
     picture("6_result")
     assert scene.scope.result.collection is not None, addon().state.message
@@ -204,7 +249,9 @@ def steps() -> Iterator[float]:
     area.tag_redraw()
     yield 1.0
     picture("7_refined")
-    scene.view_layers[0].objects.active = next(o for o in result.collection.objects if o.type == "ARMATURE")
+    scene.view_layers[0].objects.active = next(
+        o for o in result.collection.objects if o.type == "ARMATURE"
+    )
     invoke(bpy.ops.object.mode_set, mode="POSE")
     invoke(bpy.ops.pose.select_all, action="DESELECT")
     yield 1.0
@@ -218,7 +265,8 @@ def steps() -> Iterator[float]:
     invoke(bpy.ops.scope.root_motion, mode="BONES")
     invoke(bpy.ops.scope.smooth, strength=1.0)
     formats = [("FBX", "fbx"), ("GLB", "glb"), ("BVH", "bvh")]
-    formats += [("USDC", "usdc")] if "usd_export" in dir(bpy.ops.wm) else []  # Debian builds Blender without USD
+    # Debian builds Blender without USD
+    formats += [("USDC", "usdc")] if "usd_export" in dir(bpy.ops.wm) else []
     for kind, suffix in formats:
         invoke(bpy.ops.scope.export, filepath=str(OUT / f"export.{suffix}"), format=kind)
         report["exports"].append(f"export.{suffix}")

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Correct a captured motion in a Blender with a window: drag handles with the mouse, undo, smooth, remove.
+"""Correct a captured motion in a Blender with a window: drag handles with the mouse, undo, smooth,
+remove.
 
 Usage: ``blender --python pins.py -- VIDEO OUT_FOLDER``
 """
@@ -38,7 +39,12 @@ from shared.session import (
 
 # On a screen of 1600 x 1000, in the comparison of the only capture.
 DOCUMENTATION, RAW, NORMAL, STRONG = (1222, 97), (1086, 529), (1165, 529), (1244, 529)
-LEFT_FOOT_STANDS, EXCHANGE, UPRIGHT_LINE, FLOOR_HERE = (1105, 811), (1175, 836), (1175, 863), (1175, 888)
+LEFT_FOOT_STANDS, EXCHANGE, UPRIGHT_LINE, FLOOR_HERE = (
+    (1105, 811),
+    (1175, 836),
+    (1175, 863),
+    (1175, 888),
+)
 report: dict[str, object] = {"blender": bpy.app.version_string}
 
 
@@ -53,7 +59,9 @@ def listed() -> list[dict]:
 
 
 def on_screen(joint: str, area: bpy.types.Area | None = None) -> tuple[float, float]:
-    """Return where a joint is on the screen, in pixels from the top left, by default in the first viewport."""
+    """Return where a joint is on the screen, in pixels from the top left, by default in the first
+    viewport.
+    """
     here, armature = viewport(), rig()
     here["window"].view_layer.update()
     place = armature.matrix_world @ armature.pose.bones[joint].head
@@ -76,7 +84,15 @@ def move(x: float, y: float) -> list[object]:
 def drag(joint: str, by: tuple[int, int], name: str = "") -> Iterator[float]:
     """Drag a handle; take a screenshot before it is dropped."""
     x, y = on_screen(joint)
-    xdotool(*move(x - 3, y), *move(x, y), "mousedown", 1, "sleep", "0.3", *move(x + by[0] / 2, y + by[1] / 2))
+    xdotool(
+        *move(x - 3, y),
+        *move(x, y),
+        "mousedown",
+        1,
+        "sleep",
+        "0.3",
+        *move(x + by[0] / 2, y + by[1] / 2),
+    )
     yield 2.5
     xdotool(*move(x + by[0], y + by[1]))
     yield 1.5
@@ -119,7 +135,8 @@ def steps() -> Iterator[float]:
 
     was = on_screen("left_wrist")
     shoulder = on_screen("left_shoulder")
-    by = round(0.3 * (shoulder[0] - was[0])), round(0.3 * (shoulder[1] - was[1]))  # where a bent arm reaches
+    # where a bent arm reaches
+    by = round(0.3 * (shoulder[0] - was[0])), round(0.3 * (shoulder[1] - was[1]))
     yield from dragged(was, by)
     yield from corrected(first, frame)
     yield from disabled()
@@ -145,7 +162,9 @@ def pressed() -> Iterator[float]:
     assert found[0] != found[1] != found[2] != found[0]
     before = keys()
     for place, kind in ((LEFT_FOOT_STANDS, "CONTACT"), (EXCHANGE, "EXCHANGE")):
-        yield from confirmed(place, lambda kind=kind: [entry["kind"] for entry in listed()] == [kind])
+        yield from confirmed(
+            place, lambda kind=kind: [entry["kind"] for entry in listed()] == [kind]
+        )
         assert keys() != before
         yield from undone(before)
     yield from press(FLOOR_HERE, lambda: [entry["kind"] for entry in listed()] == ["FLOOR"])
@@ -165,7 +184,8 @@ def confirmed(place: tuple[int, int], happened: Callable[[], bool]) -> Iterator[
     for _ in range(6):
         click(*place)
         yield 2.0
-        subprocess.run(["xdotool", "key", "Return"], check=True)  # with the mouse on the dialog, which stays open then
+        # with the mouse on the dialog, which stays open then
+        subprocess.run(["xdotool", "key", "Return"], check=True)
         for _ in range(20):
             yield 0.1
             if happened():
@@ -176,11 +196,15 @@ def confirmed(place: tuple[int, int], happened: Callable[[], bool]) -> Iterator[
 
 
 def upright_line_from_the_side() -> Iterator[float]:
-    """Draw the upright line in the view from the side; the tool begins with its button beside the footage."""
+    """Draw the upright line in the view from the side; the tool begins with its button beside the
+    footage.
+    """
     use(bpy.ops.scope.side_view)
     yield 2.0
     window, camera, before = viewport()["window"], bpy.context.scene.camera, keys()
-    area = next(a for a in window.screen.areas if a.type == "VIEW_3D" and a.spaces.active.lock_object)
+    area = next(
+        a for a in window.screen.areas if a.type == "VIEW_3D" and a.spaces.active.lock_object
+    )
     yield from press(UPRIGHT_LINE, lambda: len(window.modal_operators) > 0)
     was, (x, y) = camera.matrix_world.copy(), on_screen("left_ankle", area)
     xdotool(*move(x - 3, y), *move(x, y), "mousedown", 1, "sleep", "0.3", *move(x + 12, y - 180))
@@ -189,7 +213,9 @@ def upright_line_from_the_side() -> Iterator[float]:
     yield 1.0
     picture("pins_9_upright_from_the_side")
     xdotool("mouseup", 1)
-    yield from until(lambda: [entry["kind"] for entry in listed()] == ["UPRIGHT"], 20, "the upright line")
+    yield from until(
+        lambda: [entry["kind"] for entry in listed()] == ["UPRIGHT"], 20, "the upright line"
+    )
     yield 0.5
     turned = camera.matrix_world.to_quaternion().rotation_difference(was.to_quaternion()).angle
     report["upright_from_the_side_deg"] = round(math.degrees(turned), 2)
@@ -201,7 +227,9 @@ def upright_line_from_the_side() -> Iterator[float]:
 
 def tools() -> int:
     """Return how often the tool runs."""
-    return [each.bl_idname for each in viewport()["window"].modal_operators].count("SCOPE_OT_pin_limb")
+    return [each.bl_idname for each in viewport()["window"].modal_operators].count(
+        "SCOPE_OT_pin_limb"
+    )
 
 
 def disabled() -> Iterator[float]:
@@ -242,7 +270,9 @@ def hidden_by_its_button() -> Iterator[float]:
         x, y = on_screen("head")
         xdotool(*move(x - 60, y), *move(x - 64, y))  # a tool ends at its next event
         yield from until(
-            lambda wanted=expected: tools() == wanted and drawn("left_hip") == bool(wanted), 30, f"{expected} tools"
+            lambda wanted=expected: tools() == wanted and drawn("left_hip") == bool(wanted),
+            30,
+            f"{expected} tools",
         )
 
 
@@ -250,13 +280,28 @@ def dragged_in_side_view(joint: str, by: tuple[int, int]) -> Iterator[float]:
     """Drag a handle in the view from the side, which pins the joint in space."""
     use(bpy.ops.scope.side_view)
     yield 1.0
-    area = next(a for a in viewport()["window"].screen.areas if a.type == "VIEW_3D" and a.spaces.active.lock_object)
-    legs = [f"{side}_{name}" for name in ("hip", "knee", "ankle") for side in ("left", "right")]  # an arm can cover one
+    area = next(
+        a
+        for a in viewport()["window"].screen.areas
+        if a.type == "VIEW_3D" and a.spaces.active.lock_object
+    )
+    # an arm can cover one
+    legs = [f"{side}_{name}" for name in ("hip", "knee", "ankle") for side in ("left", "right")]
     yield from until(
-        lambda: drawn("left_hip") and any(drawn(each, area) for each in legs), 30, "the handles in both views"
+        lambda: drawn("left_hip") and any(drawn(each, area) for each in legs),
+        30,
+        "the handles in both views",
     )
     before, (x, y) = len(listed()), on_screen(joint, area)
-    xdotool(*move(x - 3, y), *move(x, y), "mousedown", 1, "sleep", "0.3", *move(x + by[0] / 2, y + by[1] / 2))
+    xdotool(
+        *move(x - 3, y),
+        *move(x, y),
+        "mousedown",
+        1,
+        "sleep",
+        "0.3",
+        *move(x + by[0] / 2, y + by[1] / 2),
+    )
     yield 2.0
     picture("pins_6_side_view")
     xdotool(*move(x + by[0], y + by[1]), "mouseup", 1)
@@ -292,7 +337,18 @@ def dragged(was: tuple[float, float], by: tuple[int, int]) -> Iterator[float]:
     report["redone_px"] = off("left_wrist", target)
     x, y = on_screen("left_wrist")  # Escape during a drag changes nothing
     xdotool(
-        *move(x, y), "mousedown", 1, "sleep", "0.3", *move(x + 40, y), "key", "Escape", "sleep", "0.3", "mouseup", 1
+        *move(x, y),
+        "mousedown",
+        1,
+        "sleep",
+        "0.3",
+        *move(x + 40, y),
+        "key",
+        "Escape",
+        "sleep",
+        "0.3",
+        "mouseup",
+        1,
     )
     yield 3.0
     yield from until(lambda: off("left_wrist", target) < 2.5, 30, "the wrist to go back")
@@ -310,7 +366,9 @@ def dragged(was: tuple[float, float], by: tuple[int, int]) -> Iterator[float]:
 
 
 def dragged_while_busy(joint: str, by: tuple[int, int]) -> Iterator[float]:
-    """Drag a handle while Blender does not react: the drag is over before Blender handles the press."""
+    """Drag a handle while Blender does not react: the drag is over before Blender handles the
+    press.
+    """
     before, (x, y) = len(listed()), on_screen(joint)
     xdotool(*move(x - 3, y), *move(x, y), "mousedown", 1, *move(x + by[0], y + by[1]), "mouseup", 1)
     time.sleep(3.0)
@@ -323,7 +381,9 @@ def dragged_while_busy(joint: str, by: tuple[int, int]) -> Iterator[float]:
 
 
 def dragged_out_of_reach() -> Iterator[float]:
-    """Drag a wrist farther away than the arm is long: its handle is orange, as long as the pin is there."""
+    """Drag a wrist farther away than the arm is long: its handle is orange, as long as the pin is
+    there.
+    """
     before, wrist, shoulder = len(listed()), on_screen("right_wrist"), on_screen("right_shoulder")
     yield from drag("right_wrist", (round(wrist[0] - shoulder[0]), round(wrist[1] - shoulder[1])))
     assert [bool(e["missed"]) for e in listed()[before:]] == [True], listed()
@@ -359,9 +419,15 @@ def corrected(first: int, frame: int) -> Iterator[float]:
 
 
 def upright_line() -> None:
-    """Turn the world by a line near the image's middle; without it, the keys are the same to the bit."""
+    """Turn the world by a line near the image's middle; without it, the keys are the same to the
+    bit.
+    """
     before, (width, height) = keys(), bpy.context.scene.scope.result.resolution
-    use(bpy.ops.scope.set_upright, start=(0.5 * width, 0.2 * height), end=(0.52 * width, 0.8 * height))
+    use(
+        bpy.ops.scope.set_upright,
+        start=(0.5 * width, 0.2 * height),
+        end=(0.52 * width, 0.8 * height),
+    )
     assert [entry["kind"] for entry in listed()] == ["UPRIGHT"]
     assert keys() != before
     use(bpy.ops.scope.remove_correction, index=0)
@@ -370,7 +436,9 @@ def upright_line() -> None:
 
 
 def floor_here(frame: int) -> Iterator[float]:
-    """Say that the lower foot rests on the floor: it does, whatever the smoothing, until the correction is removed."""
+    """Say that the lower foot rests on the floor: it does, whatever the smoothing, until the
+    correction is removed.
+    """
     use(bpy.ops.scope.smooth, strength=1.0)  # writes keys as below
     scene, before = bpy.context.scene, keys()
     scene.frame_set(frame)
@@ -393,7 +461,9 @@ def floor_here(frame: int) -> Iterator[float]:
 
 
 def kept_edits(first: int, frame: int) -> Iterator[float]:
-    """Interpolate frames, swap sides and put feet on the floor, which smoothing keeps, until they are taken back."""
+    """Interpolate frames, swap sides and put feet on the floor, which smoothing keeps, until they
+    are taken back.
+    """
     before, frames = keys(), (first + 8, frame - 2, frame, frame + 2, frame + 10)
     captured_there = places(frames)
     use(bpy.ops.scope.interpolate_span, start=frame - 4, end=frame + 4)
@@ -431,7 +501,10 @@ def places(frames: tuple[int, ...]) -> list[Vector]:
     found = []
     for frame in frames:
         bpy.context.scene.frame_set(frame)
-        found += [place(joint) for joint in ("left_wrist", "right_wrist", "left_knee", "right_knee", "pelvis")]
+        found += [
+            place(joint)
+            for joint in ("left_wrist", "right_wrist", "left_knee", "right_knee", "pelvis")
+        ]
     return found
 
 
@@ -443,7 +516,11 @@ def apart(these: list[Vector], those: list[Vector]) -> float:
 def lowest_skin() -> float:
     """Return the height of the body's lowest vertex in the current frame, metres."""
     viewport()["window"].view_layer.update()
-    body = next(o for o in rig().users_collection[0].objects if o.type == "MESH" and o.find_armature() == rig())
+    body = next(
+        o
+        for o in rig().users_collection[0].objects
+        if o.type == "MESH" and o.find_armature() == rig()
+    )
     posed = body.evaluated_get(bpy.context.evaluated_depsgraph_get())
     mesh = posed.to_mesh()
     lowest = min((posed.matrix_world @ vertex.co).z for vertex in mesh.vertices)
@@ -452,9 +529,16 @@ def lowest_skin() -> float:
 
 
 def out_of_reach() -> None:
-    """Pin a wrist a metre away: the body stays, and without the pin the keys are the same to the bit."""
+    """Pin a wrist a metre away: the body stays, and without the pin the keys are the same to the
+    bit.
+    """
     before, shoulder, pelvis = keys(), place("left_shoulder"), place("pelvis")
-    use(bpy.ops.scope.add_pin, joint="left_wrist", location=shoulder + Vector((1.1, 0.0, 0.0)), in_image=False)
+    use(
+        bpy.ops.scope.add_pin,
+        joint="left_wrist",
+        location=shoulder + Vector((1.1, 0.0, 0.0)),
+        in_image=False,
+    )
     report["out_of_reach"] = listed()[0]["missed"]
     report["pelvis_moved_cm"] = round(100 * (place("pelvis") - pelvis).length, 2)
     assert report["pelvis_moved_cm"] < 3.5, report

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Open other files amid whatever keeps running in the window: a capture, a live one, the tools with the mouse, undo.
+"""Open other files amid whatever keeps running in the window: a capture, a live one, the tools with
+the mouse, undo.
 
 Usage: ``blender --python reload.py -- VIDEO OUT_FOLDER``
 """
@@ -15,7 +16,19 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from shared.session import FOOTAGE, OUT, addon, captured, inventory, invoke, run, show_tab, until, use, viewport
+from shared.session import (
+    FOOTAGE,
+    OUT,
+    addon,
+    captured,
+    inventory,
+    invoke,
+    run,
+    show_tab,
+    until,
+    use,
+    viewport,
+)
 
 SAVED = OUT / "reload.blend"
 report: dict[str, int] = {"files_opened": 0}
@@ -93,7 +106,9 @@ def upright() -> Iterator[float]:
 
 
 def undone() -> Iterator[float]:
-    """Pin, retarget to a duplicate, push to the NLA, compare, and undo all but the first, which is left to timers."""
+    """Pin, retarget to a duplicate, push to the NLA, compare, and undo all but the first, which is
+    left to timers.
+    """
     use(bpy.ops.scope.add_pin, joint="left_wrist", location=(0.5, 0.0, 1.2), frame=20)
     use(bpy.ops.scope.push_to_nla)
     use(bpy.ops.object.duplicate)
@@ -104,7 +119,8 @@ def undone() -> Iterator[float]:
 
 
 def removed_in_another_scene() -> Iterator[float]:
-    """Cancel a live capture while the window shows another scene, whose graph alone Blender updates by itself.
+    """Cancel a live capture while the window shows another scene, whose graph alone Blender updates
+    by itself.
 
     Drawing would read the removed objects from the graph of the first scene, and may crash.
     """
@@ -116,13 +132,17 @@ def removed_in_another_scene() -> Iterator[float]:
     use(bpy.ops.scene.new, type="NEW")
     yield 0.1
     use(bpy.ops.scope.cancel_live)
-    yield from until(lambda: module("live.live_state").state.job is None, 60, "the end of the live capture")
+    yield from until(
+        lambda: module("live.live_state").state.job is None, 60, "the end of the live capture"
+    )
     found = blocks_in_graph(scene)
     assert found == before, f"the hidden scene's graph has {found} datablocks, not {before}"
 
 
 def blocks_in_graph(scene: bpy.types.Scene) -> int:
-    """Return how many datablocks a scene's dependency graph has; those that were removed cannot be looked at."""
+    """Return how many datablocks a scene's dependency graph has; those that were removed cannot be
+    looked at.
+    """
     return len(scene.view_layers[0].depsgraph.ids)
 
 

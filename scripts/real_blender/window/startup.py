@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Time how long Blender takes to open with the extension enabled, disabled and empty, in turns: ``startup.py ROUNDS``.
+"""Time how long Blender takes to open with the extension enabled, disabled and empty, in turns:
+``startup.py ROUNDS``.
 
-Runs in the Debian with its own Python, in /scope. All have the extension's files; in one it is disabled, and in one its
-code does nothing, which is what Blender itself takes for an extension with these packages. Each start opens a window on
-a separate screen, and Blender's first timer, which runs once the window exists, ends it. Besides the time that passed,
-the processor time is measured, which means something on a busy machine too.
+Runs in the Debian with its own Python, in /scope. All have the extension's files; in one it is
+disabled, and in one its code does nothing, which is what Blender itself takes for an extension with
+these packages. Each start opens a window on a separate screen, and Blender's first timer, which
+runs once the window exists, ends it. Besides the time that passed, the processor time is measured,
+which means something on a busy machine too.
 """
 
 from __future__ import annotations
@@ -25,7 +27,8 @@ HOMES = {
     "without": Path("/scope/home_without"),
 }
 DISABLE = (
-    "import bpy; bpy.ops.preferences.addon_disable(module='bl_ext.user_default.scope'); bpy.ops.wm.save_userpref()"
+    "import bpy; bpy.ops.preferences.addon_disable(module='bl_ext.user_default.scope'); "
+    "bpy.ops.wm.save_userpref()"
 )
 END = """
 import bpy, os, time
@@ -38,7 +41,9 @@ bpy.app.timers.register(end, first_interval=0.0)
 
 
 def opened(kind: str) -> tuple[float, float]:
-    """Return the seconds from the start of the process to the window's first timer, and those of the processor."""
+    """Return the seconds from the start of the process to the window's first timer, and those of
+    the processor.
+    """
     began, used = time.monotonic(), processor_s()
     done = subprocess.run(
         ["blender", "--python-expr", END],
@@ -85,12 +90,18 @@ def main(rounds: int) -> None:
     figures: dict[str, float] = {"rounds": rounds}
     for index, what in enumerate(("", "processor_")):
         found = {kind: [run[index] for run in runs] for kind, runs in times.items()}
-        figures |= {f"{what}{kind}_s": statistics.median(seconds) for kind, seconds in found.items()}
+        figures |= {
+            f"{what}{kind}_s": statistics.median(seconds) for kind, seconds in found.items()
+        }
         for kind, prefix in (("enabled", ""), ("empty", "empty_")):
             pairs = [1e3 * (a - b) for a, b in zip(found[kind], found["without"], strict=True)]
-            figures[f"{what}{prefix}more_ms"] = 1e3 * (figures[f"{what}{kind}_s"] - figures[f"{what}without_s"])
+            figures[f"{what}{prefix}more_ms"] = 1e3 * (
+                figures[f"{what}{kind}_s"] - figures[f"{what}without_s"]
+            )
             figures[f"{what}{prefix}median_of_differences_ms"] = statistics.median(pairs)
-    Path("out/startup.json").write_text(json.dumps({name: round(value, 4) for name, value in figures.items()}))
+    Path("out/startup.json").write_text(
+        json.dumps({name: round(value, 4) for name, value in figures.items()})
+    )
 
 
 if __name__ == "__main__":

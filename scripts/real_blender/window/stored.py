@@ -59,7 +59,9 @@ def shown() -> tuple[str, int, int]:
 
 
 def two_captures() -> Iterator[float]:
-    """Import two motions as another tool writes them, which is faster than capturing; undo and redo the second."""
+    """Import two motions as another tool writes them, which is faster than capturing; undo and redo
+    the second.
+    """
     for path, speed in ((WALK, 1.0), (JUMP, 2.0)):
         phase = 2 * np.pi * speed * np.arange(120) / 60.0
         poses, trans = np.zeros((120, 24, 3)), np.zeros((120, 3))
@@ -83,7 +85,9 @@ def two_captures() -> Iterator[float]:
     yield 1.0
 
 
-def renamed_and_reopened(first: tuple[str, int, int], second: tuple[str, int, int]) -> Iterator[float]:
+def renamed_and_reopened(
+    first: tuple[str, int, int], second: tuple[str, int, int]
+) -> Iterator[float]:
     """Rename and duplicate, clear the cache, save and reopen, undo, delete."""
     armature("walk").name = "hero"
     activate("hero")
@@ -121,13 +125,17 @@ def renamed_and_reopened(first: tuple[str, int, int], second: tuple[str, int, in
 def in_other_files(first: tuple[str, int, int]) -> Iterator[float]:
     """Append the armature, append its collection, and link the collection."""
     yield from new_file()
-    bpy.ops.wm.append(filepath=f"{SAVED}/Object/hero", directory=f"{SAVED}/Object/", filename="hero")
+    bpy.ops.wm.append(
+        filepath=f"{SAVED}/Object/hero", directory=f"{SAVED}/Object/", filename="hero"
+    )
     activate("hero")
     for strength in (0.0, 2.5):
         assert use(bpy.ops.scope.smooth, strength=strength) == {"FINISHED"}
     report["worked"].append("hero, appended alone")
     yield from new_file()
-    bpy.ops.wm.append(filepath=f"{SAVED}/Collection/zebra", directory=f"{SAVED}/Collection/", filename="zebra")
+    bpy.ops.wm.append(
+        filepath=f"{SAVED}/Collection/zebra", directory=f"{SAVED}/Collection/", filename="zebra"
+    )
     yield 1.0
     assert shown() == ("zebra", *first[1:]), shown()
     usable("hero", "appended with its collection")

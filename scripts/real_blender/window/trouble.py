@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Failures while a Blender with a window captures: nothing may be left behind, and the next capture must work.
+"""Failures while a Blender with a window captures: nothing may be left behind, and the next capture
+must work.
 
 Usage: ``blender --python trouble.py -- VIDEO OUT_FOLDER``
 """
@@ -18,7 +19,20 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from shared.session import FOOTAGE, OUT, addon, captured, inventory, invoke, picture, run, show_tab, until, use, workers
+from shared.session import (
+    FOOTAGE,
+    OUT,
+    addon,
+    captured,
+    inventory,
+    invoke,
+    picture,
+    run,
+    show_tab,
+    until,
+    use,
+    workers,
+)
 
 SMALL = Path("/scope/small")  # a separate disk
 report: dict[str, str] = {}
@@ -31,7 +45,9 @@ def cache():
 
 def preferences() -> bpy.types.AddonPreferences:
     """Return the extension's preferences."""
-    return next(a for a in bpy.context.preferences.addons if a.module.endswith(".scope")).preferences
+    return next(
+        a for a in bpy.context.preferences.addons if a.module.endswith(".scope")
+    ).preferences
 
 
 def nothing_left(when: str) -> None:
@@ -50,7 +66,9 @@ def begin() -> None:
 def begun() -> Iterator[float]:
     """Start a capture that is in no cache, and wait until it is at work."""
     begin()
-    yield from until(lambda: addon().state.job is None or addon().state.job.progress.done > 5, 400, "the worker")
+    yield from until(
+        lambda: addon().state.job is None or addon().state.job.progress.done > 5, 400, "the worker"
+    )
     assert addon().state.job is not None, addon().state.message
 
 
@@ -102,7 +120,9 @@ def full_disk() -> Iterator[float]:
     kernels = cache().kernels  # which clearing keeps, so that they are not part of the size
     size = cache().size() + sum(path.stat().st_size for path in kernels.rglob("*.code"))
     SMALL.mkdir(exist_ok=True)
-    subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={2 * size + 2**20}", "tmpfs", str(SMALL)], check=True)
+    subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", f"size={2 * size + 2**20}", "tmpfs", str(SMALL)], check=True
+    )
     preferences().cache_folder = str(SMALL)
     shutil.copytree(kernels, cache().kernels)
     before = inventory()
@@ -116,7 +136,8 @@ def full_disk() -> Iterator[float]:
         there = sorted(SMALL.iterdir())
         fill()
         try:
-            said = f"{invoke(bpy.ops.scope.export, filepath=str(SMALL / f'out.{suffix}'), format=kind)}"
+            path = SMALL / f"out.{suffix}"
+            said = f"{invoke(bpy.ops.scope.export, filepath=str(path), format=kind)}"
         except RuntimeError as error:
             said = str(error).strip()
         assert "space" in said, f"exporting {kind} to a full disk: {said}"
@@ -144,7 +165,9 @@ def closed(how: str) -> Iterator[float]:
     script = str(Path(__file__).resolve().parents[1] / "shared" / "closed.py")
     other = subprocess.Popen(["blender", "--python", script, "--", FOOTAGE, str(OUT), how])
     yield from until(lambda: other.poll() is not None, 300, "the other Blender to end")
-    assert (OUT / f"closed_{how}").read_text("utf-8") == "capturing", "the other Blender did not capture"
+    assert (OUT / f"closed_{how}").read_text("utf-8") == "capturing", (
+        "the other Blender did not capture"
+    )
     assert other.returncode == (-9 if how == "crash" else 0), other.returncode
     yield from until(lambda: not workers(), 60, "the worker to end")
     nothing_left(f"after Blender's {how}")
@@ -152,12 +175,17 @@ def closed(how: str) -> Iterator[float]:
 
 
 def deleted_footage() -> Iterator[float]:
-    """Delete what the comparison with the footage shows, and undo it: if that is a movie clip, Blender crashes."""
+    """Delete what the comparison with the footage shows, and undo it: if that is a movie clip,
+    Blender crashes.
+    """
     invoke(bpy.ops.scope.look_through)
     yield 1.0
     for k in range(3):
         use(bpy.ops.ed.undo_push, message="Shown")
-        shown = [*bpy.data.movieclips, *(image for image in bpy.data.images if image.source == "MOVIE")]
+        shown = [
+            *bpy.data.movieclips,
+            *(image for image in bpy.data.images if image.source == "MOVIE"),
+        ]
         assert shown, "the comparison shows no footage"
         bpy.data.batch_remove(shown)
         use(bpy.ops.ed.undo_push, message="Deleted")
@@ -184,7 +212,9 @@ def steps() -> Iterator[float]:
     yield from closed("crash")
     before = len([c for c in bpy.data.collections if "scope_capture" in c])
     yield from captured()
-    assert len([c for c in bpy.data.collections if "scope_capture" in c]) == before + 1, addon().state.message
+    assert len([c for c in bpy.data.collections if "scope_capture" in c]) == before + 1, (
+        addon().state.message
+    )
     report["afterwards"] = "captured as usual"
     yield from deleted_footage()
     (OUT / "trouble.json").write_text(json.dumps(report))

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Undo and redo every operator of the panel in a Blender with a window: the file must be the same as before.
+"""Undo and redo every operator of the panel in a Blender with a window: the file must be the same
+as before.
 
 Usage: ``blender --python undo.py -- VIDEO OUT_FOLDER``
 """
@@ -18,9 +19,22 @@ from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from shared.file_state import State, identities, same, state
-from shared.session import FOOTAGE, OUT, addon, captured, invoke, picture, run, show_tab, until, use, viewport
+from shared.session import (
+    FOOTAGE,
+    OUT,
+    addon,
+    captured,
+    invoke,
+    picture,
+    run,
+    show_tab,
+    until,
+    use,
+    viewport,
+)
 
-# Bones of the face by which a rig like MPFB's is known, and the tip of each, from the head's bone; metres.
+# Bones of the face by which a rig like MPFB's is known, and the tip of each, from the head's bone;
+# metres.
 FACE = {
     "jaw": ((0.0, -0.064, 0.088), (0.0, -0.123, 0.016)),
     "eye.L": ((0.031, -0.125, 0.128), (0.032, -0.162, 0.129)),
@@ -78,7 +92,9 @@ def armature() -> bpy.types.Object:
 
 
 def add_rig() -> None:
-    """Make a user's own rig: the captured skeleton a fifth larger, without the extension's properties, with a face."""
+    """Make a user's own rig: the captured skeleton a fifth larger, without the extension's
+    properties, with a face.
+    """
     source = armature()
     rig = bpy.data.objects.new("rig", source.data.copy())
     bpy.context.scene.collection.objects.link(rig)
@@ -138,7 +154,9 @@ def edits() -> dict[str, Callable[[], object]]:
         "mark as asset": lambda: use(scope.mark_asset, author="Ada"),
         "footage to sequencer": lambda: use(scope.footage_to_sequencer),
         "rename take": lambda: use(scope.rename_take, name="renamed"),
-        "upright line": lambda: use(scope.set_upright_in_view, end=(0.0, 0.1, 1.5), direction=(1.0, 0.0, 0.0)),
+        "upright line": lambda: use(
+            scope.set_upright_in_view, end=(0.0, 0.1, 1.5), direction=(1.0, 0.0, 0.0)
+        ),
         "floor here": lambda: use(scope.floor_here),
         "push to NLA": lambda: use(scope.push_to_nla),  # last, because it leaves no action to edit
     }
@@ -159,7 +177,9 @@ def retarget_beside() -> None:
 
 def capturing() -> Iterator[float]:
     """Try the capture, and undoing something else while it runs."""
-    yield from tried("choose footage", lambda: use(bpy.ops.scope.choose_footage, filepath=FOOTAGE), keep=True)
+    yield from tried(
+        "choose footage", lambda: use(bpy.ops.scope.choose_footage, filepath=FOOTAGE), keep=True
+    )
     bpy.context.scene.scope.quality, bpy.context.scene.scope.face = "FAST", True
     invoke(bpy.ops.ed.undo_push, message="Quality")
     before = state()
@@ -180,7 +200,9 @@ def capturing() -> Iterator[float]:
 
 
 def failing() -> Iterator[float]:
-    """Let a correction fail after it has changed keys, and then undo what came before, which must not crash."""
+    """Let a correction fail after it has changed keys, and then undo what came before, which must
+    not crash.
+    """
     package = addon().__name__.removesuffix(".ui.capture.capture_operators")
     names = "scene.character.corrections.corrected_keys", "errors"
     keys, errors = (import_module(f"{package}.{name}") for name in names)
@@ -189,7 +211,8 @@ def failing() -> Iterator[float]:
         raise errors.UsageError("this fails")
 
     invoke(bpy.ops.ed.undo_push, message="Evaluated")
-    use(bpy.ops.scope.use_sample)  # only the scene changes, so that undoing this does not read the armature again
+    # only the scene changes, so that undoing this does not read the armature again
+    use(bpy.ops.scope.use_sample)
     yield 0.2
     before, there = state(), identities()
     meet_pin, keys._meet_pin = keys._meet_pin, fail
@@ -232,8 +255,12 @@ def steps() -> Iterator[float]:
     yield from tried("frame rate from footage", lambda: use(bpy.ops.scope.match_frame_rate))
     undo()
     yield from failing()
-    yield from tried("root motion on an object", lambda: use(bpy.ops.scope.root_motion, mode="OBJECT"), keep=True)
-    yield from tried("root motion in the bones", lambda: use(bpy.ops.scope.root_motion, mode="BONES"))
+    yield from tried(
+        "root motion on an object", lambda: use(bpy.ops.scope.root_motion, mode="OBJECT"), keep=True
+    )
+    yield from tried(
+        "root motion in the bones", lambda: use(bpy.ops.scope.root_motion, mode="BONES")
+    )
     undo()
     use(bpy.ops.scope.look_through)
     yield 0.5

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Time the first captures after installation: ``blender --background --python first_capture.py``.
 
-The second begins with a cleared cache, which keeps compiled code. Writes out/first.json, and fails if these two
-compile what the extension should contain, if the first takes more than 15 s longer, or if it shows any one stage for
-so much longer, as it would while something else runs. A third has to compile large kernels, and must say so. Another
-part may run beside one of them alone, on the same cores, so that twice as long is no longer.
+The second begins with a cleared cache, which keeps compiled code. Writes out/first.json, and fails
+if these two compile what the extension should contain, if the first takes more than 15 s longer, or
+if it shows any one stage for so much longer, as it would while something else runs. A third has to
+compile large kernels, and must say so. Another part may run beside one of them alone, on the same
+cores, so that twice as long is no longer.
 """
 
 from __future__ import annotations
@@ -21,11 +22,15 @@ MAX_LONGER_S = 15.0
 COMPILING = "compiling the solver"
 SHIPPED = ".config/blender/*/extensions/user_default/scope/assets/kernels"
 LARGE = ("optimizer.optimize", "problem.linearize_half")
-NAME = next(addon.module for addon in bpy.context.preferences.addons if addon.module.endswith(".scope"))
+NAME = next(
+    addon.module for addon in bpy.context.preferences.addons if addon.module.endswith(".scope")
+)
 
 
 def capture() -> tuple[float, dict[str, float]]:
-    """Capture the sample as the panel does; return how many seconds it took, in all and by stage."""
+    """Capture the sample as the panel does; return how many seconds it took, in all and by
+    stage.
+    """
     job_class = import_module(f"{NAME}.scope_addon.ui.capture.capture_job").CaptureJob
     bpy.ops.scope.use_sample()
     since = last = time.monotonic()
@@ -40,7 +45,9 @@ def capture() -> tuple[float, dict[str, float]]:
 
 
 def compiled_before(kernels: Path) -> Path:
-    """Put compiled code where a computer keeps it whose processor or Python no code is shipped for; return the file."""
+    """Put compiled code where a computer keeps it whose processor or Python no code is shipped for;
+    return the file.
+    """
     path = kernels / f"solver-{'0' * 8}-{'0' * 12}" / "kernel.code"
     path.parent.mkdir(parents=True)
     path.write_bytes(b"code")
@@ -48,8 +55,12 @@ def compiled_before(kernels: Path) -> Path:
 
 
 def compiling() -> dict[str, float]:
-    """Capture without the code of two large kernels, which are compiled again; return the seconds by stage."""
-    paths = [path for name in LARGE for path in Path("/scope/home").glob(f"{SHIPPED}/*/{name}-*.code")]
+    """Capture without the code of two large kernels, which are compiled again; return the seconds
+    by stage.
+    """
+    paths = [
+        path for name in LARGE for path in Path("/scope/home").glob(f"{SHIPPED}/*/{name}-*.code")
+    ]
     assert len(paths) == len(LARGE), paths
     asides = [shutil.move(path, Path("/scope/out") / path.name) for path in paths]
     assert bpy.ops.scope.clear_cache() == {"FINISHED"}
@@ -61,7 +72,9 @@ def compiling() -> dict[str, float]:
 
 
 def longer_stages(stages: dict[str, float], others: dict[str, float]) -> dict[str, float]:
-    """Return by how many seconds each stage took longer than twice as long as in another capture."""
+    """Return by how many seconds each stage took longer than twice as long as in another
+    capture.
+    """
     return {stage: s - 2.0 * others.get(stage, 0.0) for stage, s in stages.items()}
 
 
@@ -87,7 +100,9 @@ def main() -> None:
     found["stages_compiling_s"] = compiling()
     longer = longer_stages(found["stages_compiling_s"], second_stages)
     assert longer.pop(COMPILING, 0.0) > 0.0, f"compiling was not shown: {longer}"
-    assert max(longer.values()) < MAX_LONGER_S, f"another stage was shown while the solver was compiled: {longer}"
+    assert max(longer.values()) < MAX_LONGER_S, (
+        f"another stage was shown while the solver was compiled: {longer}"
+    )
     Path("/scope/out/first.json").write_text(json.dumps(found, indent=1))
 
 

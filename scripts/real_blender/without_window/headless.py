@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``blender --background --command scope``: one clip, and a folder with failing clips, interrupted and resumed.
+"""``blender --background --command scope``: one clip, and a folder with failing clips, interrupted
+and resumed.
 
-Runs in the Debian with its own Python, in /scope; ``compare.py`` compares its files with the shell's.
+Runs in the Debian with its own Python, in /scope; ``compare.py`` compares its files with the
+shell's.
 """
 
 from __future__ import annotations
@@ -36,7 +38,15 @@ def statuses(report: dict) -> dict[str, str]:
 def one_clip() -> None:
     """Try a capture and the ways in which it can fail."""
     report = command(
-        "capture", "clips/walk.mp4", *FAST, "-o", "out/command.npz", "-o", "out/command.glb", "--json", status=0
+        "capture",
+        "clips/walk.mp4",
+        *FAST,
+        "-o",
+        "out/command.npz",
+        "-o",
+        "out/command.glb",
+        "--json",
+        status=0,
     )
     assert report is not None
     assert report["people"] == 1
@@ -48,9 +58,14 @@ def one_clip() -> None:
 
 
 def without_a_video() -> None:
-    """Capture the sample clip, whose results are not for the folder of the clip, and import a motion."""
+    """Capture the sample clip, whose results are not for the folder of the clip, and import a
+    motion.
+    """
     command("capture", *FAST, status=0)
-    assert {path.name for path in Path().glob("sample.*")} - {"sample.mp4"} == {"sample.npz", "sample.glb"}
+    assert {path.name for path in Path().glob("sample.*")} - {"sample.mp4"} == {
+        "sample.npz",
+        "sample.glb",
+    }
     command("import", "sample.npz", "-o", "out/imported.glb", status=0)
     assert (OUT / "imported.glb").stat().st_size > 1000
 
@@ -67,8 +82,12 @@ def name_that_is_not_utf8() -> None:
 
 
 def damaged_code() -> None:
-    """Damage some of the compiled code that comes with the extension: a capture compiles it again."""
-    files = Path("home/.config/blender").glob("*/extensions/user_default/scope/assets/kernels/*/*.code")
+    """Damage some of the compiled code that comes with the extension: a capture compiles it
+    again.
+    """
+    files = Path("home/.config/blender").glob(
+        "*/extensions/user_default/scope/assets/kernels/*/*.code"
+    )
     empty, cut, flipped = sorted(files, key=lambda path: path.stat().st_size)[:3]
     whole = {path: path.read_bytes() for path in (empty, cut, flipped)}
     replace(empty, b"")
@@ -98,9 +117,22 @@ def running(what: bytes) -> list[str]:
 
 
 def stopped(name: str) -> None:
-    """Interrupt, terminate or kill a batch: its captures end with it, and no file is left incomplete."""
+    """Interrupt, terminate or kill a batch: its captures end with it, and no file is left
+    incomplete.
+    """
     out = OUT / f"stopped_{name}"
-    arguments = ("batch", "clips", "--out", str(out), "--jobs", "2", "--formats", "npz", "--quality", "best")
+    arguments = (
+        "batch",
+        "clips",
+        "--out",
+        str(out),
+        "--jobs",
+        "2",
+        "--formats",
+        "npz",
+        "--quality",
+        "best",
+    )
     print("scope", *arguments, name, flush=True)
     process = subprocess.Popen([*COMMAND, *arguments], stderr=subprocess.PIPE, text=True)
     end = time.monotonic() + 120.0
@@ -120,17 +152,27 @@ def stopped(name: str) -> None:
 
 
 def folder() -> None:
-    """Capture a folder with a clip that fails and one without people; a second run repeats only the failed one."""
+    """Capture a folder with a clip that fails and one without people; a second run repeats only the
+    failed one.
+    """
     arguments = ("batch", "clips", "--out", "out/batch", "--jobs", "2", *FAST, "--json")
     first = command(*arguments, status=1)
     assert first is not None
-    assert statuses(first) == {"broken.mp4": "failed", "walk.mp4": "done", "wall.png": "no_person"}, statuses(first)
+    assert statuses(first) == {
+        "broken.mp4": "failed",
+        "walk.mp4": "done",
+        "wall.png": "no_person",
+    }, statuses(first)
     assert first["exit_status"] == 1
     made = {p.name: p.stat().st_mtime_ns for p in (OUT / "batch").iterdir() if p.suffix != ".json"}
     assert set(made) == {"walk.npz", "walk.glb"}, made
     second = command(*arguments, status=1)
     assert second is not None
-    assert statuses(second) == {"broken.mp4": "failed", "walk.mp4": "skipped", "wall.png": "no_person"}
+    assert statuses(second) == {
+        "broken.mp4": "failed",
+        "walk.mp4": "skipped",
+        "wall.png": "no_person",
+    }
     assert {name: (OUT / "batch" / name).stat().st_mtime_ns for name in made} == made
     (OUT / "batch.json").write_text(json.dumps(first))
 
@@ -138,7 +180,9 @@ def folder() -> None:
 def languages() -> None:
     """Show texts of the interface in each of its languages."""
     script = "parts/without_window/languages.py"
-    subprocess.run(["blender", "--background", "--python-exit-code", "1", "--python", script], check=True)
+    subprocess.run(
+        ["blender", "--background", "--python-exit-code", "1", "--python", script], check=True
+    )
 
 
 if __name__ == "__main__":

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The interface in each of its languages, in a Blender that has them: bpy from the package index has none.
+"""The interface in each of its languages, in a Blender that has them: bpy from the package index
+has none.
 
-Usage: ``blender --background --python-exit-code 1 --python languages.py``, with the extension enabled.
+Usage: ``blender --background --python-exit-code 1 --python languages.py``, with the extension
+enabled.
 """
 
 from __future__ import annotations
@@ -16,7 +18,9 @@ LANGUAGES = {"de_DE": "de", "fr_FR": "fr", "es": "es", "ja_JP": "ja", "zh_HANS":
 
 
 def shown() -> tuple[str, str, str, str]:
-    """Return a button, a label, a tooltip and an option whose name means something else in Blender."""
+    """Return a button, a label, a tooltip and an option whose name means something else in
+    Blender.
+    """
     return (
         pgettext_iface("Compare with Footage", contexts.operator_default),
         pgettext_iface("Footage Opacity"),
@@ -25,7 +29,9 @@ def shown() -> tuple[str, str, str, str]:
     )
 
 
-translations = next(module for name, module in sys.modules.items() if name.endswith(".scope_addon.ui.translations"))
+translations = next(
+    module for name, module in sys.modules.items() if name.endswith(".scope_addon.ui.translations")
+)
 view = bpy.context.preferences.view
 english = shown()
 view.use_translate_interface = view.use_translate_tooltips = True
@@ -33,7 +39,10 @@ for code, module in LANGUAGES.items():
     assert code in bpy.app.translations.locales, (code, bpy.app.translations.locales)
     view.language = code
     texts = getattr(translations, module).TEXTS
-    expected = getattr(translations, module).OPERATORS[english[0]], *(texts[text] for text in english[1:])
+    expected = (
+        getattr(translations, module).OPERATORS[english[0]],
+        *(texts[text] for text in english[1:]),
+    )
     assert shown() == expected, (shown(), expected)
     translations.unregister()
     assert shown() == english, shown()

@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The outline of the body against the contour of a person mask: one signed distance for each point of the rim.
+"""The outline of the body against the contour of a person mask: one signed distance for each point
+of the rim.
 
-    r = sqrt(w) d,   d = n^T (pi(p) - m),   p = R_i (V_j beta + v_bar_j + delta) + t_i,   pi(p) = (x, y) / z
-with m the contour point that belongs to p and n its outward normal, both in normalized image coordinates, and delta
-what blending the parts' poses adds to the rigid place of the skin, in the part's axes and held fixed. The kernel has
-two sides, each with a weight and a scale: outside the mask, d > 0, a body is wrong; inside, clothes explain some.
+    r = sqrt(w) d,   d = n^T (pi(p) - m),   p = R_i (V_j beta + v_bar_j + delta) + t_i,
+    pi(p) = (x, y) / z
+with m the contour point that belongs to p and n its outward normal, both in normalized image
+coordinates, and delta what blending the parts' poses adds to the rigid place of the skin, in the
+part's axes and held fixed. The kernel has two sides, each with a weight and a scale: outside the
+mask, d > 0, a body is wrong; inside, clothes explain some.
     cost = 1/2 w rho(d^2),   (w, sigma) = (w_out, sigma_out) where d > 0, else (w_in, sigma_in)
     dd/dp = (n_x, n_y, -n^T pi(p)) / z
-Cost and gradient are continuous at d = 0. A point nearer than z_min is left out. The focal length is taken as given:
-the residual adds nothing to its column. Source: section 3 of the paper; correspondences as in iterative closest points,
-point to line, renewed by the caller between fits.
+Cost and gradient are continuous at d = 0. A point nearer than z_min is left out. The focal length
+is taken as given: the residual adds nothing to its column. Source: section 3 of the paper;
+correspondences as in iterative closest points, point to line, renewed by the caller between fits.
 """
 
 import numpy as np
@@ -27,7 +30,9 @@ INDEXES = "points"
 
 @kernel
 def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # type: ignore[no-untyped-def]
-    """Add every row's M, N, m, C, c to the blocks and return the cost. ints (n, 1), floats (n, 11)."""
+    """Add every row's M, N, m, C, c to the blocks and return the cost. ints (n, 1), floats (n,
+    11).
+    """
     cost = 0.0
     for k in range(ints.shape[0]):
         f = floats[k]
@@ -51,9 +56,23 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
             continue
         a, b, c = f[5] / z, f[6] / z, -(f[5] * u + f[6] * v) / z
         add_to_point(
-            tree, pose, blocks, j, lx, ly, lz,
-            w * a * a, w * a * b, w * a * c, w * b * b, w * b * c, w * c * c, w * d * a, w * d * b, w * d * c,
-        )  # fmt: skip
+            tree,
+            pose,
+            blocks,
+            j,
+            lx,
+            ly,
+            lz,
+            w * a * a,
+            w * a * b,
+            w * a * c,
+            w * b * b,
+            w * b * c,
+            w * c * c,
+            w * d * a,
+            w * d * b,
+            w * d * c,
+        )
     return cost
 
 
@@ -69,21 +88,31 @@ def pack(
 
     :param points: (n,) which points, as in the measurements.
     :param delta: (n, 3) offsets in the axes of their parts, metres.
-    :param contour, normal: (n, 2) contour points and unit outward normals, normalized image coordinates.
-    :param weights, sigmas: (n,) each outside and inside the mask; sigma is the square of a distance.
+    :param contour, normal: (n, 2) contour points and unit outward normals, normalized image
+        coordinates.
+    :param weights, sigmas: (n,) each outside and inside the mask; sigma is the square of a
+        distance.
     """
-    floats = np.column_stack([delta, contour, normal, *weights, *(1.0 / np.asarray(sigma) for sigma in sigmas)])
+    floats = np.column_stack(
+        [delta, contour, normal, *weights, *(1.0 / np.asarray(sigma) for sigma in sigmas)]
+    )
     return np.reshape(points, (len(floats), 1)).astype(np.int64), floats
 
 
-def evaluate(part: Part, v_bar: Array, V: Array, m: Array, n: Array, weight: float = 1.0) -> Linearization:
-    """Return the residual (1 row) of one side times sqrt(weight), without robust kernel, and its derivatives.
+def evaluate(
+    part: Part, v_bar: Array, V: Array, m: Array, n: Array, weight: float = 1.0
+) -> Linearization:
+    """Return the residual (1 row) of one side times sqrt(weight), without robust kernel, and its
+    derivatives.
 
-    :param v_bar, V: (3,), (3, P) of the point relative to its part's origin, delta included, metres.
+    :param v_bar, V: (3,), (3, P) of the point relative to its part's origin, delta included,
+        metres.
     :param m, n: (2,) contour point and (2,) outward normal, normalized image coordinates.
     """
     p = part.R @ (V @ part.beta + v_bar) + part.t
     J_x, J_beta = point_jacobian(part, p, V)
     g = np.sqrt(weight) * np.append(n, -n @ p[:2] / p[2]) / p[2]
     d = float(n @ (p[:2] / p[2] - m))
-    return Linearization(np.array([np.sqrt(weight) * d]), (g @ J_x)[None], np.zeros((1, 3)), (g @ J_beta)[None])
+    return Linearization(
+        np.array([np.sqrt(weight) * d]), (g @ J_x)[None], np.zeros((1, 3)), (g @ J_beta)[None]
+    )

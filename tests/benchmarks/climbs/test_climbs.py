@@ -36,15 +36,29 @@ def scene(body: Body, takes: list[Take]) -> Scene:
 
 
 def captured(body: Body, scene: Scene, share: float) -> SimpleNamespace:
-    """Return the true motion as a capture would, but with a share of the rise alone, in the world and in the image."""
+    """Return the true motion as a capture would, but with a share of the rise alone, in the world
+    and in the image.
+    """
     person, T = scene.people[0], len(scene)
     trans = person.trans.copy()
     trans[:, 2] = trans[0, 2] + share * (trans[:, 2] - trans[0, 2])
     joints = scene.to_camera(replace(person, trans=trans).joints(body))
     poses = log(person.rotations).reshape(T, -1)
-    world = {"poses": poses, "trans": trans, "poses_raw": poses, "trans_raw": trans, "betas": person.betas}
-    camera = {"world_from_camera": scene.world_from_camera, "intrinsics": scene.intrinsics, "mocap_framerate": FPS}
-    return SimpleNamespace(joints_cam=joints, valid=np.ones(T, bool), frames=np.arange(T), **world, **camera)
+    world = {
+        "poses": poses,
+        "trans": trans,
+        "poses_raw": poses,
+        "trans_raw": trans,
+        "betas": person.betas,
+    }
+    camera = {
+        "world_from_camera": scene.world_from_camera,
+        "intrinsics": scene.intrinsics,
+        "mocap_framerate": FPS,
+    }
+    return SimpleNamespace(
+        joints_cam=joints, valid=np.ones(T, bool), frames=np.arange(T), **world, **camera
+    )
 
 
 def test_a_climb_rises_before_a_camera_at_rest(body, scene):
@@ -58,14 +72,23 @@ def test_a_climb_rises_before_a_camera_at_rest(body, scene):
 
 
 def test_recordings_that_are_too_short_are_refused(body, takes):
-    short = Take(0, "up_0", takes[0].poses[:60], takes[0].trans[:60], takes[0].valid[:60], takes[0].betas, 30.0)
+    short = Take(
+        0,
+        "up_0",
+        takes[0].poses[:60],
+        takes[0].trans[:60],
+        takes[0].valid[:60],
+        takes[0].betas,
+        30.0,
+    )
     with pytest.raises(ValueError, match="climb 1"):
         draw_climb(body, [short], 1)
 
 
 def test_a_rise_is_that_of_the_lower_ankle_and_not_of_a_knee():
     limbs = np.zeros((40, len(LIMB_JOINTS), 3))
-    limbs[:, LIMB_JOINTS.index("left_ankle"), 2] = np.where(np.arange(40) < 20, 0.3, 1.0)  # a foot in the air
+    # a foot in the air
+    limbs[:, LIMB_JOINTS.index("left_ankle"), 2] = np.where(np.arange(40) < 20, 0.3, 1.0)
     limbs[:, LIMB_JOINTS.index("right_ankle"), 2] = np.where(np.arange(40) < 20, 0.1, 0.6)
     limbs[:, LIMB_JOINTS.index("left_knee"), 2] = np.linspace(-1, -9, 40)
     assert rise_m(limbs) == pytest.approx(0.5)

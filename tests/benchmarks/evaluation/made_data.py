@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small data sets in the layouts of the real ones, down to types, pickle protocols and axes; none of their content."""
+"""Small data sets in the layouts of the real ones, down to types, pickle protocols and axes; none
+of their content.
+"""
 
 from __future__ import annotations
 
@@ -36,10 +38,14 @@ def write_blank(folder: Path, names: list[str]) -> None:
 
 
 def write_models(folder: Path, *names: str) -> Path:
-    """Random bodies under the names of the publisher's files; SMPL's two hands lie where the real ones do."""
+    """Random bodies under the names of the publisher's files; SMPL's two hands lie where the real
+    ones do.
+    """
     folder.mkdir()
     for seed, name in enumerate(names):
-        np.savez(folder / f"{name}.npz", **make_tables("smplx" if "SMPLX" in name else "smpl", seed=seed))
+        np.savez(
+            folder / f"{name}.npz", **make_tables("smplx" if "SMPLX" in name else "smpl", seed=seed)
+        )
     return folder
 
 
@@ -52,8 +58,14 @@ def write_regressor(path: Path, vertices: int = 300) -> np.ndarray:
 def motion(frames: int, joints: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Poses (T, 3J), translation (T, 3) some metres in front of a camera, and ten betas."""
     rng = np.random.default_rng(seed)
-    poses = rng.normal(scale=0.2, size=(1, 3 * joints)) + rng.normal(scale=0.02, size=(frames, 3 * joints))
-    return poses, rng.normal(scale=0.1, size=(frames, 3)) + [0, 0, 4], rng.normal(scale=0.5, size=10)
+    poses = rng.normal(scale=0.2, size=(1, 3 * joints)) + rng.normal(
+        scale=0.02, size=(frames, 3 * joints)
+    )
+    return (
+        poses,
+        rng.normal(scale=0.1, size=(frames, 3)) + [0, 0, 4],
+        rng.normal(scale=0.5, size=10),
+    )
 
 
 def rigid(count: int, seed: int = 0) -> np.ndarray:
@@ -104,10 +116,21 @@ def write_emdb(root: Path, count: int = 6, gender: str = "female", **flags: obje
     good = np.ones(count, dtype=bool)
     good[1] = False
     table = {
-        **{"gender": gender, "name": "P0_00_mvs_a", "emdb1": np.bool_(True), "emdb2": False, "n_frames": count},
+        **{
+            "gender": gender,
+            "name": "P0_00_mvs_a",
+            "emdb1": np.bool_(True),
+            "emdb2": False,
+            "n_frames": count,
+        },
         "good_frames_mask": good,
         "camera": {"intrinsics": K, "extrinsics": rigid(count, 2), "width": 640, "height": 480},
-        "smpl": {"poses_root": poses[:, :3], "poses_body": poses[:, 3:], "trans": trans, "betas": betas},
+        "smpl": {
+            "poses_root": poses[:, :3],
+            "poses_body": poses[:, 3:],
+            "trans": trans,
+            "betas": betas,
+        },
         "kp2d": np.zeros((count, 24, 2)),
         "bboxes": {"bboxes": np.zeros((count, 4)), "invalid_idxs": np.array([1])},
         **flags,
@@ -121,17 +144,29 @@ def write_emdb(root: Path, count: int = 6, gender: str = "female", **flags: obje
 
 def write_rich(root: Path, count: int = 5) -> None:
     sequence, camera = "Gym_011_pushup1", "cam_02"
-    write_blank(root / "images" / "test" / sequence / camera, [f"{k:05d}_02.jpeg" for k in range(10, 10 + count)])
+    write_blank(
+        root / "images" / "test" / sequence / camera,
+        [f"{k:05d}_02.jpeg" for k in range(10, 10 + count)],
+    )
     poses, trans, betas = motion(count, 22)
     for k in range(count - 1):  # the last image has no body
         path = root / "bodies" / "test" / sequence / f"{k + 10:05d}" / "011.pkl"
         path.parent.mkdir(parents=True)
         table = {
             **{"global_orient": poses[k : k + 1, :3], "body_pose": poses[k : k + 1, 3:]},
-            **{"transl": trans[k : k + 1], "betas": betas[None], "left_hand_pose": np.zeros((1, 12))},
+            **{
+                "transl": trans[k : k + 1],
+                "betas": betas[None],
+                "left_hand_pose": np.zeros((1, 12)),
+            },
         }
-        path.write_bytes(pickle.dumps({key: value.astype(np.float32) for key, value in table.items()}))
-    write_blank(root / "images" / "test" / "LectureHall_009_021_reparingprojector1" / camera, ["00001_02.jpeg"])
+        path.write_bytes(
+            pickle.dumps({key: value.astype(np.float32) for key, value in table.items()})
+        )
+    write_blank(
+        root / "images" / "test" / "LectureHall_009_021_reparingprojector1" / camera,
+        ["00001_02.jpeg"],
+    )
     path = root / "scan_calibration" / "Gym" / "calibration" / "002.xml"
     path.parent.mkdir(parents=True)
     matrices = {"CameraMatrix": rigid(1, 3)[0, :3], "Intrinsics": K, "Distortion": np.zeros((5, 1))}
@@ -147,7 +182,9 @@ def write_bedlam(root: Path, count: int = 4) -> Path:
     """Two people at 6 frames per second, the second in the last images alone; rows in no order."""
     scene = "20221019_3-8_250_highbmihand_orbit_stadium_6fps"
     names = [f"seq_000003/seq_000003_{5 * k:04d}.png" for k in range(count)]
-    write_blank(root / "validation" / scene / "png" / "seq_000003", [Path(name).name for name in names])
+    write_blank(
+        root / "validation" / scene / "png" / "seq_000003", [Path(name).name for name in names]
+    )
     rows = [(name, "a") for name in names] + [(name, "b") for name in names[2:]]
     order = np.random.default_rng(4).permutation(len(rows))
     poses, trans, betas = motion(len(rows), 55)
@@ -156,15 +193,24 @@ def write_bedlam(root: Path, count: int = 4) -> Path:
     path.parent.mkdir(parents=True)
     np.savez(
         path,
-        **{"imgname": np.array([name for name, _ in rows])[order], "sub": np.array([sub for _, sub in rows])[order]},
-        **{"pose_cam": poses[order], "shape": np.tile(np.append(betas, 0.0), (len(rows), 1)), "cam_ext": ext[order]},
+        **{
+            "imgname": np.array([name for name, _ in rows])[order],
+            "sub": np.array([sub for _, sub in rows])[order],
+        },
+        **{
+            "pose_cam": poses[order],
+            "shape": np.tile(np.append(betas, 0.0), (len(rows), 1)),
+            "cam_ext": ext[order],
+        },
         **{"trans_cam": trans[order], "cam_int": np.tile(K, (len(rows), 1, 1))},
         motion_info=np.array([{"pickled": 1}], dtype=object),
     )
     return path
 
 
-def write_h36m(root: Path, joints_mm: np.ndarray, subject: str, name: str, with_pixels: bool = True) -> Path:
+def write_h36m(
+    root: Path, joints_mm: np.ndarray, subject: str, name: str, with_pixels: bool = True
+) -> Path:
     """One video's worth of poses; joints (T, 32, 3) in the camera. The video is an empty file."""
     video = root / subject / "Videos" / f"{name}.mp4"
     video.parent.mkdir(parents=True, exist_ok=True)
@@ -180,7 +226,13 @@ def write_h36m(root: Path, joints_mm: np.ndarray, subject: str, name: str, with_
 
 def write_cdf(path: Path, variable: str, records: np.ndarray) -> None:
     spec = {
-        **{"Variable": variable, "Data_Type": 44, "Num_Elements": 1, "Rec_Vary": True, "Var_Type": "zVariable"},
+        **{
+            "Variable": variable,
+            "Data_Type": 44,
+            "Num_Elements": 1,
+            "Rec_Vary": True,
+            "Var_Type": "zVariable",
+        },
         "Dim_Sizes": list(records.shape[1:]),
     }
     file = CDF(path, cdf_spec={"Compressed": 6}, delete=True)
@@ -189,7 +241,9 @@ def write_cdf(path: Path, variable: str, records: np.ndarray) -> None:
 
 
 def write_3dhp(root: Path, joints_mm: np.ndarray, valid: np.ndarray) -> None:
-    """Six sequences, whose joints (T, 17, 3) are in the camera; the universal ones are 0.9 times as large."""
+    """Six sequences, whose joints (T, 17, 3) are in the camera; the universal ones are 0.9 times as
+    large.
+    """
     pixels = (joints_mm @ K.T)[..., :2] / joints_mm[..., 2:]
     for number in range(1, 7):
         folder = root / "mpi_inf_3dhp_test_set" / f"TS{number}"

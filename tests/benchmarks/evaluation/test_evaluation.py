@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The whole command on a data set made from the sample clip: figures, interruptions, wrong folders."""
+"""The whole command on a data set made from the sample clip: figures, interruptions, wrong
+folders.
+"""
 
 import json
 
@@ -16,7 +18,9 @@ COUNT = 8
 
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory):
-    """The first frames of the sample clip as a sequence of 3DPW, whose second person is not there."""
+    """The first frames of the sample clip as a sequence of 3DPW, whose second person is not
+    there.
+    """
     root = tmp_path_factory.mktemp("3DPW")
     with np.load(SAMPLE.with_name("sample_truth.npz")) as file:
         joints = file["joints_cam"][:COUNT].astype(float)
@@ -29,11 +33,22 @@ def dataset(tmp_path_factory):
 
 
 def test_a_data_set_is_captured_compared_and_kept(dataset, tmp_path, capsys, monkeypatch, networks):
-    command = ["3dpw", str(dataset), "--quality", "fast", "--results", str(tmp_path / "results"), "--given-camera"]
+    command = [
+        "3dpw",
+        str(dataset),
+        "--quality",
+        "fast",
+        "--results",
+        str(tmp_path / "results"),
+        "--given-camera",
+    ]
     assert main([*command, "--json", str(tmp_path / "figures.json")]) == 0
     out = capsys.readouterr().out
     assert "3DPW, test split: the 24 joints of SMPL's skeleton" in out
-    assert "8 of 16 frames were captured; 1 of 2 people were not found; joints: those of the body 'scope'" in out
+    assert (
+        "8 of 16 frames were captured; 1 of 2 people were not found; joints: those of the body "
+        "'scope'" in out
+    )
     found = json.loads((tmp_path / "figures.json").read_text("utf-8"))
     figures = found["protocols"]["3dpw"]["figures"]
     assert 10 < figures["pa_mpjpe"] < figures["mpjpe"] < 150
@@ -49,7 +64,8 @@ def test_a_data_set_is_captured_compared_and_kept(dataset, tmp_path, capsys, mon
     assert json.loads((tmp_path / "again.json").read_text("utf-8")) == found
     with pytest.raises(AssertionError, match="captured again"):
         main([*command, "--again"])
-    with pytest.raises(AssertionError, match="captured again"):  # its record is gone, and nothing half done is kept
+    # its record is gone, and nothing half done is kept
+    with pytest.raises(AssertionError, match="captured again"):
         main(command)
 
 
@@ -82,7 +98,14 @@ def test_footage_that_cannot_be_decoded_is_told_and_left_out(tmp_path, capsys, m
     write_3dhp(tmp_path / "data", joints, np.ones(2))
     for picture in (tmp_path / "data/mpi_inf_3dhp_test_set/TS2/imageSequence").iterdir():
         picture.write_bytes(b"no picture")
-    command = ["3dhp", str(tmp_path / "data"), "--results", str(tmp_path / "results"), "--clips", "TS2"]
+    command = [
+        "3dhp",
+        str(tmp_path / "data"),
+        "--results",
+        str(tmp_path / "results"),
+        "--clips",
+        "TS2",
+    ]
     assert main(command) == 1
     err = capsys.readouterr().err
     assert "TS2 is not in these figures:" in err
@@ -118,7 +141,9 @@ def test_a_pattern_that_no_clip_has_is_told(tmp_path, capsys):
     assert "no clip" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("content", [b"", b"\x93NUMPY", b"\x93NUMPY\x01\x00v\x00{'descr': '<f8', 'fortran_order'"])
+@pytest.mark.parametrize(
+    "content", [b"", b"\x93NUMPY", b"\x93NUMPY\x01\x00v\x00{'descr': '<f8', 'fortran_order'"]
+)
 def test_a_damaged_regressor_is_told(tmp_path, capsys, content):
     (tmp_path / "J.npy").write_bytes(content)
     assert main(["3dpw", str(tmp_path), "--regressor", str(tmp_path / "J.npy")]) == 1

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The joints of protocols lie where anatomy has them, on the built-in body and in the published orders."""
+"""The joints of protocols lie where anatomy has them, on the built-in body and in the published
+orders.
+"""
 
 import numpy as np
 import pytest
@@ -18,7 +20,10 @@ def at_rest(body):
 
 def test_every_joint_of_every_protocol_is_on_the_body(at_rest):
     for protocol in PROTOCOLS.values():
-        assert at_rest(*protocol.joints, *protocol.root).shape == (len(protocol.joints) + len(protocol.root), 3)
+        assert at_rest(*protocol.joints, *protocol.root).shape == (
+            len(protocol.joints) + len(protocol.root),
+            3,
+        )
         assert set(protocol.pck_joints) <= set(protocol.joints)
         assert set(protocol.measures) <= set(MEASURES)
 
@@ -31,7 +36,9 @@ def test_points_that_smpl_lacks_lie_where_anatomy_has_them(body, at_rest):
     assert abs(top[0]) < 0.03
 
 
-@pytest.mark.parametrize("names", [joint_sets.LSP14, joint_sets.REGRESSED17, joint_sets.TEST_3DHP, joint_sets.H36M32])
+@pytest.mark.parametrize(
+    "names", [joint_sets.LSP14, joint_sets.REGRESSED17, joint_sets.TEST_3DHP, joint_sets.H36M32]
+)
 def test_left_is_left(at_rest, names):
     for name, point in zip(names, at_rest(*names), strict=True):
         side = name.split("_")[0]

@@ -16,7 +16,9 @@ CORNERS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 
 
 def by_quaternion(source, target, with_scale=True):
-    """Horn's closed form (1987): the rotation is the eigenvector of a 4 × 4 matrix, which no reflection can be."""
+    """Horn's closed form (1987): the rotation is the eigenvector of a 4 × 4 matrix, which no
+    reflection can be.
+    """
     a, b = source - source.mean(axis=0), target - target.mean(axis=0)
     S = a.T @ b
     N = np.zeros((4, 4))
@@ -31,7 +33,11 @@ def by_quaternion(source, target, with_scale=True):
             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
         ]
     )
-    scale = sum(q @ R @ p for p, q in zip(a, b, strict=True)) / sum(p @ p for p in a) if with_scale else 1.0
+    scale = (
+        sum(q @ R @ p for p, q in zip(a, b, strict=True)) / sum(p @ p for p in a)
+        if with_scale
+        else 1.0
+    )
     return np.array([scale * R @ p for p in a]) + target.mean(axis=0)
 
 
@@ -40,7 +46,11 @@ def by_quaternion(source, target, with_scale=True):
 def test_the_similarity_agrees_with_horns(with_scale, mirrored):
     for _ in range(5):
         target = RNG.normal(size=(14, 3))
-        source = target @ exp(RNG.normal(size=3)).T * 1.7 + RNG.normal(size=3) + RNG.normal(scale=0.1, size=(14, 3))
+        source = (
+            target @ exp(RNG.normal(size=3)).T * 1.7
+            + RNG.normal(size=3)
+            + RNG.normal(scale=0.1, size=(14, 3))
+        )
         source *= [-1, 1, 1] if mirrored else 1
         moved = metrics.aligned(source, metrics.similarity(source, target, with_scale))
         assert np.allclose(moved, by_quaternion(source, target, with_scale), atol=1e-9)
@@ -84,7 +94,8 @@ def test_pa_mpjpe_ignores_a_similarity_but_not_a_mirror_image():
 def test_pck_and_auc_by_hand():
     errors = np.array([[0.0, 149.9, 150.0, 75.0], [1000, 1000, 1000, 1000]])
     assert metrics.pck(errors) == pytest.approx([75.0, 0.0])  # 150 is not below 150
-    # Of the 31 thresholds, 0 is above 30, 149.9 above the last one's 1, 150 above none, 75 above those from 80 on: 15.
+    # Of the 31 thresholds, 0 is above 30, 149.9 above the last one's 1, 150 above none, 75 above
+    # those from 80 on: 15.
     assert metrics.auc(errors) == pytest.approx([100 * (30 + 1 + 0 + 15) / (4 * 31), 0.0])
 
 
@@ -95,8 +106,11 @@ def test_the_best_auc_is_below_100_as_in_the_official_program():
 def test_the_challenges_pck_and_auc_by_hand():
     errors = np.array([[50.0, 50.1, 198.5, 199.5], [0.0, 0.0, 0.0, 0.0]])
     assert metrics.challenge_pck(errors) == pytest.approx([25.0, 100.0])
-    # Half a step, and whole ones from there to 199 mm: of 50 mm from 49 on, of 50.1 from 50, of 198.5 from 198.
-    assert metrics.challenge_auc(errors) == pytest.approx([100 * (149.5 + 148.5 + 0.5 + 0) / (4 * 199), 100.0])
+    # Half a step, and whole ones from there to 199 mm: of 50 mm from 49 on, of 50.1 from 50, of
+    # 198.5 from 198.
+    assert metrics.challenge_auc(errors) == pytest.approx(
+        [100 * (149.5 + 148.5 + 0.5 + 0) / (4 * 199), 100.0]
+    )
 
 
 def test_acceleration_error_of_a_known_motion():
@@ -134,7 +148,8 @@ def test_world_errors_are_of_segments_of_100_frames():
     moves = [0.5 * true[:100] + 3, 2 * true[100:200] @ exp(np.array([0, 1.0, 0])).T, true[200:] - 1]
     assert metrics.wa_mpjpe(np.concatenate(moves), true) == pytest.approx(np.zeros(250), abs=1e-8)
     assert metrics.w_mpjpe(np.concatenate(moves), true) == pytest.approx(np.zeros(250), abs=1e-8)
-    one = 0.5 * true + 3  # one similarity for all is one for each segment as well, two in a segment are not
+    # one similarity for all is one for each segment as well, two in a segment are not
+    one = 0.5 * true + 3
     one[50:] += 1
     assert metrics.wa_mpjpe(one, true)[:100].min() > 1
     assert metrics.wa_mpjpe(one, true)[100:] == pytest.approx(np.zeros(150), abs=1e-8)
@@ -143,7 +158,9 @@ def test_world_errors_are_of_segments_of_100_frames():
 def test_w_mpjpe_lets_errors_grow_after_the_first_two_frames():
     true = RNG.normal(size=(40, 6, 3))
     drifting = true + 0.01 * np.maximum(np.arange(40) - 1, 0)[:, None, None] * [1, 0, 0]
-    assert metrics.w_mpjpe(drifting, true) == pytest.approx(10.0 * np.maximum(np.arange(40) - 1, 0), abs=1e-8)
+    assert metrics.w_mpjpe(drifting, true) == pytest.approx(
+        10.0 * np.maximum(np.arange(40) - 1, 0), abs=1e-8
+    )
     assert metrics.wa_mpjpe(drifting, true).mean() < metrics.w_mpjpe(drifting, true).mean()
 
 
@@ -169,5 +186,7 @@ def test_foot_slide_counts_only_points_that_stand():
 
 def test_a_clip_of_one_frame_has_no_measures_of_motion():
     one = CORNERS[None]
-    assert metrics.acceleration_error(one, one, 30.0).shape == metrics.jitter(one, 30.0).shape == (0,)
+    assert (
+        metrics.acceleration_error(one, one, 30.0).shape == metrics.jitter(one, 30.0).shape == (0,)
+    )
     assert metrics.w_mpjpe(one, one) == pytest.approx([0.0], abs=1e-9)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The user's body files are found by their publisher's names, and a regressor is used for its mesh alone."""
+"""The user's body files are found by their publisher's names, and a regressor is used for its mesh
+alone.
+"""
 
 import numpy as np
 import pytest
@@ -9,7 +11,9 @@ from scope.benchmarks.evaluation.models import Models, pose_body
 from .made_data import motion, write_models, write_regressor
 
 
-@pytest.mark.parametrize("name", ["SMPL_MALE", "basicModel_m_lbs_10_207_0_v1.0.0", "basicmodel_m_lbs_10_207_0_v1.1.0"])
+@pytest.mark.parametrize(
+    "name", ["SMPL_MALE", "basicModel_m_lbs_10_207_0_v1.0.0", "basicmodel_m_lbs_10_207_0_v1.1.0"]
+)
 def test_files_are_found_by_every_name_that_they_have_had(tmp_path, name):
     models = Models(write_models(tmp_path / "smpl", name))
     body = models.body("smpl", "male", "a data set")

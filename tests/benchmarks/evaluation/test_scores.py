@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Scores of made captures: exact ones have no error, people are told apart, frames and people that lack are counted."""
+"""Scores of made captures: exact ones have no error, people are told apart, frames and people that
+lack are counted.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -29,7 +31,9 @@ def walking(body, x=0.0, seed=0):
     world_from_camera[:3, :3] = exp(np.array([-np.pi / 2, 0, 0])).T @ np.eye(3)
     world_from_camera[:3, :3] = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
     world_from_camera[:3, 3] = [0, -4, 1]
-    motion = replace(motion, world_from_camera=np.tile(world_from_camera, (COUNT, 1, 1)), intrinsics=K)
+    motion = replace(
+        motion, world_from_camera=np.tile(world_from_camera, (COUNT, 1, 1)), intrinsics=K
+    )
     joints = PosedBody.of_motion(body, motion).joints(body.joint_names)
     return replace(motion, joints_cam=joints.astype(np.float32))
 
@@ -46,7 +50,9 @@ def clip(alone=True, rate=30.0):
 
 def test_an_exact_capture_has_no_error(body):
     motion = walking(body)
-    found = module.score_clip(clip(), Truth([person(body, motion)]), body, [motion], PROTOCOLS["rich"])
+    found = module.score_clip(
+        clip(), Truth([person(body, motion)]), body, [motion], PROTOCOLS["rich"]
+    )
     means = found.means()
     assert set(means) == {
         "mpjpe",
@@ -73,7 +79,8 @@ def test_errors_are_those_of_the_joints_that_differ(body):
     measured = replace(true, camera=MeasuredJoints(SMPL24, joints))
     means = module.score_clip(clip(), Truth([measured]), body, [motion], PROTOCOLS["3dpw"]).means()
     assert means["mpjpe"] == pytest.approx(40 / 24, rel=1e-4)
-    assert 0 < means["pa_mpjpe"] < 40 / 24 * 4  # squares are least, so that one large error becomes many small ones
+    # squares are least, so that one large error becomes many small ones
+    assert 0 < means["pa_mpjpe"] < 40 / 24 * 4
     assert means["pck_50"] == pytest.approx(100)
     assert "mpvpe" not in means  # there is no mesh of the truth
 
@@ -85,11 +92,22 @@ def test_a_step_between_frames_and_a_late_start_are_matched_by_number(body):
         motion,
         joint_sigma_m=None,
         joint_sigma_depth_m=None,
-        **{key: getattr(motion, key)[3:] for key in ("poses", "trans", "poses_raw", "trans_raw", "frames", "valid")},
-        **{key: getattr(motion, key)[3:] for key in ("timestamps", "joints_cam", "keypoints2d", "joint_confidence")},
-        **{key: getattr(motion, key)[3:] for key in ("world_from_camera", "foot_contact", "residual_px")},
+        **{
+            key: getattr(motion, key)[3:]
+            for key in ("poses", "trans", "poses_raw", "trans_raw", "frames", "valid")
+        },
+        **{
+            key: getattr(motion, key)[3:]
+            for key in ("timestamps", "joints_cam", "keypoints2d", "joint_confidence")
+        },
+        **{
+            key: getattr(motion, key)[3:]
+            for key in ("world_from_camera", "foot_contact", "residual_px")
+        },
     )
-    found = module.score_clip(clip(), Truth([person(body, motion, rows=rows)]), body, [late], PROTOCOLS["h36m-p1"])
+    found = module.score_clip(
+        clip(), Truth([person(body, motion, rows=rows)]), body, [late], PROTOCOLS["h36m-p1"]
+    )
     assert found.means()["mpjpe"] == pytest.approx(0, abs=1e-4)
     assert (found.frames, found.seen) == (3, 2)
 
@@ -110,12 +128,17 @@ def test_someone_else_is_not_taken_for_the_person(body):
 
 
 def test_nobody_was_found(body):
-    found = module.score_clip(clip(), Truth([person(body, walking(body))]), body, [], PROTOCOLS["rich"])
+    found = module.score_clip(
+        clip(), Truth([person(body, walking(body))]), body, [], PROTOCOLS["rich"]
+    )
     assert (found.missed, found.seen, found.means()) == (1, 0, {})
 
 
 def test_means_are_over_frames_not_clips():
-    scores, other = module.Scores({"mpjpe": [np.array([1.0, 1.0, 1.0])]}), module.Scores({"mpjpe": [np.array([5.0])]})
+    scores, other = (
+        module.Scores({"mpjpe": [np.array([1.0, 1.0, 1.0])]}),
+        module.Scores({"mpjpe": [np.array([5.0])]}),
+    )
     scores.add(other)
     assert scores.means() == {"mpjpe": 2.0}
     scores.add(module.Scores({"mpjpe": [np.array([np.nan])]}))

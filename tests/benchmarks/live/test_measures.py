@@ -7,7 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scope.benchmarks.live.measures import common_rows, compared, jerk, lowest_sole_m, seen_from_the_world, world_joints
+from scope.benchmarks.live.measures import (
+    common_rows,
+    compared,
+    jerk,
+    lowest_sole_m,
+    seen_from_the_world,
+    world_joints,
+)
 from scope.scope_addon.motion import Motion
 from scope.solver import Body, rotations
 
@@ -30,7 +37,9 @@ def walking(body: Body) -> Motion:
     motion = made_motion(body, poses, trans)
     world = body.forward_kinematics(rotations.exp(poses), trans, motion.betas)[1]
     T_camera_world = np.linalg.inv(motion.world_from_camera)
-    joints = np.einsum("tij,tkj->tki", T_camera_world[:, :3, :3], world) + T_camera_world[:, None, :3, 3]
+    joints = (
+        np.einsum("tij,tkj->tki", T_camera_world[:, :3, :3], world) + T_camera_world[:, None, :3, 3]
+    )
     return replace(motion, joints_cam=joints)
 
 
@@ -57,14 +66,24 @@ def test_a_hand_that_is_elsewhere_and_twice_the_jitter(body: Body, walking: Moti
     assert found["frames"] == 11
     assert found["difference"] == pytest.approx(30.0, abs=0.01)
     twice = walking.joints_cam[:, :1] + 2 * (walking.joints_cam - walking.joints_cam[:, :1])
-    assert compared(replace(walking, joints_cam=twice), walking, body)["jitter"] == pytest.approx(2.0, rel=1e-3)
+    assert compared(replace(walking, joints_cam=twice), walking, body)["jitter"] == pytest.approx(
+        2.0, rel=1e-3
+    )
 
 
 def test_the_lowest_sole_follows_the_body(body: Body) -> None:
-    """The soles of a body at rest are its lowest vertices; in the second of three frames, it is 20 cm lower."""
+    """The soles of a body at rest are its lowest vertices; in the second of three frames, it is 20
+    cm lower.
+    """
     upright = np.zeros((3, body.K + 1, 3))
     upright[:, 0, 0] = np.pi / 2  # the body's y axis becomes the world's z axis
-    trans = np.array([[0, 0, 1.2], [0, 0, 1.0], [0, 0, 1.3]]) - body.rest_joints(np.zeros(body.P))[0]
-    motion = made_motion(body, upright, trans, joints_cam=np.random.default_rng(0).normal(size=(3, body.K + 1, 3)))
-    lowest_vertex = (body.rest_vertices(np.zeros(body.P)) - body.rest_joints(np.zeros(body.P))[0])[:, 1].min()
+    trans = (
+        np.array([[0, 0, 1.2], [0, 0, 1.0], [0, 0, 1.3]]) - body.rest_joints(np.zeros(body.P))[0]
+    )
+    motion = made_motion(
+        body, upright, trans, joints_cam=np.random.default_rng(0).normal(size=(3, body.K + 1, 3))
+    )
+    lowest_vertex = (body.rest_vertices(np.zeros(body.P)) - body.rest_joints(np.zeros(body.P))[0])[
+        :, 1
+    ].min()
     assert lowest_sole_m(motion, np.arange(3), body) == pytest.approx(1.0 + lowest_vertex, abs=0.01)

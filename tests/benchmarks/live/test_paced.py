@@ -6,7 +6,15 @@ from scope.benchmarks.live.paced import Costs, EveryFrame, simulated
 from scope.scope_addon.cli import SAMPLE
 
 FRAME_S = 1 / 30  # of the sample clip
-COSTS = Costs(frame_s=0.3, spread=0.0, largest_s=0.0, reference_s=0.0, estimate_s=0.0, first_estimate_s=0.0, shared=1.0)
+COSTS = Costs(
+    frame_s=0.3,
+    spread=0.0,
+    largest_s=0.0,
+    reference_s=0.0,
+    estimate_s=0.0,
+    first_estimate_s=0.0,
+    shared=1.0,
+)
 
 
 def test_poses_and_latency_follow_from_the_costs(body, networks):

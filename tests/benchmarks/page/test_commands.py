@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The commands of the page are scripts of the repository, and what running them gave is kept as it is."""
+"""The commands of the page are scripts of the repository, and what running them gave is kept as it
+is.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,16 @@ import numpy as np
 import pytest
 from scope.benchmarks.__main__ import ELSEWHERE
 from scope.benchmarks.page import commands
-from scope.benchmarks.page.commands import SCRIPTS, Command, Outcome, motion_files, run, run_capture, timed, worst_clips
+from scope.benchmarks.page.commands import (
+    SCRIPTS,
+    Command,
+    Outcome,
+    motion_files,
+    run,
+    run_capture,
+    timed,
+    worst_clips,
+)
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -21,12 +32,18 @@ ROOT = Path(__file__).resolve().parents[3]
 def test_every_command_is_a_script(quick):
     for command in commands.commands(quick):
         assert (ROOT / "scripts" / command.script).is_file()
-        assert f"-m {SCRIPTS[command.script]}" in (ROOT / "scripts" / command.script).read_text("utf-8")
+        assert f"-m {SCRIPTS[command.script]}" in (ROOT / "scripts" / command.script).read_text(
+            "utf-8"
+        )
         assert ("--quick" in command.arguments) == (quick and command.script == "bench")
 
 
 def test_a_full_run_measures_every_benchmark_but_those_of_blender_live_and_many_machines():
-    run = {command.arguments[0] for command in commands.commands(quick=False) if command.script == "bench"}
+    run = {
+        command.arguments[0]
+        for command in commands.commands(quick=False)
+        if command.script == "bench"
+    }
     assert {"solver", *ELSEWHERE} - run == {"choices", "blender", "live", "cluster"}
     assert run <= {"solver", *ELSEWHERE}
 
@@ -43,7 +60,12 @@ def test_figures_are_those_of_this_run_alone(tmp_path, monkeypatch):
 
     monkeypatch.setattr(commands, "timed", fake)
     failed = run(Command("Gate", "gate", ()), tmp_path, lambda text: None)
-    assert (failed.figures, failed.status, failed.printed, failed.said) == ({}, 1, "printed", "said")
+    assert (failed.figures, failed.status, failed.printed, failed.said) == (
+        {},
+        1,
+        "printed",
+        "said",
+    )
     done |= {"status": 0, "json": {"new": 2}}
     assert run(Command("Gate", "gate", ()), tmp_path, lambda text: None).figures == {"new": 2}
     done |= {"status": 3, "json": None}
@@ -56,10 +78,15 @@ def test_figures_are_those_of_this_run_alone(tmp_path, monkeypatch):
 
 
 def test_a_command_costs_the_processor_time_of_the_processes_that_it_starts_too(monkeypatch):
-    """The inner process computes for half a second of processor time; the outer one sleeps for a while, then ends."""
+    """The inner process computes for half a second of processor time; the outer one sleeps for a
+    while, then ends.
+    """
     monkeypatch.setattr(commands, "LOAD_EVERY_S", 0.1)
     spin = "import time\nwhile time.process_time() < 0.5: pass"
-    code = f"import subprocess, sys, time; subprocess.run([sys.executable, '-c', {spin!r}]); time.sleep(1); "
+    code = (
+        f"import subprocess, sys, time; subprocess.run([sys.executable, '-c', {spin!r}]); "
+        f"time.sleep(1); "
+    )
     code += "print('a'); print('b', file=sys.stderr); sys.exit(3)"
     outcome = timed(Command("Spin", "bench", ()), ["-c", code])
     assert (outcome.printed, outcome.said, outcome.status, outcome.figures) == ("a\n", "b\n", 3, {})
@@ -70,7 +97,9 @@ def test_a_command_costs_the_processor_time_of_the_processes_that_it_starts_too(
 
 
 def test_everybody_is_captured_where_no_truth_says_who_it_is_about(tmp_path, monkeypatch):
-    monkeypatch.setattr(commands, "timed", lambda command, arguments: Outcome(command, "", "", {}, 1.0, 3))
+    monkeypatch.setattr(
+        commands, "timed", lambda command, arguments: Outcome(command, "", "", {}, 1.0, 3)
+    )
     for name in ("truth_cam1.npz", "roll_truth.npz"):
         np.savez(tmp_path / name, joints=np.zeros(3))
     np.savez(tmp_path / "test_00_truth.npz", limbs=np.zeros(3))  # of several people
@@ -80,32 +109,67 @@ def test_everybody_is_captured_where_no_truth_says_who_it_is_about(tmp_path, mon
 
 
 def test_commands_name_files_of_the_checkout_from_its_root(monkeypatch):
-    monkeypatch.setattr(commands, "timed", lambda command, arguments: Outcome(command, "", "", {}, 1.0, 3))
+    monkeypatch.setattr(
+        commands, "timed", lambda command, arguments: Outcome(command, "", "", {}, 1.0, 3)
+    )
     data = ROOT.parent / "shared" / "data"
-    outcome = run_capture(data / "no such clip.mp4", ROOT / "build" / "report" / "no.npz", lambda text: None)
-    assert outcome.command.arguments[:3] == ("../shared/data/no such clip.mp4", "-o", "build/report/no.npz")
+    outcome = run_capture(
+        data / "no such clip.mp4", ROOT / "build" / "report" / "no.npz", lambda text: None
+    )
+    assert outcome.command.arguments[:3] == (
+        "../shared/data/no such clip.mp4",
+        "-o",
+        "build/report/no.npz",
+    )
 
 
 def test_motion_files_are_those_of_everybody_in_their_order(tmp_path):
-    for name in ("bb.person1.npz", "b.personal.npz", "c.npz", *(f"b.person{n}.npz" for n in range(12, 0, -1))):
+    for name in (
+        "bb.person1.npz",
+        "b.personal.npz",
+        "c.npz",
+        *(f"b.person{n}.npz" for n in range(12, 0, -1)),
+    ):
         (tmp_path / name).touch()
-    assert [path.name for path in motion_files(tmp_path, "b")] == [f"b.person{n}.npz" for n in range(1, 13)]
+    assert [path.name for path in motion_files(tmp_path, "b")] == [
+        f"b.person{n}.npz" for n in range(1, 13)
+    ]
     assert [path.name for path in motion_files(tmp_path, "c")] == ["c.npz"]
 
 
 def test_the_worst_rendered_clips_are_shown_too(tmp_path, monkeypatch):
     monkeypatch.setattr(commands, "CACHE", tmp_path)
-    for name in ("renders/roll.mp4", "renders/walk.mp4", "scenes/test_00.mp4", "scenes/test_01.mp4"):
+    for name in (
+        "renders/roll.mp4",
+        "renders/walk.mp4",
+        "scenes/test_00.mp4",
+        "scenes/test_01.mp4",
+    ):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).touch()
-    shots = {"walk": {"mpjpe_root": 40.0}, "roll": {"mpjpe_root": 132.46}, "lost": {"coverage": 0.0}}
-    given = {"nothing given": shots | {"sample": {"mpjpe_root": 900.0}, "mean": {"mpjpe_root": 950.0}}}
+    shots = {
+        "walk": {"mpjpe_root": 40.0},
+        "roll": {"mpjpe_root": 132.46},
+        "lost": {"coverage": 0.0},
+    }
+    given = {
+        "nothing given": shots | {"sample": {"mpjpe_root": 900.0}, "mean": {"mpjpe_root": 950.0}}
+    }
     people = [("test_00", float("nan")), ("test_01", 120.0), ("test_00", 60.0)]
-    rows = [{"clip": clip, "mpjpe_root": error, "found": float(error > 0)} for clip, error in people]
+    rows = [
+        {"clip": clip, "mpjpe_root": error, "found": float(error > 0)} for clip, error in people
+    ]
     outcomes = [
-        Outcome(Command("Renders", "bench", ("renders",)), "", "", {"fast": {}, "best": given}, 1.0, 0),
         Outcome(
-            Command("Scenes", "bench", ("scenes",)), "", "", {"test": {"people": {"default preset": rows}}}, 1.0, 0
+            Command("Renders", "bench", ("renders",)), "", "", {"fast": {}, "best": given}, 1.0, 0
+        ),
+        Outcome(
+            Command("Scenes", "bench", ("scenes",)),
+            "",
+            "",
+            {"test": {"people": {"default preset": rows}}},
+            1.0,
+            0,
         ),
         Outcome(Command("Scenes", "bench", ("scenes",)), "", "", {}, 1.0, 1),
     ]
@@ -125,9 +189,14 @@ def test_a_scene_that_is_shown_for_two_reasons_gives_both(tmp_path, monkeypatch)
     monkeypatch.setattr(commands, "CACHE", tmp_path)
     (tmp_path / "scenes").mkdir()
     (tmp_path / "scenes" / "test_00.mp4").touch()
-    rows = [{"clip": "test_00", "mpjpe_root": error, "found": float(error > 0)} for error in (120.0, float("nan"))]
+    rows = [
+        {"clip": "test_00", "mpjpe_root": error, "found": float(error > 0)}
+        for error in (120.0, float("nan"))
+    ]
     figures = {"test": {"people": {"default preset": rows}}}
-    ((name, _, why),) = worst_clips([Outcome(Command("Scenes", "bench", ("scenes",)), "", "", figures, 1.0, 0)])
+    ((name, _, why),) = worst_clips(
+        [Outcome(Command("Scenes", "bench", ("scenes",)), "", "", figures, 1.0, 0)]
+    )
     assert name == "test_00"
     assert "MPJPE-root is 120.0 mm. A person" in why
     assert "not found" in why

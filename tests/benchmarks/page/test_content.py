@@ -14,15 +14,26 @@ from scope.benchmarks import report
 from scope.benchmarks.page import content
 from scope.benchmarks.page.about import ABOUT
 from scope.benchmarks.page.commands import Command, Outcome, commands
-from scope.benchmarks.page.content import experiment_plots, outcome_section, printed_parts, time_against_accuracy
+from scope.benchmarks.page.content import (
+    experiment_plots,
+    outcome_section,
+    printed_parts,
+    time_against_accuracy,
+)
 
 
 def cells(markup: str) -> list[list[str]]:
-    return [re.findall(r"<t[hd][^>]*>([^<]*)</t", row) for row in re.findall(r"<tr>(.*?)</tr>", markup)]
+    return [
+        re.findall(r"<t[hd][^>]*>([^<]*)</t", row) for row in re.findall(r"<tr>(.*?)</tr>", markup)
+    ]
 
 
 def test_tables_are_found_among_other_text():
-    printed = "Frames per second <1080p>\n\n" + report.table(("clip", "mm"), [("a & b", 12.34), ("c", None)]) + "\nend"
+    printed = (
+        "Frames per second <1080p>\n\n"
+        + report.table(("clip", "mm"), [("a & b", 12.34), ("c", None)])
+        + "\nend"
+    )
     words, table, end = printed_parts(printed)
     assert words == "<p>Frames per second &lt;1080p&gt;</p>\n"
     assert end == "<p>end</p>\n"
@@ -40,7 +51,11 @@ def test_tables_are_found_among_other_text():
         ),
         (
             "scenes",
-            ["test: people", "test: MPJPE-root, more than the default, mm", "new, default preset: performers"],
+            [
+                "test: people",
+                "test: MPJPE-root, more than the default, mm",
+                "new, default preset: performers",
+            ],
             ["test, preset fast: depth flips", "new, default preset, statures given: performers"],
         ),
         ("solver", ["one iteration, K=23 P=10 N=120, us"], []),
@@ -69,7 +84,10 @@ def test_experiments_are_plotted_where_their_values_are():
     assert found == pytest.approx([100 * (1 - share), 100 * share], abs=0.01)
     assert 'class="cursor"' not in times
     of_more_terms = experiment_plots("3_N600", [{**row, "P": row["N"] // 60} for row in rows])
-    assert "Experiment 3, N = 600: µs per step against the number of shape coefficients P" in of_more_terms[0]
+    assert (
+        "Experiment 3, N = 600: µs per step against the number of shape coefficients P"
+        in of_more_terms[0]
+    )
 
 
 def test_every_command_says_what_its_tables_were_measured_on():
@@ -80,7 +98,9 @@ def test_every_command_says_what_its_tables_were_measured_on():
 
 
 def test_where_plots_were_written_is_not_shown():
-    assert printed_parts("| a |\n|---|\n| b |\n\nPlots are in /somewhere/build") == printed_parts("| a |\n|---|\n| b |")
+    assert printed_parts("| a |\n|---|\n| b |\n\nPlots are in /somewhere/build") == printed_parts(
+        "| a |\n|---|\n| b |"
+    )
 
 
 def test_keys_of_the_evaluation_get_their_headings():
@@ -90,8 +110,14 @@ def test_keys_of_the_evaluation_get_their_headings():
 
 def test_time_and_accuracy_of_a_method_are_a_point_for_each_clip():
     figures = {
-        "cam1": {"dense": {"mpjpe_root": 100.0, "ms": 400.0}, "Scope": {"mpjpe_root": 50.0, "ms": 4.0}},
-        "cam2": {"dense": {"mpjpe_root": 50.0, "ms": 40.0}, "Scope": {"mpjpe_root": 25.0, "ms": 4.0}},
+        "cam1": {
+            "dense": {"mpjpe_root": 100.0, "ms": 400.0},
+            "Scope": {"mpjpe_root": 50.0, "ms": 4.0},
+        },
+        "cam2": {
+            "dense": {"mpjpe_root": 50.0, "ms": 40.0},
+            "Scope": {"mpjpe_root": 25.0, "ms": 4.0},
+        },
     }
     drawn = time_against_accuracy(figures)
     (dense, scope) = re.findall(r'class="points" d="([^"]*)"', drawn)
@@ -106,7 +132,9 @@ def test_time_and_accuracy_of_a_method_are_a_point_for_each_clip():
     height = 100 / 110  # the axis ends 10 % above the largest error
     expected = [at(40), 100 - 50 * height, at(400), 100 - 100 * height]
     assert points(dense) == pytest.approx(expected, abs=0.06)
-    assert points(scope) == pytest.approx([at(4), 100 - 25 * height, at(4), 100 - 50 * height], abs=0.06)
+    assert points(scope) == pytest.approx(
+        [at(4), 100 - 25 * height, at(4), 100 - 50 * height], abs=0.06
+    )
     outcome = Outcome(Command("SMPLify", "bench", ("smplify",)), "", "", figures, 1.0, 0)
     assert drawn in outcome_section(outcome)
 
@@ -114,9 +142,15 @@ def test_time_and_accuracy_of_a_method_are_a_point_for_each_clip():
 def test_clips_are_not_connected_and_their_pictures_are_shown(tmp_path, monkeypatch):
     monkeypatch.setattr(content, "CACHE", tmp_path)
     cv2.imwrite(str(tmp_path / "smplify_b.jpg"), np.full((40, 60, 3), 200, np.uint8))
-    figures = {clip: {"Scope": {"mpjpe_root": 50.0, "ms": ms}} for clip, ms in (("a", 3.0), ("b", 5.0))}
-    printed = "/somewhere/smplify_b.jpg: 60 x 40, 1 kB, quality 34\n" + report.table(("b", "mm"), [("Scope", 50.0)])
-    section = outcome_section(Outcome(Command("SMPLify", "bench", ("smplify",)), printed, "", figures, 1.0, 0))
+    figures = {
+        clip: {"Scope": {"mpjpe_root": 50.0, "ms": ms}} for clip, ms in (("a", 3.0), ("b", 5.0))
+    }
+    printed = "/somewhere/smplify_b.jpg: 60 x 40, 1 kB, quality 34\n" + report.table(
+        ("b", "mm"), [("Scope", 50.0)]
+    )
+    section = outcome_section(
+        Outcome(Command("SMPLify", "bench", ("smplify",)), printed, "", figures, 1.0, 0)
+    )
     assert 'class="curve"' not in section
     assert 'class="points"' in section
     assert re.findall(r'width="60" height="40" alt="b"><figcaption>([^<]*)<', section) == ["b"]
@@ -125,8 +159,11 @@ def test_clips_are_not_connected_and_their_pictures_are_shown(tmp_path, monkeypa
 
 
 def test_a_command_that_failed_says_so():
-    outcome = Outcome(Command("Speed", "bench", ("solver", "--quick")), "", "first\nno <clips>", {}, 3.2, 1)
+    outcome = Outcome(
+        Command("Speed", "bench", ("solver", "--quick")), "", "first\nno <clips>", {}, 3.2, 1
+    )
     section = outcome_section(outcome)
-    assert '<code>./scripts/bench solver <span class="option">--quick</span></code>' in section  # in one line
+    # in one line
+    assert '<code>./scripts/bench solver <span class="option">--quick</span></code>' in section
     assert "Elapsed 0:03 min:s, processor time –, mean load –; it ended with status 1." in section
     assert "<p>no &lt;clips&gt;</p>" in section

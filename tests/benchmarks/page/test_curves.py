@@ -14,8 +14,13 @@ from scope.solver.errors import InputError
 
 def test_points_are_sorted_by_experiment_and_body(tmp_path):
     path = tmp_path / "curves.csv"
-    path.write_text("\ufeffexperiment, body,x,speedup\n3,SMPL,10,4\n\n3,SMPL,0,2.5\n1,SMPL+H,120,9e1\n", "utf-8")
-    assert read_curves(path) == {("3", "SMPL"): [(0.0, 2.5), (10.0, 4.0)], ("1", "SMPL+H"): [(120.0, 90.0)]}
+    path.write_text(
+        "\ufeffexperiment, body,x,speedup\n3,SMPL,10,4\n\n3,SMPL,0,2.5\n1,SMPL+H,120,9e1\n", "utf-8"
+    )
+    assert read_curves(path) == {
+        ("3", "SMPL"): [(0.0, 2.5), (10.0, 4.0)],
+        ("1", "SMPL+H"): [(120.0, 90.0)],
+    }
 
 
 @pytest.mark.parametrize(
@@ -52,13 +57,17 @@ def test_files_that_cannot_be_read_are_refused(tmp_path):
 
 def test_a_digitized_curve_lies_where_its_values_are():
     rows = [{"K": K, "N": N, "sparse": 1.0, "dense": 10.0} for K in (23, 51) for N in (120, 600)]
-    speedups = experiment_plots("1", rows, {("1", "SMPL"): [(120.0, 100.0), (600.0, 10.0)], ("2", "SMPL"): [(1, 1)]})[1]
+    speedups = experiment_plots(
+        "1", rows, {("1", "SMPL"): [(120.0, 100.0), (600.0, 10.0)], ("2", "SMPL"): [(1, 1)]}
+    )[1]
     assert "SMPL, digitized" in speedups
     assert "SMPL+H, digitized" not in speedups
     height = [
         [float(y) for y in pair]
         for pair in re.findall(
-            r'class="curve" d="M[\d.]+ ([\d.]+)L[\d.]+ ([\d.]+)" stroke="[^"]*"><title>SMPL, d', speedups
+            r'class="curve" d="M[\d.]+ ([\d.]+)L[\d.]+ ([\d.]+)" stroke="[^"]*"><title>SMPL, '
+            r"d",
+            speedups,
         )
     ]
     share = math.log(1.3) / math.log(100 * 1.3**2 / 10)  # the axis goes from 10 / 1.3 to 100 * 1.3

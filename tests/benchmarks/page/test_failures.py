@@ -22,7 +22,9 @@ COUNT = 8
 
 @pytest.fixture
 def capture(body, tmp_path):
-    """A motion, and the file with its ground truth, from which it is off in three frames, and which the last lacks."""
+    """A motion, and the file with its ground truth, from which it is off in three frames, and which
+    the last lacks.
+    """
     poses, trans = np.zeros((COUNT, 3 * (body.K + 1))), np.zeros((COUNT, 3))
     motion = made_motion(body, poses, trans, rate=5.0)
     _, t = body.forward_kinematics(exp(poses.reshape(COUNT, -1, 3)), trans, np.zeros(body.P))
@@ -47,12 +49,16 @@ def test_the_worst_moments_are_apart(capture):
     motion, truth = capture
     assert worst_rows(limb_errors(motion, truth), motion.timestamps) == [3, 6]  # 2 is 0.2 s from 3
     assert worst_rows(np.full(COUNT, 5.0), motion.timestamps) == []
-    assert worst_rows(np.array([9.0, 8, 5, 5, 5, 5.5, 5, 5]), motion.timestamps) == [0]  # the mean is 5.9
+    # the mean is 5.9
+    assert worst_rows(np.array([9.0, 8, 5, 5, 5, 5.5, 5, 5]), motion.timestamps) == [0]
 
 
 def test_the_page_says_how_far_off_they_are(capture, body):
     shown = worst_moments(*capture, body)
-    assert re.findall(r"<figcaption>([^<]*)<", shown) == ["frame 3, 0.60 s: 30 mm", "frame 6, 1.20 s: 10 mm"]
+    assert re.findall(r"<figcaption>([^<]*)<", shown) == [
+        "frame 3, 0.60 s: 30 mm",
+        "frame 6, 1.20 s: 10 mm",
+    ]
     assert "its mean over the clip is 9 mm" in shown  # 60 / 7
 
 

@@ -14,7 +14,11 @@ from scope.scope_addon.errors import SetupError
 from scope.solver.errors import InputError
 
 CLIPS = [("sample", Path("sample.mp4")), ("b", Path("b.mp4"))]
-COMMANDS = [Command("Gate", "gate", ()), Command("Solver", "bench", ("solver",)), Command("Faces", "bench", ("faces",))]
+COMMANDS = [
+    Command("Gate", "gate", ()),
+    Command("Solver", "bench", ("solver",)),
+    Command("Faces", "bench", ("faces",)),
+]
 
 
 @pytest.fixture
@@ -33,7 +37,12 @@ def done(tmp_path, monkeypatch):
         return Outcome(command, "printed", "", {}, 90.0, 0)
 
     for name, value in {
-        **{"FOLDER": tmp_path, "clips": lambda quick: CLIPS, "commands": lambda quick: COMMANDS, "run": measure},
+        **{
+            "FOLDER": tmp_path,
+            "clips": lambda quick: CLIPS,
+            "commands": lambda quick: COMMANDS,
+            "run": measure,
+        },
         **{"run_capture": capture, "revision": lambda: "abc"},
     }.items():
         monkeypatch.setattr(module, name, value)
@@ -73,9 +82,13 @@ def test_a_run_goes_on_as_quick_or_whole_as_it_began(done, monkeypatch):
 
 
 @pytest.mark.parametrize("failure", [KeyboardInterrupt, SetupError])
-def test_an_earlier_run_is_not_taken_for_one_that_stopped_at_its_first_clip(done, tmp_path, monkeypatch, failure):
+def test_an_earlier_run_is_not_taken_for_one_that_stopped_at_its_first_clip(
+    done, tmp_path, monkeypatch, failure
+):
     """Whatever of the earlier run is kept, its first clip's motion is gone."""
-    earlier = Run([], [Outcome(COMMANDS[0], "hours", "", {}, 9000.0, 0)], "earlier", {}, quick=False)
+    earlier = Run(
+        [], [Outcome(COMMANDS[0], "hours", "", {}, 9000.0, 0)], "earlier", {}, quick=False
+    )
     write_run(tmp_path, earlier)
 
     def stopped(video, target, say):
@@ -97,7 +110,9 @@ def test_a_run_without_the_motion_of_its_first_clip_has_no_page(tmp_path, monkey
     clip = Outcome(Command("sample.mp4", "capture", ("sample.mp4",)), "", "", {}, 60.0, 0)
     for captured in ([("sample", Path("sample.mp4"), clip)], []):
         write_run(tmp_path, Run(captured, [], "", {}, quick=False))
-        monkeypatch.setattr(module.sys, "argv", ["report", "--recorded", str(tmp_path), str(tmp_path / "out.html")])
+        monkeypatch.setattr(
+            module.sys, "argv", ["report", "--recorded", str(tmp_path), str(tmp_path / "out.html")]
+        )
         assert module.main() == 1
         assert "no motion of its first clip" in capsys.readouterr().err
 
@@ -132,7 +147,9 @@ def test_without_an_earlier_run_there_is_nothing_to_go_on_with(done):
 
 
 def test_a_clip_that_could_not_be_captured_says_why(body, tmp_path):
-    outcome = Outcome(Command("b.mp4", "capture", ("b.mp4",)), "", "first\nnobody <was> found\n", {}, 1.0, 3)
+    outcome = Outcome(
+        Command("b.mp4", "capture", ("b.mp4",)), "", "first\nnobody <was> found\n", {}, 1.0, 3
+    )
     section = module.capture_section(tmp_path, "b", Path("b.mp4"), outcome, body)
     assert "The capture ended with status 3." in section
     assert "nobody &lt;was&gt; found" in section

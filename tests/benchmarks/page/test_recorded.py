@@ -14,8 +14,16 @@ from scope.solver.errors import InputError
 
 def test_a_run_is_read_as_it_was_written(tmp_path):
     gate = Outcome(Command("Gate", "gate", ()), "| a |", "", {"pa_mpjpe": 48.1}, 2.5, 1, 4.5, 3.25)
-    clip = Outcome(Command("a b.mp4", "capture", ("a b.mp4", "--json")), "", "said", {"frames": 3}, 1.0, 0)
-    run = Run([("a b", Path("a b.mp4"), clip)], [gate], "2026-01-02 03:04", {"Machine": "two cores"}, quick=True)
+    clip = Outcome(
+        Command("a b.mp4", "capture", ("a b.mp4", "--json")), "", "said", {"frames": 3}, 1.0, 0
+    )
+    run = Run(
+        [("a b", Path("a b.mp4"), clip)],
+        [gate],
+        "2026-01-02 03:04",
+        {"Machine": "two cores"},
+        quick=True,
+    )
     write_run(tmp_path, run)
     assert read_run(tmp_path) == run
     assert run.everything == [clip, gate]
@@ -37,7 +45,11 @@ def test_what_is_no_run_is_refused(tmp_path):
     (tmp_path / FILE).write_text("{")
     with pytest.raises(InputError, match="is no JSON"):
         read_run(tmp_path)
-    for content in ([], {"captured": []}, {"captured": [{}], "measured": [], "time": "", "facts": {}}):
+    for content in (
+        [],
+        {"captured": []},
+        {"captured": [{}], "measured": [], "time": "", "facts": {}},
+    ):
         (tmp_path / FILE).write_text(json.dumps(content))
         with pytest.raises(InputError, match="is not of this version"):
             read_run(tmp_path)

@@ -9,7 +9,8 @@ from scope.benchmarks.perception.choices import CHOICES, left_out
 def test_the_other_cameras_choose():
     errors = np.array([[10.0, 20.0, 30.0], [11.0, 16.0, 31.0], [30.0, 10.0, 10.0]])
     chosen, there = left_out(errors)
-    # without the first: 25, 23.5, 10; without the second: 20, 21, 20; without the third: 15, 13.5, 20
+    # without the first: 25, 23.5, 10; without the second: 20, 21, 20; without the third: 15, 13.5,
+    # 20
     np.testing.assert_array_equal(chosen, [2, 0, 1])
     np.testing.assert_array_equal(there, [30.0, 20.0, 31.0])
 

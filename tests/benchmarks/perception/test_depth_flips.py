@@ -7,7 +7,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scope.benchmarks.perception.depth_flips import BONES, DepthFlips, count_flips, depth_flips, out_of_plane_deg, total
+from scope.benchmarks.perception.depth_flips import (
+    BONES,
+    DepthFlips,
+    count_flips,
+    depth_flips,
+    out_of_plane_deg,
+    total,
+)
 from scope.solver.rotations import exp, log
 
 RATE = 10.0
@@ -16,7 +23,9 @@ RATE = 10.0
 def counted(captured, true, rows=None):
     """The counts of one bone's angles."""
     captured, true = (np.array(deg, float)[:, None] for deg in (captured, true))
-    return count_flips(captured, true, np.arange(len(true)) if rows is None else np.array(rows), RATE)
+    return count_flips(
+        captured, true, np.arange(len(true)) if rows is None else np.array(rows), RATE
+    )
 
 
 def test_the_angle_is_to_the_plane_across_the_line_of_sight():
@@ -29,7 +38,8 @@ def test_the_angle_is_to_the_plane_across_the_line_of_sight():
 
 def test_a_flip_counts_as_brief_if_it_begins_and_ends_within_the_clip():
     assert counted([30, -30, -30, 30], [30, 30, 30, 30]) == DepthFlips(1, 2, 4, 0, 0)
-    assert counted([-30, -30, 30, 30], [30, 30, 30, 30]) == DepthFlips(0, 2, 4, 0, 0)  # when did it begin?
+    # when did it begin?
+    assert counted([-30, -30, 30, 30], [30, 30, 30, 30]) == DepthFlips(0, 2, 4, 0, 0)
     assert counted([30, 30, -30, -30], [30, 30, 30, 30]) == DepthFlips(0, 2, 4, 0, 0)
     assert counted([-30, 30, -30, 30, -30], [30] * 5) == DepthFlips(1, 3, 5, 0, 0)
 
@@ -58,21 +68,28 @@ def test_no_frames_have_no_flips():
     found = count_flips(empty, empty, np.zeros(0, int), RATE)
     assert found == DepthFlips()
     assert np.isnan(found.share)
-    assert total([found, DepthFlips(1, 2, 4, 3, 1), DepthFlips(0, 1, 2, 1, 0)]) == DepthFlips(1, 3, 6, 4, 1)
+    assert total([found, DepthFlips(1, 2, 4, 3, 1), DepthFlips(0, 1, 2, 1, 0)]) == DepthFlips(
+        1, 3, 6, 4, 1
+    )
 
 
 def test_a_forearm_that_flips_in_two_frames_fitted_alone(body):
-    """The camera looks along y, at a person whose forearm points at it; in two frames it points away."""
+    """The camera looks along y, at a person whose forearm points at it; in two frames it points
+    away.
+    """
     T, elbow = 6, body.joint_names.index("left_elbow")
     states = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
     states[:, 0] = exp(np.array([np.pi / 2, 0, 0]))  # y up becomes z up; the person faces -y
-    states[:, elbow] = exp(np.array([0, -1.0, 0]))  # the left arm points to +x: the forearm swings to the front
+    # the left arm points to +x: the forearm swings to the front
+    states[:, elbow] = exp(np.array([0, -1.0, 0]))
     trans = np.tile([0.0, 4.0, 1.0], (T, 1))
     world_from_camera = np.eye(4)
     world_from_camera[:3, :3] = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
 
     def joints_cam(states):
-        return body.forward_kinematics(states, trans, np.zeros(body.P))[1] @ world_from_camera[:3, :3]
+        return (
+            body.forward_kinematics(states, trans, np.zeros(body.P))[1] @ world_from_camera[:3, :3]
+        )
 
     wrong = states.copy()
     wrong[2:4, elbow] = exp(np.array([0, 1.0, 0]))
@@ -86,7 +103,9 @@ def test_a_forearm_that_flips_in_two_frames_fitted_alone(body):
         betas=np.zeros(body.P),
         world_from_camera=np.tile(world_from_camera, (T, 1, 1)),
     )
-    true = {name: joints_cam(states)[:, body.joint_names.index(name)] for bone in BONES for name in bone}
+    true = {
+        name: joints_cam(states)[:, body.joint_names.index(name)] for bone in BONES for name in bone
+    }
     found = depth_flips(body, motion, true)
     assert (found["clip"].brief, found["clip"].flipped) == (0, 0)
     assert (found["alone"].brief, found["alone"].flipped) == (1, 2)

@@ -8,7 +8,12 @@ from scope.tools.calibrate_face.observe import SeenFaces
 
 def test_pieces_are_as_long_as_asked_and_belong_to_one_person():
     seconds, person = np.tile(np.arange(360) / 30, 2), np.repeat([0, 1], 360)
-    seen = SeenFaces({"seconds": seconds, "person": person}, np.zeros((720, 478, 3)), np.ones(720), np.zeros((720, 52)))
+    seen = SeenFaces(
+        {"seconds": seconds, "person": person},
+        np.zeros((720, 478, 3)),
+        np.ones(720),
+        np.zeros((720, 52)),
+    )
     pieces = in_pieces(seen, 5.0)
     assert pieces.landmarks is seen.landmarks
     counts = {}

@@ -33,4 +33,6 @@ def test_eyes_that_never_close_have_no_offset():
 
 
 def test_the_nearest_sequence_that_does_not_decrease():
-    np.testing.assert_allclose(pooled(np.array([1.0, 3, 2, 2, 5, 4])), [1, 7 / 3, 7 / 3, 7 / 3, 4.5, 4.5])
+    np.testing.assert_allclose(
+        pooled(np.array([1.0, 3, 2, 2, 5, 4])), [1, 7 / 3, 7 / 3, 7 / 3, 4.5, 4.5]
+    )

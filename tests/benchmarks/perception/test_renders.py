@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shots of held-out recordings: in the picture, on the floor, the same for the same seed; and what is measured."""
+"""The shots of held-out recordings: in the picture, on the floor, the same for the same seed; and
+what is measured.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,12 @@ from scope.benchmarks.perception.held_out import (
     held_out_takes,
     standing_feet,
 )
-from scope.benchmarks.perception.renders import against_world, intervals_table, mean_of, presets_table
+from scope.benchmarks.perception.renders import (
+    against_world,
+    intervals_table,
+    mean_of,
+    presets_table,
+)
 from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
 from scope.solver.loaders.body_file import ASSETS
 from scope.solver.rotations import log
@@ -33,7 +40,15 @@ def take(body) -> Take:
     states[:, 0] = R_WORLD_MODEL.T @ states[:, 0]
     J_root = body.rest_joints(betas)[0]
     poses = log(states).reshape(len(trans), -1)
-    return Take(9, "sample", poses, (trans + J_root) @ R_WORLD_MODEL - J_root, np.ones(len(trans), bool), betas, 30.0)
+    return Take(
+        9,
+        "sample",
+        poses,
+        (trans + J_root) @ R_WORLD_MODEL - J_root,
+        np.ones(len(trans), bool),
+        betas,
+        30.0,
+    )
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
@@ -48,7 +63,8 @@ def test_the_person_stands_on_the_floor_well_inside_the_picture(body, take, seed
         assert (uv.max(0) <= np.array(SIZE) - 1 - MARGIN_PX + 1e-3).all()
         assert -0.03 < skin[:, 2].min() < 0.05
         assert skin[:, 2].max() > 0.9  # squats, at the lowest
-    assert shot.standing.any(axis=1).mean() > 0.8  # one foot or both, as in the sample: the path fits the legs
+    # one foot or both, as in the sample: the path fits the legs
+    assert shot.standing.any(axis=1).mean() > 0.8
 
 
 def test_a_shot_is_the_same_for_the_same_seed_alone(body, take):
@@ -63,9 +79,14 @@ def test_frames_that_the_fit_calls_broken_are_left_out(body, take):
     valid = np.zeros(len(take.valid), bool)
     valid[60:105] = True
     shot = draw_shot(body, Take(9, "broken", take.poses, take.trans, valid, take.betas, take.fps))
-    np.testing.assert_allclose(log(shot.rotations[:, 1:]).reshape(45, -1), take.poses[60:105, 3:], atol=1e-9)
+    np.testing.assert_allclose(
+        log(shot.rotations[:, 1:]).reshape(45, -1), take.poses[60:105, 3:], atol=1e-9
+    )
     with pytest.raises(ValueError, match="no 21 sound frames"):
-        draw_shot(body, Take(9, "broken", take.poses, take.trans, np.zeros_like(valid), take.betas, take.fps))
+        draw_shot(
+            body,
+            Take(9, "broken", take.poses, take.trans, np.zeros_like(valid), take.betas, take.fps),
+        )
 
 
 def test_only_every_tenth_take_is_drawn(tmp_path, body):
@@ -109,7 +130,9 @@ def test_worlds_are_compared_by_up_floor_and_focal_length(body):
 
 
 def test_a_mean_leaves_out_what_a_clip_does_not_have():
-    means = mean_of([{"floor_cm": 2.0, "coverage": 1.0}, {"floor_cm": None, "coverage": 0.0}, {"coverage": 1.0}])
+    means = mean_of(
+        [{"floor_cm": 2.0, "coverage": 1.0}, {"floor_cm": None, "coverage": 0.0}, {"coverage": 1.0}]
+    )
     assert means["floor_cm"] == 2.0
     assert means["coverage"] == pytest.approx(2 / 3)
     assert means["up_deg"] is None
@@ -119,7 +142,9 @@ def test_intervals_are_over_clips_and_differences_between_the_same_clips():
     best = {"a": 40.0, "b": 60.0, "c": 50.0, "sample": 900.0, "mean": 950.0}
     figures = {
         quality: {
-            "nothing given": {name: {"mpjpe_root": mm + more, "pa_mpjpe": mm / 2} for name, mm in best.items()}
+            "nothing given": {
+                name: {"mpjpe_root": mm + more, "pa_mpjpe": mm / 2} for name, mm in best.items()
+            }
             | {"lost": {"coverage": 0.0}}
         }
         for quality, more in (("fast", 7.0), ("best", 0.0))
@@ -132,14 +157,22 @@ def test_intervals_are_over_clips_and_differences_between_the_same_clips():
         "25.0 (20.0 to 30.0)",
         "7.0 (7.0 to 7.0)",
     ]
-    assert [cell.strip() for cell in ours.strip("|").split("|")][1:3] == ["3", "50.0 (40.0 to 60.0)"]
+    assert [cell.strip() for cell in ours.strip("|").split("|")][1:3] == [
+        "3",
+        "50.0 (40.0 to 60.0)",
+    ]
     assert ours.rstrip("| ").endswith("(20.0 to 30.0)")
     assert "more than the default" in head
 
 
 def test_clips_are_listed_with_every_preset_the_best_captured_first():
     walk = {"mpjpe_root": 40.0, "pa_mpjpe": 30.0}
-    best = {"roll": {"coverage": 0.0}, "walk": walk, "sample": {"mpjpe_root": 35.0, "pa_mpjpe": 20.0}, "mean": walk}
+    best = {
+        "roll": {"coverage": 0.0},
+        "walk": walk,
+        "sample": {"mpjpe_root": 35.0, "pa_mpjpe": 20.0},
+        "mean": walk,
+    }
     fast = best | {"roll": {"mpjpe_root": 90.0, "pa_mpjpe": 70.06}}
     figures = {"best": {"nothing given": best}, "fast": {"nothing given": fast}}
     head, _, *lines = presets_table(figures).splitlines()

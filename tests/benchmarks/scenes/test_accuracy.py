@@ -44,10 +44,22 @@ def motion(body, limbs_cam, valid=None):
     joints = np.zeros((T, body.K + 1, 3))
     joints[:, [body.joint_names.index(name) for name in LIMB_JOINTS]] = limbs_cam
     rows = np.ones(T, bool) if valid is None else valid
-    alone = {"poses_raw": np.zeros((T, 3 * (body.K + 1))), "trans_raw": np.tile([0.0, 0.0, 4.0], (T, 1))}
-    camera = {"world_from_camera": np.tile(np.eye(4), (T, 1, 1)), "intrinsics": K, "mocap_framerate": 30.0}
+    alone = {
+        "poses_raw": np.zeros((T, 3 * (body.K + 1))),
+        "trans_raw": np.tile([0.0, 0.0, 4.0], (T, 1)),
+    }
+    camera = {
+        "world_from_camera": np.tile(np.eye(4), (T, 1, 1)),
+        "intrinsics": K,
+        "mocap_framerate": 30.0,
+    }
     return SimpleNamespace(
-        joints_cam=joints, valid=rows, frames=np.arange(T), betas=np.zeros(body.P), **alone, **camera
+        joints_cam=joints,
+        valid=rows,
+        frames=np.arange(T),
+        betas=np.zeros(body.P),
+        **alone,
+        **camera,
     )
 
 
@@ -107,9 +119,12 @@ def test_statures_are_given_in_order_of_size_to_a_body_that_can_have_them(body, 
 def test_frames_in_which_nothing_is_visible_are_left_out(body, truth, monkeypatch):
     truth["hidden"][0, :2] = True
     valid = np.arange(T) > 1
-    rows = accuracy.groups(evaluate(body, truth, [motion(body, truth["limbs_cam"][0], valid)], monkeypatch))
+    rows = accuracy.groups(
+        evaluate(body, truth, [motion(body, truth["limbs_cam"][0], valid)], monkeypatch)
+    )
     assert rows["indoors"]["found"].people == 2
-    assert rows["all"]["found"].mean == 0.5  # the first in all frames that count, the second in none
+    # the first in all frames that count, the second in none
+    assert rows["all"]["found"].mean == 0.5
 
 
 def test_groups_are_of_frames_and_of_people(body, truth, monkeypatch):
@@ -120,7 +135,8 @@ def test_groups_are_of_frames_and_of_people(body, truth, monkeypatch):
         limbs[:3, LIMB_JOINTS.index("left_wrist"), 2] += offsets[k]
         people.append(motion(body, limbs))
     rows = accuracy.groups(evaluate(body, truth, people, monkeypatch))
-    assert rows["all"]["mpjpe_root"].mean == pytest.approx((0.5 + 1.0) / 2)  # 12 and 24 mm, of 12 joints, half the time
+    # 12 and 24 mm, of 12 joints, half the time
+    assert rows["all"]["mpjpe_root"].mean == pytest.approx((0.5 + 1.0) / 2)
     assert rows["one to four joints hidden"]["mpjpe_root"].mean == pytest.approx(2.0)
     assert rows["one to four joints hidden"]["mpjpe_root"].people == 1
     assert rows["stature below 1.5 m"]["mpjpe_root"].mean == pytest.approx(1.0)
@@ -128,11 +144,17 @@ def test_groups_are_of_frames_and_of_people(body, truth, monkeypatch):
     assert "travelling camera" not in rows
 
 
-def test_a_group_of_which_nobody_was_found_has_dashes_in_the_tables(body, truth, monkeypatch, capsys):
+def test_a_group_of_which_nobody_was_found_has_dashes_in_the_tables(
+    body, truth, monkeypatch, capsys
+):
     evaluated = evaluate(body, truth, [motion(body, truth["limbs_cam"][0])], monkeypatch)
     accuracy._tables("test", {"default preset": evaluated})
     lines = capsys.readouterr().out.splitlines()
-    cells = {line.split("|")[1].strip(): [cell.strip() for cell in line.split("|")[2:-1]] for line in lines if line}
+    cells = {
+        line.split("|")[1].strip(): [cell.strip() for cell in line.split("|")[2:-1]]
+        for line in lines
+        if line
+    }
     assert cells["stature below 1.5 m"] == ["1", "–", "–", "0 %", "–"]
     assert cells["1.5 to 1.75 m"][:2] == ["1", "0.0"]
     assert "nan" not in "\n".join(lines)
@@ -142,7 +164,9 @@ def test_variants_are_compared_where_both_found_the_person(body, truth, monkeypa
     right, wrong = truth["limbs_cam"][0], truth["limbs_cam"][0].copy()
     wrong[:, LIMB_JOINTS.index("left_wrist"), 2] += 0.12
     default = evaluate(body, truth, [motion(body, right, np.arange(T) > 1)], monkeypatch)
-    other = evaluate(body, truth, [motion(body, wrong), motion(body, truth["limbs_cam"][1])], monkeypatch)
+    other = evaluate(
+        body, truth, [motion(body, wrong), motion(body, truth["limbs_cam"][1])], monkeypatch
+    )
     more = accuracy.more_than(default, other)
     assert (more.people, more.mean) == (1, pytest.approx(10.0))
 
@@ -153,4 +177,6 @@ def test_people_are_told_apart_by_their_performers(body, truth, monkeypatch):
     assert list(rows) == ["all, performers drawn", "climber_a", "fencer"]
     assert rows["all, performers drawn"]["mpjpe_root"].people == 2
     assert rows["fencer"]["found"].mean == 1.0
-    assert rows["climber_a"]["size_off"].mean == pytest.approx(100 * abs(body.stature(np.zeros(body.P)) / 1.4 - 1))
+    assert rows["climber_a"]["size_off"].mean == pytest.approx(
+        100 * abs(body.stature(np.zeros(body.P)) / 1.4 - 1)
+    )

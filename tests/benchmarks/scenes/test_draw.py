@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Scenes are reproducible, their people are in the picture and on the floor, and the splits share no recording."""
+"""Scenes are reproducible, their people are in the picture and on the floor, and the splits share
+no recording.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scope.benchmarks.perception.held_out import Take
-from scope.benchmarks.scenes.draw import APART_M, FPS, MAX_HIDDEN, STRIDE, draw_person, draw_scene, look_at
+from scope.benchmarks.scenes.draw import (
+    APART_M,
+    FPS,
+    MAX_HIDDEN,
+    STRIDE,
+    draw_person,
+    draw_scene,
+    look_at,
+)
 from scope.benchmarks.scenes.scene import DEVELOPMENT, NEW_PERFORMERS, STATIC, TEST
 
 NUMBERS = (1, 3, 4, 6)
@@ -16,7 +26,9 @@ NUMBERS = (1, 3, 4, 6)
 
 @pytest.fixture(scope="module")
 def takes(body):
-    """Recordings of somebody who strides at 1 m/s, in a world with y up; those numbered 9 and 19 are for testing."""
+    """Recordings of somebody who strides at 1 m/s, in a world with y up; those numbered 9 and 19
+    are for testing.
+    """
     found = []
     for number in (0, 1, 9, 19):
         t = np.arange(80) / (STRIDE * FPS)
@@ -25,7 +37,15 @@ def takes(body):
         poses[:, body.joint_names.index("right_hip"), 0] = -0.4 * np.sin(4 * t + number)
         trans = np.stack([0 * t, 1.0 + 0 * t, t], axis=1)
         found.append(
-            Take(number, f"take{number}", poses.reshape(80, -1), trans, np.ones(80, bool), np.zeros(10), STRIDE * FPS)
+            Take(
+                number,
+                f"take{number}",
+                poses.reshape(80, -1),
+                trans,
+                np.ones(80, bool),
+                np.zeros(10),
+                STRIDE * FPS,
+            )
         )
     return found
 
@@ -49,9 +69,14 @@ def test_the_splits_share_no_recording_of_the_first_person(scenes):
 
 
 def test_scenes_of_new_performers_show_each_of_them(body, takes):
-    known = [replace(take, performer="one" if k < 2 else "two", name=f"take{k}") for k, take in enumerate(takes)]
+    known = [
+        replace(take, performer="one" if k < 2 else "two", name=f"take{k}")
+        for k, take in enumerate(takes)
+    ]
     found = [draw_scene(body, known, number, NEW_PERFORMERS) for number in range(4)]
-    assert [scene.name for scene in found] == [f"new_performers_{number:02d}" for number in range(4)]
+    assert [scene.name for scene in found] == [
+        f"new_performers_{number:02d}" for number in range(4)
+    ]
     performers = ["one" if scene.people[0].take in ("take0", "take1") else "two" for scene in found]
     assert sorted(performers[:2]) == sorted(performers[2:]) == ["one", "two"]
 
@@ -77,7 +102,9 @@ def test_static_cameras_stand_still_and_others_do_not(scenes):
 @pytest.mark.parametrize("is_child", [False, True])
 def test_people_stand_on_the_floor_whatever_their_size(body, takes, is_child):
     for seed in range(2):
-        person = draw_person(np.random.default_rng(seed), body, takes[0], is_child, wears_loose=False)
+        person = draw_person(
+            np.random.default_rng(seed), body, takes[0], is_child, wears_loose=False
+        )
         assert (person.scale < 0.86) == is_child
         lowest = [person.skin(body, f)[:, 2].min() for f in range(len(person))]
         assert min(lowest) > -0.02
@@ -88,8 +115,12 @@ def test_people_stand_on_the_floor_whatever_their_size(body, takes, is_child):
 def test_people_walk_as_fast_as_in_the_recording(body, takes):
     person = draw_person(np.random.default_rng(0), body, takes[0], is_child=False, wears_loose=True)
     walked = np.linalg.norm(np.diff(person.trans, axis=0), axis=1) * FPS
-    legs = [body.rest_joints(betas)[[body.joint_names.index(f"left_{part}") for part in ("hip", "knee", "ankle")]]
-            for betas in (person.betas, takes[0].betas)]  # fmt: skip
+    legs = [
+        body.rest_joints(betas)[
+            [body.joint_names.index(f"left_{part}") for part in ("hip", "knee", "ankle")]
+        ]
+        for betas in (person.betas, takes[0].betas)
+    ]
     ratio = np.divide(*[np.linalg.norm(np.diff(chain, axis=0), axis=1).sum() for chain in legs])
     np.testing.assert_allclose(walked, ratio, rtol=1e-6)  # the performer walks 1 m/s
     assert person.loose_m > 0

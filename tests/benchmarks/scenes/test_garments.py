@@ -37,18 +37,24 @@ def test_a_coat_is_open_in_front(body: Body) -> None:
         ring = points[np.isclose(points[:, 1], level)]
         middle, radius = ring[:, 0].mean(), np.ptp(ring[:, 0]) / 2
         front = ring[ring[:, 2] > np.quantile(ring[:, 2], 0.97)]
-        assert np.abs(front[:, 0] - middle).min() >= 0.95 * radius * np.sin(np.radians(COAT_OPEN_DEG))
+        assert np.abs(front[:, 0] - middle).min() >= 0.95 * radius * np.sin(
+            np.radians(COAT_OPEN_DEG)
+        )
 
 
 def test_a_garment_moves_with_the_pelvis(body: Body) -> None:
     betas, R, t = np.zeros(body.P), exp(np.array([0.1, 0.7, -0.2])), np.array([0.3, -0.1, 3.0])
     garment = skirt(body, betas)
     placed = garment.placed(body, betas, R, t)
-    np.testing.assert_allclose((placed - t) @ R + body.rest_joints(betas)[0], garment.points, atol=1e-12)
+    np.testing.assert_allclose(
+        (placed - t) @ R + body.rest_joints(betas)[0], garment.points, atol=1e-12
+    )
 
 
 def test_girths_and_mass_grow_with_the_body(body: Body) -> None:
-    """A body larger by a tenth has girths larger by a tenth and 1.1³ times the mass; mass as of a rendered person."""
+    """A body larger by a tenth has girths larger by a tenth and 1.1³ times the mass; mass as of a
+    rendered person.
+    """
     betas = np.zeros(body.P)
     waist, hips = girths_m(body, betas)
     assert 0.65 < waist < 0.95

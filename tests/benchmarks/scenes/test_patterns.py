@@ -1,11 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of walls and floors are colours, have the colour that was asked for, and repeat without a seam."""
+"""Pictures of walls and floors are colours, have the colour that was asked for, and repeat without
+a seam.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.benchmarks.scenes.patterns import SIDE, boards, bricks, mottled, noise, painting, stripes, tiles
+from scope.benchmarks.scenes.patterns import (
+    SIDE,
+    boards,
+    bricks,
+    mottled,
+    noise,
+    painting,
+    stripes,
+    tiles,
+)
 
 COLOR = np.array([0.4, 0.3, 0.2])
 

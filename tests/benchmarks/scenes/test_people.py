@@ -48,4 +48,6 @@ def test_the_default_body_weighs_what_people_weigh(body, person):
     # by the divergence theorem, with other coordinates: V = sum of z dA
     a, b, c = np.moveaxis(body.v_template[body.triangles()], 1, 0)
     volume = ((a + b + c)[:, 2] / 3 * np.cross(b - a, c - a)[:, 2] / 2).sum()
-    assert index == pytest.approx(DENSITY * abs(volume) / body.stature(np.zeros(body.P)) ** 2, rel=0.01)
+    assert index == pytest.approx(
+        DENSITY * abs(volume) / body.stature(np.zeros(body.P)) ** 2, rel=0.01
+    )

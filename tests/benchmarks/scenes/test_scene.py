@@ -15,7 +15,9 @@ from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
 
 @pytest.fixture
 def scene(body):
-    """Somebody who stands at the origin and faces -y, seen from the front at 4 m, behind a box of half a metre."""
+    """Somebody who stands at the origin and faces -y, seen from the front at 4 m, behind a box of
+    half a metre.
+    """
     rotations = np.tile(np.eye(3), (2, body.K + 1, 1, 1))
     rotations[:, 0] = R_WORLD_MODEL
     trans = np.tile([0.0, 0.0, 0.93] - body.rest_joints(np.zeros(body.P))[0], (2, 1))
@@ -23,7 +25,19 @@ def scene(body):
     K = np.array([[600.0, 0, 319.5], [0, 600, 239.5], [0, 0, 1]])
     pose = look_at(np.array([0.0, -4.0, 0.9]), np.array([0.0, 0.0, 0.9]))
     block = Block(np.array([-1.0, -1.5, 0.0]), np.array([1.0, -1.0, 0.5]))
-    return Scene(1, TEST, (person,), K, np.tile(pose, (2, 1, 1)), (640, 480), 30.0, STATIC, OUTDOORS, block, 0)
+    return Scene(
+        1,
+        TEST,
+        (person,),
+        K,
+        np.tile(pose, (2, 1, 1)),
+        (640, 480),
+        30.0,
+        STATIC,
+        OUTDOORS,
+        block,
+        0,
+    )
 
 
 def test_what_the_box_hides(body, scene):
@@ -69,4 +83,5 @@ def test_the_ground_truth_projects_to_where_the_person_is(body, scene, tmp_path)
     # the camera looks along +y: x to the right, y down
     for name, (x, y, z) in limbs.items():
         np.testing.assert_allclose(camera[name], [x, 0.9 - z, y + 4.0], atol=1e-9)
-    assert limbs["left_hip"][0] > 0 > limbs["right_hip"][0]  # faces the camera: the left is on the picture's right
+    # faces the camera: the left is on the picture's right
+    assert limbs["left_hip"][0] > 0 > limbs["right_hip"][0]

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Scenes in Blender: the person is drawn where the ground truth says, and nothing hides people or the camera."""
+"""Scenes in Blender: the person is drawn where the ground truth says, and nothing hides people or
+the camera.
+"""
 
 from __future__ import annotations
 
@@ -55,7 +57,11 @@ def test_nothing_stands_between_camera_and_person(body, surroundings, seed):
     scene = scene_of(body, surroundings, seed)
     build_scene(scene, body)
     eye, middle = scene.world_from_camera[0, :3, 3], scene.people[0].joints(body)[0].mean(axis=0)
-    others = [thing for thing in bpy.data.objects if thing.type == "MESH" and not thing.name.startswith("person")]
+    others = [
+        thing
+        for thing in bpy.data.objects
+        if thing.type == "MESH" and not thing.name.startswith("person")
+    ]
     assert len(others) > 3
     bpy.context.view_layer.update()
     for thing in others:

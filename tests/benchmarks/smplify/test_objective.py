@@ -9,8 +9,11 @@ from scope.benchmarks.smplify.objective import ROOT, SIGMA_PX, UPRIGHT, Frame, O
 from scope.solver.rotations import exp
 
 K = np.array([[900.0, 0, 480], [0, 900, 270], [0, 0, 1]])
-NAMES = tuple(f"{side}_{part}" for part in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "heel", "foot_index")
-              for side in ("left", "right"))  # fmt: skip
+NAMES = tuple(
+    f"{side}_{part}"
+    for part in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "heel", "foot_index")
+    for side in ("left", "right")
+)
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +51,8 @@ def test_a_known_body_is_found_from_any_heading(body, prior, truth):
     objective = Objective(body, prior, frame_at(body, truth))
     found = objective.fit()
     off = objective.joints(found.x) - objective.joints(truth)
-    assert np.linalg.norm(off - off[0], axis=1).max() < 0.12  # a frame alone tells little about depth
+    # a frame alone tells little about depth
+    assert np.linalg.norm(off - off[0], axis=1).max() < 0.12
     assert abs(off[0, 2]) < 0.2  # size and distance trade places
     pixels = objective.residuals(found.x[None], 0.0, 0.0)[0, : 2 * len(NAMES)].reshape(-1, 2)
     assert np.linalg.norm(pixels, axis=1).max() < 4.0
@@ -66,7 +70,9 @@ def test_the_priors_whitening_is_that_of_its_samples():
     A = 3.0 * np.eye(6) + rng.normal(size=(6, 6))
     poses = rng.normal(size=(20000, 6)) @ A.T + 0.3
     prior = PosePrior.of(poses)
-    np.testing.assert_allclose(np.cov(((poses - prior.mean) @ prior.whitening.T).T), np.eye(6), atol=0.01)
+    np.testing.assert_allclose(
+        np.cov(((poses - prior.mean) @ prior.whitening.T).T), np.eye(6), atol=0.01
+    )
 
 
 def test_joints_that_bend_the_wrong_way_cost_most(body, prior, truth):

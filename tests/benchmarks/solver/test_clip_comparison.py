@@ -16,5 +16,7 @@ def test_dense_matrix_and_elimination_give_the_same_step():
     solve_clip(problem.tree, system, 1.0, scale, factor)
     d = solve_cholesky(*dense_equations(system, 5, parts, count, 1.0, scale))
     steps, shared = d[:-count].reshape(5, -1), d[-count:]
-    np.testing.assert_allclose(steps, factor.d[:, : steps.shape[1]], rtol=0, atol=1e-8 * np.abs(d).max())
+    np.testing.assert_allclose(
+        steps, factor.d[:, : steps.shape[1]], rtol=0, atol=1e-8 * np.abs(d).max()
+    )
     np.testing.assert_allclose(shared, factor.dg[:count], rtol=0, atol=1e-8 * np.abs(d).max())

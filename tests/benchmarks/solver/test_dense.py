@@ -11,11 +11,17 @@ from scope.solver.gauss_newton.recursion import make_workspace, step
 
 
 @pytest.mark.parametrize(
-    ("K", "P", "N", "prior"), [(23, 10, 52, True), (23, 10, 120, False), (51, 10, 120, False), (23, 0, 120, False)]
+    ("K", "P", "N", "prior"),
+    [(23, 10, 52, True), (23, 10, 120, False), (51, 10, 120, False), (23, 0, 120, False)],
 )
 def test_dense_and_sparse_steps_agree(K, P, N, prior):
     p = make_problem(K, P, N, prior)
-    pose, blocks, work, dense = make_pose(p.tree), make_blocks(p.tree), make_workspace(p.tree), Dense(p)
+    pose, blocks, work, dense = (
+        make_pose(p.tree),
+        make_blocks(p.tree),
+        make_workspace(p.tree),
+        Dense(p),
+    )
     for k in (0, 5):
         put(p.bank, k, pose)
         linearize(p.tree, p.terms, p.stage, 0.0, pose, blocks, work.scratch)

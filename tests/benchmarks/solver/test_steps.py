@@ -8,12 +8,17 @@ from scope.benchmarks.solver import steps
 
 @pytest.fixture
 def made(monkeypatch):
-    """Problems as their sizes; times that grow with K for the sparse step, with its cube for the dense one."""
+    """Problems as their sizes; times that grow with K for the sparse step, with its cube for the
+    dense one.
+    """
     monkeypatch.setattr(steps, "make_problem", lambda K, P, N: (K, P, N))
     sizes = {"sparse": lambda K: K / 23, "dense": lambda K: 10 * (K / 23) ** 3}
 
     def compare(problems, rounds):
-        return tuple({n: sizes[kind](p[0]) for n, p in problems.items()} for kind in ("sparse", "sparse", "dense"))
+        return tuple(
+            {n: sizes[kind](p[0]) for n, p in problems.items()}
+            for kind in ("sparse", "sparse", "dense")
+        )
 
     monkeypatch.setattr(steps, "compare", compare)
 
@@ -26,7 +31,9 @@ def test_experiment_3_has_one_term_of_each_kind_for_every_part(made):
 
 
 def test_experiments_1_and_2_grow_in_terms(made):
-    assert {(row["P"], row["N"]) for row in steps.experiment(1, 1)} == {(0, n) for n in (120, 240, 360, 480, 600)}
+    assert {(row["P"], row["N"]) for row in steps.experiment(1, 1)} == {
+        (0, n) for n in (120, 240, 360, 480, 600)
+    }
     assert {row["P"] for row in steps.experiment(2, 1)} == {10}
 
 

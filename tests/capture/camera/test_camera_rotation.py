@@ -16,17 +16,25 @@ FPS = 30.0
 
 @pytest.fixture(scope="module")
 def panorama():
-    """A texture with corners everywhere: blocks of noise at three sizes, seen by a static wide camera."""
+    """A texture with corners everywhere: blocks of noise at three sizes, seen by a static wide
+    camera.
+    """
     rng = np.random.default_rng(0)
     layers = [
-        cv2.resize(rng.integers(0, 255, (n, 2 * n, 3), np.uint8), (3600, 1800), interpolation=cv2.INTER_CUBIC)
+        cv2.resize(
+            rng.integers(0, 255, (n, 2 * n, 3), np.uint8),
+            (3600, 1800),
+            interpolation=cv2.INTER_CUBIC,
+        )
         for n in (20, 60, 180)
     ]
     return np.mean(layers, axis=0).astype(np.uint8)
 
 
 def view(panorama, R_first_camera):
-    """The image of a rotated camera: the panorama is a plane at infinity in front of the first camera."""
+    """The image of a rotated camera: the panorama is a plane at infinity in front of the first
+    camera.
+    """
     wide = pinhole(3600, 1800, FOCAL)
     H = wide @ R_first_camera @ np.linalg.inv(K)
     return cv2.warpPerspective(panorama, np.linalg.inv(H), (WIDTH, HEIGHT), flags=cv2.INTER_LINEAR)
@@ -84,7 +92,9 @@ def test_a_large_moving_object_does_not_disturb_the_estimate(panorama):
     T = 45
     truth = exp(np.linspace(0, 0.25, T)[:, None] * [0.0, 1.0, 0.0])
     rng = np.random.default_rng(2)
-    lorry = cv2.resize(rng.integers(0, 255, (20, 20, 3), np.uint8), (400, 400), interpolation=cv2.INTER_CUBIC)
+    lorry = cv2.resize(
+        rng.integers(0, 255, (20, 20, 3), np.uint8), (400, 400), interpolation=cv2.INTER_CUBIC
+    )
 
     def picture(k):
         image = view(panorama, truth[k])
@@ -116,7 +126,11 @@ def test_a_short_blackout_is_bridged(panorama):
     truth = exp(np.linspace(0, 0.3, T)[:, None] * [0.0, 1.0, 0.0])
 
     def picture(k):
-        return np.zeros((HEIGHT, WIDTH, 3), np.uint8) if k in (30, 31, 32) else view(panorama, truth[k])
+        return (
+            np.zeros((HEIGHT, WIDTH, 3), np.uint8)
+            if k in (30, 31, 32)
+            else view(panorama, truth[k])
+        )
 
     found = follow(picture(k) for k in range(T))
     assert not found.is_static

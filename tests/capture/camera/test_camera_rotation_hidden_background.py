@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Edges that people hide at first: drawn rooms with a known camera, through which somebody walks."""
+"""Edges that people hide at first: drawn rooms with a known camera, through which somebody
+walks.
+"""
 
 from collections.abc import Callable
 
@@ -23,16 +25,21 @@ HEIGHT_PX = np.array([40.0, 680.0])  # of the person, from head to feet
 
 
 def office() -> NDArray[np.uint8]:
-    """A cupboard on the left, whose shelves determine one horizontal direction, books leaning in it, and a door.
+    """A cupboard on the left, whose shelves determine one horizontal direction, books leaning in
+    it, and a door.
 
-    The cupboard's posts are seen from one side, so that lines along them agree with any direction in a plane: with that
-    of the books as well as with up.
+    The cupboard's posts are seen from one side, so that lines along them agree with any direction
+    in a plane: with that of the books as well as with up.
     """
     noise = np.random.default_rng(5).integers(110, 130, (90, 90), np.uint8)
-    picture = cv2.resize(np.repeat(noise[..., None], 3, axis=2), (WIDTH, HEIGHT), interpolation=cv2.INTER_CUBIC)
+    picture = cv2.resize(
+        np.repeat(noise[..., None], 3, axis=2), (WIDTH, HEIGHT), interpolation=cv2.INTER_CUBIC
+    )
 
     def line(through: NDArray[np.float64], along: NDArray[np.float64], half_m: float) -> None:
-        ends = np.array([through - half_m * along, through + half_m * along]) @ R_CAMERA_LEVEL.T @ K.T
+        ends = (
+            np.array([through - half_m * along, through + half_m * along]) @ R_CAMERA_LEVEL.T @ K.T
+        )
         (x0, y0), (x1, y1) = np.round(ends[:, :2] / ends[:, 2:] * 16).astype(int).tolist()
         cv2.line(picture, (x0, y0), (x1, y1), (30, 30, 30), 3, cv2.LINE_AA, shift=4)
 
@@ -57,7 +64,9 @@ def person_at(x: float) -> NDArray[np.float64]:
 def lines_after(
     positions: list[float], picture: Callable[[int], NDArray[np.uint8]] | None = None, cut: int = -1
 ) -> Lines:
-    """The lines after a walk; somebody is drawn as a striped box, so that it has edges of its own."""
+    """The lines after a walk; somebody is drawn as a striped box, so that it has edges of its
+    own.
+    """
     tracker = BackgroundTracker(CAMERA, WIDTH, HEIGHT)
     background = office()
     for k, x in enumerate(positions):
@@ -92,7 +101,9 @@ def test_a_door_that_somebody_hid_at_first_decides_which_way_is_up() -> None:
 
 def test_edges_are_counted_once_however_often_they_come_into_view() -> None:
     once = lines_after([560.0, *np.linspace(560.0, 200.0, 24)])
-    again = lines_after([560.0, *np.linspace(560.0, 200.0, 24), *np.linspace(200.0, 560.0, 24), *[200.0] * 12])
+    again = lines_after(
+        [560.0, *np.linspace(560.0, 200.0, 24), *np.linspace(200.0, 560.0, 24), *[200.0] * 12]
+    )
     assert len(again.lengths) == len(once.lengths)
     assert again.lengths.sum() == pytest.approx(once.lengths.sum())
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Heading drift: the edges of a hall seen by a camera of known rotation, and a runner on a straight path."""
+"""Heading drift: the edges of a hall seen by a camera of known rotation, and a runner on a straight
+path.
+"""
 
 import numpy as np
 import pytest
@@ -18,7 +20,13 @@ CAMERA = Camera(pinhole(WIDTH, HEIGHT, 1100.0), np.zeros(5), "given")
 def edges(rng, directions, count=25):
     """(n, 2, 3) ends of edges in space along each of the directions."""
     starts = rng.uniform([-8, -3, 5], [14, 3, 12], (len(directions) * count, 3))
-    return np.stack([starts, starts + np.repeat(directions, count, axis=0) * rng.uniform(1, 4, (len(starts), 1))], 1)
+    return np.stack(
+        [
+            starts,
+            starts + np.repeat(directions, count, axis=0) * rng.uniform(1, 4, (len(starts), 1)),
+        ],
+        1,
+    )
 
 
 def seen(rng, ends, R_camera_hall, center, noise_px=0.5):
@@ -34,7 +42,9 @@ def seen(rng, ends, R_camera_hall, center, noise_px=0.5):
 
 
 def run(clutter, directions=None):
-    """Errors in degrees before and after, of a camera that pans and travels, and whose rotation is overestimated."""
+    """Errors in degrees before and after, of a camera that pans and travels, and whose rotation is
+    overestimated.
+    """
     rng = np.random.default_rng(3)
     T = 150
     times = np.arange(T) / 25
@@ -43,12 +53,20 @@ def run(clutter, directions=None):
     truth = exp(s * [0.02, 0.25, -0.01])  # R_first_camera
     drifted = exp(s * [0.01, 0.4, 0.02]) @ truth
     ends = edges(rng, np.eye(3) if directions is None else directions)
-    ends = np.concatenate([ends, edges(rng, rng.standard_normal((clutter, 3)), 1)]) if clutter else ends
+    ends = (
+        np.concatenate([ends, edges(rng, rng.standard_normal((clutter, 3)), 1)])
+        if clutter
+        else ends
+    )
     edge_frames = [
-        FrameEdges(k, seen(rng, ends, truth[k].T @ hall, np.array([4.0 * k / T, 0, 0]))) for k in (0, *range(12, T, 12))
+        FrameEdges(k, seen(rng, ends, truth[k].T @ hall, np.array([4.0 * k / T, 0, 0])))
+        for k in (0, *range(12, T, 12))
     ]
     found = remove_heading_drift(drifted, times, edge_frames, CAMERA, (WIDTH, HEIGHT))
-    error = [np.degrees(np.linalg.norm(log(np.swapaxes(truth, 1, 2) @ R), axis=1)).max() for R in (drifted, found)]
+    error = [
+        np.degrees(np.linalg.norm(log(np.swapaxes(truth, 1, 2) @ R), axis=1)).max()
+        for R in (drifted, found)
+    ]
     np.testing.assert_allclose(found[0], np.eye(3), atol=1e-9)
     return error, found, drifted
 

@@ -21,7 +21,9 @@ def test_focal_mm_is_35_mm_equivalent():
 
 def test_metadata_counts_only_without_the_users_value():
     assert np.isclose(choose_camera(3600, 2000, metadata_focal_mm=26).intrinsics[0, 0], 2600)
-    assert np.isclose(choose_camera(3600, 2000, metadata_focal_mm=26, focal_mm=50).intrinsics[0, 0], 5000)
+    assert np.isclose(
+        choose_camera(3600, 2000, metadata_focal_mm=26, focal_mm=50).intrinsics[0, 0], 5000
+    )
     assert "assumed" in choose_camera(640, 480).source
 
 
@@ -39,7 +41,11 @@ def test_a_distorting_lens_and_a_background_without_features():
     assert camera.rays(np.zeros((0, 2))).shape == (0, 3)
     background = BackgroundTracker(camera, 320, 240)
     for k, grey in enumerate((0, 0, 128, 128)):
-        background.add(np.full((240, 320, 3), grey, np.uint8), k / 10, [np.array([[100.0, 60.0], [160.0, 200.0]])])
+        background.add(
+            np.full((240, 320, 3), grey, np.uint8),
+            k / 10,
+            [np.array([[100.0, 60.0], [160.0, 200.0]])],
+        )
     record = background.record()
     motion = record.motion(camera, camera, (320, 240))
     assert motion.is_static

@@ -42,7 +42,9 @@ def test_drawn_lines_are_found_where_they_are(scale: int) -> None:
         longest = max((np.linalg.norm(s[1] - s[0]) for s in on_it), default=0.0)
         assert longest > 0.9 * np.linalg.norm(np.subtract(*line))
     ends = found.ends_px[0]
-    assert found.lengths[0] == pytest.approx(np.linalg.norm(ends[1] - ends[0]) / (scale * WIDTH), rel=1e-6)
+    assert found.lengths[0] == pytest.approx(
+        np.linalg.norm(ends[1] - ends[0]) / (scale * WIDTH), rel=1e-6
+    )
 
 
 def test_edges_on_people_and_at_bars_are_left_out() -> None:
@@ -79,7 +81,9 @@ def test_the_plane_of_a_segment_contains_the_line_that_it_shows() -> None:
 
 def test_segments_of_several_images_are_the_longest_first() -> None:
     rng = np.random.default_rng(3)
-    parts = [Segments(rng.normal(size=(n, 2, 2)), np.sort(rng.uniform(size=n))[::-1]) for n in (3, 0, 4)]
+    parts = [
+        Segments(rng.normal(size=(n, 2, 2)), np.sort(rng.uniform(size=n))[::-1]) for n in (3, 0, 4)
+    ]
     both = Segments.of_all(parts)
     assert (np.diff(both.lengths) <= 0).all()
     for part in parts:

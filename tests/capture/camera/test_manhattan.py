@@ -17,7 +17,11 @@ def projected(R_camera_room: np.ndarray, rng: np.random.Generator, others: int) 
     ends: list[np.ndarray] = []
     while len(ends) < 60 + others:
         a = rng.uniform([-4, -2, -3], [4, 2, 3])
-        step = np.eye(3)[len(ends) // 20] * rng.uniform(1, 3) if len(ends) < 60 else rng.uniform(-1, 1, 3)
+        step = (
+            np.eye(3)[len(ends) // 20] * rng.uniform(1, 3)
+            if len(ends) < 60
+            else rng.uniform(-1, 1, 3)
+        )
         points = np.stack([a, a + step]) @ R_camera_room.T + [0, 0, 8.0]
         if points[:, 2].min() > 0.5:
             ends.append(FOCAL_PX * points[:, :2] / points[:, 2:] + [WIDTH / 2, HEIGHT / 2])
@@ -35,18 +39,23 @@ def test_the_axes_of_a_room_are_found(turn: tuple[float, float, float], others: 
     np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-5)
     agreement = np.abs(axes @ R)
     assert agreement[0, 1] > np.cos(np.radians(0.3))  # up is the room's y axis
-    assert agreement.max(axis=0).min() > np.cos(np.radians(0.5))  # and each axis is one of the three
+    # and each axis is one of the three
+    assert agreement.max(axis=0).min() > np.cos(np.radians(0.5))
     assert explained == pytest.approx(edges.support(FOCAL_PX))
 
 
 def test_the_true_focal_length_explains_most() -> None:
-    edges = Edges.of(projected(exp(np.array([0.15, 0.6, 0.05])), np.random.default_rng(5), 10), WIDTH, HEIGHT)
+    edges = Edges.of(
+        projected(exp(np.array([0.15, 0.6, 0.05])), np.random.default_rng(5), 10), WIDTH, HEIGHT
+    )
     support = {factor: edges.support(factor * FOCAL_PX) for factor in (0.6, 0.8, 1.0, 1.25, 1.6)}
     assert max(support, key=lambda factor: support[factor]) == 1.0
 
 
 def test_each_edge_counts_as_far_as_it_points_at_the_nearest_vanishing_point() -> None:
-    edges = Edges.of(projected(exp(np.array([0.1, 0.6, 0.05])), np.random.default_rng(3), 40), WIDTH, HEIGHT)
+    edges = Edges.of(
+        projected(exp(np.array([0.1, 0.6, 0.05])), np.random.default_rng(3), 40), WIDTH, HEIGHT
+    )
     explained, axes = edges.axes(FOCAL_PX)
     expected = 0.0
     for middle, along, weight in zip(edges.middle, edges.along, edges.weight, strict=True):
@@ -66,8 +75,13 @@ def test_steps_lead_to_the_directions_of_the_lines() -> None:
     rng = np.random.default_rng(7)
     true = exp(rng.normal(size=3))
     normals = np.cross(true[np.arange(60) % 3], rng.normal(size=(60, 3)))
-    lines = Lines(normals / np.linalg.norm(normals, axis=1, keepdims=True), rng.uniform(0.1, 0.5, 60))
-    found, supports = np.asarray(true @ exp(np.array([0.02, -0.03, 0.015])).T, np.float64), np.zeros(3)
+    lines = Lines(
+        normals / np.linalg.norm(normals, axis=1, keepdims=True), rng.uniform(0.1, 0.5, 60)
+    )
+    found, supports = (
+        np.asarray(true @ exp(np.array([0.02, -0.03, 0.015])).T, np.float64),
+        np.zeros(3),
+    )
     for _ in range(8):
         H, g, supports = line_normal_equations(lines, found, sigma=0.05)
         found = found @ exp(np.linalg.solve(H, g)).T
@@ -84,10 +98,15 @@ def test_directions_without_value_do_not_count() -> None:
 
 def test_several_sets_of_directions_at_once() -> None:
     rng = np.random.default_rng(11)
-    lines, several = Lines(rng.normal(size=(20, 3)) / 2, rng.uniform(0.1, 0.5, 20)), exp(rng.normal(size=(4, 3)))
+    lines, several = (
+        Lines(rng.normal(size=(20, 3)) / 2, rng.uniform(0.1, 0.5, 20)),
+        exp(rng.normal(size=(4, 3))),
+    )
     together = line_normal_equations(lines, several, 0.3, np.array([2.0, 1.0, 1.0]))
     for k, directions in enumerate(several):
         for all_of_them, one in zip(
-            together, line_normal_equations(lines, directions, 0.3, np.array([2.0, 1.0, 1.0])), strict=True
+            together,
+            line_normal_equations(lines, directions, 0.3, np.array([2.0, 1.0, 1.0])),
+            strict=True,
         ):
             np.testing.assert_allclose(all_of_them[k], one, rtol=1e-12)

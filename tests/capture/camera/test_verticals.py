@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Up from vertical and horizontal edges: drawn rooms with a known camera, and real pictures with known up."""
+"""Up from vertical and horizontal edges: drawn rooms with a known camera, and real pictures with
+known up.
+"""
 
 import cv2
 import numpy as np
@@ -26,7 +28,14 @@ def room(R_camera_level, posts=14, clutter=0, seed=0, across=10, tiles=0):
         if (ends[:, 2] > 0.5).all():
             pixels = ends @ K.T
             pixels = np.round(pixels[:, :2] / pixels[:, 2:]).astype(int)
-            cv2.line(picture, tuple(map(int, pixels[0])), tuple(map(int, pixels[1])), colour, 3, cv2.LINE_AA)
+            cv2.line(
+                picture,
+                tuple(map(int, pixels[0])),
+                tuple(map(int, pixels[1])),
+                colour,
+                3,
+                cv2.LINE_AA,
+            )
 
     for _ in range(posts):
         x, z = rng.uniform(-4, 4), rng.uniform(4, 9)
@@ -65,26 +74,38 @@ def test_a_tiled_floor_determines_up_without_vertical_edges(turn):
     truth = R @ LEVEL_UP
     picture = room(R, posts=0, across=0, tiles=8, clutter=10)
     leaning = exp([0.12, 0.0, 0.15]) @ truth
-    assert angle_deg(estimate_up_from_lines(find_segments(picture, []).lines(CAMERA), leaning).up, truth) < 1.0
+    assert (
+        angle_deg(
+            estimate_up_from_lines(find_segments(picture, []).lines(CAMERA), leaning).up, truth
+        )
+        < 1.0
+    )
 
 
 def test_a_body_that_leans_by_thirty_degrees_is_corrected():
     """Bodies appear to lean when the camera looks down steeply."""
     truth = LEVEL_UP
     lines = find_segments(room(np.eye(3), tiles=4), []).lines(CAMERA)
-    assert angle_deg(estimate_up_from_lines(lines, exp([np.radians(30), 0.0, 0.0]) @ truth).up, truth) < 1.0
+    assert (
+        angle_deg(estimate_up_from_lines(lines, exp([np.radians(30), 0.0, 0.0]) @ truth).up, truth)
+        < 1.0
+    )
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_ramp_next_to_a_floor_is_ambiguous(seed):
-    """Edges across both, and as many along either: one of them determines up, both together do not."""
+    """Edges across both, and as many along either: one of them determines up, both together do
+    not.
+    """
     rng = np.random.default_rng(seed)
     up_of = {"floor": LEVEL_UP, "ramp": exp([np.radians(16), 0, 0]) @ LEVEL_UP}
     R = exp([0.0, 0.5, 0.0])
     between = exp([np.radians(8), 0, 0]) @ LEVEL_UP
 
     def edges(direction, count):
-        through = np.stack([rng.uniform(-0.5, 0.5, count), rng.uniform(-0.3, 0.3, count), np.ones(count)], axis=1)
+        through = np.stack(
+            [rng.uniform(-0.5, 0.5, count), rng.uniform(-0.3, 0.3, count), np.ones(count)], axis=1
+        )
         normals = np.cross(through, direction)
         return normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
@@ -93,10 +114,16 @@ def test_a_ramp_next_to_a_floor_is_ambiguous(seed):
     for name, up in up_of.items():
         normals = np.concatenate([across, along[name]])
         assert (
-            angle_deg(estimate_up_from_lines(Lines(normals, np.full(len(normals), 0.1)), R @ between).up, R @ up) < 1.0
+            angle_deg(
+                estimate_up_from_lines(Lines(normals, np.full(len(normals), 0.1)), R @ between).up,
+                R @ up,
+            )
+            < 1.0
         )
     normals = np.concatenate([across, *along.values()])
-    assert estimate_up_from_lines(Lines(normals, np.full(len(normals), 0.1)), R @ between).up is None
+    assert (
+        estimate_up_from_lines(Lines(normals, np.full(len(normals), 0.1)), R @ between).up is None
+    )
 
 
 @pytest.mark.parametrize("turn", [[0, 0, 0.12], [-0.1, 0.1, -0.1]])
@@ -111,12 +138,16 @@ def test_a_fence_determines_a_horizontal_direction_but_not_up(turn):
     assert source == BODIES
     off_deg = angle_deg(up, R @ LEVEL_UP)
     assert off_deg < 0.8 * angle_deg(leaning, R @ LEVEL_UP)
-    assert off_deg == pytest.approx(np.degrees(0.1), abs=1.2)  # the pitch, which no edge determines, remains
+    # the pitch, which no edge determines, remains
+    assert off_deg == pytest.approx(np.degrees(0.1), abs=1.2)
 
 
 def test_a_banister_is_not_horizontal():
     R = exp([0.0, 0.0, 0.5])  # of the edges, not of the camera
-    assert estimate_up_from_lines(find_segments(room(R, posts=0), []).lines(CAMERA), LEVEL_UP).level is None
+    assert (
+        estimate_up_from_lines(find_segments(room(R, posts=0), []).lines(CAMERA), LEVEL_UP).level
+        is None
+    )
 
 
 def test_few_posts_are_enough_where_horizontal_edges_agree():
@@ -143,7 +174,10 @@ def test_a_picture_without_vertical_edges_determines_nothing():
     blank = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
     assert estimate_up_from_lines(find_segments(blank, []).lines(CAMERA), LEVEL_UP).up is None
     horizontal_edges_only = room(np.eye(3), posts=0)
-    assert estimate_up_from_lines(find_segments(horizontal_edges_only, []).lines(CAMERA), LEVEL_UP).up is None
+    assert (
+        estimate_up_from_lines(find_segments(horizontal_edges_only, []).lines(CAMERA), LEVEL_UP).up
+        is None
+    )
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -151,13 +185,15 @@ def test_leaves_and_rubbish_do_not_tilt_the_world(seed):
     rubbish = room(np.eye(3), posts=0, clutter=60, seed=seed)
     estimate = estimate_up_from_lines(find_segments(rubbish, []).lines(CAMERA), LEVEL_UP)
     assert estimate.up is None
-    assert angle_deg(estimate.level, LEVEL_UP) == pytest.approx(90, abs=0.2)  # the level edges among it
+    # the level edges among it
+    assert angle_deg(estimate.level, LEVEL_UP) == pytest.approx(90, abs=0.2)
 
 
 def test_lines_on_people_are_left_out():
     picture = room(np.eye(3), posts=0)
     for k in range(12):
-        cv2.line(picture, (600 + 8 * k, 200), (500 + 8 * k, 520), (0, 0, 0), 3)  # somebody's striped coat
+        # somebody's striped coat
+        cv2.line(picture, (600 + 8 * k, 200), (500 + 8 * k, 520), (0, 0, 0), 3)
     box = np.array([[480.0, 190.0], [700.0, 530.0]])
     assert len(find_segments(picture, []).lengths) > len(find_segments(picture, [box]).lengths) + 5
 

@@ -44,23 +44,32 @@ def test_the_mean_shape_stays_when_the_shape_is_left_out(body: Body) -> None:
     for shape in (True, False):
         given = Ablation(lifter=False, keypoint_offsets=False, shape=shape)
         prepared = prepare_track(body, track, camera, given)
-        found[shape] = np.abs(fit_shape_to_outline(prepared, usable_masks(prepared), None).beta).max()
+        found[shape] = np.abs(
+            fit_shape_to_outline(prepared, usable_masks(prepared), None).beta
+        ).max()
     assert found[True] > 0.5
     assert found[False] < 0.02
 
 
-def test_without_its_own_prior_proportions_and_stature_go_together_as_in_the_population(body: Body) -> None:
-    """As in the population, where short people have relatively long trunks: see `with_unknown_stature`."""
+def test_without_its_own_prior_proportions_and_stature_go_together_as_in_the_population(
+    body: Body,
+) -> None:
+    """As in the population, where short people have relatively long trunks: see
+    `with_unknown_stature`.
+    """
     track, camera = seen_in(body, np.zeros(body.P), None), Camera(K, np.zeros(5), "test")
     information = [
-        prepare_track(body, track, camera, Ablation(stature=own)).priors.shape_information for own in (True, False)
+        prepare_track(body, track, camera, Ablation(stature=own)).priors.shape_information
+        for own in (True, False)
     ]
     assert information[0] is not None
     assert information[1] is None or np.allclose(information[1], np.diag(np.diag(information[1])))
     assert not np.allclose(information[0], np.diag(np.diag(information[0])))
 
 
-def test_limbs_are_not_searched_for_when_the_search_is_left_out(body: Body, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_limbs_are_not_searched_for_when_the_search_is_left_out(
+    body: Body, monkeypatch: pytest.MonkeyPatch
+) -> None:
     calls: list[int] = []
     monkeypatch.setattr(clip_fit, "search_limbs", lambda *_: calls.append(1))
     track, camera = seen_in(body, np.zeros(body.P), None), Camera(K, np.zeros(5), "test")

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The focal length is that of the frames, whenever they are added, and only compiling is reported as such."""
+"""The focal length is that of the frames, whenever they are added, and only compiling is reported
+as such.
+"""
 
 import threading
 from dataclasses import replace
@@ -62,13 +64,16 @@ def test_a_cancel_while_compiling_is_passed_on(monkeypatch):
 
 TIMES = np.arange(34) / 8.0
 SEEN = (TIMES >= 0.5) & ~((TIMES > 1.8) & (TIMES < 2.4))
-FITTED = [0.5, 0.75, 1.25, 2.5, 4.125]  # after at least 0.2, 0.4, 0.8 and 1.6 s, where somebody is seen
+# after at least 0.2, 0.4, 0.8 and 1.6 s, where somebody is seen
+FITTED = [0.5, 0.75, 1.25, 2.5, 4.125]
 PEOPLE = [(time_s, SimpleNamespace(time_s=time_s)) for time_s in TIMES[SEEN].tolist()]
 BARS = [np.array([0.0, 0.0, 8.0, 48.0]), np.array([56.0, 0.0, 64.0, 48.0])]
 
 
 class RecordedFits(FocalFits):
-    """Fits that record the times of their frames, and prefer focal lengths that are longer by a third."""
+    """Fits that record the times of their frames, and prefer focal lengths that are longer by a
+    third.
+    """
 
     def __init__(self):
         super().__init__(None)
@@ -93,13 +98,16 @@ class Background:
 
 
 def estimate(frames, replayed=(), lag=0, given=None):
-    """The camera, and the fits, if some frames are added one by one and some of `PEOPLE` at the end.
+    """The camera, and the fits, if some frames are added one by one and some of `PEOPLE` at the
+    end.
 
     :param lag: 1: the background of a frame is ready only when the next one is added.
     """
     fits, followed, live = RecordedFits(), Background(), SimpleNamespace(load=lambda: None)
     largest = dict(PEOPLE)
-    with BackgroundEstimators(given or assumed_camera(64, 48, 64.0), 64, 48, live, fits) as background:
+    with BackgroundEstimators(
+        given or assumed_camera(64, 48, 64.0), 64, 48, live, fits
+    ) as background:
         for row in range(frames):
             if row >= lag:
                 followed.add(row - lag)
@@ -112,7 +120,9 @@ def estimate(frames, replayed=(), lag=0, given=None):
 
 @pytest.mark.parametrize("lag", [0, 1])
 @pytest.mark.parametrize("frames", [len(TIMES), 17, 11, 3])
-def test_the_focal_length_is_the_same_from_frames_that_were_added_and_from_people_at_the_end(frames, lag):
+def test_the_focal_length_is_the_same_from_frames_that_were_added_and_from_people_at_the_end(
+    frames, lag
+):
     alone, alone_fits = estimate(0, PEOPLE)
     both, both_fits = estimate(frames, PEOPLE, lag)
     assert alone_fits.times == FITTED

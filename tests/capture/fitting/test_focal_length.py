@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The focal length from edges: drawn boxes seen by a known camera, and real images with known calibration."""
+"""The focal length from edges: drawn boxes seen by a known camera, and real images with known
+calibration.
+"""
 
 import json
 
@@ -27,7 +29,14 @@ def room(focal_px, R_camera_room, clutter=20, seed=0):
         if (ends[:, 2] > 0.5).all():
             pixels = ends @ K.T
             pixels = np.round(pixels[:, :2] / pixels[:, 2:]).astype(int)
-            cv2.line(picture, tuple(map(int, pixels[0])), tuple(map(int, pixels[1])), colour, 3, cv2.LINE_AA)
+            cv2.line(
+                picture,
+                tuple(map(int, pixels[0])),
+                tuple(map(int, pixels[1])),
+                colour,
+                3,
+                cv2.LINE_AA,
+            )
 
     for axis in range(3):
         for _ in range(14):
@@ -65,12 +74,16 @@ def test_a_wall_seen_frontally_gives_no_estimate():
 
 @pytest.mark.parametrize("ratio", [0.5, 1.0, 2.0])
 def test_horizontal_edges_count_at_every_focal_length_without_vertical_ones(ratio):
-    """Otherwise, a focal length at which two edges happen to meet vertically above would have no competitor."""
+    """Otherwise, a focal length at which two edges happen to meet vertically above would have no
+    competitor.
+    """
     floor = np.full((HEIGHT, WIDTH, 3), 120, np.uint8)
     for y in (380, 400, 470, 690):
         cv2.line(floor, (40, y), (1240, y), (30, 30, 30), 3)
     for side in (-1, 1):  # a mat's, which meet at the horizon
-        cv2.line(floor, (640 + side * 260, 470), (640 + side * 640, 690), (220, 220, 220), 3, cv2.LINE_AA)
+        cv2.line(
+            floor, (640 + side * 260, 470), (640 + side * 640, 690), (220, 220, 220), 3, cv2.LINE_AA
+        )
     edges = Edges.of(find_segments(floor, []), WIDTH, HEIGHT)
     level = np.abs(edges.along[:, 1]) < 0.01
     assert level.sum() >= 4
@@ -95,14 +108,20 @@ def test_random_edges_give_no_estimate(seed):
 
 @pytest.mark.parametrize("number", [1, 2, 3, 4])
 def test_real_cameras(shared, number):
-    """Four images of a laboratory; one of them has too few edges in depth and must not give an estimate."""
+    """Four images of a laboratory; one of them has too few edges in depth and must not give an
+    estimate.
+    """
     folder = shared / "data" / "pose2sim"
     ok, picture = cv2.VideoCapture(str(folder / f"cam{number}.mp4")).read()
     assert ok
     height, width = picture.shape[:2]
-    truth = json.loads((folder / f"calibration_cam{number}.json").read_text("utf-8"))["intrinsics"][0][0]
+    truth = json.loads((folder / f"calibration_cam{number}.json").read_text("utf-8"))["intrinsics"][
+        0
+    ][0]
     assumed = 1.2 * truth  # so that what was assumed is no help
-    estimate = focal_from_edges(find_segments(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), []), width, height, assumed)
+    estimate = focal_from_edges(
+        find_segments(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), []), width, height, assumed
+    )
     if number == 4:
         assert estimate is None
     else:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The focal length from fits: the body itself in front of known cameras, and our own clip with exact ground truth."""
+"""The focal length from fits: the body itself in front of known cameras, and our own clip with
+exact ground truth.
+"""
 
 from __future__ import annotations
 
@@ -23,24 +25,42 @@ from scope.solver.rotations import exp
 WIDTH, HEIGHT = 1080, 1920
 ASSUMED = assumed_camera(WIDTH, HEIGHT, float(HEIGHT))
 POSES = [  # axis-angle of joints; arms and legs reach towards the camera and away from it
-    {"left_hip": [-1.2, 0, 0], "left_knee": [0.6, 0, 0], "right_shoulder": [0, 1.2, 0], "left_shoulder": [0, 0, -1.2]},
-    {"right_hip": [-0.8, 0, 0.3], "left_hip": [0.5, 0, 0], "left_shoulder": [0, -1.4, 0], "spine1": [0.4, 0, 0]},
+    {
+        "left_hip": [-1.2, 0, 0],
+        "left_knee": [0.6, 0, 0],
+        "right_shoulder": [0, 1.2, 0],
+        "left_shoulder": [0, 0, -1.2],
+    },
+    {
+        "right_hip": [-0.8, 0, 0.3],
+        "left_hip": [0.5, 0, 0],
+        "left_shoulder": [0, -1.4, 0],
+        "spine1": [0.4, 0, 0],
+    },
     {"left_shoulder": [0, 0.9, -0.5], "right_shoulder": [0, 1.4, 0.3], "right_hip": [0.7, 0, 0]},
 ]
 
 
 def observe(body, pose, ratio: float, distance_m: float, pitch: float = 0.35) -> Observation:
-    """The body seen by a camera with ``ratio`` times the assumed focal length that looks down on it."""
+    """The body seen by a camera with ``ratio`` times the assumed focal length that looks down on
+    it.
+    """
     rotations = np.tile(np.eye(3), (body.K + 1, 1, 1))
     rotations[0] = exp([pitch, 0, 0]) @ np.diag([1.0, -1.0, -1.0])
     for joint, vector in pose.items():
         rotations[body.joint_names.index(joint)] = exp(np.array(vector, float))
     R, t = body.forward_kinematics(rotations, np.array([0, 0, distance_m]), np.zeros(body.P))
     at = body.keypoint_set("blazepose")
-    points = with_keypoint_offsets(body).keypoints(R, t, np.zeros(body.P))[[at[name] for name in KEYPOINT_NAMES]]
-    pixels = points[:, :2] / points[:, 2:] * ratio * ASSUMED.intrinsics[0, 0] + ASSUMED.intrinsics[:2, 2]
+    points = with_keypoint_offsets(body).keypoints(R, t, np.zeros(body.P))[
+        [at[name] for name in KEYPOINT_NAMES]
+    ]
+    pixels = (
+        points[:, :2] / points[:, 2:] * ratio * ASSUMED.intrinsics[0, 0] + ASSUMED.intrinsics[:2, 2]
+    )
     region = Region((WIDTH / 2, HEIGHT / 2), float(HEIGHT), 0.0)
-    return Observation(pixels, np.ones(len(points)), points - points[HIPS].mean(0), 1.0, region, acquired=True)
+    return Observation(
+        pixels, np.ones(len(points)), points - points[HIPS].mean(0), 1.0, region, acquired=True
+    )
 
 
 def found(body, ratio: float, distance_m: float):
@@ -54,9 +74,14 @@ def found(body, ratio: float, distance_m: float):
 
 
 def test_a_nearby_person_determines_the_focal_length(body):
-    """At 1.3 m and half the focal length, a person is as large in the image as at 2.6 m and the full one."""
+    """At 1.3 m and half the focal length, a person is as large in the image as at 2.6 m and the
+    full one.
+    """
     ratios = [0.6, 1.0, 1.6]
-    log_f = [np.log(found(body, ratio, 2.2 * ratio).intrinsics[0, 0] / ASSUMED.intrinsics[0, 0]) for ratio in ratios]
+    log_f = [
+        np.log(found(body, ratio, 2.2 * ratio).intrinsics[0, 0] / ASSUMED.intrinsics[0, 0])
+        for ratio in ratios
+    ]
     assert log_f[0] < log_f[1] - 0.1 < log_f[2] - 0.2
     before, after = np.log(ratios), np.log(ratios) - log_f
     assert np.square(after).mean() < 0.7 * np.square(before).mean()
@@ -80,7 +105,9 @@ def test_a_more_certain_estimate_from_edges_weighs_more(body):
     assert camera_by_fits(by_edges, ASSUMED, [], float(HEIGHT)) is by_edges
 
 
-@pytest.mark.parametrize(("seconds", "least", "most"), [(0.01, 1, 1), (1.5, 3, 5), (60.0, 7, 10), (3600.0, 13, 16)])
+@pytest.mark.parametrize(
+    ("seconds", "least", "most"), [(0.01, 1, 1), (1.5, 3, 5), (60.0, 7, 10), (3600.0, 13, 16)]
+)
 def test_an_hour_takes_few_more_fits_than_a_minute(body, seconds, least, most):
     fits = FocalFits(body)
     due = [k for k in range(int(30 * seconds) + 1) if fits.is_due(7.0 + k / 30)]

@@ -27,7 +27,15 @@ from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.left_right import MIRROR_PARTNER, repair_left_right
 from scope.scope_addon.capture.tracking.track import Tracklet, make_track
 from scope.scope_addon.errors import UsageError
-from scope.solver import Keypoints2D, Measurements, OrientationField, State, default_priors, fit, load_body
+from scope.solver import (
+    Keypoints2D,
+    Measurements,
+    OrientationField,
+    State,
+    default_priors,
+    fit,
+    load_body,
+)
 from scope.solver.compiled.part import Part
 from scope.solver.residuals.joint_limits import evaluate
 from scope.solver.rotations import exp, log
@@ -43,7 +51,9 @@ def body():
 
 
 def somebody(body, grips) -> State:
-    """Arms half raised towards the camera; every finger joint bends by the hand's grip, in radians."""
+    """Arms half raised towards the camera; every finger joint bends by the hand's grip, in
+    radians.
+    """
     Omega = np.tile(np.eye(3), (body.K, 1, 1))
     for side, sign, grip in zip(SIDES, (1.0, -1.0), grips, strict=True):
         at = {name: body.joint_names.index(f"{side}_{name}") - 1 for name in ("shoulder", "elbow")}
@@ -62,7 +72,9 @@ def points_of(body, state):
 
 
 def line_of_sight(points):
-    """(3, 3) rotation from camera axes to axes that look at the centre of the points, without roll."""
+    """(3, 3) rotation from camera axes to axes that look at the centre of the points, without
+    roll.
+    """
     z = points.mean(axis=0) / points[:, 2].mean()
     z = z / np.linalg.norm(z)
     x = np.cross([0.0, 1.0, 0.0], z)
@@ -71,10 +83,16 @@ def line_of_sight(points):
 
 
 def hands_of(body, points):
-    """(2, 21, 6) the output of a perfect network for both hands: world landmarks in the axes of the line of sight."""
+    """(2, 21, 6) the output of a perfect network for both hands: world landmarks in the axes of the
+    line of sight.
+    """
     hands = np.zeros((2, HAND_POINTS, 6))
     for side, name in enumerate(SIDES):
-        at = [body.keypoint_names.index(n) for n in HAND_KEYPOINT_NAMES if n.startswith(f"hand/{name}")]
+        at = [
+            body.keypoint_names.index(n)
+            for n in HAND_KEYPOINT_NAMES
+            if n.startswith(f"hand/{name}")
+        ]
         p = points[at]
         pixels = p @ K.T
         hands[side, :, :2], hands[side, :, 2] = pixels[:, :2] / pixels[:, 2:], 1.0
@@ -100,7 +118,9 @@ def fitted(body, measured):
 
 
 def bends(body, Omega, side):
-    """(12,) flexion of each finger joint in radians: its rotation vector's component about the body's z axis."""
+    """(12,) flexion of each finger joint in radians: its rotation vector's component about the
+    body's z axis.
+    """
     sign = -1.0 if side == "left" else 1.0
     return sign * log(Omega[np.array(finger_joints(body, side)[:12]) - 1])[:, 2]
 
@@ -113,7 +133,9 @@ def test_the_fingers_of_a_known_pose_are_recovered(body):
         assert np.abs(bends(body, found.state.Omega, side) - grip).mean() < 0.12
         joints = finger_joints(body, side)
         true_R = np.concatenate([truth.R_camera_root[None], truth.Omega])
-        t = body.forward_kinematics(true_R, truth.t_camera_root - body.rest_joints(truth.beta)[0], truth.beta)[1]
+        t = body.forward_kinematics(
+            true_R, truth.t_camera_root - body.rest_joints(truth.beta)[0], truth.beta
+        )[1]
         wrist = body.joint_names.index(f"{side}_wrist")
         ours = found.t_camera_part[joints] - found.t_camera_part[wrist]
         assert np.linalg.norm(ours - (t[joints] - t[wrist]), axis=1).mean() < 0.008  # metres
@@ -139,9 +161,9 @@ def test_the_palm_determines_the_wrists_rotation(body):
     truth.Omega[wrist - 1] = exp([0.7, 0.0, 0.3])
     points = points_of(body, truth)
     found = fitted(body, measure(body, points, hands_of(body, points)))
-    R = body.forward_kinematics(np.concatenate([truth.R_camera_root[None], truth.Omega]), np.zeros(3), truth.beta)[0][
-        wrist
-    ]
+    R = body.forward_kinematics(
+        np.concatenate([truth.R_camera_root[None], truth.Omega]), np.zeros(3), truth.beta
+    )[0][wrist]
     assert np.linalg.norm(log(R.T @ found.R_camera_part[wrist])) < 0.2
 
 
@@ -161,7 +183,9 @@ def test_directions_are_rotated_from_the_line_of_sight_to_camera_axes(body):
 
 def _joints(body, state):
     R = np.concatenate([state.R_camera_root[None], state.Omega])
-    return body.forward_kinematics(R, state.t_camera_root - body.rest_joints(state.beta)[0], state.beta)[1]
+    return body.forward_kinematics(
+        R, state.t_camera_root - body.rest_joints(state.beta)[0], state.beta
+    )[1]
 
 
 def test_limits_let_fingers_bend_towards_the_palm_only(body):
@@ -177,7 +201,9 @@ def test_limits_let_fingers_bend_towards_the_palm_only(body):
 
 
 def _bent(Omega, P) -> Part:
-    return Part(np.eye(3), np.zeros(3), np.zeros((3, P)), Omega, np.eye(3), np.zeros(3), np.zeros(P))
+    return Part(
+        np.eye(3), np.zeros(3), np.zeros((3, P)), Omega, np.eye(3), np.zeros(3), np.zeros(P)
+    )
 
 
 def test_unseen_fingers_are_interpolated_over_short_gaps_and_rest_in_long_ones(body):
@@ -235,7 +261,9 @@ def test_tracks_keep_hands_in_their_rows_and_swap_them_with_left_and_right():
         hands = np.zeros((2, HAND_POINTS, 6))
         hands[0] = row
         where = Region((0.0, 0.0), 1.0, 0.0)
-        tracklet.add(row, Observation(np.zeros((33, 2)), np.ones(33), WALKER, 1.0, where, False, hands=hands))
+        tracklet.add(
+            row, Observation(np.zeros((33, 2)), np.ones(33), WALKER, 1.0, where, False, hands=hands)
+        )
     track = make_track([0, 1, 2], [0.0, 0.1, 0.2], [tracklet])
     assert [track.hands[k, 0].max() for k in range(3)] == [0, 1, 2]
     assert track.hands.dtype == np.float32  # an hour of one person's take 110 MB
@@ -249,7 +277,9 @@ def test_tracks_keep_hands_in_their_rows_and_swap_them_with_left_and_right():
 
 
 def weights_of(body, presence: float, size_px: float) -> tuple[float, float]:
-    """Sums of the weights of the keypoints and of the directions of a hand of a presence and a size."""
+    """Sums of the weights of the keypoints and of the directions of a hand of a presence and a
+    size.
+    """
     hands = np.zeros((2, HAND_POINTS, 6))
     hands[0, :, :2] = 300.0 + size_px * np.linspace(0.0, 1.0, HAND_POINTS)[:, None] * [0.6, 0.8]
     hands[0, HAND_NAMES.index("middle_finger_mcp"), :2] = 300.0 + size_px * np.array([0.6, 0.8])
@@ -257,16 +287,24 @@ def weights_of(body, presence: float, size_px: float) -> tuple[float, float]:
     hands[0, :, 3:] = np.random.default_rng(0).normal(0, 0.05, (HAND_POINTS, 3))
     empty = Measurements(
         keypoints2d=Keypoints2D(np.zeros(0, int), np.zeros((0, 2)), np.zeros(0)),
-        orientation_field=OrientationField(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 3)), np.zeros(0)),
+        orientation_field=OrientationField(
+            np.zeros(0, int), np.zeros(0, int), np.zeros((0, 3)), np.zeros(0)
+        ),
     )
-    added = HandMeasurer(body, np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]])).add(empty, hands)
+    added = HandMeasurer(body, np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]])).add(
+        empty, hands
+    )
     assert added.keypoints2d is not None
     assert added.orientation_field is not None
-    return float(np.sum(added.keypoints2d.confidence)), float(np.sum(added.orientation_field.confidence))
+    return float(np.sum(added.keypoints2d.confidence)), float(
+        np.sum(added.orientation_field.confidence)
+    )
 
 
 def test_directions_of_a_hand_that_is_hardly_present_count_less_than_its_place(body):
-    (place, turn), (place_low, turn_low) = (weights_of(body, presence, 100.0) for presence in (0.9, 0.3))
+    (place, turn), (place_low, turn_low) = (
+        weights_of(body, presence, 100.0) for presence in (0.9, 0.3)
+    )
     assert place_low / place == pytest.approx(1 / 3)
     assert turn_low / turn < 0.1
 

@@ -20,8 +20,12 @@ def test_everything_is_where_it_is_with_fingers_at_rest():
     R, t = body.forward_kinematics(rotations, root, betas)
     R_palms, t_palms = palms.forward_kinematics(rotations[at], root, betas)
     np.testing.assert_allclose(t_palms, t[at], atol=1e-12)
-    np.testing.assert_allclose(palms.keypoints(R_palms, t_palms, betas), body.keypoints(R, t, betas), atol=1e-12)
-    np.testing.assert_allclose(palms.skin(R_palms, t_palms, betas), body.skin(R, t, betas), atol=1e-12)
+    np.testing.assert_allclose(
+        palms.keypoints(R_palms, t_palms, betas), body.keypoints(R, t, betas), atol=1e-12
+    )
+    np.testing.assert_allclose(
+        palms.skin(R_palms, t_palms, betas), body.skin(R, t, betas), atol=1e-12
+    )
     assert palms.keypoint_names == body.keypoint_names
 
 

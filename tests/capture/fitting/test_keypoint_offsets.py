@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keypoint offsets: symmetric, recovered if known, and an improvement on people they were not estimated from."""
+"""Keypoint offsets: symmetric, recovered if known, and an improvement on people they were not
+estimated from.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,9 @@ def test_left_and_right_are_mirror_images(body):
     at = body.keypoint_set("blazepose")
     for name in BLAZEPOSE:
         if name.startswith("left_"):
-            left, right = (seen.keypoint_template[at[n]] for n in (name, name.replace("left", "right")))
+            left, right = (
+                seen.keypoint_template[at[n]] for n in (name, name.replace("left", "right"))
+            )
             np.testing.assert_allclose(left, right * [-1, 1, 1], atol=2e-5, err_msg=name)
 
 
@@ -47,7 +51,9 @@ def test_only_the_networks_keypoints_move(body):
 
 
 def left_over_px(body: Body, motion: Motion) -> float:
-    """Median distance of confident keypoints from the body's, by OpenCV's rotation vectors and projection."""
+    """Median distance of confident keypoints from the body's, by OpenCV's rotation vectors and
+    projection.
+    """
     names = motion.keypoints2d_names.tolist()
     at = body.keypoint_set("blazepose")
     found = []
@@ -58,7 +64,9 @@ def left_over_px(body: Body, motion: Motion) -> float:
         points = body.keypoints(*body.forward_kinematics(R, root, motion.betas), motion.betas)
         points = points[[at[name] for name in BLAZEPOSE]].astype(float)
         intrinsics = motion.intrinsics.astype(float)
-        pixels = cv2.projectPoints(points, np.zeros(3), np.zeros(3), intrinsics, np.zeros(5))[0][:, 0]
+        pixels = cv2.projectPoints(points, np.zeros(3), np.zeros(3), intrinsics, np.zeros(5))[0][
+            :, 0
+        ]
         seen = motion.keypoints2d[t, [names.index(name) for name in BLAZEPOSE]]
         found.append(np.linalg.norm(seen[:, :2] - pixels, axis=1)[seen[:, 2] > 0.5])
     return float(np.median(np.concatenate(found)))
@@ -75,9 +83,13 @@ def test_keypoints_of_a_network_without_depth_get_no_offsets(body):
 
 
 def test_a_hip_is_as_confident_as_the_knee_that_determines_its_rotation(body):
-    """Keypoints at joints do not determine the rotation of these joints; keypoints further down the chain do."""
+    """Keypoints at joints do not determine the rotation of these joints; keypoints further down the
+    chain do.
+    """
     measurer = Measurer(with_keypoint_offsets(body), choose_camera(1280, 720).intrinsics)
-    hidden = np.array([any(part in name for part in ("knee", "ankle", "heel", "foot")) for name in BLAZEPOSE])
+    hidden = np.array(
+        [any(part in name for part in ("knee", "ankle", "heel", "foot")) for name in BLAZEPOSE]
+    )
     confidence = np.ones((1, len(BLAZEPOSE)))
     confidence[:, hidden] = 0.0
     joints = dict(zip(body.joint_names, measurer.joint_confidence(confidence)[0], strict=True))
@@ -93,16 +105,25 @@ class Recorded(SimpleNamespace):
 
 
 def test_known_offsets_are_recovered(body):
-    """On a body that turns in front of the camera, with keypoints displaced symmetrically by some centimetres."""
+    """On a body that turns in front of the camera, with keypoints displaced symmetrically by some
+    centimetres.
+    """
     rng = np.random.default_rng(2)
     displaced = {name: rng.normal(0, 0.012, 3) for name in BLAZEPOSE if "right" not in name}
     displaced["nose"][0] = 0.0
     mirror = np.array([-1.0, 1.0, 1.0])
-    shifts = [displaced[n] if n in displaced else displaced[n.replace("right", "left")] * mirror for n in BLAZEPOSE]
+    shifts = [
+        displaced[n] if n in displaced else displaced[n.replace("right", "left")] * mirror
+        for n in BLAZEPOSE
+    ]
     at = [body.keypoint_set("blazepose")[name] for name in BLAZEPOSE]
     template = body.keypoint_template.copy()
     template[at] += np.array(shifts)
-    seen, T, K = replace(body, keypoint_template=template), 24, np.array([[900.0, 0, 640], [0, 900, 360], [0, 0, 1]])
+    seen, T, K = (
+        replace(body, keypoint_template=template),
+        24,
+        np.array([[900.0, 0, 640], [0, 900, 360], [0, 0, 1]]),
+    )
     poses = rng.normal(0, 0.2, (T, body.K + 1, 3))
     poses[:, 0] = np.linspace(0, 2 * np.pi, T)[:, None] * np.array([0.1, 1.0, 0.0])
     R_world_camera = exp(np.array([2.8, 0.1, 0.2]))
@@ -114,21 +135,31 @@ def test_known_offsets_are_recovered(body):
     motion = Recorded(
         betas=np.zeros(body.P),
         poses=poses.reshape(T, -1),
-        world_from_camera=np.tile(np.block([[R_world_camera, np.zeros((3, 1))], [np.zeros(3), 1.0]]), (T, 1, 1)),
+        world_from_camera=np.tile(
+            np.block([[R_world_camera, np.zeros((3, 1))], [np.zeros(3), 1.0]]), (T, 1, 1)
+        ),
         joints_cam=t,
-        keypoints2d=np.concatenate([pixels[..., :2] / pixels[..., 2:], np.ones((T, len(at), 1))], axis=-1),
+        keypoints2d=np.concatenate(
+            [pixels[..., :2] / pixels[..., 2:], np.ones((T, len(at), 1))], axis=-1
+        ),
         keypoints2d_names=np.array(BLAZEPOSE),
         intrinsics=K,
         valid=np.ones(T, bool),
     )
-    found = offsets(*(100 * each for each in normal_equations(body, motion)))  # as of a hundred people
+    # as of a hundred people
+    found = offsets(*(100 * each for each in normal_equations(body, motion)))
     np.testing.assert_allclose(found, shifts, atol=2e-3)
 
 
 def test_offsets_lower_the_reprojection_error_of_a_man_they_were_not_estimated_from(shared, body):
     video, wanted = shared / "data" / "pose2sim" / "cam3.mp4", VideoRange(end_s=0.6)
     left_over = []
-    for which, ablation in ((body, Ablation(keypoint_offsets=False)), (with_keypoint_offsets(body), Ablation())):
-        (motion,) = capture(video, body, CaptureOptions(quality="balanced", ablation=ablation, wanted=wanted)).motions
+    for which, ablation in (
+        (body, Ablation(keypoint_offsets=False)),
+        (with_keypoint_offsets(body), Ablation()),
+    ):
+        (motion,) = capture(
+            video, body, CaptureOptions(quality="balanced", ablation=ablation, wanted=wanted)
+        ).motions
         left_over.append(left_over_px(which, motion))
     assert left_over[1] < 0.9 * left_over[0]

@@ -24,7 +24,9 @@ LIMBS = [1, 2, 4, 5, 7, 8, 16, 17, 18, 19, 20, 21]
 
 @pytest.fixture(scope="module")
 def watched(body):
-    """The sample's capture, and the live pose of every sixth frame: (frame index, picture, pose)."""
+    """The sample's capture, and the live pose of every sixth frame: (frame index, picture,
+    pose).
+    """
     seen = []
 
     def watch(frame, observation, live):

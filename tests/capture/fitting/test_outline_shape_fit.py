@@ -1,12 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shape from masks and keypoints as in a capture: garments fatten a body up to a limit, however wide they are."""
+"""The shape from masks and keypoints as in a capture: garments fatten a body up to a limit, however
+wide they are.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scope.benchmarks.scenes.garments import COAT_M, SKIRT_M, Garment, coat, girths_m, mass_kg, skirt
+from scope.benchmarks.scenes.garments import (
+    COAT_M,
+    SKIRT_M,
+    Garment,
+    coat,
+    girths_m,
+    mass_kg,
+    skirt,
+)
 from scope.scope_addon.capture.camera.intrinsics import Camera
 from scope.scope_addon.capture.fitting import outline
 from scope.scope_addon.capture.fitting.ablation import Ablation
@@ -31,7 +41,9 @@ def seen() -> dict[object, Track]:
 def added_by(
     body: Body, seen: dict[object, Track], seed: int | None, name: str = "", times: float = 0.0
 ) -> tuple[float, float]:
-    """The larger gain of waist and hips, metres, and of mass, kg, of the captured shape over the true one."""
+    """The larger gain of waist and hips, metres, and of mass, kg, of the captured shape over the
+    true one.
+    """
     betas, key = shape_of(body, seed), (name, times, seed)
     if key not in seen:
         seen[key] = seen_in(body, betas, garment_of(body, betas, name, times) if name else None)
@@ -43,7 +55,9 @@ def added_by(
 
 
 def shape_of(body: Body, seed: int | None) -> NDArray[np.float64]:
-    return np.zeros(body.P) if seed is None else np.random.default_rng(seed).uniform(-1.2, 1.2, body.P)
+    return (
+        np.zeros(body.P) if seed is None else np.random.default_rng(seed).uniform(-1.2, 1.2, body.P)
+    )
 
 
 def garment_of(body: Body, betas: NDArray[np.float64], name: str, times: float) -> Garment:
@@ -52,7 +66,9 @@ def garment_of(body: Body, betas: NDArray[np.float64], name: str, times: float) 
 
 
 @pytest.mark.parametrize("seed", SHAPES)
-def test_a_body_without_garments_keeps_its_girths(body: Body, seen: dict[object, Track], seed: int | None) -> None:
+def test_a_body_without_garments_keeps_its_girths(
+    body: Body, seen: dict[object, Track], seed: int | None
+) -> None:
     girth, mass = added_by(body, seen, seed)
     assert abs(girth) < 0.03
     assert abs(mass) < 3.0
@@ -66,7 +82,8 @@ def test_garments_fatten_a_body_up_to_a_limit_however_wide_they_are(
     added = [added_by(body, seen, seed, name, times) for times in HEMS]
     assert max(girth for girth, _ in added) < GIRTH_M[name]
     assert max(mass for _, mass in added) < MASS_KG[name]
-    assert added[-1][1] < 0.8 * max(mass for _, mass in added)  # what is wider than bodies counts less
+    # what is wider than bodies counts less
+    assert added[-1][1] < 0.8 * max(mass for _, mass in added)
 
 
 @pytest.mark.parametrize(("name", "hem"), [("skirt", 1.0), ("coat", 2.0)])

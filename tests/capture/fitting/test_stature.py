@@ -13,7 +13,14 @@ from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.cli import build_parser
 from scope.scope_addon.command_line.arguments import body_and_options
 from scope.scope_addon.errors import UsageError
-from scope.solver import Keypoints2D, Measurements, OrientationField, default_priors, fit_clip, load_body
+from scope.solver import (
+    Keypoints2D,
+    Measurements,
+    OrientationField,
+    default_priors,
+    fit_clip,
+    load_body,
+)
 from scope.solver.loaders.body_file import ASSETS
 from scope.solver.rotations import exp
 
@@ -35,7 +42,9 @@ def test_the_mean_is_the_most_probable_shape_of_a_height(height_m):
 
 
 def test_an_unknown_stature_depends_less_on_proportions_and_varies_among_people():
-    """Conditioning on any linear proportion of β moves the stature by 1 / (1 + κ) of what it moves under N(0, I)."""
+    """Conditioning on any linear proportion of β moves the stature by 1 / (1 + κ) of what it moves
+    under N(0, I).
+    """
     body = load_body("scope")
     before, after = default_priors(body), with_unknown_stature(default_priors(body), body)
     assert before.shape_information is None
@@ -51,7 +60,9 @@ def test_an_unknown_stature_depends_less_on_proportions_and_varies_among_people(
 
 
 def test_a_long_trunk_is_found_and_does_not_make_a_person_short():
-    """A trunk that is 12 % longer on average legs, from keypoints alone: the trunk's share of the stature grows."""
+    """A trunk that is 12 % longer on average legs, from keypoints alone: the trunk's share of the
+    stature grows.
+    """
     body = load_body("scope")
     person = longer_trunk(body, 1.12)
     weights = replace(WEIGHTS, shape=WEIGHTS.shape * 8)
@@ -69,7 +80,9 @@ def test_a_long_trunk_is_found_and_does_not_make_a_person_short():
 
 
 def longer_trunk(body, factor):
-    hip, shoulder = (body.J_template[body.joint_names.index(f"left_{joint}"), 1] for joint in ("hip", "shoulder"))
+    hip, shoulder = (
+        body.J_template[body.joint_names.index(f"left_{joint}"), 1] for joint in ("hip", "shoulder")
+    )
 
     def lift(points):
         out = points.copy()
@@ -95,13 +108,19 @@ def seen_from(person, heading):
     R, t = person.forward_kinematics(rotations, np.array([0, 0, 4.5]))
     at = np.array(sorted(person.keypoint_set("blazepose").values()))
     pixels = person.keypoints(R, t)[at] @ K.T
-    bones = [(f"{s}_{a}", f"{s}_{b}") for s in ("left", "right") for a, b in (("shoulder", "elbow"), ("hip", "knee"))]
+    bones = [
+        (f"{s}_{a}", f"{s}_{b}")
+        for s in ("left", "right")
+        for a, b in (("shoulder", "elbow"), ("hip", "knee"))
+    ]
     ends = np.array([[names.index(name) for name in bone] for bone in bones])
     return Measurements(
         intrinsics=K,
         keypoints2d=Keypoints2D(at, pixels[:, :2] / pixels[:, 2:], np.ones(len(at))),
         orientation_field=OrientationField(
-            *(len(person.keypoint_names) + ends.T), t[ends[:, 1]] - t[ends[:, 0]], np.ones(len(ends))
+            *(len(person.keypoint_names) + ends.T),
+            t[ends[:, 1]] - t[ends[:, 0]],
+            np.ones(len(ends)),
         ),
     )
 
@@ -113,7 +132,9 @@ def trunk(body, betas):
 
 @pytest.mark.parametrize("height_m", [0.8, 0.95, 1.1, 1.3, 1.44])
 def test_below_the_stature_of_adults_the_most_probable_shape_is_a_childs(height_m):
-    """Legs grow faster than the trunk: sitting height is 0.62 of the stature at one year, 0.52 at twelve (Fredriks)."""
+    """Legs grow faster than the trunk: sitting height is 0.62 of the stature at one year, 0.52 at
+    twelve (Fredriks).
+    """
     body = load_body("scope_child")
     betas = np.asarray(with_stature(default_priors(body), body, height_m).shape_mean)
     assert np.ptp(body.rest_vertices(betas)[:, 1]) == pytest.approx(height_m, abs=0.003)
@@ -121,7 +142,8 @@ def test_below_the_stature_of_adults_the_most_probable_shape_is_a_childs(height_
     share = np.interp(height_m, [0.75, 0.87, 1.15, 1.5], [0.62, 0.585, 0.548, 0.52])
     J, low = body.rest_joints(betas), body.rest_vertices(betas)[:, 1].min()
     hip = J[body.joint_names.index("left_hip"), 1] - low
-    assert hip / height_m == pytest.approx(1.0535 - share, abs=0.04)  # the joint is above the seat, as in adults
+    # the joint is above the seat, as in adults
+    assert hip / height_m == pytest.approx(1.0535 - share, abs=0.04)
 
 
 @pytest.mark.parametrize("height_m", [None, 1.5, 1.8])
@@ -130,8 +152,14 @@ def test_adults_are_the_same_with_the_body_of_all_ages(height_m):
     means = []
     for body in (adult, of_ages):
         priors = default_priors(body)
-        priors = with_unknown_stature(priors, body) if height_m is None else with_stature(priors, body, height_m)
-        means.append(np.zeros(body.P) if priors.shape_mean is None else np.asarray(priors.shape_mean))
+        priors = (
+            with_unknown_stature(priors, body)
+            if height_m is None
+            else with_stature(priors, body, height_m)
+        )
+        means.append(
+            np.zeros(body.P) if priors.shape_mean is None else np.asarray(priors.shape_mean)
+        )
         information = np.asarray(priors.shape_information)
         assert means[-1].shape == (body.P,)
         np.testing.assert_allclose(np.linalg.inv(information)[10:], 0.0, atol=1e-4)
@@ -144,7 +172,11 @@ def test_adults_are_the_same_with_the_body_of_all_ages(height_m):
     [
         (0.3, "a height of 30 cm is not plausible"),
         (np.nan, "nan"),
-        (1.0, "can be 127 to 213 cm tall, not 100: use the body 'scope_child', which can be 80 to 213 cm tall"),
+        (
+            1.0,
+            "can be 127 to 213 cm tall, not 100: use the body 'scope_child', which can be 80 to "
+            "213 cm tall",
+        ),
         (0.7, "can be 127 to 213 cm tall, not 70: omit the height"),
         (2.5, "not 250"),
         (-1.8, "-180"),
@@ -160,21 +192,39 @@ def test_a_known_height_sets_size_and_distance():
     body = load_body("scope")
     found = {}
     for height_m in (1.5, 1.9):
-        options = CaptureOptions("fast", heights_m=(height_m, 1.6), fov_deg=60.0, wanted=VideoRange(0, 0.5))
+        options = CaptureOptions(
+            "fast", heights_m=(height_m, 1.6), fov_deg=60.0, wanted=VideoRange(0, 0.5)
+        )
         result = capture(SAMPLE, body, options)
         motion = result.motions[0]
         assert body.stature(motion.betas) == pytest.approx(height_m, abs=0.015)
         assert result.report["per_person"][0]["height_m"] == pytest.approx(height_m, abs=0.015)
         assert result.report["per_person"][0]["height_sigma_m"] == pytest.approx(0.005, abs=0.002)
-        assert any("2 heights were given, but one person was found" in text for text in result.report["warnings"])
+        assert any(
+            "2 heights were given, but one person was found" in text
+            for text in result.report["warnings"]
+        )
         found[height_m] = np.linalg.norm(motion.joints_cam[:, 0], axis=1).mean()
     assert found[1.9] / found[1.5] == pytest.approx(1.9 / 1.5, rel=0.05)
 
 
 def test_the_height_of_a_child_gives_a_child():
-    arguments = ["capture", str(SAMPLE), "--height", "110", "--quality", "fast", "--fov", "60", "--end", "0.5"]
+    arguments = [
+        "capture",
+        str(SAMPLE),
+        "--height",
+        "110",
+        "--quality",
+        "fast",
+        "--fov",
+        "60",
+        "--end",
+        "0.5",
+    ]
     body, options = body_and_options(build_parser().parse_args(arguments))
     (motion,) = capture(SAMPLE, body, options).motions
     assert motion.body_model == body.name == "scope_child"
-    assert np.ptp(body.rest_vertices(motion.betas.astype(float))[:, 1]) == pytest.approx(1.1, abs=0.01)
+    assert np.ptp(body.rest_vertices(motion.betas.astype(float))[:, 1]) == pytest.approx(
+        1.1, abs=0.01
+    )
     assert (np.abs(motion.betas[:-1]) < 4).all()

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The standard deviation of a captured stature against the true statures of people drawn from the population."""
+"""The standard deviation of a captured stature against the true statures of people drawn from the
+population.
+"""
 
 from __future__ import annotations
 
@@ -19,16 +21,26 @@ BODY, CAMERA = load_body("scope"), choose_camera(1080, 1920)
 
 
 def _track(rng: np.random.Generator, betas: np.ndarray) -> Track:
-    """A person of a shape, 4 m away, at arbitrary angles of view, by keypoints with 4 pixels of noise."""
+    """A person of a shape, 4 m away, at arbitrary angles of view, by keypoints with 4 pixels of
+    noise.
+    """
     flip, J = np.diag([1.0, -1.0, -1.0]), len(KEYPOINT_NAMES)
     rotations = np.tile(np.eye(3), (FRAMES, BODY.K + 1, 1, 1))
-    rotations[:, 0] = flip @ exp(np.outer(rng.uniform(-1.0, 1.0) + 0.1 * np.arange(FRAMES), [0.0, 1.0, 0.0]))
+    rotations[:, 0] = flip @ exp(
+        np.outer(rng.uniform(-1.0, 1.0) + 0.1 * np.arange(FRAMES), [0.0, 1.0, 0.0])
+    )
     R, t = BODY.forward_kinematics(rotations, np.tile([0.0, 0.0, 4.0], (FRAMES, 1)), betas)
     at = BODY.keypoint_set("blazepose")
-    points = with_keypoint_offsets(BODY).keypoints(R, t, betas, [at[name] for name in KEYPOINT_NAMES])
+    points = with_keypoint_offsets(BODY).keypoints(
+        R, t, betas, [at[name] for name in KEYPOINT_NAMES]
+    )
     pixels = points[..., :2] / points[..., 2:] * CAMERA.intrinsics[0, 0] + CAMERA.intrinsics[:2, 2]
     hips = [KEYPOINT_NAMES.index(f"{side}_hip") for side in ("left", "right")]
-    landmarks = (points - points[:, hips].mean(axis=1, keepdims=True)) * BODY.stature() / BODY.stature(betas)
+    landmarks = (
+        (points - points[:, hips].mean(axis=1, keepdims=True))
+        * BODY.stature()
+        / BODY.stature(betas)
+    )
     return Track(
         frames=np.arange(FRAMES),
         times=np.arange(FRAMES) / 30.0,

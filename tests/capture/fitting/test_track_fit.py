@@ -29,7 +29,9 @@ FEET = np.array([1.0, 1.0, 1.0, 1.0, 0.0, 0.0])  # stand, and hands do not
 
 
 def _standing_track(body, camera, bent=()) -> Track:
-    """A person upright, 4 m in front of the camera, in the rest pose except for ``bent`` (joint, radians about x)."""
+    """A person upright, 4 m in front of the camera, in the rest pose except for ``bent`` (joint,
+    radians about x).
+    """
     flip = np.diag([1.0, -1.0, -1.0])  # body y up, OpenCV y down
     rotations = np.tile(np.eye(3), (1, body.K + 1, 1, 1))
     rotations[:, 0] = flip
@@ -37,7 +39,9 @@ def _standing_track(body, camera, bent=()) -> Track:
         rotations[:, body.joint_names.index(joint)] = exp(np.array([angle, 0.0, 0.0]))
     R, t = body.forward_kinematics(rotations, np.array([[0.0, 0.0, 4.0]]), np.zeros(body.P))
     at = body.keypoint_set("blazepose")
-    points = with_keypoint_offsets(body).keypoints(R, t, np.zeros(body.P))[0, [at[name] for name in KEYPOINT_NAMES]]
+    points = with_keypoint_offsets(body).keypoints(R, t, np.zeros(body.P))[
+        0, [at[name] for name in KEYPOINT_NAMES]
+    ]
     pixels = points[:, :2] / points[:, 2:] * camera.intrinsics[0, 0] + camera.intrinsics[:2, 2]
     hips = [KEYPOINT_NAMES.index(f"{side}_hip") for side in ("left", "right")]
     J = len(KEYPOINT_NAMES)
@@ -53,7 +57,9 @@ def _standing_track(body, camera, bent=()) -> Track:
 
 
 def _stance(fit: FittedTrack, contact: float = 0.0, floor_m: float = 0.0) -> Stance:
-    """The fitted pelvis, and a floor ``floor_m`` below the camera with this contact probability of the feet."""
+    """The fitted pelvis, and a floor ``floor_m`` below the camera with this contact probability of
+    the feet.
+    """
     return Stance(
         root_cam=fit.t_camera_root,
         turn=np.tile(np.eye(3), (FRAMES, 1, 1)),
@@ -72,12 +78,16 @@ def _refit(prepared, first, stance) -> FittedTrack:
 
 
 def test_a_child_is_lifted_in_its_size():
-    """The same pixels of a person of 1.1 m: of a size that no person had whom the lifting network was trained on."""
+    """The same pixels of a person of 1.1 m: of a size that no person had whom the lifting network
+    was trained on.
+    """
     body, camera = load_body("scope_child"), choose_camera(1080, 1920)
     prepared = prepare_track(body, _standing_track(body, camera), camera, height_m=1.1)
     ends = [KEYPOINT_NAMES.index(f"left_{joint}") for joint in ("hip", "knee", "ankle")]
     leg = np.linalg.norm(np.diff(prepared.lifted.points[:, ends], axis=1), axis=2).sum(axis=1)
-    rest = body.rest_joints()[[body.joint_names.index(f"left_{joint}") for joint in ("hip", "knee", "ankle")]]
+    rest = body.rest_joints()[
+        [body.joint_names.index(f"left_{joint}") for joint in ("hip", "knee", "ankle")]
+    ]
     true = 1.1 / 1.695 * np.linalg.norm(np.diff(rest, axis=0), axis=1).sum()
     np.testing.assert_allclose(leg, true, rtol=0.1)
 
@@ -101,18 +111,23 @@ def test_the_lifting_network_runs_once_for_all_fits(monkeypatch):
     np.testing.assert_array_equal(second.betas, first.betas)
     placed = place_track(body, track, second, smoothing=False)
     np.testing.assert_allclose(placed.joints[:, 0], second.t_camera_root, atol=1e-9)
-    assert abs(placed.joints[:, 0, 2].mean() - 4.0) < 0.6  # metres; one view tells the distance by the body's size
+    # metres; one view tells the distance by the body's size
+    assert abs(placed.joints[:, 0, 2].mean() - 4.0) < 0.6
 
 
 def test_a_person_nearer_than_first_estimated_is_smaller():
-    """The floor that others stand on determines the distance, and so the size; the image stays the same."""
+    """The floor that others stand on determines the distance, and so the size; the image stays the
+    same.
+    """
     body, camera = load_body("scope"), choose_camera(1080, 1920)
     prepared = prepare_track(body, _standing_track(body, camera), camera)
     first = track_fit.fit_track(prepared, lambda *_: None)
 
     def leg(fit):
         J = body.rest_joints(fit.betas)
-        return np.linalg.norm(J[body.joint_names.index("left_hip")] - J[body.joint_names.index("left_ankle")])
+        return np.linalg.norm(
+            J[body.joint_names.index("left_hip")] - J[body.joint_names.index("left_ankle")]
+        )
 
     for nearer in (0.85, 1.1):
         stance = replace(_stance(first), root_cam=nearer * first.t_camera_root)
@@ -129,7 +144,10 @@ def test_a_head_leans_as_its_face_does_although_the_bodys_keypoints_say_that_it_
     landmarks = np.tile([*track.keypoints_px[0, :11].mean(axis=0), 0.0], (FACE_POINTS, 1))
     landmarks[response.landmarks] += face
     row = record(FaceEstimate(landmarks, 1.0, Region((0.0, 0.0), 1.0, 0.0)), None)
-    for each, expected in ((track, 0.0), (replace(track, face=np.tile(row, (FRAMES, 1))), lean_deg)):
+    for each, expected in (
+        (track, 0.0),
+        (replace(track, face=np.tile(row, (FRAMES, 1))), lean_deg),
+    ):
         prepared = prepare_track(body, each, camera)
         first = track_fit.fit_track(prepared, lambda *_: None)
         for fit in (first, _refit(prepared, first, _stance(first))):
@@ -141,15 +159,20 @@ def test_a_head_leans_as_its_face_does_although_the_bodys_keypoints_say_that_it_
 
 
 def test_a_confident_direction_corrects_a_limb_in_earlier_frames_as_well():
-    """A leg in front of the body looks like one behind it, and the first frames are lifted to the wrong one."""
+    """A leg in front of the body looks like one behind it, and the first frames are lifted to the
+    wrong one.
+    """
     body, camera = load_body("scope"), choose_camera(1080, 1920)
     track = _standing_track(body, camera, (("right_hip", 0.15), ("right_knee", 0.9)))
     prepared = prepare_track(body, track, camera)
-    leg = [KEYPOINT_NAMES.index(f"right_{name}") for name in ("knee", "ankle", "heel", "foot_index")]
+    leg = [
+        KEYPOINT_NAMES.index(f"right_{name}") for name in ("knee", "ankle", "heel", "foot_index")
+    ]
     hip = KEYPOINT_NAMES.index("right_hip")
     truth, sigma = track.world_landmarks.copy(), np.full((FRAMES, len(KEYPOINT_NAMES)), 0.1)
     lifted = truth.copy()
-    lifted[:2, leg, 2] = 2 * truth[:2, hip, None, 2] - truth[:2, leg, 2]  # the leg's mirror image in depth
+    # the leg's mirror image in depth
+    lifted[:2, leg, 2] = 2 * truth[:2, hip, None, 2] - truth[:2, leg, 2]
     sigma[:2, leg] = 0.25
     prepared = replace(prepared, lifted=Lifted(lifted, sigma, sigma))
 
@@ -179,9 +202,13 @@ def test_a_leg_at_a_wrong_depth_moves_to_the_floor_only_while_in_contact():
     )
     up = down @ [0.0, -1.0, 0.0]
     prepared = prepare_track(body, track, camera)
-    leg = [KEYPOINT_NAMES.index(f"right_{name}") for name in ("knee", "ankle", "heel", "foot_index")]
+    leg = [
+        KEYPOINT_NAMES.index(f"right_{name}") for name in ("knee", "ankle", "heel", "foot_index")
+    ]
     lifted, sigma = track.world_landmarks.copy(), np.full((FRAMES, len(KEYPOINT_NAMES)), 0.1)
-    good = track_fit.fit_track(replace(prepared, lifted=Lifted(lifted.copy(), sigma, sigma)), lambda *_: None)
+    good = track_fit.fit_track(
+        replace(prepared, lifted=Lifted(lifted.copy(), sigma, sigma)), lambda *_: None
+    )
     floor_m = (place_track(body, track, good, smoothing=False).soles @ up).min(axis=1)
     lifted[:, leg, 2] -= [0.2, 0.4, 0.4, 0.4]
     prepared = replace(prepared, lifted=Lifted(lifted, sigma, sigma))
@@ -194,7 +221,9 @@ def test_a_leg_at_a_wrong_depth_moves_to_the_floor_only_while_in_contact():
     stance = replace(_stance(good), floor_normal=np.tile(up, (FRAMES, 1)), floor_offset=floor_m)
     free = _refit(prepared, first, stance)
     assert heights(free).min() > 0.03
-    standing = replace(stance, contact=np.full((FRAMES, 6), 0.9) * FEET, resting=np.full((FRAMES, 6), 0.9) * FEET)
+    standing = replace(
+        stance, contact=np.full((FRAMES, 6), 0.9) * FEET, resting=np.full((FRAMES, 6), 0.9) * FEET
+    )
     held = _refit(prepared, first, standing)
     assert np.abs(heights(held)).max() < 0.025
     placed, true = (place_track(body, track, fit, smoothing=False).joints for fit in (held, good))

@@ -19,8 +19,15 @@ def corner_image(width: int = W, height: int = H) -> np.ndarray:
 
 
 def corners(image: np.ndarray) -> str:
-    """Name the colours of the corners (top left, top right, bottom left, bottom right) by their first letters."""
-    names: dict[tuple[int, ...], str] = {(1, 0, 0): "r", (0, 1, 0): "g", (0, 0, 1): "b", (1, 1, 1): "w"}
+    """Name the colours of the corners (top left, top right, bottom left, bottom right) by their
+    first letters.
+    """
+    names: dict[tuple[int, ...], str] = {
+        (1, 0, 0): "r",
+        (0, 1, 0): "g",
+        (0, 0, 1): "b",
+        (1, 1, 1): "w",
+    }
     points = [image[6, 6], image[6, -7], image[-7, 6], image[-7, -7]]
     return "".join(names.get(tuple(int(c > 128) for c in p), "?") for p in points)
 

@@ -10,9 +10,13 @@ import cv2
 import numpy as np
 
 
-def write_video(path: Path, images: list[np.ndarray], fps: float = 30.0, codec: str = "mp4v") -> Path:
+def write_video(
+    path: Path, images: list[np.ndarray], fps: float = 30.0, codec: str = "mp4v"
+) -> Path:
     height, width = images[0].shape[:2]
-    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*codec), fps, (width, height))
+    writer = cv2.VideoWriter(
+        str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*codec), fps, (width, height)
+    )
     assert writer.isOpened()
     for image in images:
         writer.write(cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
@@ -23,7 +27,8 @@ def write_video(path: Path, images: list[np.ndarray], fps: float = 30.0, codec: 
 def replace_mp4_box(data: bytes, path: tuple[bytes, ...], payload: bytes) -> bytes:
     """Replace the payload of the box at ``path`` and correct the sizes of the boxes around it.
 
-    Only for files whose sample data lies before the index, as OpenCV writes them: offsets then stay true.
+    Only for files whose sample data lies before the index, as OpenCV writes them: offsets then stay
+    true.
     """
     at, end, outer = 0, len(data), []
     for name in path:
@@ -52,10 +57,13 @@ def with_time_table(path: Path, timescale: int, steps: list[tuple[int, int]]) ->
     data = replace_mp4_box(data, (*TRACK, b"mdia", b"mdhd"), header)
     table = struct.pack(">II", 0, len(steps)) + b"".join(struct.pack(">II", *s) for s in steps)
     data = replace_mp4_box(data, (*TABLE, b"stts"), table)
-    path.write_bytes(data.replace(b"edts", b"free"))  # without the edit list, whose duration is the old one
+    # without the edit list, whose duration is the old one
+    path.write_bytes(data.replace(b"edts", b"free"))
 
 
-def patch_track_header(path: Path, matrix: tuple[int, ...] | None = None, width: int | None = None) -> None:
+def patch_track_header(
+    path: Path, matrix: tuple[int, ...] | None = None, width: int | None = None
+) -> None:
     """Write the display matrix (rotation) and the display width (pixel aspect) of an .mp4."""
     data = bytearray(path.read_bytes())
     at = data.find(b"tkhd") + 4 + 40

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Dark frames are brightened without flicker, others are unchanged; a person in the dark is captured."""
+"""Dark frames are brightened without flicker, others are unchanged; a person in the dark is
+captured.
+"""
 
 from __future__ import annotations
 
@@ -16,12 +18,21 @@ from scope.solver import Body
 
 def picture(level: float) -> np.ndarray:
     """Create a grey gradient up to ``level``."""
-    return np.repeat(np.linspace(0, level, 320)[None, :, None], 180, axis=0).repeat(3, axis=2).round().astype(np.uint8)
+    return (
+        np.repeat(np.linspace(0, level, 320)[None, :, None], 180, axis=0)
+        .repeat(3, axis=2)
+        .round()
+        .astype(np.uint8)
+    )
 
 
-@pytest.mark.parametrize(("level", "becomes"), [(6, 96), (10, 160), (25, 200), (60, 200), (100, 200)])
+@pytest.mark.parametrize(
+    ("level", "becomes"), [(6, 96), (10, 160), (25, 200), (60, 200), (100, 200)]
+)
 def test_highlights_are_raised(level: int, becomes: int) -> None:
-    """Highlights become about 200 of 255, with at most 16-fold gain, and everything else in proportion."""
+    """Highlights become about 200 of 255, with at most 16-fold gain, and everything else in
+    proportion.
+    """
     before = picture(level)
     found = AutoExposure().brighten(before).astype(float)
     assert np.percentile(found, 98) == pytest.approx(becomes, rel=0.05)

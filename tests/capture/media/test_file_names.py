@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names that are not UTF-8 are passed on to libraries in a form that they can take, and shown as text."""
+"""Names that are not UTF-8 are passed on to libraries in a form that they can take, and shown as
+text.
+"""
 
 import os
 import shutil
@@ -56,5 +58,7 @@ writer.close()
 with open_video(overlay, VideoRange()) as opened:
     print(len(images), sum(1 for _ in opened))
 """
-    done = subprocess.run([sys.executable, "-c", code, video, overlay], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code, video, overlay], capture_output=True, text=True, check=False
+    )
     assert (done.stdout, done.returncode) == ("4 4\n", 0), done.stderr

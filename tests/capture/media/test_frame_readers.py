@@ -60,7 +60,11 @@ def test_the_duration_of_matroska_is_without_what_lies_before_its_first_frame(tm
         for k in range(5):
             frame = av.VideoFrame(48, 32, "yuvj420p")
             for packet in stream.encode(frame):
-                packet.time_base, packet.pts, packet.dts = Fraction(1, 1000), 3000 + 100 * k, 3000 + 100 * k
+                packet.time_base, packet.pts, packet.dts = (
+                    Fraction(1, 1000),
+                    3000 + 100 * k,
+                    3000 + 100 * k,
+                )
                 packet.duration = 100
                 container.mux(packet)
     assert shown_s(path) == pytest.approx(0.5)
@@ -83,12 +87,18 @@ def test_a_video_that_is_refused_is_closed(tmp_path, monkeypatch, video, reason)
         path = tmp_path / "sound.mp4"
         with av.open(str(path), "w") as container:
             stream = container.add_stream("aac", rate=8000)
-            sound = av.AudioFrame.from_ndarray(np.zeros((1, 8000), np.float32), format="fltp", layout="mono")
+            sound = av.AudioFrame.from_ndarray(
+                np.zeros((1, 8000), np.float32), format="fltp", layout="mono"
+            )
             sound.rate = 8000
             container.mux([*stream.encode(sound), *stream.encode()])
     monkeypatch.setattr(image_size, "MAX_PIXELS", 100)
     pyav_open = av.open
-    monkeypatch.setattr(av, "open", lambda *given, **options: opened.append(pyav_open(*given, **options)) or opened[0])
+    monkeypatch.setattr(
+        av,
+        "open",
+        lambda *given, **options: opened.append(pyav_open(*given, **options)) or opened[0],
+    )
     with pytest.raises(VideoError, match=reason):
         PyavReader(path)
     with pytest.raises(AssertionError, match="not open"):
@@ -118,7 +128,11 @@ def test_skipping_past_the_end_gives_the_number_of_frames(video):
 
 def test_without_the_decoder_a_video_is_refused(video, monkeypatch):
     monkeypatch.setitem(sys.modules, "av", None)
-    with pytest.raises(VideoError, match=r"grey\.mp4 is a video.*package 'av' that is not installed"):
+    with pytest.raises(
+        VideoError,
+        match=r"grey\.mp4 is a video.*package 'av' that is not "
+        r"installed",
+    ):
         PyavReader(video)
 
 
@@ -133,7 +147,8 @@ def test_a_stream_that_begins_later_does_not_end_the_video(tmp_path):
         container.mux(stream.encode(None))
     data = path.read_bytes()
     packets = [data[at : at + size] for at in range(0, len(data), size)]
-    begins = [k for k, packet in enumerate(packets) if packet[1:3] == b"\x41\x00"]  # a picture, of the stream 0x100
+    # a picture, of the stream 0x100
+    begins = [k for k, packet in enumerate(packets) if packet[1:3] == b"\x41\x00"]
     assert len(begins) == 60
     middle = begins[40]
     other = packets[middle][:2] + b"\xc8" + packets[middle][3:]

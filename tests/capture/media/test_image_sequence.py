@@ -19,7 +19,9 @@ NUMBERS = [*range(7, 12), 100]
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Write frames 7 to 11 and 100, not zero-padded, with their number as brightness, and unrelated files."""
+    """Write frames 7 to 11 and 100, not zero-padded, with their number as brightness, and unrelated
+    files.
+    """
     for number in NUMBERS:
         cv2.imwrite(str(tmp_path / f"walk_{number}.png"), np.full((20, 30, 3), number, np.uint8))
     (tmp_path / "notes.txt").write_text("no picture")
@@ -31,7 +33,9 @@ def brightness(path: Path, wanted: VideoRange | None = None) -> list[int]:
         return [int(frame.image_rgb[0, 0, 0]) for frame in video]
 
 
-@pytest.mark.parametrize("name", ["", "walk_####.png", "walk_%04d.png", "walk_%d.png", "walk_7.png"])
+@pytest.mark.parametrize(
+    "name", ["", "walk_####.png", "walk_%04d.png", "walk_%d.png", "walk_7.png"]
+)
 def test_pictures_are_in_numerical_order(folder: Path, name: str) -> None:
     wanted = VideoRange(fps=Fraction(12))
     assert brightness(folder / name, wanted) == NUMBERS
@@ -77,7 +81,11 @@ def test_missing_pictures_leave_gaps_and_give_a_warning(
         assert video.expected_frames == len(numbers)
         assert [f.timestamp_s for f in video] == pytest.approx([t / 10 for t in times])
         assert [f.index for f in video] == list(range(len(numbers)))
-        assert [says in warning for warning in video.warnings] == [True] if says else not video.warnings
+        assert (
+            [says in warning for warning in video.warnings] == [True]
+            if says
+            else not video.warnings
+        )
     with open_video(tmp_path, VideoRange(0.1, 0.45, Fraction(10))) as video:
         wanted = [t / 10 for t in times if 1 <= t <= 4]
         assert [f.timestamp_s for f in video] == pytest.approx(wanted)
@@ -130,7 +138,9 @@ def test_a_folder_of_unrelated_pictures_is_refused(folder: Path) -> None:
         (["one.png", "two.png"], False),
     ],
 )
-def test_capture_and_batch_agree_on_what_a_sequence_is(tmp_path: Path, names: list[str], numbered: bool) -> None:
+def test_capture_and_batch_agree_on_what_a_sequence_is(
+    tmp_path: Path, names: list[str], numbered: bool
+) -> None:
     clips = tmp_path / "clips"
     (clips / "folder").mkdir(parents=True)
     for name in names:

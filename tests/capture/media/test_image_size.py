@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files that would take all memory or time are refused by their headers, and so are lists of other files."""
+"""Files that would take all memory or time are refused by their headers, and so are lists of other
+files.
+"""
 
 import struct
 import subprocess
@@ -38,17 +40,23 @@ def png(width: int, height: int, rows: int) -> bytes:
     """An RGBA image of zeros whose data may end early."""
     chunks = [(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 6, 0, 0, 0))]
     chunks += [(b"IDAT", zlib.compress(bytes((1 + 4 * width) * rows), 1)), (b"IEND", b"")]
-    made = [struct.pack(">I", len(d)) + n + d + struct.pack(">I", zlib.crc32(n + d)) for n, d in chunks]
+    made = [
+        struct.pack(">I", len(d)) + n + d + struct.pack(">I", zlib.crc32(n + d)) for n, d in chunks
+    ]
     return b"\x89PNG\r\n\x1a\n" + b"".join(made)
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="macOS does not enforce the limit, and Windows has none")
+@pytest.mark.skipif(
+    sys.platform != "linux", reason="macOS does not enforce the limit, and Windows has none"
+)
 def test_a_large_transparent_image_takes_little_memory(tmp_path):
     """Of 36 million pixels: 144 MB, and some 1.2 GB as numbers with a fraction."""
     path = tmp_path / "large.png"
     path.write_bytes(png(6000, 6000, 6000))
     read = READ.replace("3 << 30", "1536 << 20")
-    done = subprocess.run([sys.executable, "-c", read, path], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", read, path], capture_output=True, text=True, check=True
+    )
     assert done.stdout.strip() == "6000"
 
 
@@ -70,7 +78,9 @@ def test_a_chunk_larger_than_its_file_takes_no_memory(tmp_path, damaged):
     path.write_bytes(damaged(whole, whole.index(b"IDAT") - 4))
     read = f"{READ}print(open('/proc/self/status').read().split('VmHWM:')[1].split()[0])"  # kB
     read = read.replace("3 << 30", "8 << 30")  # so that it could
-    done = subprocess.run([sys.executable, "-c", read, path], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", read, path], capture_output=True, text=True, check=True
+    )
     message, peak = done.stdout.splitlines()
     assert "cannot be decoded; it may be damaged" in message
     assert int(peak) < 600_000
@@ -88,12 +98,18 @@ def tiff(path: Path, dtype: type, side: int) -> Path:
     return path
 
 
-@pytest.mark.parametrize(("dtype", "side"), [(np.uint16, 11_585), (np.float32, 5792), (np.float64, 4096)])
+@pytest.mark.parametrize(
+    ("dtype", "side"), [(np.uint16, 11_585), (np.float32, 5792), (np.float64, 4096)]
+)
 def test_a_deep_image_may_have_fewer_pixels(tmp_path, dtype, side):
     """134 million pixels of four channels take 2.2 GB at 16 bits, and took 17 GB at 64."""
     with pytest.raises(VideoError, match="cannot be decoded"):  # its content is missing
         open_video(tiff(tmp_path / "deep.tiff", dtype, side))
-    with pytest.raises(VideoError, match=r"deep\.tiff has (too many|\d+ × \d+) pixels.*at most 134 million"):
+    with pytest.raises(
+        VideoError,
+        match=r"deep\.tiff has (too many|\d+ × \d+) pixels.*at most 134 "
+        r"million",
+    ):
         open_video(tiff(tmp_path / "deep.tiff", dtype, side + 1))
 
 
@@ -104,10 +120,16 @@ def test_an_image_of_numbers_is_converted_in_little_memory(tmp_path):
     rows = np.arange(3000, dtype=np.float32) / 2999
     cv2.imwrite(str(path), np.broadcast_to(rows[:, None, None], (3000, 3000, 4)).copy())
     read = f"{READ}print(open('/proc/self/status').read().split('VmHWM:')[1].split()[0])"  # kB
-    read = read.replace("print(open_video(sys.argv[1]).width)", "print(open_video(sys.argv[1])._still[:, 0, 0].sum())")
-    done = subprocess.run([sys.executable, "-c", read, path], capture_output=True, text=True, check=True)
+    read = read.replace(
+        "print(open_video(sys.argv[1]).width)",
+        "print(open_video(sys.argv[1])._still[:, 0, 0].sum())",
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", read, path], capture_output=True, text=True, check=True
+    )
     total, peak = map(int, done.stdout.split())
-    shown = rows * np.round(rows * 255) + 255 * (1 - rows)  # on white, as the fourth channel is its opacity
+    # on white, as the fourth channel is its opacity
+    shown = rows * np.round(rows * 255) + 255 * (1 - rows)
     assert total == pytest.approx(shown.sum(), rel=0.01)
     assert peak < 600_000
 
@@ -147,7 +169,11 @@ def test_what_follows_the_end_of_an_image_is_ignored(tmp_path):
 def test_an_image_that_is_too_long_is_refused(tmp_path, width, height):
     path = tmp_path / "long.png"
     cv2.imwrite(str(path), np.zeros((height, width, 3), np.uint8))
-    with pytest.raises(VideoError, match=rf"long\.png shows {width} × {height} pixels.*at most 20 times.*crop it"):
+    with pytest.raises(
+        VideoError,
+        match=rf"long\.png shows {width} × {height} pixels.*at most 20 "
+        rf"times.*crop it",
+    ):
         open_video(path)
 
 
@@ -187,7 +213,9 @@ def test_a_list_of_other_files_is_no_footage(tmp_path: Path, text: str) -> None:
 
 
 def test_runs_of_the_detector_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The longest picture that is accepted, 20:1, in which nobody is found, so that everywhere is searched."""
+    """The longest picture that is accepted, 20:1, in which nobody is found, so that everywhere is
+    searched.
+    """
     corners = list[tuple[int, int]]()
 
     def detect_in(_: PersonDetector, *given: Any) -> list[Any]:

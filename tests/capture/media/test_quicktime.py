@@ -25,7 +25,9 @@ def meta(kind: int, value: bytes, key: bytes = KEY, version: bytes = b"") -> byt
     names = box(b"mdta", b"com.apple.quicktime.make") + box(b"mdta", key)
     make = box(struct.pack(">I", 1), box(b"data", struct.pack(">II", 1, 0), b"Telephone"))
     item = box(struct.pack(">I", 2), box(b"data", struct.pack(">II", kind, 0), value))
-    return box(b"meta", version, box(b"keys", struct.pack(">II", 0, 2), names), box(b"ilst", make, item))
+    return box(
+        b"meta", version, box(b"keys", struct.pack(">II", 0, 2), names), box(b"ilst", make, item)
+    )
 
 
 @pytest.mark.parametrize(
@@ -44,7 +46,10 @@ def meta(kind: int, value: bytes, key: bytes = KEY, version: bytes = b"") -> byt
 def test_values_of_each_type_in_movie_and_track(tmp_path, kind, value):
     path = tmp_path / "a.mov"
     head = box(b"ftyp", b"qt  ") + box(b"wide") + box(b"mdat", bytes(5000))
-    for index in (box(b"mvhd", bytes(100)) + meta(kind, value), box(b"trak", meta(kind, value, version=bytes(4)))):
+    for index in (
+        box(b"mvhd", bytes(100)) + meta(kind, value),
+        box(b"trak", meta(kind, value, version=bytes(4))),
+    ):
         path.write_bytes(head + box(b"moov", index))
         assert focal_35mm(path) == 26.0
 
@@ -54,8 +59,16 @@ def test_absent_or_damaged_is_none(tmp_path):
     good = box(b"moov", meta(21, struct.pack(">i", 26)))
     damaged = [good[:n] for n in range(0, len(good), 7)]
     damaged += [box(b"moov", meta(21, struct.pack(">i", v))) for v in (0, -5, 10**6)]
-    damaged += [box(b"moov", meta(1, b"wide")), box(b"moov", meta(99, b"x")), box(b"moov", meta(21, b"\x1a", b"other"))]
-    damaged += [b"\0" * 40, np.random.default_rng(0).bytes(3000), struct.pack(">I4sQ", 1, b"mdat", 1 << 60)]
+    damaged += [
+        box(b"moov", meta(1, b"wide")),
+        box(b"moov", meta(99, b"x")),
+        box(b"moov", meta(21, b"\x1a", b"other")),
+    ]
+    damaged += [
+        b"\0" * 40,
+        np.random.default_rng(0).bytes(3000),
+        struct.pack(">I4sQ", 1, b"mdat", 1 << 60),
+    ]
     for data in damaged:
         path.write_bytes(data)
         assert focal_35mm(path) is None
@@ -64,7 +77,9 @@ def test_absent_or_damaged_is_none(tmp_path):
 
 def test_a_video_has_its_focal_length(tmp_path: Path):
     path = tmp_path / "a.mp4"
-    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*"mp4v"), 30, (64, 48))
+    writer = cv2.VideoWriter(
+        str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*"mp4v"), 30, (64, 48)
+    )
     for _ in range(3):
         writer.write(np.full((48, 64, 3), 90, np.uint8))
     writer.release()

@@ -64,13 +64,17 @@ def test_every_iteration_starts_at_the_first_frame(tmp_path):
     assert [f.index for f in video] == [f.index for f in video] == list(range(5))
 
 
-@pytest.mark.parametrize("rate", [Fraction(30000, 1001), Fraction(24000, 1001), Fraction(60000, 1001), Fraction(25)])
+@pytest.mark.parametrize(
+    "rate", [Fraction(30000, 1001), Fraction(24000, 1001), Fraction(60000, 1001), Fraction(25)]
+)
 def test_the_container_rate_is_exact(tmp_path, rate):
     path = write_video(tmp_path / "a.mp4", ramp(10))
     with_time_table(path, rate.numerator, [(10, rate.denominator)])
     video = open_video(path)
     assert video.fps == rate
-    np.testing.assert_allclose([f.timestamp_s for f in video], [float(i / rate) for i in range(10)], atol=1e-6)
+    np.testing.assert_allclose(
+        [f.timestamp_s for f in video], [float(i / rate) for i in range(10)], atol=1e-6
+    )
 
 
 def write_times(path: Path, shown_ms: np.ndarray) -> Path:
@@ -79,7 +83,11 @@ def write_times(path: Path, shown_ms: np.ndarray) -> Path:
         stream = container.add_stream("mjpeg", rate=25, width=W, height=H, pix_fmt="yuvj420p")
         for time_ms, image in zip(shown_ms, ramp(len(shown_ms)), strict=True):
             for packet in stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")):
-                packet.time_base, packet.pts, packet.dts = Fraction(1, 1000), int(time_ms), int(time_ms)
+                packet.time_base, packet.pts, packet.dts = (
+                    Fraction(1, 1000),
+                    int(time_ms),
+                    int(time_ms),
+                )
                 container.mux(packet)
     return path
 
@@ -98,7 +106,9 @@ def test_a_repeated_time_does_not_move_what_follows(tmp_path, again):
 @pytest.mark.parametrize("start_s", [0.09, 0.1, 0.2, 0.32])
 def test_a_start_is_found_behind_a_repeated_time(tmp_path, start_s):
     """Each repeated time made it begin a frame early."""
-    path = write_times(tmp_path / "a.mkv", np.array([0, 40, 80, 80, 120, 160, 200, 240, 240, 280, 320, 360]))
+    path = write_times(
+        tmp_path / "a.mkv", np.array([0, 40, 80, 80, 120, 160, 200, 240, 240, 280, 320, 360])
+    )
     with open_video(path) as video:
         whole = [(f.index, f.timestamp_s, f.image_rgb.mean()) for f in video]
     with open_video(path, VideoRange(start_s=start_s)) as video:
@@ -125,7 +135,9 @@ def test_a_variable_rate_keeps_presentation_times(tmp_path):
     with_time_table(path, 1000, [(3, 40), (3, 100), (3, 20)])
     with open_video(path) as video:
         times = [f.timestamp_s for f in video]
-    np.testing.assert_allclose(times, np.cumsum([0, 40, 40, 40, 100, 100, 100, 20, 20]) / 1000, atol=1e-6)
+    np.testing.assert_allclose(
+        times, np.cumsum([0, 40, 40, 40, 100, 100, 100, 20, 20]) / 1000, atol=1e-6
+    )
     assert not video.warnings
 
 
@@ -183,7 +195,9 @@ def test_a_colour_tag_alone_changes_no_pixel(tmp_path):
     paths = [tmp_path / f"{matrix}.mp4" for matrix in ("bt709", "undef")]
     for path in paths:
         with av.open(str(path), "w") as out:
-            stream = out.add_stream("libx264", rate=10, options={"x264-params": f"colormatrix={path.stem}"})
+            stream = out.add_stream(
+                "libx264", rate=10, options={"x264-params": f"colormatrix={path.stem}"}
+            )
             stream.width, stream.height, stream.pix_fmt = W, H, "yuv420p"
             out.mux(stream.encode(frame))
             out.mux(stream.encode())
@@ -251,7 +265,9 @@ def test_sixteen_bits_grey_and_alpha(tmp_path):
     deep = corner_image().astype(np.uint16)[..., ::-1] * 257
     for suffix in (".png", ".tiff"):
         cv2.imwrite(str(tmp_path / f"deep{suffix}"), deep)
-        np.testing.assert_array_equal(next(iter(open_video(tmp_path / f"deep{suffix}"))).image_rgb, corner_image())
+        np.testing.assert_array_equal(
+            next(iter(open_video(tmp_path / f"deep{suffix}"))).image_rgb, corner_image()
+        )
     cv2.imwrite(str(tmp_path / "grey.png"), np.full((H, W), 77, np.uint8))
     assert (next(iter(open_video(tmp_path / "grey.png"))).image_rgb == 77).all()
     clear = np.dstack([corner_image(), np.full((H, W), 255, np.uint8)])
@@ -273,10 +289,14 @@ def sound_track(path: Path, cover: bool = False) -> None:
     """Write an .mp4 of sound alone, or with the picture of a cover."""
     with av.open(str(path), "w") as container:
         stream = container.add_stream("aac", rate=8000)
-        picture = container.add_stream("mjpeg", width=W, height=H, pix_fmt="yuvj420p") if cover else None
+        picture = (
+            container.add_stream("mjpeg", width=W, height=H, pix_fmt="yuvj420p") if cover else None
+        )
         if picture is not None:
             picture.disposition = Disposition.attached_pic
-        sound = av.AudioFrame.from_ndarray(np.zeros((1, 8000), np.float32), format="fltp", layout="mono")
+        sound = av.AudioFrame.from_ndarray(
+            np.zeros((1, 8000), np.float32), format="fltp", layout="mono"
+        )
         sound.rate = 8000
         for packet in [*stream.encode(sound), *stream.encode()]:
             container.mux(packet)
@@ -296,9 +316,21 @@ def sound_track(path: Path, cover: bool = False) -> None:
         ("sound.wav", silence, "not a video or image"),
         ("sound.mp4", sound_track, "contains only audio; choose the file with the video"),
         ("cover.mp4", lambda p: sound_track(p, cover=True), "contains only audio"),
-        ("noise.mp4", lambda p: p.write_bytes(np.random.default_rng(0).bytes(20000)), "not a video or image"),
-        ("half.png", lambda p: p.write_bytes(encode(".png", corner_image())[:40]), "cannot be decoded"),
-        ("cut.mp4", lambda p: p.write_bytes(write_video(p, ramp(9)).read_bytes()[:700]), "not a video or image"),
+        (
+            "noise.mp4",
+            lambda p: p.write_bytes(np.random.default_rng(0).bytes(20000)),
+            "not a video or image",
+        ),
+        (
+            "half.png",
+            lambda p: p.write_bytes(encode(".png", corner_image())[:40]),
+            "cannot be decoded",
+        ),
+        (
+            "cut.mp4",
+            lambda p: p.write_bytes(write_video(p, ramp(9)).read_bytes()[:700]),
+            "not a video or image",
+        ),
     ],
 )
 def test_unusable_files_give_a_message_of_one_line(tmp_path, capfd, name, make, words):
@@ -374,7 +406,10 @@ def test_a_video_that_is_removed_while_it_is_read_gives_its_frames(tmp_path):
 def test_a_clip_cut_without_re_encoding_gives_no_warning(tmp_path, suffix, shift_s):
     """An edit list omits the beginning, or timestamps start late: neither is damage."""
     cut = tmp_path / f"cut{suffix}"
-    with av.open(str(write_video(tmp_path / "a.mp4", ramp(60)))) as source, av.open(str(cut), "w") as out:
+    with (
+        av.open(str(write_video(tmp_path / "a.mp4", ramp(60)))) as source,
+        av.open(str(cut), "w") as out,
+    ):
         stream = source.streams.video[0]
         copy = out.add_stream_from_template(stream)
         for packet in source.demux(stream):
@@ -394,15 +429,21 @@ def test_a_clip_cut_without_re_encoding_gives_no_warning(tmp_path, suffix, shift
     ("name", "codec", "start_s", "options"),
     [("late.flv", "flv1", 100.0, {}), ("pieces.mp4", "mpeg4", 0.0, {"movflags": "frag_keyframe"})],
 )
-def test_seeking_in_containers_with_unreliable_frame_counts(tmp_path, name, codec, start_s, options):
-    """Timestamps that start late, which the duration does not include; fragments of which only the first is counted."""
+def test_seeking_in_containers_with_unreliable_frame_counts(
+    tmp_path, name, codec, start_s, options
+):
+    """Timestamps that start late, which the duration does not include; fragments of which only the
+    first is counted.
+    """
     path = tmp_path / name
     with av.open(str(path), "w", options=options) as out:
         stream = out.add_stream(codec, rate=25)
         stream.width, stream.height, stream.pix_fmt, stream.gop_size = 64, 48, "yuv420p", 25
         stream.time_base = Fraction(1, 25)
         for k in range(100):
-            frame = av.VideoFrame.from_ndarray(np.full((48, 64, 3), 2 * k, np.uint8), format="rgb24")
+            frame = av.VideoFrame.from_ndarray(
+                np.full((48, 64, 3), 2 * k, np.uint8), format="rgb24"
+            )
             frame.pts, frame.time_base = k + round(25 * start_s), Fraction(1, 25)
             out.mux(stream.encode(frame))
         out.mux(stream.encode(None))

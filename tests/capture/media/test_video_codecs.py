@@ -63,7 +63,9 @@ os._exit(0)
 def encoded():
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-c", ENCODE, folder]
-        done = subprocess.run(command, capture_output=True, text=True, check=False, env=dict(os.environ))
+        done = subprocess.run(
+            command, capture_output=True, text=True, check=False, env=dict(os.environ)
+        )
         yield Path(folder), done.stderr
 
 
@@ -84,7 +86,8 @@ def test_every_frame_has_its_colour_and_time(encoded, name):
         pytest.skip(f"this Blender does not encode {name}: {errors[-200:]}")
     times, seen = colours(path)
     np.testing.assert_allclose(times - times[0], np.arange(FRAMES) / RATE, atol=2e-3)
-    # Red rises and blue falls from frame to frame, green stays: no frame is missing, twice, or in another's place.
+    # Red rises and blue falls from frame to frame, green stays: no frame is missing, twice, or in
+    # another's place.
     assert (np.diff(seen[:, 0]) > 3).all(), seen
     assert (np.diff(seen[:, 2]) < -3).all(), seen
     assert np.ptp(seen[:, 1]) < 35
@@ -118,15 +121,22 @@ def test_h264_is_never_skipped(encoded):
 
 
 def gif(frames, delays):
-    """Build a GIF of (T, H, W) images with up to 128 grey levels; delays in hundredths of a second. Not compressed: the
-    table of codes is cleared before it could grow.
+    """Build a GIF of (T, H, W) images with up to 128 grey levels; delays in hundredths of a second.
+    Not compressed: the table of codes is cleared before it could grow.
     """
     height, width = frames.shape[1:]
     grey = b"".join(bytes([2 * k] * 3) for k in range(128))
     out = [b"GIF89a", struct.pack("<HHBBB", width, height, 0xF6, 0, 0), grey]
     for frame, delay in zip(frames, delays, strict=True):
-        codes = b"".join(b"\x80" + frame.ravel()[k : k + 120].tobytes() for k in range(0, frame.size, 120)) + b"\x81"
-        blocks = b"".join(bytes([len(b)]) + b for b in (codes[k : k + 255] for k in range(0, len(codes), 255)))
+        codes = (
+            b"".join(
+                b"\x80" + frame.ravel()[k : k + 120].tobytes() for k in range(0, frame.size, 120)
+            )
+            + b"\x81"
+        )
+        blocks = b"".join(
+            bytes([len(b)]) + b for b in (codes[k : k + 255] for k in range(0, len(codes), 255))
+        )
         out += [b"\x21\xf9\x04\x04", struct.pack("<H", delay), b"\x00\x00"]
         out += [b"\x2c", struct.pack("<HHHHB", 0, 0, width, height, 0), b"\x07", blocks, b"\x00"]
     return b"".join([*out, b"\x3b"])

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Decoding from the middle of a video gives the very images that decoding from its beginning gives."""
+"""Decoding from the middle of a video gives the very images that decoding from its beginning
+gives.
+"""
 
 from __future__ import annotations
 
@@ -41,10 +43,20 @@ UNEVEN = [(k + 0.4 * (k % 3 == 1) + 0.02 * k) / FPS for k in range(SECONDS * FPS
 FILES = {
     "few keyframes.mp4": ("mpeg4", "yuv420p", EVEN, {"g": "60", "bf": "2"}),
     "h264.mp4": ("libx264", "yuv420p", EVEN, {"g": "40", "bf": "3"}),
-    "open groups.mkv": ("libx264", "yuv420p", EVEN, {"g": "16", "x264-params": "open-gop=1:bframes=3:threads=1"}),
+    "open groups.mkv": (
+        "libx264",
+        "yuv420p",
+        EVEN,
+        {"g": "16", "x264-params": "open-gop=1:bframes=3:threads=1"},
+    ),
     "one keyframe.mp4": ("libx264", "yuv420p", EVEN, {"g": "10000"}),
     "uneven.mkv": ("libx264", "yuv420p", UNEVEN, {"g": "60"}),
-    "vp9.webm": ("libvpx-vp9", "yuv420p", EVEN, {"g": "30", "cpu-used": "8", "deadline": "realtime"}),
+    "vp9.webm": (
+        "libvpx-vp9",
+        "yuv420p",
+        EVEN,
+        {"g": "30", "cpu-used": "8", "deadline": "realtime"},
+    ),
 }
 
 

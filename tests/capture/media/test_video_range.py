@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ranges of videos: start, end and frame rate; every frame of the test video shows its own index."""
+"""Ranges of videos: start, end and frame rate; every frame of the test video shows its own
+index.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,12 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.media.frame import Frame
 from scope.scope_addon.capture.media.video import open_video
-from scope.scope_addon.capture.media.video_range import FrameSampler, VideoRange, parse_range, parse_rate
+from scope.scope_addon.capture.media.video_range import (
+    FrameSampler,
+    VideoRange,
+    parse_range,
+    parse_rate,
+)
 from scope.scope_addon.errors import UsageError, VideoError
 
 FPS = 25
@@ -19,7 +26,9 @@ FPS = 25
 
 @pytest.fixture(scope="module")
 def long_video(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Write 60 s at 25 fps with few key frames; 12 black or white squares encode the index of the frame."""
+    """Write 60 s at 25 fps with few key frames; 12 black or white squares encode the index of the
+    frame.
+    """
     path = tmp_path_factory.mktemp("range") / "long.mp4"
     return write_numbers(path, FPS, 60 * FPS, "mp4v")
 
@@ -38,13 +47,19 @@ def shown(frame: Frame) -> int:
     return sum((int(frame.image_rgb[16, 16 * b + 8, 0]) > 127) << b for b in range(12))
 
 
-@pytest.mark.parametrize(("start", "end"), [(0, 0.5), (3.2, 4.0), (19.0, 19.4), (41.36, 42.0), (59.0, 1e9)])
-def test_frames_of_a_range_are_those_of_the_whole(long_video: Path, start: float, end: float) -> None:
+@pytest.mark.parametrize(
+    ("start", "end"), [(0, 0.5), (3.2, 4.0), (19.0, 19.4), (41.36, 42.0), (59.0, 1e9)]
+)
+def test_frames_of_a_range_are_those_of_the_whole(
+    long_video: Path, start: float, end: float
+) -> None:
     with open_video(long_video, VideoRange(start, end)) as video:
         frames = list(video)
         assert video.expected_frames == pytest.approx(len(frames), abs=1)
         assert not video.warnings
-    assert [f.index for f in frames] == [k for k in range(60 * FPS) if start - 1e-6 <= k / FPS <= end + 1e-6]
+    assert [f.index for f in frames] == [
+        k for k in range(60 * FPS) if start - 1e-6 <= k / FPS <= end + 1e-6
+    ]
     assert [shown(f) for f in frames] == [f.index for f in frames]
     assert [f.timestamp_s for f in frames] == pytest.approx([f.index / FPS for f in frames])
 
@@ -70,7 +85,8 @@ def test_nearest_frames_of_a_variable_rate() -> None:
     image = np.zeros((1, 1, 3), np.uint8)
     chosen = [f.timestamp_s for k, t in enumerate(times) for f in sampler.add(Frame(k, t, image))]
     chosen += [f.timestamp_s for f in sampler.flush()]
-    assert chosen == [0.0, 0.11, 0.3, 0.39, 0.52, 0.6]  # for 0.0, 0.1, (0.2: nothing near), 0.3, 0.4, 0.5, 0.6
+    # for 0.0, 0.1, (0.2: nothing near), 0.3, 0.4, 0.5, 0.6
+    assert chosen == [0.0, 0.11, 0.3, 0.39, 0.52, 0.6]
 
 
 def test_rates() -> None:
@@ -93,7 +109,9 @@ def test_an_impossible_range() -> None:
 @pytest.fixture(scope="module")
 def rounded_video(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Write 12 s of the same at 29.97 fps, in a container that rounds times to milliseconds."""
-    return write_numbers(tmp_path_factory.mktemp("range") / "rounded.mkv", 30000 / 1001, 360, "MJPG")
+    return write_numbers(
+        tmp_path_factory.mktemp("range") / "rounded.mkv", 30000 / 1001, 360, "MJPG"
+    )
 
 
 @pytest.mark.parametrize(("name", "nominal"), [("long_video", 25), ("rounded_video", 30)])

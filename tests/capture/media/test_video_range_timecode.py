@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Times and timecodes against a counter that steps through every label, and the hour of the SMPTE standard."""
+"""Times and timecodes against a counter that steps through every label, and the hour of the SMPTE
+standard.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,20 @@ def test_times(text: str, seconds: float) -> None:
     assert parse_time(text) == pytest.approx(seconds)
 
 
-NO_TIMES = ["", ".", "1:.5", "-1", "1:60", "1:60:00", "one", "1:2:3:4", "nan", "1:02:60:00", "1;02:03;04", "1:02:03;4"]
+NO_TIMES = [
+    "",
+    ".",
+    "1:.5",
+    "-1",
+    "1:60",
+    "1:60:00",
+    "one",
+    "1:2:3:4",
+    "nan",
+    "1:02:60:00",
+    "1;02:03;04",
+    "1:02:03;4",
+]
 
 
 @pytest.mark.parametrize("text", [*NO_TIMES, "9" * 9999, "9" * 9999 + ":00:00:00"])
@@ -38,7 +53,9 @@ def timecode(text: str) -> Timecode:
 
 
 def labels(rate: int, dropped: int) -> Iterator[str]:
-    """Iterate over the timecodes of 21 minutes, without the first ``dropped`` of each minute except every tenth."""
+    """Iterate over the timecodes of 21 minutes, without the first ``dropped`` of each minute except
+    every tenth.
+    """
     for minute in range(21):
         for second in range(60):
             for frame in range(rate):
@@ -58,7 +75,9 @@ def labels(rate: int, dropped: int) -> Iterator[str]:
         (Fraction(2999, 100), 30, 0),
     ],
 )
-def test_consecutive_timecodes_are_consecutive_frames(fps: Fraction, rate: int, dropped: int) -> None:
+def test_consecutive_timecodes_are_consecutive_frames(
+    fps: Fraction, rate: int, dropped: int
+) -> None:
     for number, text in enumerate(labels(rate, dropped)):
         if number % 7 == 0 or ":00" in text[-6:]:
             assert timecode(text).frame(fps) == number, text

@@ -36,8 +36,12 @@ K = np.array([[130.0, 0, 80.0], [0, 130.0, 60.0], [0, 0, 1]])
 GREY = 90
 
 
-def standing(body: Body, frames: list[int], x: float = 0.0, y: float = 3.0, size=(W, H), intrinsics=K) -> Motion:
-    """Create a person in T-pose ``y`` metres in front of a level camera at 1 m, seen in every frame."""
+def standing(
+    body: Body, frames: list[int], x: float = 0.0, y: float = 3.0, size=(W, H), intrinsics=K
+) -> Motion:
+    """Create a person in T-pose ``y`` metres in front of a level camera at 1 m, seen in every
+    frame.
+    """
     T, K1 = len(frames), body.K + 1
     poses = np.zeros((T, K1, 3), np.float32)
     poses[:, 0] = cv2.Rodrigues(R_WORLD_MODEL)[0].ravel()
@@ -71,10 +75,14 @@ def changed(image: np.ndarray) -> np.ndarray:
 
 
 def silhouette(body: Body, x: float = 0.0, y: float = 3.0) -> np.ndarray:
-    """Draw the silhouette (H, W) with OpenCV's polygons, posed by hand: x stays, model y is up, facing the camera."""
+    """Draw the silhouette (H, W) with OpenCV's polygons, posed by hand: x stays, model y is up,
+    facing the camera.
+    """
     offset = body.v_template - body.J_template[0]
     points = np.stack([x + offset[:, 0], 1.0 - (0.95 + offset[:, 1]), y - offset[:, 2]], -1)
-    pixels = np.round((points[:, :2] / points[:, 2:] @ K[:2, :2].T + K[:2, 2]) * 256).astype(np.int32)
+    pixels = np.round((points[:, :2] / points[:, 2:] @ K[:2, :2].T + K[:2, 2]) * 256).astype(
+        np.int32
+    )
     mask = np.zeros((H, W), np.uint8)
     for quad in body.faces:
         cv2.fillConvexPoly(mask, pixels[quad], (1,), shift=8)
@@ -89,23 +97,33 @@ def test_vertices_are_in_the_camera_of_their_row(body):
     motion = standing(body, [0, 1])
     rng = np.random.default_rng(2)
     rotation = cv2.Rodrigues(rng.normal(size=3))[0]
-    motion.world_from_camera[1] = np.block([[rotation, rng.normal(size=(3, 1))], [np.zeros((1, 3)), np.ones((1, 1))]])
+    motion.world_from_camera[1] = np.block(
+        [[rotation, rng.normal(size=(3, 1))], [np.zeros((1, 3)), np.ones((1, 1))]]
+    )
     motion.betas[:2] = (1.5, -2.0)
     rest = body.v_template + body.shapedirs @ motion.betas.astype(float)
     pelvis = body.J_template[0] + body.J_shapedirs[0] @ motion.betas.astype(float)
     world = (rest - pelvis) @ R_WORLD_MODEL.T + pelvis + motion.trans[0]
     for row in (0, 1):
-        homogeneous = np.c_[world, np.ones(len(world))] @ np.linalg.inv(motion.world_from_camera[row]).T
-        np.testing.assert_allclose(camera_vertices(motion, body, row), homogeneous[:, :3], atol=1e-5)
+        homogeneous = (
+            np.c_[world, np.ones(len(world))] @ np.linalg.inv(motion.world_from_camera[row]).T
+        )
+        np.testing.assert_allclose(
+            camera_vertices(motion, body, row), homogeneous[:, :3], atol=1e-5
+        )
 
 
-def test_the_video_shows_the_body_where_it_is_and_nothing_elsewhere(tmp_path, footage, body, monkeypatch):
+def test_the_video_shows_the_body_where_it_is_and_nothing_elsewhere(
+    tmp_path, footage, body, monkeypatch
+):
     monkeypatch.setattr(overlay_video, "OPACITY", 0.8)
     seen = []
     out = tmp_path / "overlay.mp4"
     motion = standing(body, [2, 3, 4, 5, 6], x=0.3)
     motion.valid[2] = False
-    write_overlay(out, footage, motion, body, progress=lambda done, total: seen.append((done, total)))
+    write_overlay(
+        out, footage, motion, body, progress=lambda done, total: seen.append((done, total))
+    )
     with open_video(out) as video:
         images = [f.image_rgb for f in video]
     assert (video.width, video.height, video.fps, len(images)) == (W, H, 25, 10)
@@ -114,7 +132,8 @@ def test_the_video_shows_the_body_where_it_is_and_nothing_elsewhere(tmp_path, fo
         assert changed(images[i]).mean() < 0.01
     expected = silhouette(body, x=0.3)
     for i in (2, 3, 5, 6):
-        assert intersection_over_union(changed(images[i]), expected) > 0.65  # at this size the codec blurs the outline
+        # at this size the codec blurs the outline
+        assert intersection_over_union(changed(images[i]), expected) > 0.65
     strength = [np.abs(image[expected].astype(float) - GREY).mean() for image in images]
     assert 0.1 * strength[3] < strength[4] < 0.6 * strength[3]  # filled in: drawn fainter
     assert sorted(p.name for p in tmp_path.iterdir()) == ["footage.mp4", "overlay.mp4"]
@@ -122,12 +141,18 @@ def test_the_video_shows_the_body_where_it_is_and_nothing_elsewhere(tmp_path, fo
 
 def test_two_people_have_different_colours_and_the_nearer_occludes_the_other(body):
     image = np.full((H, W, 3), GREY, np.uint8)
-    near, far = (camera_vertices(standing(body, [0], x, y), body, 0) for x, y in ((0.0, 2.5), (0.2, 4.0)))
+    near, far = (
+        camera_vertices(standing(body, [0], x, y), body, 0) for x, y in ((0.0, 2.5), (0.2, 4.0))
+    )
     out = draw_overlay(image, [far, near], body.faces, K, opacity=1.0)
-    other = draw_overlay(image, [near, far], body.faces, K, colors=[(0.2, 0.75, 1.0), (1.0, 0.55, 0.15)], opacity=1.0)
+    other = draw_overlay(
+        image, [near, far], body.faces, K, colors=[(0.2, 0.75, 1.0), (1.0, 0.55, 0.15)], opacity=1.0
+    )
     np.testing.assert_array_equal(out, other)
     in_front, behind = silhouette(body, 0.0, 2.5), silhouette(body, 0.2, 4.0)
-    inside, only_far = (cv2.erode(m.astype(np.uint8), np.ones((3, 3))) > 0 for m in (in_front, behind & ~in_front))
+    inside, only_far = (
+        cv2.erode(m.astype(np.uint8), np.ones((3, 3))) > 0 for m in (in_front, behind & ~in_front)
+    )
     blue = out[..., 2].astype(int) > out[..., 0]
     assert blue[inside].mean() > 0.98  # the second tint; an eye may be of its own colour
     assert blue[only_far].mean() < 0.02  # the first is orange
@@ -138,7 +163,9 @@ def test_opacity_blends_and_the_input_image_is_not_changed(body):
     vertices = camera_vertices(standing(body, [0]), body, 0)
     colors = body_colors(body, 0)
     assert colors.shape == (len(body.faces), 3)
-    none, half, full = (draw_overlay(image, vertices, body.faces, K, None, colors, a) for a in (0.0, 0.5, 1.0))
+    none, half, full = (
+        draw_overlay(image, vertices, body.faces, K, None, colors, a) for a in (0.0, 0.5, 1.0)
+    )
     np.testing.assert_array_equal(none, image)
     assert np.abs(half.astype(int) - (full.astype(int) + GREY) / 2).max() <= 2
     assert (image == GREY).all()
@@ -155,7 +182,9 @@ def test_a_picture_suffix_gives_the_first_frame_with_a_person(tmp_path, footage,
 
 def test_confident_keypoints_are_drawn_as_dots(tmp_path, footage, body):
     motion = standing(body, [0])
-    motion.keypoints2d = np.array([[[20, 30, 0.9], [20, 90, 0.1], [np.nan, 5, 0.9], [1e9, 5, 0.9]]], np.float32)
+    motion.keypoints2d = np.array(
+        [[[20, 30, 0.9], [20, 90, 0.1], [np.nan, 5, 0.9], [1e9, 5, 0.9]]], np.float32
+    )
     motion.keypoints2d_names = np.array(list("abcd"))
     write_overlay(tmp_path / "a.png", footage, motion, body)
     marks = changed(cv2.imread(str(tmp_path / "a.png")))
@@ -180,7 +209,8 @@ def test_the_video_has_the_times_of_footage_with_a_variable_rate(tmp_path, foota
 
 
 @pytest.mark.parametrize(
-    ("suffix", "rate"), [(".mp4", Fraction(24000, 1001)), (".mkv", Fraction(30)), (".mp4", Fraction(1000))]
+    ("suffix", "rate"),
+    [(".mp4", Fraction(24000, 1001)), (".mkv", Fraction(30)), (".mp4", Fraction(1000))],
 )
 def test_the_video_of_footage_with_a_constant_rate_has_exactly_that(tmp_path, body, suffix, rate):
     """Also where the container rounds its times to milliseconds, as Matroska does."""
@@ -215,9 +245,12 @@ def test_unwritable_outputs_are_errors(tmp_path, footage, body, name):
     assert [p.name for p in tmp_path.iterdir()] == ["footage.mp4"]
 
 
-@pytest.mark.skipif(os.name == "nt", reason="Windows has no limit on a file's size that a process could set")
+@pytest.mark.skipif(
+    os.name == "nt", reason="Windows has no limit on a file's size that a process could set"
+)
 @pytest.mark.parametrize(
-    ("name", "failed"), [("overlay.mp4", "could not finish writing"), ("overlay.png", "cannot write")]
+    ("name", "failed"),
+    [("overlay.mp4", "could not finish writing"), ("overlay.png", "cannot write")],
 )
 def test_a_full_disk_is_an_error_and_leaves_no_file(tmp_path, footage, body, name, failed):
     import resource
@@ -247,8 +280,14 @@ def test_cancelling_leaves_no_file_and_keeps_an_existing_one(tmp_path, footage, 
 
 @pytest.mark.parametrize("name", ["overlay.mp4", "overlay.png"])
 def test_a_range_without_frames_is_an_error_and_leaves_no_file(tmp_path, footage, body, name):
-    with pytest.raises(VideoError, match=r"footage\.mp4 has no frames between the given start and end"):
-        write_overlay(tmp_path / name, footage, standing(body, [0]), body, wanted=VideoRange(start_s=1.0))
+    with pytest.raises(
+        VideoError,
+        match=r"footage\.mp4 has no frames between the given start and "
+        r"end",
+    ):
+        write_overlay(
+            tmp_path / name, footage, standing(body, [0]), body, wanted=VideoRange(start_s=1.0)
+        )
     assert [p.name for p in tmp_path.iterdir()] == ["footage.mp4"]
 
 
@@ -265,7 +304,10 @@ def test_missing_footage_and_a_wrong_body_are_errors(tmp_path, footage, body):
 def test_the_points_of_a_face_are_drawn_where_it_was_seen(tmp_path, footage, body, monkeypatch):
     monkeypatch.setattr(overlay_video, "OPACITY", 0.0)
     motion = standing(body, [0, 1])
-    motion.face = made_face(2) | {"face_points": np.full((2, 3, 2), 20.0), "expression_confidence": np.array([0, 1.0])}
+    motion.face = made_face(2) | {
+        "face_points": np.full((2, 3, 2), 20.0),
+        "expression_confidence": np.array([0, 1.0]),
+    }
     with open_video(footage) as video:
         size = (video.height, video.width)
     shown = dict(painted_frames(footage, [motion], body, [0, 1]))

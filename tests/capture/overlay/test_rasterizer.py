@@ -1,12 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The rasterizer against closed forms: ray-sphere and ray-plane depths, OpenCV's polygons and its projection."""
+"""The rasterizer against closed forms: ray-sphere and ray-plane depths, OpenCV's polygons and its
+projection.
+"""
 
 from __future__ import annotations
 
 import cv2
 import numpy as np
 import pytest
-from scope.scope_addon.capture.overlay.rasterizer import NEAR, Canvas, fill_silhouette, rasterize, vertex_normals
+from scope.scope_addon.capture.overlay.rasterizer import (
+    NEAR,
+    Canvas,
+    fill_silhouette,
+    rasterize,
+    vertex_normals,
+)
 
 WIDTH, HEIGHT = 160, 120
 K = np.array([[150.0, 0.0, 80.5], [0.0, 140.0, 60.25], [0.0, 0.0, 1.0]])
@@ -21,7 +29,9 @@ def sphere(center, radius: float, rows: int = 48) -> tuple[np.ndarray, np.ndarra
     i, j = np.meshgrid(np.arange(rows - 1), np.arange(2 * rows), indexing="ij")
     k = (j + 1) % (2 * rows)
     a, b, c, d = (r * 2 * rows + s for r, s in ((i, j), (i + 1, j), (i + 1, k), (i, k)))
-    triangles = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
+    triangles = np.concatenate(
+        [np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)]
+    )
     return np.asarray(center) + radius * points, triangles.astype(np.int32)
 
 
@@ -32,7 +42,9 @@ def rays() -> np.ndarray:
 
 
 def sphere_depth(center, radius: float) -> np.ndarray:
-    """Calculate z (H, W) of the nearer intersection of each pixel's ray with a sphere, inf where there is none."""
+    """Calculate z (H, W) of the nearer intersection of each pixel's ray with a sphere, inf where
+    there is none.
+    """
     d, c = rays(), np.asarray(center)
     a, b = (d * d).sum(-1), d @ c
     inside = b * b - a * (c @ c - radius**2)
@@ -88,7 +100,10 @@ def test_triangles_cover_the_pixels_of_opencv_polygons():
         if np.linalg.det(np.stack([corners[1] - corners[0], corners[2] - corners[0]])) > 0:
             corners = corners[::-1]
         z = rng.uniform(0.5, 4, 3)
-        points = np.stack([(corners[:, 0] - K[0, 2]) / K[0, 0] * z, (corners[:, 1] - K[1, 2]) / K[1, 1] * z, z], -1)
+        points = np.stack(
+            [(corners[:, 0] - K[0, 2]) / K[0, 0] * z, (corners[:, 1] - K[1, 2]) / K[1, 1] * z, z],
+            -1,
+        )
         canvas = Canvas.blank(WIDTH, HEIGHT)
         rasterize(canvas, points, np.array([[0, 1, 2]]), RED, K)
         margin = 24  # so that erosion sees edges just outside the picture too
@@ -119,7 +134,8 @@ def test_back_faces_are_left_out():
     points, triangles = sphere((0, 0, 3.0), 0.5)
     canvas = Canvas.blank(WIDTH, HEIGHT)
     rasterize(canvas, points, triangles[:, ::-1], RED, K)
-    outline = 3.0 - 0.5**2 / 3.0  # depth of the outline, where rays touch the sphere: only what lies beyond is seen
+    # depth of the outline, where rays touch the sphere: only what lies beyond is seen
+    outline = 3.0 - 0.5**2 / 3.0
     assert canvas.depth[canvas.coverage].min() > outline - 0.03
 
 
@@ -150,7 +166,9 @@ def test_vertices_behind_the_camera_or_nan_are_not_drawn():
     assert NEAR > 0
 
 
-@pytest.mark.parametrize("dist", [[-0.25, 0.06, 0.002, -0.001, 0.0], [0.3], [0.1, -0.05, 0.0, 0.0, 0.01]])
+@pytest.mark.parametrize(
+    "dist", [[-0.25, 0.06, 0.002, -0.001, 0.0], [0.3], [0.1, -0.05, 0.0, 0.0, 0.01]]
+)
 def test_distortion_agrees_with_opencv(dist):
     rng, inside = np.random.default_rng(5), 0
     for _ in range(30):
@@ -168,7 +186,8 @@ def test_distortion_agrees_with_opencv(dist):
 
 def test_points_far_outside_the_picture_do_not_fold_back_with_barrel_distortion():
     canvas = Canvas.blank(WIDTH, HEIGHT)
-    # At x/z = 3 the radial polynomial is 3 (1 - 0.25·9) < 0: taken at its word it would land inside the picture.
+    # At x/z = 3 the radial polynomial is 3 (1 - 0.25·9) < 0: taken at its word it would land inside
+    # the picture.
     rasterize(canvas, *sphere((6.0, 0.0, 2.0), 0.5), RED, K, np.array([-0.25, 0, 0, 0, 0]))
     assert not canvas.coverage.any()
 
@@ -186,7 +205,8 @@ def test_the_lit_side_is_brighter_and_opacity_is_written():
     canvas = Canvas.blank(WIDTH, HEIGHT)
     rasterize(canvas, points, triangles, (0.5, 0.5, 0.5), K, opacity=0.25)
     assert set(np.unique(canvas.rgba[..., 3])) == {0, 64}
-    assert canvas.rgba[45, 70, 0] > canvas.rgba[75, 95, 0] + 20  # the light stands above the left shoulder
+    # the light stands above the left shoulder
+    assert canvas.rgba[45, 70, 0] > canvas.rgba[75, 95, 0] + 20
     canvas.clear()
     assert not canvas.coverage.any()
     assert not canvas.rgba.any()

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Videos that are written can be read, and one that cannot be written is an error of one sentence."""
+"""Videos that are written can be read, and one that cannot be written is an error of one
+sentence.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +40,9 @@ def test_another_ffmpeg_reads_what_is_written(tmp_path, suffix, fps):
 
 @pytest.mark.parametrize("suffix", [".mp4", ".mov", ".mkv"])
 @pytest.mark.parametrize(
-    "times_s", [[0.0, 0.04, 0.5, 1.0], [*np.arange(50) / 25, *(2.0 + 0.5 * np.arange(6))]], ids=["few", "slower"]
+    "times_s",
+    [[0.0, 0.04, 0.5, 1.0], [*np.arange(50) / 25, *(2.0 + 0.5 * np.arange(6))]],
+    ids=["few", "slower"],
 )
 def test_a_variable_rate_keeps_its_times_and_duration(tmp_path, suffix, times_s):
     path = tmp_path / f"a{suffix}"
@@ -55,7 +59,11 @@ def test_a_variable_rate_keeps_its_times_and_duration(tmp_path, suffix, times_s)
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="only Linux has this device")
 def test_a_full_disk_is_an_error(tmp_path):
     (tmp_path / "a.mkv").symlink_to("/dev/full")
-    with pytest.raises(OutputError, match=r"could not finish writing .*shown\.mkv; free some space"):
+    with pytest.raises(
+        OutputError,
+        match=r"could not finish writing .*shown\.mkv; free some "
+        r"space",
+    ):
         write(VideoWriter(tmp_path / "a.mkv", Fraction(30), 64, 48, tmp_path / "shown.mkv"), 2)
 
 
@@ -76,7 +84,9 @@ def test_another_codec_is_used_where_there_is_no_x264(tmp_path, monkeypatch):
     monkeypatch.setattr(av, "codecs_available", {"mpeg4"})
     path = tmp_path / "a.mp4"
     write(VideoWriter(path, Fraction(30), 64, 48, path), 2)
-    assert int(cv2.VideoCapture(str(path)).get(cv2.CAP_PROP_FOURCC)).to_bytes(4, "little") == b"FMP4"
+    assert (
+        int(cv2.VideoCapture(str(path)).get(cv2.CAP_PROP_FOURCC)).to_bytes(4, "little") == b"FMP4"
+    )
     monkeypatch.setattr(av, "codecs_available", set())
     with pytest.raises(OutputError, match="no video encoder was found"):
         VideoWriter(path, Fraction(30), 64, 48, path)

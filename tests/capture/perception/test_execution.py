@@ -10,7 +10,13 @@ from types import SimpleNamespace
 
 import pytest
 from scope.scope_addon.capture.perception import sessions
-from scope.scope_addon.capture.perception.execution import CHOICES, CPU, PROVIDERS, Execution, SerializedSession
+from scope.scope_addon.capture.perception.execution import (
+    CHOICES,
+    CPU,
+    PROVIDERS,
+    Execution,
+    SerializedSession,
+)
 from scope.scope_addon.capture.perception.sessions import network_path, open_session
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.options import option
@@ -19,9 +25,13 @@ CPU_NAME = "CPUExecutionProvider"
 
 
 class FakeRuntime:
-    """Fake of onnxruntime with these providers; those in ``broken`` raise, those in ``silent`` are left out."""
+    """Fake of onnxruntime with these providers; those in ``broken`` raise, those in ``silent`` are
+    left out.
+    """
 
-    def __init__(self, available: list[str], broken: tuple[str, ...] = (), silent: tuple[str, ...] = ()) -> None:
+    def __init__(
+        self, available: list[str], broken: tuple[str, ...] = (), silent: tuple[str, ...] = ()
+    ) -> None:
         self.available, self.broken, self.silent = available, broken, silent
         self.asked: list[list[str]] = []
         self.threads: list[int] = []
@@ -32,7 +42,9 @@ class FakeRuntime:
     def SessionOptions(self) -> SimpleNamespace:
         return SimpleNamespace(add_session_config_entry=lambda *_: None)
 
-    def InferenceSession(self, path: str, options: SimpleNamespace, providers: list[str]) -> SimpleNamespace:
+    def InferenceSession(
+        self, path: str, options: SimpleNamespace, providers: list[str]
+    ) -> SimpleNamespace:
         self.asked.append(providers)
         self.threads.append(options.intra_op_num_threads)
         if providers[0] in self.broken:
@@ -63,7 +75,9 @@ def runtime(monkeypatch: pytest.MonkeyPatch):
         (("cuda",), "cpu", "cpu"),
     ],
 )
-def test_the_best_available_provider_is_used(runtime, available: tuple[str, ...], asked: str, used: str) -> None:
+def test_the_best_available_provider_is_used(
+    runtime, available: tuple[str, ...], asked: str, used: str
+) -> None:
     fake, execution = runtime(*available), Execution(asked)
     open_session(Path("m.onnx"), 3, execution)
     assert execution.used == [used]
@@ -108,7 +122,9 @@ def test_directml_sessions_run_in_one_thread_at_a_time(runtime) -> None:
 
     session._session.run = run
     results: list = []
-    threads = [threading.Thread(target=lambda: results.extend(session.run(None, {}))) for _ in range(6)]
+    threads = [
+        threading.Thread(target=lambda: results.extend(session.run(None, {}))) for _ in range(6)
+    ]
     for thread in threads:
         thread.start()
     for thread in threads:

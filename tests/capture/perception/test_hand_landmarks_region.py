@@ -45,11 +45,15 @@ def arm(elbow, wrist, index, pinky):
 def test_the_body_predicts_the_hand_beyond_the_wrist_in_any_direction_of_the_arm(angle):
     scale = 500.0
     length = HAND_LENGTH_M * scale
-    along = turned([[0.0, 3 * length], [0, 0], [-10, -length / 2], [10, -length / 2]], angle, (400, 300))
+    along = turned(
+        [[0.0, 3 * length], [0, 0], [-10, -length / 2], [10, -length / 2]], angle, (400, 300)
+    )
     region = region_from_body(arm(*along), scale, 0)
     assert region.side_px == pytest.approx(1.5 * length)
     assert math.remainder(region.rotation - angle, 2 * math.pi) == pytest.approx(0.0, abs=1e-9)
-    assert region.center_px == pytest.approx(tuple(turned([[0, -0.45 * length]], angle, (400, 300))[0]))
+    assert region.center_px == pytest.approx(
+        tuple(turned([[0, -0.45 * length]], angle, (400, 300))[0])
+    )
     tips = turned([[0, -length]], angle, (400, 300))
     inside = region.crop_from_image(np.concatenate([tips, along[1:2]]))
     assert ((inside > 0) & (inside < 1)).all()
@@ -77,7 +81,9 @@ def test_keypoints_predict_the_next_region(angle):
     hand = turned(flat_hand(), angle, (320, 240), 100)
     region = region_from_landmarks(hand)
     assert region.side_px == pytest.approx(upright.side_px)
-    assert math.remainder(region.rotation - upright.rotation - angle, 2 * math.pi) == pytest.approx(0.0, abs=1e-9)
+    assert math.remainder(region.rotation - upright.rotation - angle, 2 * math.pi) == pytest.approx(
+        0.0, abs=1e-9
+    )
     seen = region.crop_from_image(hand)
     assert np.allclose(seen, upright.crop_from_image(flat_hand() * 100))
     assert (seen > 0).all()
@@ -104,4 +110,6 @@ def test_a_palm_gives_the_region_also_in_a_rotated_square():
     found = _in_image(np.concatenate([[72, 72, 120, 120], points.ravel()]).astype(float), where)
     assert found.rotation == pytest.approx(0.6)
     assert found.side_px == pytest.approx(upright.side_px * 384 / PALM_INPUT_SIZE)
-    assert found.center_px == pytest.approx(tuple(where.image_from_crop(np.array([96, 72]) / PALM_INPUT_SIZE)))
+    assert found.center_px == pytest.approx(
+        tuple(where.image_from_crop(np.array([96, 72]) / PALM_INPUT_SIZE))
+    )

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Kept estimates are found again bit for bit, only for the same network, pixels and region; damage costs only time."""
+"""Kept estimates are found again bit for bit, only for the same network, pixels and region; damage
+costs only time.
+"""
 
 from __future__ import annotations
 
@@ -100,7 +102,9 @@ def test_nothing_is_kept_without_a_folder():
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no limit on the size of a file")
-def test_on_a_full_disk_nothing_is_kept_and_nothing_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_on_a_full_disk_nothing_is_kept_and_nothing_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A half-written zip file printed a traceback when it was destroyed."""
     resource, unraisable = pytest.importorskip("resource"), list[object]()
     gc.collect()  # what other tests have left

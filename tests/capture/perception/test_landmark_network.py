@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The landmark network: decoding of hand-made outputs, and real images against measured ground truth."""
+"""The landmark network: decoding of hand-made outputs, and real images against measured ground
+truth.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES, LandmarkNetwork, interpret, refine
+from scope.scope_addon.capture.perception.landmark_network import (
+    KEYPOINT_NAMES,
+    LandmarkNetwork,
+    interpret,
+    refine,
+)
 from scope.scope_addon.capture.perception.person_detector import PersonDetector
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.perception.sessions import landmark_network_name
@@ -20,8 +27,10 @@ from ...required import package
 
 SAMPLE = ASSETS / "sample"
 TRUTH_NAMES = {
-    "LShoulder": "left_shoulder", "RShoulder": "right_shoulder", "LElbow": "left_elbow", "RElbow": "right_elbow",
-    "LWrist": "left_wrist", "RWrist": "right_wrist", "LHip": "left_hip", "RHip": "right_hip", "LKnee": "left_knee",
+    "LShoulder": "left_shoulder", "RShoulder": "right_shoulder", "LElbow": "left_elbow",
+    "RElbow": "right_elbow",
+    "LWrist": "left_wrist", "RWrist": "right_wrist", "LHip": "left_hip", "RHip": "right_hip",
+    "LKnee": "left_knee",
     "RKnee": "right_knee", "LAnkle": "left_ankle", "RAnkle": "right_ankle",
 }  # fmt: skip
 
@@ -32,7 +41,9 @@ def network(networks: Path) -> LandmarkNetwork:
 
 
 def raw_outputs() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Create outputs: landmarks in the middle of the crop, empty heatmaps, world landmarks at the origin."""
+    """Create outputs: landmarks in the middle of the crop, empty heatmaps, world landmarks at the
+    origin.
+    """
     landmarks = np.zeros((39, 5), np.float32)
     landmarks[:, :2] = 128
     return landmarks, np.full((39, 64, 64), -20, np.float32), np.zeros((39, 3), np.float32)
@@ -40,13 +51,15 @@ def raw_outputs() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def test_interpret_maps_to_the_image_and_the_camera() -> None:
     landmarks, heatmaps, world = raw_outputs()
-    landmarks[15, :] = [256, 128, 0, 0, math.log(3)]  # right edge of the crop; visibility ½, in frame ¾
+    # right edge of the crop; visibility ½, in frame ¾
+    landmarks[15, :] = [256, 128, 0, 0, math.log(3)]
     landmarks[34, :2] = [128, 25.6]
     world[15] = [1, 0, 0.5]
     world[[23, 24]] = [[0.1, 0.02, 0], [-0.1, 0.02, 0]]
     region = Region((100.0, 60.0), 40.0, math.pi / 2)
     estimate = interpret(landmarks.ravel(), 0.8, heatmaps, world.ravel(), region)
-    np.testing.assert_allclose(estimate.keypoints_px[15], [100, 80], atol=1e-9)  # the crop's right is down
+    # the crop's right is down
+    np.testing.assert_allclose(estimate.keypoints_px[15], [100, 80], atol=1e-9)
     np.testing.assert_allclose(estimate.keypoints_px[0], [100, 60], atol=1e-9)
     assert estimate.keypoints_confidence[15] == pytest.approx(0.5 * 0.75)
     np.testing.assert_allclose(estimate.world_landmarks[15], [0.02, 1, 0.5], atol=1e-6)
@@ -71,14 +84,18 @@ def test_refine_at_the_edge_sees_only_its_own_cells() -> None:
     heatmaps = np.full((1, 64, 64), -30.0, np.float32)
     heatmaps[0, 2, 63] = 30
     heatmaps[0, :, 0] = 30  # what wrapping round would see
-    np.testing.assert_allclose(refine(np.array([[0.999, 0.01]]), heatmaps), [[63 / 64, 2 / 64]], atol=1e-9)
+    np.testing.assert_allclose(
+        refine(np.array([[0.999, 0.01]]), heatmaps), [[63 / 64, 2 / 64]], atol=1e-9
+    )
 
 
 @pytest.mark.parametrize("camera", [1, 2, 3, 4])
 def test_agrees_with_measured_ground_truth(
     network: LandmarkNetwork, first_frame: Callable[..., np.ndarray], shared: Path, camera: int
 ) -> None:
-    """x right, y down, z away from the camera, left is the person's left: any other convention has large errors."""
+    """x right, y down, z away from the camera, left is the person's left: any other convention has
+    large errors.
+    """
     truth = np.load(shared / "data" / "pose2sim" / f"truth_cam{camera}.npz")
     row = 10
     image = first_frame(f"pose2sim/cam{camera}", skip=int(truth["frame_index"][row]))
@@ -93,7 +110,9 @@ def test_agrees_with_measured_ground_truth(
     assert np.nanmedian(distance_px) < 0.04 * height
     ours = estimate.world_landmarks[numbers]
     errors = {
-        signs: np.nanmean(np.linalg.norm(ours * signs - (joints - joints[6:8].mean(axis=0)), axis=1))
+        signs: np.nanmean(
+            np.linalg.norm(ours * signs - (joints - joints[6:8].mean(axis=0)), axis=1)
+        )
         for signs in [(1, 1, 1), (1, 1, -1), (-1, 1, 1), (-1, 1, -1)]
     }
     assert errors[1, 1, 1] < 0.17
@@ -111,8 +130,13 @@ def test_batch_equals_one_by_one_and_follows_the_rotation(
     np.testing.assert_allclose(both[1].keypoints_px, alone.keypoints_px, atol=0.05)
     np.testing.assert_allclose(both[1].world_landmarks, alone.world_landmarks, atol=1e-4)
     # the same person whichever way the square is turned
-    assert np.median(np.linalg.norm(both[0].keypoints_px - both[1].keypoints_px, axis=1)) < 0.02 * upright.side_px
-    assert np.median(np.linalg.norm(both[0].world_landmarks - both[1].world_landmarks, axis=1)) < 0.06
+    assert (
+        np.median(np.linalg.norm(both[0].keypoints_px - both[1].keypoints_px, axis=1))
+        < 0.02 * upright.side_px
+    )
+    assert (
+        np.median(np.linalg.norm(both[0].world_landmarks - both[1].world_landmarks, axis=1)) < 0.06
+    )
     assert network.estimate(image, []) == []
 
 
@@ -122,7 +146,9 @@ def test_unknown_quality_lists_the_presets() -> None:
 
 
 def test_mask_covers_the_person_alone(network: LandmarkNetwork) -> None:
-    """The true body of the sample clip's first frame, drawn into the region, covers what the network calls a person."""
+    """The true body of the sample clip's first frame, drawn into the region, covers what the
+    network calls a person.
+    """
     cv2 = package("cv2")
     with np.load(SAMPLE / "sample_truth.npz") as truth:
         joints, K = truth["joints_cam"][0], truth["intrinsics"]
@@ -139,7 +165,10 @@ def test_mask_covers_the_person_alone(network: LandmarkNetwork) -> None:
     assert mask[:, -20:].mean() < 0.05
     assert 0.05 < (mask > 0.5).mean() < 0.4
     rgb = np.ascontiguousarray(image[:, :, ::-1])
-    (alone,), (masked,) = network.estimate(rgb, [region]), network.estimate(rgb, [region], with_masks=True)
+    (alone,), (masked,) = (
+        network.estimate(rgb, [region]),
+        network.estimate(rgb, [region], with_masks=True),
+    )
     assert alone.mask is None
     assert masked.mask is not None
     np.testing.assert_allclose(masked.mask, mask, atol=1e-3)

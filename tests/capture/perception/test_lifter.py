@@ -19,7 +19,16 @@ from scope.scope_addon.capture.perception.lifter import (
 from scope.scope_addon.capture.perception.person_detector import PersonDetector
 from scope.scope_addon.capture.tracking.left_right import MIRROR_PARTNER
 from scope.scope_addon.errors import SetupError
-from scope.solver import Keypoints2D, Measurements, Options, Stage, View, Weights, fit_motion, load_body
+from scope.solver import (
+    Keypoints2D,
+    Measurements,
+    Options,
+    Stage,
+    View,
+    Weights,
+    fit_motion,
+    load_body,
+)
 from scope.solver.errors import ModelFileError, ShapeError
 from scope.solver.rotations import exp
 
@@ -30,9 +39,14 @@ def lifter():
 
 
 def before_camera(body, R, heading):
-    """Place a pose (24, 3, 3) 5 m away: its keypoints (2, 33, 3) in camera axes, exact and with keypoint offsets."""
+    """Place a pose (24, 3, 3) 5 m away: its keypoints (2, 33, 3) in camera axes, exact and with
+    keypoint offsets.
+    """
     R[0] = np.diag([1.0, -1.0, -1.0]) @ exp(np.array([0, heading, 0])) @ R[0]
-    pose, at = body.forward_kinematics(R, np.array([0.3, 0.1, 5.0])), list(body.keypoint_set("blazepose").values())
+    pose, at = (
+        body.forward_kinematics(R, np.array([0.3, 0.1, 5.0])),
+        list(body.keypoint_set("blazepose").values()),
+    )
     return np.array([which.keypoints(*pose)[at] for which in (body, with_keypoint_offsets(body))])
 
 
@@ -43,13 +57,19 @@ def truth_and_rays(moments):
 
 @pytest.fixture(scope="module")
 def people(body):
-    """Create keypoints of the body in camera axes (T, 33, 3) and their image (T, 33, 2) at z = 1: walking-like
-    poses, every heading, a camera 5 m away."""
+    """Create keypoints of the body in camera axes (T, 33, 3) and their image (T, 33, 2) at z = 1:
+    walking-like poses, every heading, a camera 5 m away.
+    """
     rng, out = np.random.default_rng(0), []
     for k in range(48):
         pose = rng.normal(0, 0.05, (body.K + 1, 3))
         swing = 0.5 * np.sin(k)
-        for name, angle in (("left_hip", -swing), ("right_hip", swing), ("left_knee", 0.4), ("right_knee", 0.4)):
+        for name, angle in (
+            ("left_hip", -swing),
+            ("right_hip", swing),
+            ("left_knee", 0.4),
+            ("right_knee", 0.4),
+        ):
             pose[body.joint_names.index(name), 0] += angle
         for name, side in (("left_shoulder", -1), ("right_shoulder", 1)):
             pose[body.joint_names.index(name), 2] += 1.2 * side
@@ -65,7 +85,12 @@ def walkers(body):
     for t in times:
         pose = np.zeros((body.K + 1, 3))
         swing = 0.5 * np.sin(2 * np.pi * 0.9 * t)
-        turns = {"left_hip": -swing, "right_hip": swing, "left_shoulder": swing, "right_shoulder": -swing}
+        turns = {
+            "left_hip": -swing,
+            "right_hip": swing,
+            "left_shoulder": swing,
+            "right_shoulder": -swing,
+        }
         for name, angle in (turns | {"left_knee": 0.3, "right_knee": 0.3}).items():
             pose[body.joint_names.index(name), 0] += angle
         R = exp(pose)
@@ -80,7 +105,9 @@ def relative(points):
     return points - points[:, HIPS].mean(axis=1, keepdims=True)
 
 
-def test_depth_of_people_outside_the_training_data_is_estimated_from_their_image_alone(lifter, people):
+def test_depth_of_people_outside_the_training_data_is_estimated_from_their_image_alone(
+    lifter, people
+):
     people, rays = people
     lifted = lifter.lift(rays, np.ones(rays.shape[:2]), None)
     limbs = [*range(11, 17), *range(25, 29)]
@@ -96,7 +123,9 @@ def test_true_world_landmarks_improve_the_estimate(lifter, people):
     R = virtual_camera(rays)
     given = relative(people) @ np.swapaxes(R, 1, 2)  # landmark networks look straight at the person
     without, informed = lifter.lift(rays, ones, None), lifter.lift(rays, ones, given)
-    error = [np.linalg.norm(x.points - relative(people), axis=-1).mean() for x in (without, informed)]
+    error = [
+        np.linalg.norm(x.points - relative(people), axis=-1).mean() for x in (without, informed)
+    ]
     assert error[1] < error[0]
 
 
@@ -133,15 +162,21 @@ def test_errors_match_their_standard_deviations(lifter, people):
     z = (lifted.points - relative(people))[..., 2] / lifted.sigma_along
     assert 0.9 < np.sqrt(np.square(z).mean()) < 1.15
     assert (lifted.sigma_along > 0).all()
-    assert lifted.sigma_along[:, 15].mean() > lifted.sigma_along[:, HIPS].mean()  # wrists are harder than hips
+    # wrists are harder than hips
+    assert lifted.sigma_along[:, 15].mean() > lifted.sigma_along[:, HIPS].mean()
 
 
-LIMBS = [f"{side}_{part}" for part in ("shoulder", "elbow", "wrist", "knee", "ankle") for side in ("left", "right")]
+LIMBS = [
+    f"{side}_{part}"
+    for part in ("shoulder", "elbow", "wrist", "knee", "ankle")
+    for side in ("left", "right")
+]
 
 
 @pytest.fixture(scope="module")
 def estimates(shared, frames):
-    """The landmark network's estimates of a man filmed by four cameras: (camera, frame, estimate, truth, joint names).
+    """The landmark network's estimates of a man filmed by four cameras: (camera, frame, estimate,
+    truth, joint names).
 
     The true joints are in the camera's axes, NaN where not measured.
     """
@@ -149,12 +184,16 @@ def estimates(shared, frames):
     found = []
     for camera in range(1, 5):
         truth = np.load(shared / "data" / "pose2sim" / f"truth_cam{camera}.npz")
-        names = [{"L": "left_", "R": "right_"}.get(n[0], "") + n[1:].lower() for n in truth["names"]]
+        names = [
+            {"L": "left_", "R": "right_"}.get(n[0], "") + n[1:].lower() for n in truth["names"]
+        ]
         rows = {int(index): row for row, index in enumerate(truth["frame_index"])}
         for k, image in enumerate(frames(f"pose2sim/cam{camera}", stop=81, every=20)):
             if 20 * k not in rows:
                 continue
-            (seen,) = network.estimate(image, [max(detector.detect(image), key=lambda d: d.region.side_px).region])
+            (seen,) = network.estimate(
+                image, [max(detector.detect(image), key=lambda d: d.region.side_px).region]
+            )
             (seen,) = network.estimate(image, [seen.next_region])
             joints = dict(zip(names, truth["joints"][rows[20 * k]], strict=True))
             found.append((camera, 20 * k, seen, truth, joints))
@@ -165,8 +204,8 @@ def estimates(shared, frames):
 def real_people(estimates):
     """Return what the network estimates of him, and his true position, hip centre at 0.
 
-    rays (n, 33, 2), confidence (n, 33), world landmarks (n, 33, 3), true limbs (n, 10, 3), NaN where not
-    measured, and their keypoints' numbers.
+    rays (n, 33, 2), confidence (n, 33), world landmarks (n, 33, 3), true limbs (n, 10, 3), NaN
+    where not measured, and their keypoints' numbers.
     """
     found = []
     for _, _, seen, truth, joints in estimates:
@@ -175,20 +214,26 @@ def real_people(estimates):
         hips = (joints["left_hip"] + joints["right_hip"]) / 2
         limb_joints = np.array([joints[name] for name in LIMBS]) - hips
         found.append((rays, seen.keypoints_confidence, seen.world_landmarks, limb_joints))
-    return [np.array(part) for part in zip(*found, strict=True)], [KEYPOINT_NAMES.index(n) for n in LIMBS]
+    return [np.array(part) for part in zip(*found, strict=True)], [
+        KEYPOINT_NAMES.index(n) for n in LIMBS
+    ]
 
 
 def test_lifting_real_people_is_more_accurate_than_their_world_landmarks(lifter, real_people):
     (rays, confidence, world, truth), limbs = real_people
     lifted = lifter.lift_mixture(rays, confidence, world)
-    ours, theirs = (np.nanmean(np.linalg.norm(p[:, limbs] - truth, axis=-1)) for p in (lifted.points, world))
+    ours, theirs = (
+        np.nanmean(np.linalg.norm(p[:, limbs] - truth, axis=-1)) for p in (lifted.points, world)
+    )
     assert len(truth) >= 15
     assert ours < 0.115
     assert ours < 0.85 * theirs
 
 
 def test_errors_on_real_people_match_their_standard_deviations(lifter, real_people):
-    """Root mean square of residual over standard deviation, 1 if calibrated, over all four cameras."""
+    """Root mean square of residual over standard deviation, 1 if calibrated, over all four
+    cameras.
+    """
     (rays, confidence, world, truth), limbs = real_people
     lifted = lifter.lift_mixture(rays, confidence, world)
     error = (lifted.points[:, limbs] - truth) @ np.swapaxes(virtual_camera(rays), 1, 2)
@@ -206,28 +251,37 @@ def rigid(a, b):
 
 
 def head_as_three_keypoints(confidence):
-    """The errors of the eleven keypoints of a head are alike, so that they weigh as much as three others."""
-    head = [any(part in name for part in ("nose", "eye", "ear", "mouth")) for name in KEYPOINT_NAMES]
+    """The errors of the eleven keypoints of a head are alike, so that they weigh as much as three
+    others.
+    """
+    head = [
+        any(part in name for part in ("nose", "eye", "ear", "mouth")) for name in KEYPOINT_NAMES
+    ]
     return np.where(head, 0.25, 1.0) * confidence
 
 
 @pytest.mark.parametrize(
-    ("cameras", "limit_mm"), [((1, 2, 3, 4), 35.0), ((1, 2, 3), 39.0), ((1, 2, 4), 34.0), ((1, 3, 4), 34.0)]
+    ("cameras", "limit_mm"),
+    [((1, 2, 3, 4), 35.0), ((1, 2, 3), 39.0), ((1, 2, 4), 34.0), ((1, 3, 4), 34.0)],
 )
 def test_several_cameras_together_are_near_the_truth(estimates, cameras, limit_mm):
     """One frame in 20 of each camera, 2D keypoints alone, through `fit_motion`.
 
-    The rig's calibration: intrinsics and distortion as published; a camera's place is where the true joints are the
-    same in its axes as in the first one's, to rounding. Measured: 33.5 mm, and 37.2 with the first three cameras;
-    captures of one camera have 56 to 69. The true hips are keypoints; with the body's hip joints there instead of
-    where anatomy has them, 28.4 and 32.5 mm.
+    The rig's calibration: intrinsics and distortion as published; a camera's place is where the
+    true joints are the same in its axes as in the first one's, to rounding. Measured: 33.5 mm, and
+    37.2 with the first three cameras; captures of one camera have 56 to 69. The true hips are
+    keypoints; with the body's hip joints there instead of where anatomy has them, 28.4 and 32.5 mm.
     """
     plain = load_body("scope")
     body, names = with_keypoint_offsets(plain), plain.joint_names
     at = body.keypoint_set("blazepose")
     index = [at[name] for name in KEYPOINT_NAMES]
     true = {(camera, frame): joints for camera, frame, _, _, joints in estimates}
-    common = sorted(frame for camera, frame in true if camera == 1 and all((c, frame) in true for c in (2, 3, 4)))
+    common = sorted(
+        frame
+        for camera, frame in true
+        if camera == 1 and all((c, frame) in true for c in (2, 3, 4))
+    )
     views = {frame: [] for frame in common}
     for camera, frame, seen, truth, joints in estimates:
         if frame not in common or camera not in cameras:
@@ -237,11 +291,15 @@ def test_several_cameras_together_are_near_the_truth(estimates, cameras, limit_m
         a, b = (np.array([side[n] for n in both]) for side in (first, joints))
         R, t = rigid(a, b)
         assert np.abs(a @ R.T + t - b).max() < 1e-9
-        pixels = cv2.undistortPoints(seen.keypoints_px[:, None].astype(float), K, truth["dist"], P=K)[:, 0]
+        pixels = cv2.undistortPoints(
+            seen.keypoints_px[:, None].astype(float), K, truth["dist"], P=K
+        )[:, 0]
         keypoints = Keypoints2D(index, pixels, head_as_three_keypoints(seen.keypoints_confidence))
         views[frame].append(View(Measurements(K, keypoints2d=keypoints), R, t))
     options = Options(robust_keypoints2d=0.01, stages=[Stage(Weights())])
-    found = fit_motion(body, [views[frame] for frame in common], np.array(common) / 60.0, options=options)
+    found = fit_motion(
+        body, [views[frame] for frame in common], np.array(common) / 60.0, options=options
+    )
     parts = [*LIMBS, "left_hip", "right_hip"]
     ours = found.t_world_part[:, [names.index(part) for part in parts]]
     exact = np.array([[true[1, frame][part] for part in parts] for frame in common])
@@ -255,7 +313,8 @@ def test_disagreement_widens_the_deviation_along_its_own_axis(people):
     people, rays = people
     rng, R = np.random.default_rng(1), virtual_camera(rays)
     sigma = rng.uniform(0.02, 0.1, (2, *people.shape[:2]))
-    depth = np.swapaxes(R, 1, 2) @ np.array([0.0, 0.0, 0.2])  # of the virtual camera, in camera axes
+    # of the virtual camera, in camera axes
+    depth = np.swapaxes(R, 1, 2) @ np.array([0.0, 0.0, 0.2])
     ways = [Lifted(people + side * depth[:, None], sigma[0], sigma[1]) for side in (-1, 1)]
     both = mixture(ways, [0.5, 0.5], R)
     assert np.allclose(both.points, people)
@@ -286,7 +345,9 @@ def test_the_virtual_camera_looks_at_the_person_and_is_upright():
 
 
 def test_panning_the_camera_changes_neither_input_nor_shape(lifter, people):
-    """A pan around the camera's centre moves the person in the image; the lifted keypoints rotate with it."""
+    """A pan around the camera's centre moves the person in the image; the lifted keypoints rotate
+    with it.
+    """
     turn, (_, rays) = exp(np.array([0.0, 0.35, 0.0])), people
     turned = np.concatenate([rays, np.ones((*rays.shape[:2], 1))], axis=-1) @ turn.T
     other = turned[..., :2] / turned[..., 2:]

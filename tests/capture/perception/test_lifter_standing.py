@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether the lifting network lets people stand straight, and sink into a squat: exact keypoints, analytic truth."""
+"""Whether the lifting network lets people stand straight, and sink into a squat: exact keypoints,
+analytic truth.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,9 @@ def lifted_flexion(view, with_world):
 
 def errors(body, bend_deg, with_world, betas=None):
     views = list(standing_views(body, bend_deg, betas))
-    return np.array([lifted_flexion(view, with_world) - knee_flexion(view.points) for view in views])
+    return np.array(
+        [lifted_flexion(view, with_world) - knee_flexion(view.points) for view in views]
+    )
 
 
 @pytest.mark.parametrize("with_world", [False, True])
@@ -47,7 +51,9 @@ def test_straight_legs_of_other_proportions_stay_straight(body):
 
 
 def test_bent_legs_stay_bent(body):
-    """Seen from the front, bent knees only shorten the legs; with depth from the landmark network they are known."""
+    """Seen from the front, bent knees only shorten the legs; with depth from the landmark network
+    they are known.
+    """
     views = list(standing_views(body, 67.0))
     from_the_side = [k for k, view in enumerate(views) if view.azimuth in (30, 60, 90, 150)]
     found = errors(body, 67.0, True)

@@ -66,7 +66,8 @@ def test_windows_of_sparse_frames_and_stills_repeat_one_frame():
     times = np.arange(5) * 2 * LONGEST_GAP_S
     assert np.allclose(samples(times, np.ones(5, bool)), times[:, None])
     assert np.allclose(samples(np.zeros(1), np.ones(1, bool)), 0)
-    assert np.allclose(samples(times, np.zeros(5, bool))[:, MIDDLE], times)  # no frame was seen: all are used
+    # no frame was seen: all are used
+    assert np.allclose(samples(times, np.zeros(5, bool))[:, MIDDLE], times)
     still = single_frame_windows(3)
     x = np.arange(3.0)[:, None]
     assert np.array_equal(still.gather(x, np.arange(3), 0)[..., 0], np.repeat(x, WINDOW, axis=1))

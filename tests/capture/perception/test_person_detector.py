@@ -34,9 +34,13 @@ def detector(networks: Path) -> PersonDetector:
 def test_anchors_are_cell_centres_in_layer_order() -> None:
     anchors = make_anchors()
     assert anchors.shape == (2254, 2)
-    np.testing.assert_array_equal(anchors[[0, 1, 2, 3, 56]], [[4, 4], [4, 4], [12, 4], [12, 4], [4, 12]])
+    np.testing.assert_array_equal(
+        anchors[[0, 1, 2, 3, 56]], [[4, 4], [4, 4], [12, 4], [12, 4], [4, 12]]
+    )
     np.testing.assert_array_equal(anchors[1568:1571], [[8, 8], [8, 8], [24, 8]])
-    np.testing.assert_array_equal(anchors[[1960, 1965, 1966, 2253]], [[16, 16], [16, 16], [48, 16], [208, 208]])
+    np.testing.assert_array_equal(
+        anchors[[1960, 1965, 1966, 2253]], [[16, 16], [16, 16], [48, 16], [208, 208]]
+    )
 
 
 def test_decode_adds_the_anchor_and_sorts_by_score() -> None:
@@ -60,11 +64,16 @@ def test_overlapping_boxes_become_their_weighted_mean() -> None:
 
 @pytest.mark.parametrize(("height", "width"), [(1080, 1920), (640, 360), (31, 29), (1, 500)])
 def test_letterbox_shows_the_whole_image_centred(height: int, width: int) -> None:
-    fitted, scale = fit_in(np.full((height, width, 3), 255, np.uint8), 224, 224, border=0), 224 / max(height, width)
+    fitted, scale = (
+        fit_in(np.full((height, width, 3), 255, np.uint8), 224, 224, border=0),
+        224 / max(height, width),
+    )
     square, offset = fitted.picture_rgb, fitted.offset
     rows, columns = np.flatnonzero(square.any(axis=(1, 2))), np.flatnonzero(square.any(axis=(0, 2)))
     np.testing.assert_allclose([columns[0], rows[0]], offset)
-    np.testing.assert_allclose([len(columns), len(rows)], np.maximum(np.array([width, height]) * scale, 1), atol=0.51)
+    np.testing.assert_allclose(
+        [len(columns), len(rows)], np.maximum(np.array([width, height]) * scale, 1), atol=0.51
+    )
     assert abs(offset[1] - (224 - len(rows)) / 2) <= 0.5
 
 
@@ -86,7 +95,9 @@ def test_every_small_person_is_entirely_in_a_square(
     person = int(share * min(height, width) - 1)  # corners of squares are whole pixels
     for x in range(0, width - person, 7):
         for y in range(0, height - person, 7):
-            around = (left <= x) & (x + person <= left + side) & (top <= y) & (y + person <= top + side)
+            around = (
+                (left <= x) & (x + person <= left + side) & (top <= y) & (y + person <= top + side)
+            )
             assert around.any()
 
 
@@ -113,13 +124,17 @@ def test_a_small_person_beside_a_larger_one_is_found_in_the_parts_alone(
     assert other.points_px[0, 0] < 576
     scale = 180 / small.shape[0]
     expected = (person.points_px[:2] + 0.5) * scale - 0.5 + [800, 200]
-    off = [np.abs(found.points_px[:2] - expected).max() for found in detector.detect_in_parts(image)]
+    off = [
+        np.abs(found.points_px[:2] - expected).max() for found in detector.detect_in_parts(image)
+    ]
     assert min(off) < 0.05 * person.region.side_px * scale
     assert len(off) == 2
     assert detector.detect_in_parts(np.full((90, 160, 3), 128, np.uint8)) == []
 
 
-def test_finds_the_squatting_person(detector: PersonDetector, first_frame: Callable[[str], np.ndarray]) -> None:
+def test_finds_the_squatting_person(
+    detector: PersonDetector, first_frame: Callable[[str], np.ndarray]
+) -> None:
     (person,) = detector.detect(first_frame("clips/squats_5fps"))
     assert person.score > 0.9
     left, top, right, bottom = person.box_px
@@ -128,18 +143,28 @@ def test_finds_the_squatting_person(detector: PersonDetector, first_frame: Calla
     assert abs(person.region.rotation) < 0.3
 
 
-def test_detections_follow_the_image(detector: PersonDetector, first_frame: Callable[[str], np.ndarray]) -> None:
+def test_detections_follow_the_image(
+    detector: PersonDetector, first_frame: Callable[[str], np.ndarray]
+) -> None:
     image = first_frame("clips/gesture_square")
     (person,) = detector.detect(image)
     bordered = np.zeros((800, 900, 3), np.uint8)
     bordered[100:676, 200:776] = image
     (moved,) = detector.detect(bordered)
-    assert np.abs(moved.points_px[:2] - person.points_px[:2] - [200, 100]).max() < 0.04 * person.region.side_px
+    assert (
+        np.abs(moved.points_px[:2] - person.points_px[:2] - [200, 100]).max()
+        < 0.04 * person.region.side_px
+    )
     (mirrored,) = detector.detect(np.ascontiguousarray(image[:, ::-1]))
-    assert np.abs(575 - mirrored.points_px[:2, 0] - person.points_px[:2, 0]).max() < 0.04 * person.region.side_px
+    assert (
+        np.abs(575 - mirrored.points_px[:2, 0] - person.points_px[:2, 0]).max()
+        < 0.04 * person.region.side_px
+    )
 
 
-def test_finds_both_people(detector: PersonDetector, last_frame: Callable[[str], np.ndarray]) -> None:
+def test_finds_both_people(
+    detector: PersonDetector, last_frame: Callable[[str], np.ndarray]
+) -> None:
     found = detector.detect(last_frame("clips/two_people_portrait"))
     assert len(found) == 2
     assert not found[0].region.resembles(found[1].region, 0.2)
@@ -149,7 +174,9 @@ def test_no_detections_in_a_blank_image(detector: PersonDetector) -> None:
     assert detector.detect(np.full((90, 160, 3), 128, np.uint8)) == []
 
 
-def test_missing_and_damaged_networks_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_and_damaged_networks_are_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(sessions, "NETWORKS_FOLDER", tmp_path)
     with pytest.raises(SetupError, match="pose_detection.onnx is missing"):
         network_path("pose_detection")

@@ -9,7 +9,10 @@ from scope.scope_addon.capture.perception.person_detector import overlap_cluster
 
 def iou(a: np.ndarray, b: np.ndarray) -> float:
     """Intersection over union by counting unit squares of boxes with whole corners."""
-    inside = [{(x, y) for x in range(int(p[0]), int(p[2])) for y in range(int(p[1]), int(p[3]))} for p in (a, b)]
+    inside = [
+        {(x, y) for x in range(int(p[0]), int(p[2])) for y in range(int(p[1]), int(p[3]))}
+        for p in (a, b)
+    ]
     return len(inside[0] & inside[1]) / len(inside[0] | inside[1])
 
 

@@ -16,25 +16,31 @@ TILTED = Region((320.0, 200.0), 180.0, math.radians(35))
     ("top", "rotation_deg"),
     [((50, 20), 0), ((80, 50), 90), ((50, 80), 180), ((20, 50), -90), ((50 + 30, 50 - 30), 45)],
 )
-def test_region_rotates_the_top_point_upright(top: tuple[float, float], rotation_deg: float) -> None:
+def test_region_rotates_the_top_point_upright(
+    top: tuple[float, float], rotation_deg: float
+) -> None:
     region = region_from_points(np.array([50.0, 50.0]), np.array(top, float))
     distance = math.dist((50, 50), top)
     assert math.degrees(region.rotation) == pytest.approx(rotation_deg)
     assert region.side_px == pytest.approx(2.5 * distance)
     np.testing.assert_allclose(region.crop_from_image(np.array([50.0, 50.0])), [0.5, 0.5])
-    np.testing.assert_allclose(region.crop_from_image(np.array(top, float)), [0.5, 0.1])  # 0.5 − 1 / 2.5
+    # 0.5 − 1 / 2.5
+    np.testing.assert_allclose(region.crop_from_image(np.array(top, float)), [0.5, 0.1])
 
 
 def test_quarter_turn_by_hand() -> None:
     region = Region((10.0, 20.0), 4.0, math.pi / 2)
-    np.testing.assert_allclose(region.image_from_crop(np.array([1.0, 0.5])), [10, 22])  # the crop's right is down
+    # the crop's right is down
+    np.testing.assert_allclose(region.image_from_crop(np.array([1.0, 0.5])), [10, 22])
     corners = region.image_from_crop(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]))
     np.testing.assert_allclose(corners, [[12, 18], [12, 22], [8, 22], [8, 18]], atol=1e-12)
 
 
 def test_maps_are_inverse() -> None:
     points = np.random.default_rng(1).uniform(-50, 700, (20, 2))
-    np.testing.assert_allclose(TILTED.image_from_crop(TILTED.crop_from_image(points)), points, atol=1e-9)
+    np.testing.assert_allclose(
+        TILTED.image_from_crop(TILTED.crop_from_image(points)), points, atol=1e-9
+    )
 
 
 @pytest.mark.parametrize("side", [90.0, 256.0, 700.0, 1500.0])
@@ -47,7 +53,9 @@ def test_cut_agrees_with_the_coordinate_map(side: float, rotation_deg: float) ->
     sigma = max(2.0, 1.5 * side / size)
     spot = 255 * np.exp(-((x - blob[0]) ** 2 + (y - blob[1]) ** 2) / (2 * sigma**2))
     image = np.repeat(spot[..., None], 3, axis=2).astype(np.uint8)
-    region = Region((float(blob[0]) + 0.2 * side, float(blob[1]) - 0.1 * side), side, math.radians(rotation_deg))
+    region = Region(
+        (float(blob[0]) + 0.2 * side, float(blob[1]) - 0.1 * side), side, math.radians(rotation_deg)
+    )
     crop = region.cut(image, size)[..., 0].astype(float)
     rows, columns = np.mgrid[:size, :size]
     found = (np.array([(crop * columns).sum(), (crop * rows).sum()]) / crop.sum() + 0.5) / size
@@ -56,14 +64,20 @@ def test_cut_agrees_with_the_coordinate_map(side: float, rotation_deg: float) ->
 
 def test_cut_repeats_the_border_pixels_outside_the_image() -> None:
     image = np.full((40, 40, 3), 77, np.uint8)
-    for region in (Region((0.0, 0.0), 60.0, 0.3), Region((-100.0, 20.0), 30.0, 0.0), Region((20.0, 20.0), 4000.0, 1.0)):
+    for region in (
+        Region((0.0, 0.0), 60.0, 0.3),
+        Region((-100.0, 20.0), 30.0, 0.0),
+        Region((20.0, 20.0), 4000.0, 1.0),
+    ):
         assert (region.cut(image, 64) == 77).all()
 
 
 def test_world_vectors_rotate_with_the_region() -> None:
     quarter = Region((0.0, 0.0), 1.0, math.pi / 2)
     vectors = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1]])
-    np.testing.assert_allclose(quarter.rotate_to_camera(vectors), [[0, 1, 0], [-1, 0, 0], [0, 0, 1]], atol=1e-12)
+    np.testing.assert_allclose(
+        quarter.rotate_to_camera(vectors), [[0, 1, 0], [-1, 0, 0], [0, 0, 1]], atol=1e-12
+    )
 
 
 def test_resembles() -> None:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Opening a network leaves nothing behind: onnxruntime's wheels keep a list of events for a server of Microsoft's.
+"""Opening a network leaves nothing behind: onnxruntime's wheels keep a list of events for a server
+of Microsoft's.
 
 And networks that are missing: a wheel of Scope has none, nor the tool that builds them.
 """
@@ -20,7 +21,8 @@ from scope.scope_addon.capture.perception.adapters import network_server
 from scope.scope_addon.capture.perception.sessions import network_path, open_session
 if {direct}:
     limits = {{"limit_bytes": 1 << 33, "limit_s": 30.0, "threads": 1, "mem_pattern": True}}
-    request = {{"path": str(network_path("face_expression")), "providers": ["CPUExecutionProvider"], **limits}}
+    path = str(network_path("face_expression"))
+    request = {{"path": path, "providers": ["CPUExecutionProvider"], **limits}}
     answer, _ = network_server.Server().answer(request)
     assert answer["outputs"], answer
 else:
@@ -42,7 +44,11 @@ def test_opening_a_network_records_no_events(tmp_path: Path, networks: None) -> 
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
 
 
-def test_a_wheel_has_no_networks_and_says_what_has(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_wheel_has_no_networks_and_says_what_has(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(sessions, "NETWORKS_FOLDER", tmp_path)
-    with pytest.raises(SetupError, match="a wheel contains none: capture with the scripts of the repository"):
+    with pytest.raises(
+        SetupError, match="a wheel contains none: capture with the scripts of the repository"
+    ):
         sessions.network_path("pose_landmark_lite")

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""People who stand, and may step up or down, as exact keypoints and world landmarks of a network."""
+"""People who stand, and may step up or down, as exact keypoints and world landmarks of a
+network.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,9 @@ T_CAMERA_WORLD = np.linalg.inv(world_from_level_camera(np.array([0.0, -1.0, 0.0]
 
 
 def steps(height_m: float, betas: np.ndarray | None = None, right_m: float = 0.0) -> Track:
-    """Return the track of a person 3.5 m from the camera who stands, steps up by ``height_m``, and stands again."""
+    """Return the track of a person 3.5 m from the camera who stands, steps up by ``height_m``, and
+    stands again.
+    """
     betas = np.zeros(BODY.P) if betas is None else betas
     times = np.arange(round((2 * STAYS_S + STEPS_S) * RATE)) / RATE
     share = np.clip((times - STAYS_S) / STEPS_S, 0.0, 1.0)
@@ -35,13 +39,20 @@ def steps(height_m: float, betas: np.ndarray | None = None, right_m: float = 0.0
         pose[:, BODY.joint_names.index(f"{side}_knee"), 0] = 1.4 * bent
         pose[:, BODY.joint_names.index(f"{side}_shoulder"), 2] = -1.2 * sign
     rotations = exp(pose)
-    facing = exp(np.array([np.pi / 2, 0.0, 0.0])) @ exp(np.array([0.0, 0.7, 0.0]))  # model y up to world z up
-    R, t = BODY.forward_kinematics(np.concatenate([facing[None], rotations[0, 1:]]), np.zeros(3), betas)
+    # model y up to world z up
+    facing = exp(np.array([np.pi / 2, 0.0, 0.0])) @ exp(np.array([0.0, 0.7, 0.0]))
+    R, t = BODY.forward_kinematics(
+        np.concatenate([facing[None], rotations[0, 1:]]), np.zeros(3), betas
+    )
     standing_m = -BODY.skin(R, t, betas)[:, 2].min()
-    trans = np.stack([right_m + 0.4 * share, 3.5 + DEEPER_M * share, standing_m + height_m * share], axis=1)
+    trans = np.stack(
+        [right_m + 0.4 * share, 3.5 + DEEPER_M * share, standing_m + height_m * share], axis=1
+    )
     rotations[:, 0] = T_CAMERA_WORLD[:3, :3] @ facing
     pelvis = BODY.rest_joints(betas)[0]
-    poses = BODY.forward_kinematics(rotations, transform_points(T_CAMERA_WORLD, trans + pelvis) - pelvis, betas)
+    poses = BODY.forward_kinematics(
+        rotations, transform_points(T_CAMERA_WORLD, trans + pelvis) - pelvis, betas
+    )
     points = with_keypoint_offsets(BODY).keypoints(*poses, betas)[:, BLAZEPOSE]
     pixels = points @ K.T
     return Track(
@@ -56,8 +67,17 @@ def steps(height_m: float, betas: np.ndarray | None = None, right_m: float = 0.0
 
 
 def seen(track: Track, uneven_ground: bool = False) -> Shot:
-    """What is known of the footage: a static camera without background, whose intrinsics are given."""
+    """What is known of the footage: a static camera without background, whose intrinsics are
+    given.
+    """
     return Shot(
-        BODY, Camera(K, np.zeros(5), "given"), CameraPath.static(len(track)), Lines.none(), Fraction(int(RATE)),
-        (1280, 720), "made", ablation=Ablation(lifter=False), uneven_ground=uneven_ground,
-    )  # fmt: skip
+        BODY,
+        Camera(K, np.zeros(5), "given"),
+        CameraPath.static(len(track)),
+        Lines.none(),
+        Fraction(int(RATE)),
+        (1280, 720),
+        "made",
+        ablation=Ablation(lifter=False),
+        uneven_ground=uneven_ground,
+    )

@@ -11,14 +11,17 @@ from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.solver import Body
 from scope.solver.rotations import exp
 
-AZIMUTHS, PITCHES = (0, 30, 60, 90, 150, 180), (0, 12)  # degrees; of cameras around the person, and downwards
+# degrees; of cameras around the person, and downwards
+AZIMUTHS, PITCHES = (0, 30, 60, 90, 150, 180), (0, 12)
 DISTANCE_M = 3.5
 K = np.array([[1000.0, 0, 640], [0, 1000.0, 500], [0, 0, 1]])
 
 
 @dataclass(frozen=True)
 class StandingView:
-    """One camera's view: (33, 3) ``points``, metres, camera axes, mid-hip at 0; the camera's ``azimuth``; (3,) up."""
+    """One camera's view: (33, 3) ``points``, metres, camera axes, mid-hip at 0; the camera's
+    ``azimuth``; (3,) up.
+    """
 
     points: np.ndarray
     azimuth: int
@@ -31,17 +34,25 @@ class StandingView:
         return projected[:, :2] / projected[:, 2:]
 
 
-def standing_views(body: Body, bend_deg: float, betas: np.ndarray | None = None) -> Iterator[StandingView]:
-    """Yield the views of a person of this shape whose arms hang and whose knees are bent by ``bend_deg`` degrees.
+def standing_views(
+    body: Body, bend_deg: float, betas: np.ndarray | None = None
+) -> Iterator[StandingView]:
+    """Yield the views of a person of this shape whose arms hang and whose knees are bent by
+    ``bend_deg`` degrees.
 
-    Hips and ankles turn by half of it each, so that the hips stay above the ankles and the trunk upright.
+    Hips and ankles turn by half of it each, so that the hips stay above the ankles and the trunk
+    upright.
     """
     betas = np.zeros(body.P) if betas is None else betas
     points = _keypoints(body, _pose(body, bend_deg, betas), betas)
     for azimuth in AZIMUTHS:
         for pitch in PITCHES:
             around, down = np.radians(azimuth), np.radians(pitch)
-            R = exp(np.array([down, 0.0, 0.0])) @ np.diag([1.0, -1.0, -1.0]) @ exp(np.array([0.0, around, 0.0]))
+            R = (
+                exp(np.array([down, 0.0, 0.0]))
+                @ np.diag([1.0, -1.0, -1.0])
+                @ exp(np.array([0.0, around, 0.0]))
+            )
             yield StandingView(points @ R.T, azimuth, R @ [0.0, 1.0, 0.0])
 
 
@@ -54,7 +65,9 @@ def knee_flexion(points: np.ndarray, names: tuple[str, ...] = KEYPOINT_NAMES) ->
 
 
 def _leg(points: np.ndarray, names: tuple[str, ...], side: str) -> tuple[np.ndarray, np.ndarray]:
-    hip, knee, ankle = (points[names.index(f"{side}_{joint}")] for joint in ("hip", "knee", "ankle"))
+    hip, knee, ankle = (
+        points[names.index(f"{side}_{joint}")] for joint in ("hip", "knee", "ankle")
+    )
     return hip - knee, knee - ankle
 
 
@@ -64,7 +77,9 @@ def _flexion(thigh: np.ndarray, shank: np.ndarray) -> float:
 
 
 def _pose(body: Body, bend_deg: float, betas: np.ndarray) -> np.ndarray:
-    """Return (24, 3) rotation vectors; the knee's rest angle is taken out, so that 0 is a straight leg."""
+    """Return (24, 3) rotation vectors; the knee's rest angle is taken out, so that 0 is a straight
+    leg.
+    """
     names, rest = list(body.joint_names), body.rest_joints(betas)
     thigh, shank = _leg(rest, tuple(names), "left")
     rest_bend = np.arctan2(shank[1], shank[2]) - np.arctan2(thigh[1], thigh[2])

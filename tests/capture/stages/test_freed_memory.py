@@ -9,7 +9,8 @@ import sys
 
 import pytest
 
-# Blocks that glibc takes from its heap; the few that stay keep it from returning the others by itself.
+# Blocks that glibc takes from its heap; the few that stay keep it from returning the others by
+# itself.
 PROGRAM = """
 import os
 from scope.scope_addon.capture.stages.freed_memory import return_freed_memory
@@ -28,5 +29,7 @@ print(kept - resident_mib())
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="another C library returns it itself")
 def test_memory_between_blocks_in_use_is_returned() -> None:
-    done = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM], capture_output=True, text=True, check=True
+    )
     assert float(done.stdout) > 100.0

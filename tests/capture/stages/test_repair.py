@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What becomes of tentative hands in a track: nothing that comes after the repair sees a negative confidence."""
+"""What becomes of tentative hands in a track: nothing that comes after the repair sees a negative
+confidence.
+"""
 
 from __future__ import annotations
 
@@ -31,6 +33,8 @@ def test_tentative_hands_are_believed_beside_sure_ones_and_dropped_elsewhere():
     )
     repaired = repair(track, Camera(np.eye(3), np.zeros(5), ""), AS_OBSERVED)
     assert repaired.hands is not None
-    np.testing.assert_allclose(repaired.hands[:, 0, 0, 2], [0.4, 0.4, 0.4, 0.9] + 8 * [0.0], atol=1e-6)
+    np.testing.assert_allclose(
+        repaired.hands[:, 0, 0, 2], [0.4, 0.4, 0.4, 0.9] + 8 * [0.0], atol=1e-6
+    )
     assert not repaired.hands[:, 1].any()
     assert track.hands is hands

@@ -16,7 +16,11 @@ from ..walking import someone_walking, track_without_depth
 LEFT, RIGHT = 0, 1
 WRISTS = [KEYPOINT_NAMES.index(f"{side}_wrist") for side in ("left", "right")]
 
-OTHERS = [k for k, name in enumerate(KEYPOINT_NAMES) if name.split("_")[-1] not in ("wrist", "pinky", "index", "thumb")]
+OTHERS = [
+    k
+    for k, name in enumerate(KEYPOINT_NAMES)
+    if name.split("_")[-1] not in ("wrist", "pinky", "index", "thumb")
+]
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +30,9 @@ def walking_track():
 
 
 def with_hand(track, row, side, away, confidence):
-    """The track with an upright hand so many hand lengths to the right of the body's wrist in one frame."""
+    """The track with an upright hand so many hand lengths to the right of the body's wrist in one
+    frame.
+    """
     length = HAND_LENGTH_M * pixels_per_metre(track.keypoints_px[row], track.world_landmarks[row])
     hands = np.zeros((len(track), 2, 21, 6), np.float32)
     hands[row, side, :, :2] = track.keypoints_px[row, WRISTS[side]] + [away * length, 0]
@@ -35,9 +41,13 @@ def with_hand(track, row, side, away, confidence):
     return replace(track, hands=hands)
 
 
-@pytest.mark.parametrize(("away", "confidence", "moves"), [(1.0, 0.95, True), (0.3, 0.95, False), (1.0, 0.5, False)])
+@pytest.mark.parametrize(
+    ("away", "confidence", "moves"), [(1.0, 0.95, True), (0.3, 0.95, False), (1.0, 0.5, False)]
+)
 @pytest.mark.parametrize("side", [LEFT, RIGHT])
-def test_a_wrist_goes_to_a_sure_hand_that_contradicts_it(walking_track, side, away, confidence, moves):
+def test_a_wrist_goes_to_a_sure_hand_that_contradicts_it(
+    walking_track, side, away, confidence, moves
+):
     before = with_hand(walking_track, 5, side, away, confidence)
     after = wrists_at_hands(before)
     wrist = WRISTS[side]
@@ -45,7 +55,9 @@ def test_a_wrist_goes_to_a_sure_hand_that_contradicts_it(walking_track, side, aw
     np.testing.assert_allclose(after.keypoints_px[5, wrist], expected, atol=1e-3)
     moved_m = away * HAND_LENGTH_M if moves else 0.0
     np.testing.assert_allclose(
-        after.world_landmarks[5, wrist] - before.world_landmarks[5, wrist], [moved_m, 0, 0], atol=1e-4
+        after.world_landmarks[5, wrist] - before.world_landmarks[5, wrist],
+        [moved_m, 0, 0],
+        atol=1e-4,
     )
     np.testing.assert_array_equal(after.keypoints_px[:, OTHERS], before.keypoints_px[:, OTHERS])
     np.testing.assert_array_equal(after.keypoints_px[6:], before.keypoints_px[6:])

@@ -29,7 +29,12 @@ def test_blinks_are_counted_and_related_to_the_time_in_which_the_face_was_seen(m
     motion.face = made_face(T, eyeBlinkLeft=lids, eyeBlinkRight=lids, jawOpen=jaw)
     motion.face["expression_confidence"][180:] = 0.0
     # Seen for 6 s: two blinks are twenty a minute.
-    assert face_frames(motion) == {"face_frames": 180, "blinks": 2, "blinks_per_minute": 20.0, "jaw_open": 0.8}
+    assert face_frames(motion) == {
+        "face_frames": 180,
+        "blinks": 2,
+        "blinks_per_minute": 20.0,
+        "jaw_open": 0.8,
+    }
 
 
 def test_one_eye_alone_is_a_wink(motion):

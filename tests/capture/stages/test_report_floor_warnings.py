@@ -10,14 +10,23 @@ from ...made_motion import made_motion
 
 
 def standing(body, height, raw=None):
-    """Three seconds of a person at rest, the lowest vertex at ``height`` (90,) metres, contact certain."""
+    """Three seconds of a person at rest, the lowest vertex at ``height`` (90,) metres, contact
+    certain.
+    """
     poses = np.zeros((90, body.K + 1, 3))
     poses[:, 0] = [np.pi / 2, 0, 0]
     R, t = body.forward_kinematics(rotations.exp(poses[0]), np.zeros(3))
     on_floor = np.array([0.0, 0.0, -body.skin(R, t)[:, 2].min()])
-    trans, trans_raw = (on_floor + np.asarray(h)[:, None] * [0, 0, 1] for h in (height, height if raw is None else raw))
+    trans, trans_raw = (
+        on_floor + np.asarray(h)[:, None] * [0, 0, 1]
+        for h in (height, height if raw is None else raw)
+    )
     before = poses if raw is None else poses + 1e-3 * np.array([0.0, 0, 1])
-    given = {"poses_raw": before.reshape(90, -1), "trans_raw": trans_raw, "foot_contact": np.full((90, 4), 0.95)}
+    given = {
+        "poses_raw": before.reshape(90, -1),
+        "trans_raw": trans_raw,
+        "foot_contact": np.full((90, 4), 0.95),
+    }
     return made_motion(body, poses, trans, **given)
 
 
@@ -33,27 +42,34 @@ def test_nothing_is_said_of_somebody_on_the_floor(body):
 def test_another_floor(body, height, where):
     found = floor_warnings("a.mp4", body, [standing(body, from_second(2, height))])
     assert found == [
-        f"a.mp4: the person stands up to {where} the floor at 2.0 s, so the clip has more than one floor: capture the "
+        f"a.mp4: the person stands up to {where} the floor at 2.0 s, so the clip has more than one "
+        "floor: capture the "
         "part that matters, with a start and end time, or with uneven ground"
     ]
 
 
 @pytest.mark.parametrize(
-    ("given", "cause"), [(0, "give everybody's height"), (1, "give everybody's height"), (2, "in another order")]
+    ("given", "cause"),
+    [(0, "give everybody's height"), (1, "give everybody's height"), (2, "in another order")],
 )
 def test_somebody_off_the_floor_of_another_all_the_time_may_have_another_size(body, given, cause):
     low, other = standing(body, np.zeros(90)), standing(body, np.full(90, 0.5))
     (found,) = floor_warnings("a.mp4", body, [low, other], given)
-    assert found.startswith("a.mp4: person 2 stands up to 0.5 m above the floor at 0.0 s, so either ")
+    assert found.startswith(
+        "a.mp4: person 2 stands up to 0.5 m above the floor at 0.0 s, so either "
+    )
     assert cause in found
     assert found.endswith(
-        "or the clip has more than one floor: capture the part that matters, with a start and end time, or with uneven "
+        "or the clip has more than one floor: capture the part that matters, with a start and end "
+        "time, or with uneven "
         "ground"
     )
 
 
 def test_somebody_who_changes_floors_has_no_other_size(body):
-    (found,) = floor_warnings("a.mp4", body, [standing(body, np.zeros(90)), standing(body, from_second(2, -1.5))])
+    (found,) = floor_warnings(
+        "a.mp4", body, [standing(body, np.zeros(90)), standing(body, from_second(2, -1.5))]
+    )
     assert found.startswith(
         "a.mp4: person 2 stands up to 1.5 m below the floor at 2.0 s, so the clip has more than one"
     )

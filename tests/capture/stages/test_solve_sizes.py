@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Two people on one floor, the height of one of them given: the other one's follows from the floor."""
+"""Two people on one floor, the height of one of them given: the other one's follows from the
+floor.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,10 @@ def shape(height_m: float) -> np.ndarray:
 def test_the_size_of_others_follows_from_a_given_height():
     tracks = [steps(0.0, shape(TALL_M), -0.6), steps(0.0, shape(SHORT_M), 0.6)]
     statures = [
-        [BODY.stature(motion.betas) for motion in solve(seen(tracks[0]), tracks, lambda *_: None, given).motions]
+        [
+            BODY.stature(motion.betas)
+            for motion in solve(seen(tracks[0]), tracks, lambda *_: None, given).motions
+        ]
         for given in ((), (TALL_M,))
     ]
     (_, unknown), (tall, short) = statures

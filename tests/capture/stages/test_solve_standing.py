@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Two seconds of a person who stands straight or bends the knees, with noise, through lifting network and solver."""
+"""Two seconds of a person who stands straight or bends the knees, with noise, through lifting
+network and solver.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ RATE, FRAMES, NOISE_PX = 30, 60, 3.0
 
 
 def captured_flexion(body, view, rng):
-    """The knees' flexion of the captured motion's median pose; the network sees no world landmarks."""
+    """The knees' flexion of the captured motion's median pose; the network sees no world
+    landmarks.
+    """
     pixels = view.pixels + rng.normal(size=(FRAMES, *view.pixels.shape)) * NOISE_PX
     track = Track(
         frames=np.arange(FRAMES),
@@ -42,7 +46,9 @@ def captured_flexion(body, view, rng):
 
 @pytest.mark.parametrize(("bend_deg", "mean_deg"), [(0.0, 7.0), (67.0, -25.0)])
 def test_knees_are_as_bent_as_they_are(bend_deg, mean_deg):
-    """From the front, from the side and from between. Before this test: 12.8° for straight legs, 21° from the front."""
+    """From the front, from the side and from between. Before this test: 12.8° for straight legs,
+    21° from the front.
+    """
     body = load_body("scope")
     rng = np.random.default_rng(0)
     views = [view for view in standing_views(body, bend_deg) if view.azimuth in (0, 60, 90)][::2]

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Somebody who steps up or down: exact keypoints and world landmarks, solved with one floor and on uneven ground."""
+"""Somebody who steps up or down: exact keypoints and world landmarks, solved with one floor and on
+uneven ground.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,9 @@ def captured(request: pytest.FixtureRequest, height_m: float) -> Motion:
     return solve(seen(track, request.param), [track], lambda *_: None, [BODY.stature()]).motions[0]
 
 
-def test_feet_rest_on_a_step_only_where_the_ground_is_uneven(captured: Motion, height_m: float) -> None:
+def test_feet_rest_on_a_step_only_where_the_ground_is_uneven(
+    captured: Motion, height_m: float
+) -> None:
     heights = foot_heights(captured, BODY)
     stays = round(STAYS_S * RATE) - 4
     rise = (np.median(heights[-stays:]) - np.median(heights[:stays])) / height_m

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""People of whom no hand is seen, on a body with fingers: fitted as if hands had not been looked for."""
+"""People of whom no hand is seen, on a body with fingers: fitted as if hands had not been looked
+for.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +44,9 @@ def test_the_motion_is_that_without_hands_and_its_fingers_are_at_rest(body):
             assert np.array_equal(a, b, equal_nan=a.dtype.kind == "f"), field.name
     assert looked_for.keypoints2d.shape[1] == not_looked_for.keypoints2d.shape[1] + 42
     poses = looked_for.poses.reshape(len(track), body.K + 1, 3)
-    fingers = [k for k, name in enumerate(body.joint_names) if name[-1].isdigit() and "spine" not in name]
+    fingers = [
+        k for k, name in enumerate(body.joint_names) if name[-1].isdigit() and "spine" not in name
+    ]
     assert len(fingers) == FINGERS
     assert not poses[:, fingers].any()
     assert not looked_for.joint_confidence[:, fingers].any()

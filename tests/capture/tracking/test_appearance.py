@@ -15,7 +15,9 @@ for _side, _x in (("left", 230.0), ("right", 170.0)):
         BODY[KEYPOINT_NAMES.index(f"{_side}_{_name}")] = _x, _y
 
 
-def picture(shirt: tuple[int, int, int], trousers: tuple[int, int, int], light: float = 1.0) -> np.ndarray:
+def picture(
+    shirt: tuple[int, int, int], trousers: tuple[int, int, int], light: float = 1.0
+) -> np.ndarray:
     image = np.full((400, 400, 3), 255, np.uint8)
     image[60:190, 140:260] = np.array(shirt) * light
     image[190:400, 140:260] = np.array(trousers) * light

@@ -22,7 +22,9 @@ def test_the_assignment_is_the_cheapest_of_all(shape: tuple[int, int], seed: int
     chosen = assign(cost)
     assert len(set(chosen)) == shape[0]
     rows = range(shape[0])
-    best = min(cost[rows, list(columns)].sum() for columns in permutations(range(shape[1]), shape[0]))
+    best = min(
+        cost[rows, list(columns)].sum() for columns in permutations(range(shape[1]), shape[0])
+    )
     assert cost[rows, chosen].sum() == pytest.approx(best)
 
 
@@ -33,20 +35,37 @@ def test_links_that_cost_too_much_are_left_out() -> None:
 
 
 def tracklet(
-    first: int, last: int, start_px: float, speed_px: float, appearance: np.ndarray, side_px: float = 200.0
+    first: int,
+    last: int,
+    start_px: float,
+    speed_px: float,
+    appearance: np.ndarray,
+    side_px: float = 200.0,
 ) -> Tracklet:
-    """A person who moves horizontally at ``speed_px`` per frame, and would be at ``start_px`` in frame 0."""
+    """A person who moves horizontally at ``speed_px`` per frame, and would be at ``start_px`` in
+    frame 0.
+    """
     rows = list(range(first, last))
     centers = [np.array([start_px + speed_px * row, 200.0]) for row in rows]
     values = [np.zeros((33, 6), np.float32)] * len(rows)
-    return Tracklet(rows=rows, values=values, centers_px=centers, sides_px=[side_px] * len(rows), appearance=appearance)
+    return Tracklet(
+        rows=rows,
+        values=values,
+        centers_px=centers,
+        sides_px=[side_px] * len(rows),
+        appearance=appearance,
+    )
 
 
 def test_a_crossing_is_resolved_by_motion() -> None:
-    """Two people in the same clothes pass each other between frames 50 and 60, where neither is seen."""
+    """Two people in the same clothes pass each other between frames 50 and 60, where neither is
+    seen.
+    """
     times = (np.arange(120) / RATE).tolist()
     right, left = (0.0, 8.0), (880.0, -8.0)
-    tracklets = [tracklet(*rows, *motion, RED) for rows in ((0, 50), (60, 120)) for motion in (right, left)]
+    tracklets = [
+        tracklet(*rows, *motion, RED) for rows in ((0, 50), (60, 120)) for motion in (right, left)
+    ]
     assert sorted(link(tracklets, times)) == [[0, 2], [1, 3]]
 
 
@@ -62,7 +81,9 @@ def test_clothes_tell_people_who_turn_back_from_people_who_pass_each_other(
     assert sorted(link(before + after, times)) == people
 
 
-@pytest.mark.parametrize(("apart_px", "people"), [(20.0, [[0, 2], [1, 3]]), (120.0, [[0, 3], [1, 2]])])
+@pytest.mark.parametrize(
+    ("apart_px", "people"), [(20.0, [[0, 2], [1, 3]]), (120.0, [[0, 3], [1, 2]])]
+)
 def test_a_child_and_an_adult_in_the_same_place_are_told_apart_by_size(
     apart_px: float, people: list[list[int]]
 ) -> None:
@@ -75,7 +96,9 @@ def test_a_child_and_an_adult_in_the_same_place_are_told_apart_by_size(
 
 
 @pytest.mark.parametrize(("returns", "people"), [(RED, [[0, 1]]), (BLUE, [[0], [1]])])
-def test_after_a_long_time_the_appearance_decides(returns: np.ndarray, people: list[list[int]]) -> None:
+def test_after_a_long_time_the_appearance_decides(
+    returns: np.ndarray, people: list[list[int]]
+) -> None:
     times = (np.arange(240) / RATE).tolist()
     tracklets = [tracklet(0, 60, 100.0, 0.0, RED), tracklet(180, 240, 900.0, 0.0, returns)]
     assert sorted(link(tracklets, times)) == people

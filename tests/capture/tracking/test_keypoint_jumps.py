@@ -21,7 +21,14 @@ PX = 400.0  # per metre
 def standing(count: int, rate: float) -> Track:
     """A person whose left wrist swings by 0.4 m, 1.5 times per second, with a detector's noise."""
     rng = np.random.default_rng(1)
-    heights = {"shoulder": -0.5, "elbow": -0.3, "wrist": -0.1, "hip": 0.0, "knee": 0.45, "ankle": 0.9}
+    heights = {
+        "shoulder": -0.5,
+        "elbow": -0.3,
+        "wrist": -0.1,
+        "hip": 0.0,
+        "knee": 0.45,
+        "ankle": 0.9,
+    }
     body = np.array([[0.2 if "left" in n else -0.2, 0.0, 0.0] for n in KEYPOINT_NAMES])
     body[:, 1] = [next((h for key, h in heights.items() if key in n), -0.7) for n in KEYPOINT_NAMES]
     world = np.tile(body, (count, 1, 1))
@@ -70,7 +77,9 @@ def test_possible_motion_is_left_alone(rate: float) -> None:
     punch = 0.25 * (1 - np.cos(2 * np.pi * (time - 1.0) / 0.25)) * ((time > 1.0) & (time < 1.25))
     for values, metre in ((track.keypoints_px, PX), (track.world_landmarks, 1.0)):
         values[:, WRIST, 1] += metre * punch
-        values[:, ANKLE, 0] += metre * 0.3 * (1 - np.cos(np.pi * np.clip((time - 1.6) / 0.15, 0, 1)))
+        values[:, ANKLE, 0] += (
+            metre * 0.3 * (1 - np.cos(np.pi * np.clip((time - 1.6) / 0.15, 0, 1)))
+        )
     assert repair_keypoint_jumps(track) is track
 
 
@@ -88,7 +97,9 @@ def test_gaps_and_ends() -> None:
     points = np.zeros((12, 1, 2))
     points[[0, 5, 11]] = 3.0
     seen = np.ones(12, bool)
-    np.testing.assert_array_equal(np.flatnonzero(find_keypoint_jumps(points, seen, 1 / 30)[:, 0]), [5])
+    np.testing.assert_array_equal(
+        np.flatnonzero(find_keypoint_jumps(points, seen, 1 / 30)[:, 0]), [5]
+    )
     seen[6] = False
     assert not find_keypoint_jumps(points, seen, 1 / 30).any()
     assert not find_keypoint_jumps(points[:2], seen[:2], 1 / 30).any()

@@ -40,7 +40,9 @@ def test_mirror_partners() -> None:
 
 
 @pytest.mark.parametrize("turn_rad", [0.0, 2 * np.pi])
-@pytest.mark.parametrize("stretch", [slice(0, 0), slice(20, 21), slice(30, 75), slice(0, 25), slice(90, 120)])
+@pytest.mark.parametrize(
+    "stretch", [slice(0, 0), slice(20, 21), slice(30, 75), slice(0, 25), slice(90, 120)]
+)
 def test_a_swap_of_less_than_half_the_clip_is_found(stretch: slice, turn_rad: float) -> None:
     world = walker(120, turn_rad)
     expected = np.zeros(120, bool)
@@ -115,18 +117,23 @@ def test_nothing_to_do() -> None:
 HEADINGS = {"front": 0.0, "aslant": 0.8, "side": np.pi / 2, "back": np.pi}
 
 
-# In a side view both readings are equally continuous where the legs pass each other: only the reference decides.
+# In a side view both readings are equally continuous where the legs pass each other: only the
+# reference decides.
 @pytest.mark.parametrize(
     ("name", "has_reference"),
     [*((name, True) for name in HEADINGS), ("front", False), ("aslant", False), ("back", False)],
 )
 def test_keypoints_without_depth_are_repaired(name: str, has_reference: bool) -> None:
-    """Swaps by a user's network are found by continuity, or with few reference frames even for most of the clip."""
+    """Swaps by a user's network are found by continuity, or with few reference frames even for most
+    of the clip.
+    """
     right, world = someone_walking(90, 30.0, HEADINGS[name])
     stretch = slice(8, 85) if has_reference else slice(30, 55)
     wrong = right.copy()
     wrong[stretch] = wrong[stretch][:, MIRROR_PARTNER]
-    track = track_without_depth(wrong, 30.0, {k: world[k] for k in (5, 35, 65)} if has_reference else {})
+    track = track_without_depth(
+        wrong, 30.0, {k: world[k] for k in (5, 35, 65)} if has_reference else {}
+    )
     repaired = repair_left_right(track, CAMERA)
     off = np.linalg.norm(repaired.keypoints_px - right, axis=-1)[:, 11:29].mean(axis=1)
     assert (off > 1.0).mean() <= 0.01

@@ -9,7 +9,12 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.tracking.left_right import MIRROR_PARTNER
-from scope.scope_addon.capture.tracking.limb_swap import ARMS, LEGS, find_limb_swaps, repair_limb_swaps
+from scope.scope_addon.capture.tracking.limb_swap import (
+    ARMS,
+    LEGS,
+    find_limb_swaps,
+    repair_limb_swaps,
+)
 from scope.scope_addon.capture.tracking.track import Track
 
 from ..walking import someone_walking, track_without_depth
@@ -21,26 +26,34 @@ LIMBS = {"legs": LEGS, "arms": ARMS}
 def swapped(track: Track, points: np.ndarray, where: slice) -> Track:
     order = np.arange(33)
     order[points] = MIRROR_PARTNER[points]
-    keypoints, confidence, world = (v.copy() for v in (track.keypoints_px, track.confidence, track.world_landmarks))
+    keypoints, confidence, world = (
+        v.copy() for v in (track.keypoints_px, track.confidence, track.world_landmarks)
+    )
     for values in (keypoints, confidence, world):
         values[where] = values[where][:, order]
     return replace(track, keypoints_px=keypoints, confidence=confidence, world_landmarks=world)
 
 
 def walker(heading: float, rate: float = 30.0, count: int = 90, has_depth: bool = False) -> Track:
-    """Half a pixel of noise and equal confidence on both sides: only positions carry information."""
+    """Half a pixel of noise and equal confidence on both sides: only positions carry
+    information.
+    """
     pixels, world = someone_walking(count, rate, heading)
     noise = np.random.default_rng(3).normal(0, 0.5, pixels.shape)
     track = track_without_depth(pixels + noise, rate, {})
     return replace(
-        track, confidence=np.full((count, 33), 0.9), world_landmarks=world if has_depth else np.zeros_like(world)
+        track,
+        confidence=np.full((count, 33), 0.9),
+        world_landmarks=world if has_depth else np.zeros_like(world),
     )
 
 
 def test_the_points_that_are_swapped() -> None:
     names = {key: {KEYPOINT_NAMES[k] for k in limbs.all_points} for key, limbs in LIMBS.items()}
     assert names["legs"] == {
-        f"{side}_{part}" for side in ("left", "right") for part in ("knee", "ankle", "heel", "foot_index")
+        f"{side}_{part}"
+        for side in ("left", "right")
+        for part in ("knee", "ankle", "heel", "foot_index")
     }
     assert {"left_elbow", "right_wrist", "left_thumb", "right_pinky", "left_index"} < names["arms"]
     assert not any("shoulder" in name or "foot" in name for name in names["arms"])
@@ -61,7 +74,9 @@ def test_an_interval_is_repaired(which: str, name: str, has_depth: bool) -> None
         off = np.linalg.norm(repaired.keypoints_px - right.keypoints_px, axis=-1).max(axis=1)
         assert (off > 12.0).sum() <= 1  # where the limbs meet, either reading is right
         if has_depth:
-            assert (np.linalg.norm(repaired.world_landmarks - right.world_landmarks, axis=-1) > 0.45).sum() <= 2
+            assert (
+                np.linalg.norm(repaired.world_landmarks - right.world_landmarks, axis=-1) > 0.45
+            ).sum() <= 2
 
 
 @pytest.mark.parametrize("rate", [60.0, 30.0, 15.0, 8.0, 5.0])
@@ -76,7 +91,9 @@ def test_the_reference_decides_where_more_than_half_is_wrong() -> None:
     right = walker(HEADINGS["aslant"], has_depth=True)
     rows = np.array([5, 20, 35, 50])
     wrong = swapped(right, LEGS.all_points, slice(12, 60))
-    referenced = replace(wrong, reference_rows=rows, reference_landmarks=right.world_landmarks[rows])
+    referenced = replace(
+        wrong, reference_rows=rows, reference_landmarks=right.world_landmarks[rows]
+    )
     alone, helped = (
         np.linalg.norm(repair_limb_swaps(track).keypoints_px - right.keypoints_px, axis=-1)
         for track in (wrong, referenced)
@@ -118,7 +135,15 @@ def test_nothing_to_do() -> None:
             track,
             **{
                 key: getattr(track, key)[rows]
-                for key in ("frames", "times", "seen", "keypoints_px", "confidence", "world_landmarks", "acquired")
+                for key in (
+                    "frames",
+                    "times",
+                    "seen",
+                    "keypoints_px",
+                    "confidence",
+                    "world_landmarks",
+                    "acquired",
+                )
             },
         )
         assert repair_limb_swaps(short) is short

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Identities: synthetic people who meet, hide, leave and return, and two real clips that cross each other."""
+"""Identities: synthetic people who meet, hide, leave and return, and two real clips that cross each
+other.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,11 @@ from scope.scope_addon.capture.perception.landmark_network import PoseEstimate
 from scope.scope_addon.capture.perception.person_detector import Detection
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.landmarks import landmark_estimator
-from scope.scope_addon.capture.tracking.people import build_tracks, frames_before_flicker, frames_before_merger
+from scope.scope_addon.capture.tracking.people import (
+    build_tracks,
+    frames_before_flicker,
+    frames_before_merger,
+)
 from scope.scope_addon.capture.tracking.track import Track, Tracklet
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker
 
@@ -29,9 +35,13 @@ FPS = 30
 def follow(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Track]]:
     """``follow(people, count, wanted=None, fps=30)``: the tracks of the synthetic people."""
 
-    def run(people: list[Person], count: int, wanted: int | None = None, fps: float = FPS) -> list[Track]:
+    def run(
+        people: list[Person], count: int, wanted: int | None = None, fps: float = FPS
+    ) -> list[Track]:
         monkeypatch.setattr(
-            landmark_estimator, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people, "heavy" in name)
+            landmark_estimator,
+            "LandmarkNetwork",
+            lambda name, *_: FakeLandmarks(people, "heavy" in name),
         )
         monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: FakeDetector(people))
         tracker, followed = PeopleTracker("fast", 1, wanted), FollowedPeople()
@@ -43,37 +53,56 @@ def follow(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Track]]:
 
 
 def standing(x_px: float, count: float = np.inf) -> Callable[[int], tuple[float, float] | None]:
-    """Return the position, by frame, of a person who stands still at x_px; None after ``count`` frames."""
+    """Return the position, by frame, of a person who stands still at x_px; None after ``count``
+    frames.
+    """
     return lambda t: (x_px, 200) if t < count else None
 
 
 def identities(track: Track, people: list[Person]) -> set[int]:
-    """Return the indices of the people whom the track follows: in each frame, the person with the nearest hips."""
+    """Return the indices of the people whom the track follows: in each frame, the person with the
+    nearest hips.
+    """
     out = set()
     for t in np.flatnonzero(track.seen):
         hips = track.keypoints_px[t, [23, 24]].mean(axis=0)
         places = [person.place(t) for person in people]
-        distances = [np.inf if place is None else float(np.linalg.norm(place - hips)) for place in places]
+        distances = [
+            np.inf if place is None else float(np.linalg.norm(place - hips)) for place in places
+        ]
         assert min(distances) < 60
         out.add(int(np.argmin(distances)))
     return out
 
 
-@pytest.mark.parametrize("colors", [(RED, BLUE), (RED, RED)], ids=["different clothes", "same clothes"])
+@pytest.mark.parametrize(
+    "colors", [(RED, BLUE), (RED, RED)], ids=["different clothes", "same clothes"]
+)
 @pytest.mark.parametrize("hidden", [0, 10, 20])
-def test_identities_survive_a_crossing(follow: Callable[..., list[Track]], colors: tuple, hidden: int) -> None:
-    """The person behind is occluded for some frames, in which the network sees the other one in both regions."""
+def test_identities_survive_a_crossing(
+    follow: Callable[..., list[Track]], colors: tuple, hidden: int
+) -> None:
+    """The person behind is occluded for some frames, in which the network sees the other one in
+    both regions.
+    """
     meets = 60
-    back = Person(lambda t: (200 + 6.0 * t, 200), colors[0], hidden=range(meets - hidden // 2, meets + hidden // 2))
+    back = Person(
+        lambda t: (200 + 6.0 * t, 200),
+        colors[0],
+        hidden=range(meets - hidden // 2, meets + hidden // 2),
+    )
     front = Person(lambda t: (920 - 6.0 * t, 205), colors[1], size_px=110)
     tracks = follow([back, front], 120, wanted=2)
     assert [identities(track, [back, front]) for track in tracks] == [{1}, {0}]
     assert tracks[0].seen.mean() >= 0.98
-    assert tracks[1].seen.sum() >= 120 - hidden - 22  # not while the two bodies are indistinguishable
+    # not while the two bodies are indistinguishable
+    assert tracks[1].seen.sum() >= 120 - hidden - 22
 
 
 @pytest.mark.parametrize("turns", [False, True], ids=["pass", "turn back"])
-@pytest.mark.parametrize("colors", [(RED, BLUE), (RED, RED)], ids=["different clothes", "same clothes"])
+@pytest.mark.parametrize(
+    "colors", [(RED, BLUE), (RED, RED)], ids=["different clothes", "same clothes"]
+)
 def test_identities_after_both_people_were_hidden(
     follow: Callable[..., list[Track]], colors: tuple, turns: bool
 ) -> None:
@@ -85,8 +114,11 @@ def test_identities_after_both_people_were_hidden(
     tracks = follow([left, right], 120, wanted=2)
     assert [track.seen[hidden].any() for track in tracks] == [False, False]
     assert all(track.seen[80:].all() for track in tracks)
-    switched = turns and colors[0] == colors[1]  # taken for people who pass each other, which is all that is to be seen
-    assert [identities(track, [left, right]) for track in tracks] == ([{0, 1}] * 2 if switched else [{1}, {0}])
+    # taken for people who pass each other, which is all that is to be seen
+    switched = turns and colors[0] == colors[1]
+    assert [identities(track, [left, right]) for track in tracks] == (
+        [{0, 1}] * 2 if switched else [{1}, {0}]
+    )
 
 
 @pytest.mark.parametrize("count", [2, 8])
@@ -99,15 +131,21 @@ def test_a_person_who_is_elsewhere_in_each_frame_is_tracked_at_a_low_rate(
     assert track.seen.all()
 
 
-def test_a_single_frame_is_not_enough_next_to_a_person_who_was_tracked(follow: Callable[..., list[Track]]) -> None:
+def test_a_single_frame_is_not_enough_next_to_a_person_who_was_tracked(
+    follow: Callable[..., list[Track]],
+) -> None:
     stands = Person(lambda t: (300, 200), BLUE)
     flickers = Person(lambda t: (900, 200) if t == 4 else None, RED)
     (track,) = follow([stands, flickers], 8, wanted=3, fps=2)
     assert identities(track, [stands, flickers]) == {0}
 
 
-def test_a_person_who_is_lost_in_front_of_another_one_is_found_again(follow: Callable[..., list[Track]]) -> None:
-    """Their regions have nearly the same centre, but not the same size: that the one behind is tracked is no reason."""
+def test_a_person_who_is_lost_in_front_of_another_one_is_found_again(
+    follow: Callable[..., list[Track]],
+) -> None:
+    """Their regions have nearly the same centre, but not the same size: that the one behind is
+    tracked is no reason.
+    """
     behind = Person(lambda t: (500, 205), BLUE, size_px=80)
     front = Person(lambda t: (max(660 - 3.0 * t, 534), 200), RED, size_px=120, hidden=range(60, 63))
     tracks = follow([behind, front], 120, wanted=2)
@@ -115,8 +153,12 @@ def test_a_person_who_is_lost_in_front_of_another_one_is_found_again(follow: Cal
     assert tracks[0].seen[64:].all()
 
 
-def test_a_newcomer_who_occludes_a_person_does_not_take_the_identity(follow: Callable[..., list[Track]]) -> None:
-    """The occluded target drifts onto the newcomer; that it was tracked for longer must not decide."""
+def test_a_newcomer_who_occludes_a_person_does_not_take_the_identity(
+    follow: Callable[..., list[Track]],
+) -> None:
+    """The occluded target drifts onto the newcomer; that it was tracked for longer must not
+    decide.
+    """
     stands = Person(lambda t: (500, 200), RED, hidden=range(46, 56))
     passes = Person(lambda t: (540 - 12.0 * (t - 46), 205) if t >= 40 else None, RED, size_px=110)
     tracks = follow([stands, passes], 80, wanted=3)
@@ -149,24 +191,52 @@ def test_a_newcomer_is_found_equally_soon_at_any_rate(
 
 
 @pytest.mark.parametrize("fps", [5, 24, 30, 60, 120])
-def test_the_networks_run_equally_often_at_any_rate(monkeypatch: pytest.MonkeyPatch, fps: int) -> None:
-    """The detector every 0.27 s, or in every frame; the reference network every second; the appearance every 0.13 s."""
+def test_the_networks_run_equally_often_at_any_rate(
+    monkeypatch: pytest.MonkeyPatch, fps: int
+) -> None:
+    """The detector every 0.27 s, or in every frame; the reference network every second; the
+    appearance every 0.13 s.
+    """
     people = [Person(lambda t: (300, 200), BLUE)]
     detector = FakeDetector(people)
-    monkeypatch.setattr(landmark_estimator, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people, "heavy" in name))
+    monkeypatch.setattr(
+        landmark_estimator,
+        "LandmarkNetwork",
+        lambda name, *_: FakeLandmarks(people, "heavy" in name),
+    )
     monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: detector)
     tracker = PeopleTracker("fast", 1, 2)
-    seen = [tracker.step(image, time_s=t / fps)[0][1] for t, image in enumerate(pictures(people, 4 * fps))]
+    seen = [
+        tracker.step(image, time_s=t / fps)[0][1]
+        for t, image in enumerate(pictures(people, 4 * fps))
+    ]
     assert abs(detector.calls - 4 * fps / max(1, round(fps * 8 / 30))) <= 1
-    assert [t / fps for t, o in enumerate(seen) if o.reference_landmarks is not None] == [0.0, 1.0, 2.0, 3.0]
-    assert abs(sum(o.appearance is not None for o in seen) - 4 * fps / max(1, round(fps * 4 / 30))) <= 1
+    assert [t / fps for t, o in enumerate(seen) if o.reference_landmarks is not None] == [
+        0.0,
+        1.0,
+        2.0,
+        3.0,
+    ]
+    assert (
+        abs(sum(o.appearance is not None for o in seen) - 4 * fps / max(1, round(fps * 4 / 30)))
+        <= 1
+    )
 
 
-def test_searches_are_less_frequent_once_all_wanted_people_are_tracked(monkeypatch: pytest.MonkeyPatch) -> None:
-    """After the opening of two seconds every 0.67 s, as with one wanted person; at once when one is lost."""
-    people = [Person(lambda t: (300, 200), BLUE), Person(lambda t: (900, 200) if t < 180 else None, RED)]
+def test_searches_are_less_frequent_once_all_wanted_people_are_tracked(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """After the opening of two seconds every 0.67 s, as with one wanted person; at once when one is
+    lost.
+    """
+    people = [
+        Person(lambda t: (300, 200), BLUE),
+        Person(lambda t: (900, 200) if t < 180 else None, RED),
+    ]
     detector = FakeDetector(people)
-    monkeypatch.setattr(landmark_estimator, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people))
+    monkeypatch.setattr(
+        landmark_estimator, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people)
+    )
     monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: detector)
     tracker, calls = PeopleTracker("fast", 1, people=2), []
     for t, image in enumerate(pictures(people, 184)):
@@ -178,10 +248,14 @@ def test_searches_are_less_frequent_once_all_wanted_people_are_tracked(monkeypat
     assert [t for t in calls if t >= 180] == [180, 181, 182, 183]
 
 
-def test_searches_stay_frequent_while_fewer_than_wanted_are_tracked(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_searches_stay_frequent_while_fewer_than_wanted_are_tracked(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     people = [Person(standing(90 * k + 60), BLUE, size_px=30) for k in range(11)]
     detector = FakeDetector(people)
-    monkeypatch.setattr(landmark_estimator, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people))
+    monkeypatch.setattr(
+        landmark_estimator, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people)
+    )
     monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: detector)
     tracker = PeopleTracker("fast", 1, people=12)
     for t, image in enumerate(pictures(people, 120)):
@@ -189,24 +263,33 @@ def test_searches_stay_frequent_while_fewer_than_wanted_are_tracked(monkeypatch:
     assert detector.calls == 120 // 8
 
 
-def test_every_search_for_a_person_who_was_just_lost_is_close(monkeypatch: pytest.MonkeyPatch) -> None:
-    """At 30 frames per second all other searches are close too; at a low rate some of them are not."""
+def test_every_search_for_a_person_who_was_just_lost_is_close(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """At 30 frames per second all other searches are close too; at a low rate some of them are
+    not.
+    """
     stays = Person(lambda t: (300, 200), BLUE)
     for fps, close_alone in ((30, True), (6, False)):
         leaves = Person(standing(900, fps), RED)
         detector = FakeDetector([stays, leaves])
-        monkeypatch.setattr(landmark_estimator, "LandmarkNetwork", lambda *_, d=detector: FakeLandmarks(d.people))
+        monkeypatch.setattr(
+            landmark_estimator, "LandmarkNetwork", lambda *_, d=detector: FakeLandmarks(d.people)
+        )
         monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_, d=detector: d)
         tracker, searches = PeopleTracker("fast", 1, 2), []
         for t, image in enumerate(pictures([stays, leaves], 2 * fps)):
             before = detector.calls, detector.close_calls
             tracker.step(image, time_s=t / fps)
             searches.append((detector.calls - before[0], detector.close_calls - before[1]))
-        assert searches[fps : fps + fps // 2] == [(1, 1)] * (fps // 2)  # lost for less than half a second
+        # lost for less than half a second
+        assert searches[fps : fps + fps // 2] == [(1, 1)] * (fps // 2)
         assert all(calls == close for calls, close in searches[:fps]) == close_alone
 
 
-def test_a_person_is_recognized_by_appearance_after_a_long_time(follow: Callable[..., list[Track]]) -> None:
+def test_a_person_is_recognized_by_appearance_after_a_long_time(
+    follow: Callable[..., list[Track]],
+) -> None:
     red = Person(lambda t: (200, 200) if not 40 <= t < 140 else None, RED)
     blue = Person(lambda t: (700, 200) if not 30 <= t < 160 else None, BLUE)
     moved = Person(lambda t: (640, 200) if t >= 140 else (200, 200) if t < 40 else None, RED)
@@ -216,8 +299,12 @@ def test_a_person_is_recognized_by_appearance_after_a_long_time(follow: Callable
     assert [identities(track, [moved, blue]) for track in tracks] == [{0}, {1}]
 
 
-def test_the_most_prominent_person_of_the_whole_clip_is_kept(follow: Callable[..., list[Track]]) -> None:
-    """Neither the first nor the largest one at some time; a gap is not filled with somebody else."""
+def test_the_most_prominent_person_of_the_whole_clip_is_kept(
+    follow: Callable[..., list[Track]],
+) -> None:
+    """Neither the first nor the largest one at some time; a gap is not filled with somebody
+    else.
+    """
     first = Person(lambda t: (200, 200) if t < 60 else None, RED)
     main = Person(lambda t: (900, 200) if t >= 20 else None, BLUE, hidden=range(100, 110))
     (track,) = follow([first, main], 200)
@@ -229,17 +316,25 @@ def test_the_most_prominent_person_of_the_whole_clip_is_kept(follow: Callable[..
 
 
 @pytest.mark.parametrize("comes_s", [0, 3])
-def test_a_rival_at_the_start_is_searched_for_closely(monkeypatch: pytest.MonkeyPatch, comes_s: int) -> None:
-    """A person who is hard to detect may be the most prominent one, if they are visible in the opening."""
+def test_a_rival_at_the_start_is_searched_for_closely(
+    monkeypatch: pytest.MonkeyPatch, comes_s: int
+) -> None:
+    """A person who is hard to detect may be the most prominent one, if they are visible in the
+    opening.
+    """
     leaves = Person(lambda t: (300, 200) if t < 150 else None, BLUE)
     stays = Person(lambda t: (900, 200) if t >= comes_s * FPS else None, RED, size_px=80)
 
     class Detector(FakeDetector):
-        def detect(self, image: np.ndarray, threshold: float = 0.5, closely: bool = False) -> list[Detection]:
+        def detect(
+            self, image: np.ndarray, threshold: float = 0.5, closely: bool = False
+        ) -> list[Detection]:
             return super().detect(image, threshold)[: None if closely else 1]
 
     people = [leaves, stays]
-    monkeypatch.setattr(landmark_estimator, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people))
+    monkeypatch.setattr(
+        landmark_estimator, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people)
+    )
     monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: Detector(people))
     tracker, followed = PeopleTracker("best", 1), FollowedPeople()
     for t, image in enumerate(pictures(people, 240)):
@@ -261,22 +356,28 @@ def test_small_people_are_looked_for_once_a_second_and_only_where_there_is_nobod
             looked.append(t)
             return []
 
-    monkeypatch.setattr(landmark_estimator, "LandmarkNetwork", lambda name, *_: FakeLandmarks([person]))
+    monkeypatch.setattr(
+        landmark_estimator, "LandmarkNetwork", lambda name, *_: FakeLandmarks([person])
+    )
     monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: Detector([person]))
     tracker = PeopleTracker("best", 1)
     for t, image in enumerate(pictures([person], 300)):
         tracker.step(image, time_s=t / FPS)
     assert [t for t in looked if t < 150] == [0, 30, 60, 90]
     after = [t for t in looked if t >= 150]
-    assert after[0] >= 150 + 2 * FPS - 1  # for so long, a person of that size would be found again without it
+    # for so long, a person of that size would be found again without it
+    assert after[0] >= 150 + 2 * FPS - 1
     assert (np.diff(after) == 30).all()
 
 
 @pytest.mark.parametrize("wanted", [None, 1, 2])
-def test_people_beside_larger_ones_are_looked_for_more_and_more_rarely_and_only_while_somebody_is_missing(
+def test_people_beside_larger_ones_are_looked_for_ever_more_rarely_and_only_while_one_is_missing(
     monkeypatch: pytest.MonkeyPatch, wanted: int | None
 ) -> None:
-    people = [Person(standing(300), BLUE), Person(lambda t: (900, 200) if 130 <= t < 170 else None, RED)]
+    people = [
+        Person(standing(300), BLUE),
+        Person(lambda t: (900, 200) if 130 <= t < 170 else None, RED),
+    ]
     looked: list[int] = []
 
     class Detector(FakeDetector):
@@ -284,7 +385,9 @@ def test_people_beside_larger_ones_are_looked_for_more_and_more_rarely_and_only_
             looked.append(t)
             return []
 
-    monkeypatch.setattr(landmark_estimator, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people))
+    monkeypatch.setattr(
+        landmark_estimator, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people)
+    )
     monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: Detector(people))
     tracker = PeopleTracker("best", 1, wanted)
     for t, image in enumerate(pictures(people, 400)):
@@ -301,7 +404,9 @@ def test_people_beside_larger_ones_are_looked_for_more_and_more_rarely_and_only_
     assert (pauses[-2:] == 64).all()
 
 
-def test_a_small_person_next_to_the_most_prominent_one_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_small_person_next_to_the_most_prominent_one_costs_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     people = [Person(lambda t: (300, 200), BLUE), Person(lambda t: (900, 200), RED, size_px=40)]
     networks = FakeLandmarks(people)
     monkeypatch.setattr(landmark_estimator, "LandmarkNetwork", lambda name, *_: networks)
@@ -328,13 +433,20 @@ def test_pending_estimates_do_not_change_the_result(
     networks, strong = FakeLandmarks(people), FakeLandmarks(people)
     if quality == "best":
         strong = networks
-    monkeypatch.setattr(landmark_estimator, "LandmarkNetwork", lambda name, *_: strong if "heavy" in name else networks)
+    monkeypatch.setattr(
+        landmark_estimator,
+        "LandmarkNetwork",
+        lambda name, *_: strong if "heavy" in name else networks,
+    )
     monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: FakeDetector(people))
     images = list(pictures(people, 60))
     plain, early = PeopleTracker(quality, 1), PeopleTracker(quality, 1)
     expected = [plain.step(image) for image in images]
     networks.batches.clear()
-    found = [early.step(image, upcoming) for image, upcoming in zip(images, [*images[1:], None], strict=True)]
+    found = [
+        early.step(image, upcoming)
+        for image, upcoming in zip(images, [*images[1:], None], strict=True)
+    ]
     for one, other in zip(expected, found, strict=True):
         np.testing.assert_allclose(one[0][1].keypoints_px, other[0][1].keypoints_px)
         assert [number for number, _ in one] == [number for number, _ in other]
@@ -353,19 +465,25 @@ def test_the_fallback_network_prevents_left_right_swaps(follow: Callable[..., li
     assert (track.keypoints_px[:, 11, 0] > track.keypoints_px[:, 12, 0]).all()
 
 
-def test_the_fallback_network_prevents_swaps_that_come_by_and_by(follow: Callable[..., list[Track]]) -> None:
+def test_the_fallback_network_prevents_swaps_that_come_by_and_by(
+    follow: Callable[..., list[Track]],
+) -> None:
     turned = {40: 60.0, 41: 120.0} | dict.fromkeys(range(42, 70), 180.0)
     (track,) = follow([Person(lambda t: (300 + t, 200), BLUE, turned=turned)], 120)
     assert (track.keypoints_px[:, 11, 0] > track.keypoints_px[:, 12, 0]).all()
 
 
-def test_the_fallback_network_keeps_a_person_whom_the_smaller_one_loses(follow: Callable[..., list[Track]]) -> None:
+def test_the_fallback_network_keeps_a_person_whom_the_smaller_one_loses(
+    follow: Callable[..., list[Track]],
+) -> None:
     (track,) = follow([Person(lambda t: (300 + t, 200), BLUE, lost=range(40, 80))], 120)
     assert track.seen.all()
     assert track.acquired.sum() == 1
 
 
-def test_the_reference_network_repairs_swaps_of_most_of_a_clip(follow: Callable[..., list[Track]]) -> None:
+def test_the_reference_network_repairs_swaps_of_most_of_a_clip(
+    follow: Callable[..., list[Track]],
+) -> None:
     from scope.scope_addon.capture.camera.intrinsics import choose_camera
     from scope.scope_addon.capture.tracking.left_right import repair_left_right
 
@@ -388,7 +506,9 @@ def test_tracking_does_not_wait_for_the_reference_network(monkeypatch: pytest.Mo
             return super().estimate(image, regions)
 
     networks = {True: SlowNetwork([person], is_reliable=True), False: FakeLandmarks([person])}
-    monkeypatch.setattr(landmark_estimator, "LandmarkNetwork", lambda name, *_: networks["heavy" in name])
+    monkeypatch.setattr(
+        landmark_estimator, "LandmarkNetwork", lambda name, *_: networks["heavy" in name]
+    )
     monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: FakeDetector([person]))
     tracker, followed = PeopleTracker("fast", 1), FollowedPeople()
     for t, image in enumerate(pictures([person], 20)):
@@ -434,8 +554,12 @@ def seen_at(xs: list[float], first: int = 0) -> Tracklet:
         (6, 0, 30),  # the other one is not seen after the end, so it is not in front
     ],
 )
-def test_frames_in_which_a_target_drifts_onto_another_one_are_cut_off(drifting: int, goes_on: int, kept: int) -> None:
-    """The place from which the target is followed later is the last one of the person who went behind another."""
+def test_frames_in_which_a_target_drifts_onto_another_one_are_cut_off(
+    drifting: int, goes_on: int, kept: int
+) -> None:
+    """The place from which the target is followed later is the last one of the person who went
+    behind another.
+    """
     passes = [500.0 - 4.0 * t for t in range(30 + goes_on)]
     walks = [200.0 + 2.0 * t for t in range(30 - drifting)] + passes[30 - drifting : 30]
     times = (np.arange(60) / FPS).tolist()
@@ -455,7 +579,9 @@ def test_a_real_newcomer_is_found_equally_soon_at_any_rate(shared: Path, every: 
             image[:, 700:] = 140
         if t % every:
             continue
-        hips = [o.keypoints_px[[23, 24]].mean(axis=0) for _, o in tracker.step(image, time_s=t / 30)]
+        hips = [
+            o.keypoints_px[[23, 24]].mean(axis=0) for _, o in tracker.step(image, time_s=t / 30)
+        ]
         if any(np.linalg.norm(place - places[1]) < 80 for place in hips):
             found_s = t / 30
             break
@@ -465,10 +591,15 @@ def test_a_real_newcomer_is_found_equally_soon_at_any_rate(shared: Path, every: 
 
 @pytest.mark.usefixtures("networks")
 @pytest.mark.parametrize(
-    ("cameras", "crossing"), [(("cam2", "cam3"), True), (("cam4", "cam1"), True), (("cam1", "cam3"), False)]
+    ("cameras", "crossing"),
+    [(("cam2", "cam3"), True), (("cam4", "cam1"), True), (("cam1", "cam3"), False)],
 )
-def test_identities_of_real_people_are_never_switched(shared: Path, cameras: tuple[str, str], crossing: bool) -> None:
-    """The same man twice, so that appearance does not help; occluded for a third of a second where the clips cross."""
+def test_identities_of_real_people_are_never_switched(
+    shared: Path, cameras: tuple[str, str], crossing: bool
+) -> None:
+    """The same man twice, so that appearance does not help; occluded for a third of a second where
+    the clips cross.
+    """
     tracker, followed = PeopleTracker("fast", threads=2, people=2), FollowedPeople()
     places, hidden = [], []
     for t, (image, at, is_hidden) in enumerate(composite(shared, cameras, crossing)):

@@ -18,7 +18,9 @@ W, H = 320, 180
 
 
 def scene(seed: int, width: int = W) -> np.ndarray:
-    coarse = np.random.default_rng(seed).integers(0, 256, (9, max(2, width // 20), 3), dtype=np.uint8)
+    coarse = np.random.default_rng(seed).integers(
+        0, 256, (9, max(2, width // 20), 3), dtype=np.uint8
+    )
     return cv2.resize(coarse, (width, H), interpolation=cv2.INTER_CUBIC)
 
 
@@ -53,7 +55,9 @@ def test_other_changes_are_not_cuts(frames: list[np.ndarray]) -> None:
 
 @pytest.mark.usefixtures("networks")
 def test_scenes_are_captured_separately(shared: Path, body: Body, tmp_path: Path) -> None:
-    """A man from two sides, one after the other: the cut is reported, and he is followed before and after it."""
+    """A man from two sides, one after the other: the cut is reported, and he is followed before and
+    after it.
+    """
     clip = tmp_path / "two.mp4"
     writer = cv2.VideoWriter(str(clip), cv2.VideoWriter.fourcc(*"mp4v"), 30, (540, 960))
     for camera in ("cam3", "cam1"):
@@ -66,7 +70,9 @@ def test_scenes_are_captured_separately(shared: Path, body: Body, tmp_path: Path
     found = capture(clip, body, CaptureOptions(quality="fast"))
     (motion,) = found.motions
     assert found.report["cuts_s"] == [pytest.approx(25 / 30, abs=1e-3)]
-    assert any("two.mp4 cuts to another scene at 0.8 s" in text for text in found.report["warnings"])
+    assert any(
+        "two.mp4 cuts to another scene at 0.8 s" in text for text in found.report["warnings"]
+    )
     assert np.allclose(np.diff(motion.timestamps), 1 / 30, atol=1e-3)
     seen = motion.valid
     assert seen.mean() > 0.4  # one of the two, if not both

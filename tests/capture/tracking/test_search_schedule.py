@@ -22,7 +22,9 @@ def person(side_px: float, seen_s: float = 0.0) -> TrackedTarget:
     return TrackedTarget(0, estimate, np.zeros(2), seen_s)
 
 
-def searches(people: int | None, fps: float, seconds: float, live=(), lost=(), start_s: float = 10.0) -> list[float]:
+def searches(
+    people: int | None, fps: float, seconds: float, live=(), lost=(), start_s: float = 10.0
+) -> list[float]:
     """Return the times of the searches, seconds after the first frame."""
     clock = FrameClock()
     schedule, found = SearchSchedule(clock, people), []
@@ -57,8 +59,12 @@ def test_newcomers_are_looked_for_more_often_while_people_are_missing(fps: int) 
 
 
 def test_somebody_small_may_be_in_the_background() -> None:
-    """Before the most prominent person comes; so the search is as frequent as for a person who was lost."""
-    np.testing.assert_allclose(np.diff(searches(None, 30, 10.0, live=[person(150.0)])), 4 / 30, atol=0.02)
+    """Before the most prominent person comes; so the search is as frequent as for a person who was
+    lost.
+    """
+    np.testing.assert_allclose(
+        np.diff(searches(None, 30, 10.0, live=[person(150.0)])), 4 / 30, atol=0.02
+    )
 
 
 def test_small_people_are_searched_once_a_second_and_only_where_nobody_is_tracked() -> None:
@@ -71,7 +77,8 @@ def test_small_people_are_searched_once_a_second_and_only_where_nobody_is_tracke
             times.append(t / 30)
     np.testing.assert_allclose(times, [0, 1, 2, 3, 4], atol=0.02)
     clock.advance(6.0)
-    assert not schedule.begin_small(IMAGE, [], [person(300.0)])  # a plain detection would find them again
+    # a plain detection would find them again
+    assert not schedule.begin_small(IMAGE, [], [person(300.0)])
 
 
 def test_the_search_beside_people_becomes_rare_until_their_number_changes() -> None:

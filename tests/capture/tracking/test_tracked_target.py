@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A target that becomes occluded: a synthetic body whose landmarks jump, lose confidence, or both."""
+"""A target that becomes occluded: a synthetic body whose landmarks jump, lose confidence, or
+both.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,9 @@ def at(x: float, confidence: float = 0.9) -> PoseEstimate:
 
 
 def walker(frames: int, fps: float, speed_px: float = 12.0) -> TrackedTarget:
-    """A target that was tracked for some frames, predicted at ``frames * speed_px`` in the next one."""
+    """A target that was tracked for some frames, predicted at ``frames * speed_px`` in the next
+    one.
+    """
     target = TrackedTarget(0, at(0.0), np.zeros(2), 0.0)
     for t in range(1, frames):
         target.update(at(speed_px * t), False, t / fps, 1 / fps)
@@ -30,9 +34,12 @@ def walker(frames: int, fps: float, speed_px: float = 12.0) -> TrackedTarget:
 
 
 @pytest.mark.parametrize(
-    ("jump", "confidence", "occluded"), [(0, 0.9, False), (60, 0.9, False), (0, 0.4, False), (60, 0.4, True)]
+    ("jump", "confidence", "occluded"),
+    [(0, 0.9, False), (60, 0.9, False), (0, 0.4, False), (60, 0.4, True)],
 )
-def test_a_jump_with_less_confidence_is_an_occlusion(jump: float, confidence: float, occluded: bool) -> None:
+def test_a_jump_with_less_confidence_is_an_occlusion(
+    jump: float, confidence: float, occluded: bool
+) -> None:
     assert walker(30, 30).becomes_occluded(at(30 * 12.0 + jump, confidence)) == occluded
 
 
@@ -57,7 +64,9 @@ def test_an_occluder_is_looked_for_where_the_person_was_and_where_they_walk_to()
     target = walker(30, 30, speed_px=24.0)
     target.is_occluded, target.frames_lost = True, 20
     last, now = 29 * 24.0, 49 * 24.0
-    assert [target.is_occluded_by(at(x, 0.4)) for x in (last, now, now + 0.6 * SIDE, last - 0.6 * SIDE)] == [
+    assert [
+        target.is_occluded_by(at(x, 0.4)) for x in (last, now, now + 0.6 * SIDE, last - 0.6 * SIDE)
+    ] == [
         True,
         True,
         False,

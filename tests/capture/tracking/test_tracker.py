@@ -38,18 +38,22 @@ def test_a_somersault_is_tracked_all_the_way_round(frames: Frames) -> None:
     seen: dict[int, dict[int, Observation]] = {}
     for index, image in enumerate(frames("clips/walk_side_static", start=146, stop=187), 146):
         for tracklet, observation in tracker.step(image):
-            if observation.keypoints_px[:, 1].mean() < 600:  # the man in the air, not the woman on the grass
+            # the man in the air, not the woman on the grass
+            if observation.keypoints_px[:, 1].mean() < 600:
                 seen.setdefault(tracklet, {})[index] = observation
     (man,) = (track for track in seen.values() if 165 in track)
     assert set(range(156, 187)) <= set(man)
-    head_above_hips = {k: o.keypoints_px[[23, 24], 1].mean() - o.keypoints_px[0, 1] for k, o in man.items()}
+    head_above_hips = {
+        k: o.keypoints_px[[23, 24], 1].mean() - o.keypoints_px[0, 1] for k, o in man.items()
+    }
     assert head_above_hips[156] > 0
     assert head_above_hips[170] < 0
     assert head_above_hips[186] > 0
 
 
 def test_a_person_who_walks_out_of_the_picture_is_lost(frames: Frames) -> None:
-    """The woman on the grass leaves at the left edge between frames 195 and 207, and nothing replaces her.
+    """The woman on the grass leaves at the left edge between frames 195 and 207, and nothing
+    replaces her.
 
     The man runs behind a tree between frames 223 and 229, and no person is found in its bark.
     """
@@ -59,7 +63,9 @@ def test_a_person_who_walks_out_of_the_picture_is_lost(frames: Frames) -> None:
         for tracklet, _ in tracker.step(image):
             seen.setdefault(tracklet, []).append(index)
     # a tracklet of a third of a second or more is a person
-    lasting = sorted((frames for frames in seen.values() if len(frames) >= 10), key=lambda frames: frames[-1])
+    lasting = sorted(
+        (frames for frames in seen.values() if len(frames) >= 10), key=lambda frames: frames[-1]
+    )
     woman, man = lasting
     assert 195 <= woman[-1] <= 207
     assert 223 <= man[-1] <= 226  # behind a tree
@@ -76,7 +82,8 @@ def test_person_is_found_once_and_kept(tracker: PeopleTracker, frames: Frames, c
     assert found[-1].keypoints_px.shape == (33, 2)
     assert found[-1].world_landmarks.shape == (33, 3)
     assert all(((o.keypoints_confidence >= 0) & (o.keypoints_confidence <= 1)).all() for o in found)
-    assert found[0].reference_landmarks is not None  # left and right are checked from the first frame on
+    # left and right are checked from the first frame on
+    assert found[0].reference_landmarks is not None
     assert sum(o.reference_landmarks is not None for o in found) <= 1 + len(found) // 8
 
 
@@ -88,7 +95,9 @@ def test_two_people_are_tracked_and_nobody_twice(frames: Frames) -> None:
         assert observations[0].region.center_px[0] > 500 > observations[1].region.center_px[0]
 
 
-def test_a_small_person_is_tracked_where_there_is_nobody_else(tracker: PeopleTracker, frames: Frames) -> None:
+def test_a_small_person_is_tracked_where_there_is_nobody_else(
+    tracker: PeopleTracker, frames: Frames
+) -> None:
     near = [largest(tracker, image) for image in frames("clips/squats_5fps", stop=4)]
     tracker.reset()
     for image, expected in zip(frames("clips/squats_5fps", stop=4), near, strict=True):
@@ -100,17 +109,22 @@ def test_a_small_person_is_tracked_where_there_is_nobody_else(tracker: PeopleTra
 
 
 def test_a_small_person_beside_a_larger_one_is_tracked_where_two_are_wanted(frames: Frames) -> None:
-    large, small = ([*frames(f"clips/{clip}", stop=4)] for clip in ("gesture_square", "squats_5fps"))
+    large, small = (
+        [*frames(f"clips/{clip}", stop=4)] for clip in ("gesture_square", "squats_5fps")
+    )
     tracker = PeopleTracker("fast", threads=2, people=2)
     for near, distant in zip(large, small, strict=True):
         found = dict(tracker.step(beside(near, distant)))
         assert sorted(found) == [0, 1]
         assert found[0].region.center_px[0] < 576
         x, y = found[1].keypoints_px.T
-        assert ((x > 800) & (x < 902) & (y > 200) & (y < 380)).mean() > 0.9  # where the small image is
+        # where the small image is
+        assert ((x > 800) & (x < 902) & (y > 200) & (y < 380)).mean() > 0.9
 
 
-def test_masks_come_with_the_frame_for_which_they_were_requested(tracker: PeopleTracker, frames: Frames) -> None:
+def test_masks_come_with_the_frame_for_which_they_were_requested(
+    tracker: PeopleTracker, frames: Frames
+) -> None:
     images = list(frames("clips/gesture_square", stop=6))
     found = [
         tracker.step(image, upcoming, upcoming_with_masks=k in (1, 2))[0][1]
@@ -125,7 +139,11 @@ def test_masks_come_with_the_frame_for_which_they_were_requested(tracker: People
     assert mask is not None
     assert mask.region == found[2].region
     assert mask.image_size == (images[0].shape[1], images[0].shape[0])
-    at = np.rint(mask.region.crop_from_image(found[2].keypoints_px) * 256 - 0.5).astype(int).clip(0, 255)
+    at = (
+        np.rint(mask.region.crop_from_image(found[2].keypoints_px) * 256 - 0.5)
+        .astype(int)
+        .clip(0, 255)
+    )
     assert np.median(mask.probability[at[:, 1], at[:, 0]]) > 0.9
 
 

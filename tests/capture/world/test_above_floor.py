@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Raising feet out of the floor, on motions with known ground truth; the skin is measured by full skinning."""
+"""Raising feet out of the floor, on motions with known ground truth; the skin is measured by full
+skinning.
+"""
 
 import numpy as np
 import pytest
@@ -24,8 +26,12 @@ def raised(person, omega, root, visible=1.0):
     R, t = supported.forward_kinematics(omega, root - supported.rest_joints()[0])
     points, seen = contact_point_positions(supported, R, t), np.full((len(root), 6), visible)
     betas, valid = np.zeros(supported.P), np.ones(len(root), bool)
-    placed = PlacedTrack(supported, betas, times, valid, omega, root, t, points, seen, np.zeros((len(root), 3)))
-    contact = standing.resting_probability(points, T_world_camera[2, :3], times, np.zeros(3)) * visible
+    placed = PlacedTrack(
+        supported, betas, times, valid, omega, root, t, points, seen, np.zeros((len(root), 3))
+    )
+    contact = (
+        standing.resting_probability(points, T_world_camera[2, :3], times, np.zeros(3)) * visible
+    )
     return placed, raise_feet(placed, contact, T_world_camera)
 
 
@@ -33,7 +39,10 @@ def skin_heights(person, omega, root):
     """(T, V) heights of every vertex above the floor."""
     supported, _, _, _, T_world_camera, _ = person
     pelvis_at_rest, up = supported.rest_joints()[0], T_world_camera[2, :3]
-    poses = [supported.forward_kinematics(o, r - pelvis_at_rest) for o, r in zip(omega, root, strict=True)]
+    poses = [
+        supported.forward_kinematics(o, r - pelvis_at_rest)
+        for o, r in zip(omega, root, strict=True)
+    ]
     return np.stack([supported.skin(*pose) @ up for pose in poses]) + T_world_camera[2, 3]
 
 
@@ -43,11 +52,15 @@ def points_world(person, omega, root):
 
 def bump(times, first, last):
     """(T,) 0 outside ``first`` to ``last`` seconds, 1 in the middle, smooth."""
-    return np.where((times > first) & (times < last), np.sin(np.pi * (times - first) / (last - first)) ** 2, 0.0)
+    return np.where(
+        (times > first) & (times < last), np.sin(np.pi * (times - first) / (last - first)) ** 2, 0.0
+    )
 
 
 def on_the_floor(person):
-    """The person's rotations, and a root with which the lowest vertex of the whole motion is on the floor."""
+    """The person's rotations, and a root with which the lowest vertex of the whole motion is on the
+    floor.
+    """
     omega, root = person[1], person[2] + person[0].rest_joints()[0]
     return omega, root - skin_heights(person, omega[:1], root[:1]).min() * person[4][2, :3]
 
@@ -65,7 +78,8 @@ def test_a_sinking_body_is_brought_back_to_where_it_was(step):
     assert skin_heights(step, omega, sunk).min() < -0.14
     assert skin_heights(step, found.rotations, found.root).min() > -0.01
     assert np.abs((found.root - root) @ up).max() < 0.01
-    np.testing.assert_allclose(np.cross(found.root - sunk, up), 0, atol=1e-9)  # up, and nowhere else
+    # up, and nowhere else
+    np.testing.assert_allclose(np.cross(found.root - sunk, up), 0, atol=1e-9)
     np.testing.assert_allclose(found.rotations, placed.rotations, atol=0.04)  # the pose was right
 
 
@@ -90,12 +104,17 @@ def test_a_step_of_a_sinking_body_stays_smooth(step):
 
 
 def test_a_foot_alone_is_raised_by_its_leg_and_the_other_stays(step):
-    """The pelvis tilts about the standing foot, so that the other one, stretched, goes under the floor."""
+    """The pelvis tilts about the standing foot, so that the other one, stretched, goes under the
+    floor.
+    """
     supported, _, _, _, T_world_camera, times = step
     omega, root = on_the_floor(step)
     omega = np.repeat(omega[:1], len(times), axis=0)
     root = np.repeat(root[:1], len(times), axis=0)
-    R_camera_world, standing_foot = T_world_camera[:3, :3].T, points_world(step, omega, root)[0, 2:4].mean(axis=0)
+    R_camera_world, standing_foot = (
+        T_world_camera[:3, :3].T,
+        points_world(step, omega, root)[0, 2:4].mean(axis=0),
+    )
     sway = rotations.exp(0.5 * bump(times, 0.7, 2.3)[:, None] * np.array([0.0, 1.0, 0.0]))
     turn = R_camera_world @ sway @ R_camera_world.T
     pivot = transform_points(np.linalg.inv(T_world_camera), standing_foot[None])[0]
@@ -103,11 +122,15 @@ def test_a_foot_alone_is_raised_by_its_leg_and_the_other_stays(step):
     tilted[:, 0] = turn @ omega[:, 0]
     moved = np.einsum("tij,tj->ti", turn, root - pivot) + pivot
     ankle = supported.joint_names.index("right_ankle")
-    tilted[:, ankle] = np.einsum("tji,tjk,tkl->til", tilted[:, 0], omega[:, 0], omega[:, ankle])  # the sole stays flat
+    # the sole stays flat
+    tilted[:, ankle] = np.einsum("tji,tjk,tkl->til", tilted[:, 0], omega[:, 0], omega[:, ankle])
     lowest = points_world(step, tilted, moved)[:, :2, 2].min()
     assert lowest < -0.03
     _, found = raised(step, tilted, moved)
-    before, after = points_world(step, tilted, moved), points_world(step, found.rotations, found.root)
+    before, after = (
+        points_world(step, tilted, moved),
+        points_world(step, found.rotations, found.root),
+    )
     assert after[:, :2, 2].min() > -0.01
     assert np.abs(after[:, 2:4] - before[:, 2:4]).max() < 0.02
     assert np.abs(after[:, 2:4, 2] - before[:, 2:4, 2]).max() < 0.015
@@ -137,7 +160,10 @@ def test_resting_palms_rise_less_than_the_toes():
     sunk = omega.copy()
     for side in ("left", "right"):
         hip = supported.joint_names.index(f"{side}_hip")
-        sunk[:, hip] = rotations.exp(-0.12 * bump(times, 0.3, 1.7)[:, None] * np.array([1.0, 0, 0])) @ omega[:, hip]
+        sunk[:, hip] = (
+            rotations.exp(-0.12 * bump(times, 0.3, 1.7)[:, None] * np.array([1.0, 0, 0]))
+            @ omega[:, hip]
+        )
     before = points_world(plank, sunk, root)
     assert before[:, 1].min(axis=0)[2] < -0.05
     _, found = raised(plank, sunk, root)

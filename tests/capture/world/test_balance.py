@@ -18,18 +18,23 @@ FEET = np.tile([1.0, 1.0, 1.0, 1.0, 0.0, 0.0], (T, 1))  # stand, and hands do no
 
 
 def standing(lean_deg=0.0, axis=(1.0, 0.0, 0.0), speed_m_s=0.0, arms=(0.0, 0.0, 60.0), bends=()):
-    """A person standing 4 m away with arms down, leaning as a whole about the feet, and moving at ``speed_m_s``.
+    """A person standing 4 m away with arms down, leaning as a whole about the feet, and moving at
+    ``speed_m_s``.
 
-    ``arms``: the right shoulder's axis-angle, degrees; the left one mirrors it. ``bends``: of both hips, knees and so
-    on, degrees about the joint's x axis.
+    ``arms``: the right shoulder's axis-angle, degrees; the left one mirrors it. ``bends``: of both
+    hips, knees and so on, degrees about the joint's x axis.
     """
     body = load_body("scope")
     supported = with_contact_points(body, np.zeros(body.P))
     omega = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
     for side, sign in (("left", -1), ("right", 1)):
-        omega[:, body.joint_names.index(f"{side}_shoulder")] = rotations.exp(sign * np.radians(arms))
+        omega[:, body.joint_names.index(f"{side}_shoulder")] = rotations.exp(
+            sign * np.radians(arms)
+        )
         for name, degrees in bends:
-            omega[:, body.joint_names.index(f"{side}_{name}")] = rotations.exp(np.radians([degrees, 0, 0]))
+            omega[:, body.joint_names.index(f"{side}_{name}")] = rotations.exp(
+                np.radians([degrees, 0, 0])
+            )
     upright = rotations.exp([np.pi, 0.0, 0.0])  # model y up to camera y down
     lean = rotations.exp(np.radians(lean_deg) * np.array(axis))
     omega[:, 0] = lean @ upright
@@ -41,11 +46,17 @@ def standing(lean_deg=0.0, axis=(1.0, 0.0, 0.0), speed_m_s=0.0, arms=(0.0, 0.0, 
 
     root = np.zeros((T, 3))
     joints, contact_points = place(root)
-    root += np.array([0, 1.0, 4.0]) - contact_points[:, :4].mean(axis=(0, 1)) + speed_m_s * TIMES[:, None] * [1.0, 0, 0]
+    root += (
+        np.array([0, 1.0, 4.0])
+        - contact_points[:, :4].mean(axis=(0, 1))
+        + speed_m_s * TIMES[:, None] * [1.0, 0, 0]
+    )
     joints, contact_points = place(root)
     seen, center = np.ones((T, 6)), np.zeros((T, 3))
     every = np.ones(T, bool)
-    return PlacedTrack(supported, np.zeros(body.P), TIMES, every, omega, root, joints, contact_points, seen, center)
+    return PlacedTrack(
+        supported, np.zeros(body.P), TIMES, every, omega, root, joints, contact_points, seen, center
+    )
 
 
 def turned_deg(turn):
@@ -72,8 +83,12 @@ def test_a_body_out_of_balance_is_rotated_back_over_the_feet(lean):
     assert np.sign(angle) == -np.sign(lean)
     assert 3.0 < abs(angle) < 10.5
     np.testing.assert_allclose(pivot, placed.soles.mean(axis=1), atol=1e-9)
-    turned = pivot + np.einsum("tij,tj->ti", turn, center_of_mass(placed.body, placed.joints) - pivot)
-    before, after = ((c - pivot)[T // 2] @ AWAY for c in (center_of_mass(placed.body, placed.joints), turned))
+    turned = pivot + np.einsum(
+        "tij,tj->ti", turn, center_of_mass(placed.body, placed.joints) - pivot
+    )
+    before, after = (
+        (c - pivot)[T // 2] @ AWAY for c in (center_of_mass(placed.body, placed.joints), turned)
+    )
     assert abs(after) < 0.75 * abs(before)
 
 
@@ -102,7 +117,11 @@ def test_a_body_that_moves_or_is_in_the_air_is_not_rotated():
     assert np.abs(turned_deg(turn)).max() < 1e-6
 
 
-SITS, KNEELS, BENDS = (("hip", -85), ("knee", 85)), (("knee", 90), ("ankle", 50)), (("hip", -20), ("knee", 40))
+SITS, KNEELS, BENDS = (
+    (("hip", -85), ("knee", 85)),
+    (("knee", 90), ("ankle", 50)),
+    (("hip", -20), ("knee", 40)),
+)
 
 
 @pytest.mark.parametrize("bends", [SITS, KNEELS], ids=["sits", "kneels"])
@@ -118,7 +137,9 @@ def test_a_body_with_slightly_bent_knees_must_be_balanced():
 
 
 def test_a_body_on_hands_and_feet_is_not_rotated():
-    """A plank towards the camera: the zero moment point is between toes and palms, far from the feet."""
+    """A plank towards the camera: the zero moment point is between toes and palms, far from the
+    feet.
+    """
     planks = standing(80.0, arms=(0.0, 90.0, 0.0))
     assert turned_deg(balancing_rotations(planks, FEET, UP)[0])[T // 2] < -3.0
     turn, pivot = balancing_rotations(planks, np.ones((T, 6)), UP)
@@ -128,14 +149,22 @@ def test_a_body_on_hands_and_feet_is_not_rotated():
 
 def test_a_still_image_is_balanced_without_accelerations():
     placed = standing(20.0)
-    one = PlacedTrack(*(getattr(placed, n) if n in ("body", "betas", "uneven_ground") else getattr(placed, n)[:1]
-                        for n in placed.__dataclass_fields__))  # fmt: skip
+    one = PlacedTrack(
+        *(
+            getattr(placed, n)
+            if n in ("body", "betas", "uneven_ground")
+            else getattr(placed, n)[:1]
+            for n in placed.__dataclass_fields__
+        )
+    )
     turn, _ = balancing_rotations(one, FEET[:1], UP)
     assert turned_deg(turn)[0] < -3.0
 
 
 def test_a_frame_without_contact_is_rotated_about_its_own_feet():
-    """As after a cut: the angle follows from neighbouring frames, but the centre of rotation must not be far away."""
+    """As after a cut: the angle follows from neighbouring frames, but the centre of rotation must
+    not be far away.
+    """
     placed, contact = standing(20.0), FEET.copy()
     contact[T // 2] = 0.0
     _, pivot = balancing_rotations(placed, contact, UP)

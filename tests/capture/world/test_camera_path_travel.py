@@ -18,7 +18,9 @@ TIMES = np.arange(T) / FPS
 
 
 def steps(speed, period=1.0, duty=0.6):
-    """(T, 4, 3) soles of a walk along +x at z = 4 m, 1 m below the camera: each foot is in contact, then swings."""
+    """(T, 4, 3) soles of a walk along +x at z = 4 m, 1 m below the camera: each foot is in contact,
+    then swings.
+    """
     soles = np.zeros((T, 4, 3))
     for foot, shift in ((0, 0.0), (1, 0.0), (2, 0.5), (3, 0.5)):
         phase = TIMES / period + shift
@@ -58,7 +60,9 @@ def test_a_camera_does_not_travel_from_one_scene_into_the_next():
 
 
 def test_feet_at_rest_imply_a_static_camera():
-    found = camera_travel(seen_from(steps(1.4), np.zeros((T, 3)), 0.004), np.ones(T, bool), UP, TIMES)
+    found = camera_travel(
+        seen_from(steps(1.4), np.zeros((T, 3)), 0.004), np.ones(T, bool), UP, TIMES
+    )
     np.testing.assert_array_equal(found, 0.0)
 
 
@@ -81,17 +85,22 @@ def test_transforming_along_a_path_and_back():
         1.0,
     )
     there = path.to_first(fit)
-    np.testing.assert_allclose(there.t_camera_root[2], path.R_first_camera[2] @ fit.t_camera_root[2] + path.center[2])
+    np.testing.assert_allclose(
+        there.t_camera_root[2], path.R_first_camera[2] @ fit.t_camera_root[2] + path.center[2]
+    )
     back = path.points_to_frames(there.t_camera_root[:, None])[:, 0]
     np.testing.assert_allclose(back, fit.t_camera_root, atol=1e-12)
-    # the same point through each frame's camera and through the first frame's axes ends at the same place in the world
+    # the same point through each frame's camera and through the first frame's axes ends at the same
+    # place in the world
     T_world_first = np.eye(4)
     T_world_first[:3, :3], T_world_first[:3, 3] = exp([0.1, 0.2, 0.3]), [1, 2, 3]
     points = rng.standard_normal((5, 7, 3))
     frames = path.world_from_frames(T_world_first)
     local = path.points_to_frames(points)
     through = np.einsum("tij,tkj->tki", frames[:, :3, :3], local) + frames[:, None, :3, 3]
-    np.testing.assert_allclose(through, points @ T_world_first[:3, :3].T + T_world_first[:3, 3], atol=1e-12)
+    np.testing.assert_allclose(
+        through, points @ T_world_first[:3, :3].T + T_world_first[:3, 3], atol=1e-12
+    )
     assert CameraPath.static(3).is_static
     assert not path.is_static
 
@@ -114,8 +123,14 @@ def test_a_stance_is_the_same_in_every_camera():
     seen = path.points_to_frames(points)[:, 0]
     height = (seen * frames.floor_normal).sum(axis=1) - frames.floor_offset
     np.testing.assert_allclose(height, points[:, 0] @ up + 1.4, atol=1e-12)
-    np.testing.assert_allclose(path.points_to_frames(first.root_cam[:, None])[:, 0], frames.root_cam)
-    turned = np.einsum("tij,tj->ti", path.R_first_camera, np.einsum("tij,tj->ti", frames.turn, seen - frames.root_cam))
+    np.testing.assert_allclose(
+        path.points_to_frames(first.root_cam[:, None])[:, 0], frames.root_cam
+    )
+    turned = np.einsum(
+        "tij,tj->ti",
+        path.R_first_camera,
+        np.einsum("tij,tj->ti", frames.turn, seen - frames.root_cam),
+    )
     expected = np.einsum("tij,tj->ti", first.turn, points[:, 0] - first.root_cam)
     np.testing.assert_allclose(turned, expected, atol=1e-12)
     np.testing.assert_array_equal(frames.contact, first.contact)
@@ -127,7 +142,9 @@ def test_without_smoothing_the_camera_travels_as_far(shared):
     body, clip = load_body("scope"), shared / "data/clips/run_moving_camera.mp4"
     wanted = VideoRange(end_s=1.5)
     smooth, raw = (
-        capture(clip, body, CaptureOptions(quality="fast", wanted=wanted, smoothing=smoothing)).motions[0]
+        capture(
+            clip, body, CaptureOptions(quality="fast", wanted=wanted, smoothing=smoothing)
+        ).motions[0]
         for smoothing in (True, False)
     )
     way = np.linalg.norm(raw.trans[-1] - raw.trans[0])

@@ -20,9 +20,17 @@ def stands(times):
     R, joints = supported.forward_kinematics(rotations, np.tile([0.0, 0.0, 4.0], (T, 1)))
     contact_points, every = contact_point_positions(supported, R, joints), np.ones(T, bool)
     return PlacedTrack(
-        supported, np.zeros(body.P), times, every, rotations, joints[:, 0], joints, contact_points, np.ones((T, 6)),
+        supported,
+        np.zeros(body.P),
+        times,
+        every,
+        rotations,
+        joints[:, 0],
+        joints,
+        contact_points,
+        np.ones((T, 6)),
         np.zeros((T, 3)),
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize("step_s", [1 / 240, 1 / 30, 1.0, 30.03 / 30, 5.0])

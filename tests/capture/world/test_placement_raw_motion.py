@@ -15,7 +15,9 @@ from .clip.waving_person import BODY, FRAMES, person
 
 def test_it_has_the_rotations_of_the_fit_in_the_first_frames_axes_without_gaps():
     angle = 0.1 * np.sin(np.arange(FRAMES) / 5.0)
-    path = CameraPath(exp(angle[:, None] * [0.0, 1.0, 0.0]), np.outer(np.arange(FRAMES), [0.02, 0.0, 0.01]))
+    path = CameraPath(
+        exp(angle[:, None] * [0.0, 1.0, 0.0]), np.outer(np.arange(FRAMES), [0.02, 0.0, 0.01])
+    )
     track, true = person(path=path)
     seen = path.to_frames(true)
     lost = replace(seen, valid=np.arange(FRAMES) != 7, rotations=seen.rotations.copy())

@@ -10,7 +10,9 @@ from .test_stance import TRUTH, UP, stands_at
 NOWHERE = float("nan")
 
 
-def seen_alone(true_m: float, captured_m: float, camera_m: float = 2.0, is_known: bool = False) -> Stander:
+def seen_alone(
+    true_m: float, captured_m: float, camera_m: float = 2.0, is_known: bool = False
+) -> Stander:
     """Somebody who is taken for ``captured_m`` by a camera at that height."""
     return Stander(camera_m * captured_m / true_m, captured_m, is_known)
 
@@ -29,7 +31,9 @@ def test_an_adult_moves_towards_the_size_that_the_floor_says():
 
 def test_the_order_of_people_does_not_matter():
     people = [seen_alone(1.72, 1.72, is_known=True), seen_alone(1.1, 1.66), seen_alone(1.6, 1.7)]
-    np.testing.assert_allclose(relative_sizes(people[::-1]), relative_sizes(people)[::-1], atol=0.01)
+    np.testing.assert_allclose(
+        relative_sizes(people[::-1]), relative_sizes(people)[::-1], atol=0.01
+    )
 
 
 @pytest.mark.parametrize(
@@ -43,16 +47,22 @@ def test_the_order_of_people_does_not_matter():
     ids=["unseen", "at the camera's height", "higher", "lower"],
 )
 def test_who_is_not_on_the_floor_keeps_the_size(other):
-    np.testing.assert_array_equal(relative_sizes([seen_alone(1.72, 1.72, is_known=True), other]), 1.0)
+    np.testing.assert_array_equal(
+        relative_sizes([seen_alone(1.72, 1.72, is_known=True), other]), 1.0
+    )
 
 
 def test_without_a_known_stature_nothing_changes():
-    np.testing.assert_array_equal(relative_sizes([seen_alone(1.72, 1.72), seen_alone(1.1, 1.66)]), 1.0)
+    np.testing.assert_array_equal(
+        relative_sizes([seen_alone(1.72, 1.72), seen_alone(1.1, 1.66)]), 1.0
+    )
     np.testing.assert_array_equal(relative_sizes([seen_alone(1.72, 1.72, is_known=True)]), 1.0)
 
 
 def test_the_height_of_the_camera_is_measured_from_feet_in_contact():
     placed = stands_at(TRUTH)
     found = stander(placed, UP, is_known=True)
-    assert found.height_m == pytest.approx(float((placed.contact_points[0, :4] @ -UP).max()), abs=1e-5)
+    assert found.height_m == pytest.approx(
+        float((placed.contact_points[0, :4] @ -UP).max()), abs=1e-5
+    )
     assert found.stature_m == placed.body.stature(placed.betas)

@@ -23,9 +23,17 @@ def stands_at(root: np.ndarray, T: int = 30) -> PlacedTrack:
     R, joints = supported.forward_kinematics(rotations, np.tile(root, (T, 1)))
     contact_points, every = contact_point_positions(supported, R, joints), np.ones(T, bool)
     return PlacedTrack(
-        supported, np.zeros(body.P), np.arange(T) / 30, every, rotations, joints[:, 0], joints, contact_points,
-        np.ones((T, 6)), np.zeros((T, 3)),
-    )  # fmt: skip
+        supported,
+        np.zeros(body.P),
+        np.arange(T) / 30,
+        every,
+        rotations,
+        joints[:, 0],
+        joints,
+        contact_points,
+        np.ones((T, 6)),
+        np.zeros((T, 3)),
+    )
 
 
 @pytest.mark.parametrize("error_m", [-0.25, 0.0, 0.25])

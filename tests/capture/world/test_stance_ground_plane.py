@@ -51,4 +51,6 @@ def test_the_depth_system_is_solved_as_a_dense_one():
     diagonal = 3 + np.abs(np.r_[off, 0]) + np.abs(np.r_[0, off])
     right = rng.normal(size=31)
     dense = np.diag(diagonal) + np.diag(off, 1) + np.diag(off, -1)
-    assert np.allclose(stance._solve_tridiagonal(diagonal, off, right), np.linalg.solve(dense, right))
+    assert np.allclose(
+        stance._solve_tridiagonal(diagonal, off, right), np.linalg.solve(dense, right)
+    )

@@ -14,14 +14,20 @@ from scope.scope_addon.capture.world.world_frame import (
     up_from_floor,
     up_from_standing,
 )
-from scope.scope_addon.kinematics.axes import R_WORLD_MODEL, transform_points, world_from_level_camera
+from scope.scope_addon.kinematics.axes import (
+    R_WORLD_MODEL,
+    transform_points,
+    world_from_level_camera,
+)
 from scope.scope_addon.kinematics.contact_points import contact_point_positions, with_contact_points
 from scope.solver import rotations
 from scope.solver.loaders.body_file import load_body
 
 
 def walk(body, T=60, lean_deg=0.0):
-    """A stiff walk through the world: root positions along x, legs swinging; returns part poses in the world."""
+    """A stiff walk through the world: root positions along x, legs swinging; returns part poses in
+    the world.
+    """
     omega = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
     swing = 0.35 * np.sin(np.linspace(0, 6 * np.pi, T))
     x = np.array([1.0, 0, 0])
@@ -30,20 +36,35 @@ def walk(body, T=60, lean_deg=0.0):
     omega[:, 0] = R_WORLD_MODEL @ rotations.exp(np.radians(lean_deg) * x)
     R, t = body.forward_kinematics(omega, np.zeros((T, 3)))
     soles = contact_point_positions(with_contact_points(body, np.zeros(body.P)), R, t)
-    t = t + np.stack([np.linspace(-1, 1, T), np.linspace(0, 1.5, T), -soles[..., 2].min(1)], 1)[:, None]
+    t = (
+        t
+        + np.stack([np.linspace(-1, 1, T), np.linspace(0, 1.5, T), -soles[..., 2].min(1)], 1)[
+            :, None
+        ]
+    )
     return R, t
 
 
 def seen_by(body, R, t, camera_from_world):
-    """The motion of part poses in the world as seen by a camera, 30 frames per second, everything visible."""
+    """The motion of part poses in the world as seen by a camera, 30 frames per second, everything
+    visible.
+    """
     soled, T = with_contact_points(body, np.zeros(body.P)), len(t)
     joints, R_camera = transform_points(camera_from_world, t), camera_from_world[:3, :3] @ R
     contact_points = contact_point_positions(soled, R_camera, joints)
     every = np.ones(T, bool)
     return PlacedTrack(
-        soled, np.zeros(body.P), np.arange(T) / 30, every, R_camera, joints[:, 0], joints, contact_points,
-        np.ones((T, 6)), np.zeros((T, 3)),
-    )  # fmt: skip
+        soled,
+        np.zeros(body.P),
+        np.arange(T) / 30,
+        every,
+        R_camera,
+        joints[:, 0],
+        joints,
+        contact_points,
+        np.ones((T, 6)),
+        np.zeros((T, 3)),
+    )
 
 
 @pytest.mark.parametrize("pitch_deg", [-20.0, 0.0, 15.0])
@@ -59,7 +80,8 @@ def test_up_and_floor_are_recovered_from_a_walk(pitch_deg, roll_deg):
     got = find_world([placed]).T_world_camera
     angle = np.degrees(np.arccos(np.clip(got[2, :3] @ truth[2, :3], -1, 1)))
     assert angle < 2.0
-    # The person is up to 6.5 m away: the camera's height above the floor is as uncertain as the angle makes it.
+    # The person is up to 6.5 m away: the camera's height above the floor is as uncertain as the
+    # angle makes it.
     assert abs(got[2, 3] - 1.6) < 0.01 + 6.5 * np.sin(np.radians(angle))
     assert abs(np.median(transform_points(got, placed.soles)[..., 2].min(1))) < 0.01
     assert np.allclose(transform_points(got, placed.joints[:1, 0])[0, :2], 0)
@@ -79,20 +101,26 @@ def test_a_person_who_jumps_for_most_of_a_clip_stands_on_the_floor_in_between():
 
 
 def test_people_share_a_world_and_each_has_a_floor():
-    """One person seen from the tenth frame on, one who walks 1 m higher, one who seems to be 4 % farther away."""
+    """One person seen from the tenth frame on, one who walks 1 m higher, one who seems to be 4 %
+    farther away.
+    """
     body = load_body("scope")
     R, t = walk(body)
     up = rotations.exp(np.radians([-12.0, 0, 5.0])) @ [0, -1.0, 0]
     camera_from_world = np.linalg.inv(world_from_level_camera(up, height=1.6))
     walker, climber = (seen_by(body, R, t + [0.0, 5.0, z], camera_from_world) for z in (0.0, 1.0))
-    farther = replace(walker, joints=1.04 * walker.joints, contact_points=1.04 * walker.contact_points)
+    farther = replace(
+        walker, joints=1.04 * walker.joints, contact_points=1.04 * walker.contact_points
+    )
     valid = np.arange(len(t)) >= 10
     points = np.where(valid[:, None, None], walker.contact_points, walker.contact_points[10])
     walker = replace(walker, valid=valid, contact_points=points)
     world = find_world([walker, climber, farther])
     assert np.degrees(np.arccos(world.T_world_camera[2, :3] @ up)) < 2.0
     assert abs(world.T_world_camera[2, 3] - 1.6) < 0.25
-    np.testing.assert_allclose(transform_points(world.T_world_camera, walker.joints[10, :1])[0, :2], 0, atol=1e-9)
+    np.testing.assert_allclose(
+        transform_points(world.T_world_camera, walker.joints[10, :1])[0, :2], 0, atol=1e-9
+    )
     assert world.floors_m[0] == world.floors_m[2] == 0.0
     assert abs(world.floors_m[1] - 1.0) < 0.1
     soles = transform_points(world.floor_from_camera(1), climber.soles)[..., 2].min(axis=1)
@@ -108,13 +136,17 @@ def centroid(vertices, faces):
 
 @pytest.mark.parametrize("pitch_deg", [-25.0, 0.0, 20.0])
 def test_up_of_a_person_who_bends_follows_from_the_centre_of_mass(pitch_deg):
-    """Knees and hips bent, no axis of the body upright, and the mesh's centre of volume above the soles."""
+    """Knees and hips bent, no axis of the body upright, and the mesh's centre of volume above the
+    soles.
+    """
     body = load_body("scope")
     omega = np.tile(np.eye(3), (body.K + 1, 1, 1))
     omega[0] = R_WORLD_MODEL
     for name, degrees in (("hip", -80.0), ("knee", 50.0)):
         for side in ("left", "right"):
-            omega[body.joint_names.index(f"{side}_{name}")] = rotations.exp(np.radians([degrees, 0, 0]))
+            omega[body.joint_names.index(f"{side}_{name}")] = rotations.exp(
+                np.radians([degrees, 0, 0])
+            )
     soled = with_contact_points(body, np.zeros(body.P))
     for _ in range(30):
         R, t = body.forward_kinematics(omega, np.zeros(3))
@@ -129,38 +161,56 @@ def test_up_of_a_person_who_bends_follows_from_the_centre_of_mass(pitch_deg):
     assert np.degrees(np.arccos(up_from_bodies([placed]) @ up)) < 8.0
 
 
-@pytest.mark.parametrize("bends", [{"hip": -85.0, "knee": 85.0}, {"knee": 90.0, "ankle": 50.0}], ids=["sits", "kneels"])
+@pytest.mark.parametrize(
+    "bends", [{"hip": -85.0, "knee": 85.0}, {"knee": 90.0, "ankle": 50.0}], ids=["sits", "kneels"]
+)
 @pytest.mark.parametrize("turned_deg", [0.0, 90.0, 180.0])
 def test_people_who_sit_or_kneel_do_not_tilt_the_world(bends, turned_deg):
-    """Their feet are at rest as well, but the weight is on a chair or the shins; up follows from the upright trunk."""
+    """Their feet are at rest as well, but the weight is on a chair or the shins; up follows from
+    the upright trunk.
+    """
     body = load_body("scope")
     omega = np.tile(np.eye(3), (body.K + 1, 1, 1))
     omega[0] = rotations.exp(np.radians([0, 0, turned_deg])) @ R_WORLD_MODEL
     for name, degrees in bends.items():
         for side in ("left", "right"):
-            omega[body.joint_names.index(f"{side}_{name}")] = rotations.exp(np.radians([degrees, 0, 0]))
-    R, t = (np.repeat(each[None], 60, axis=0) for each in body.forward_kinematics(omega, np.zeros(3)))
+            omega[body.joint_names.index(f"{side}_{name}")] = rotations.exp(
+                np.radians([degrees, 0, 0])
+            )
+    R, t = (
+        np.repeat(each[None], 60, axis=0) for each in body.forward_kinematics(omega, np.zeros(3))
+    )
     up = np.array([0, -1.0, 0])
-    placed = seen_by(body, R, t + [0.0, 4.0, 0.0], np.linalg.inv(world_from_level_camera(up, height=1.6)))
+    placed = seen_by(
+        body, R, t + [0.0, 4.0, 0.0], np.linalg.inv(world_from_level_camera(up, height=1.6))
+    )
     assert np.degrees(np.arccos(find_world([placed]).T_world_camera[2, :3] @ up)) < 2.0
 
 
 def test_a_single_moment_does_not_use_the_centre_of_mass():
-    """A runner's centre of mass is not above the feet in one frame; over a clip, inertial forces average out."""
+    """A runner's centre of mass is not above the feet in one frame; over a clip, inertial forces
+    average out.
+    """
     body = load_body("scope")
     R, t = walk(body, T=60, lean_deg=12.0)
     camera_from_world = np.linalg.inv(world_from_level_camera(np.array([0, -1.0, 0]), height=1.6))
     placed = seen_by(body, R, t + np.array([0, 5.0, 0]), camera_from_world)
     of_clip = ("body", "betas", "uneven_ground")
-    one = PlacedTrack(*(getattr(placed, f.name)[:1] if f.name not in of_clip else getattr(placed, f.name)
-                        for f in fields(placed)))  # fmt: skip
+    one = PlacedTrack(
+        *(
+            getattr(placed, f.name)[:1] if f.name not in of_clip else getattr(placed, f.name)
+            for f in fields(placed)
+        )
+    )
     np.testing.assert_allclose(up_from_bodies([one]), up_from_standing([one]), atol=1e-9)
     assert np.abs(up_from_bodies([placed]) - up_from_standing([placed])).max() > 1e-3
 
 
 @pytest.mark.parametrize("standing", [0, 20])
 def test_people_lying_on_the_floor_do_not_tilt_the_world(standing):
-    """A person lies straight for 60 frames and then stands, or not; the camera is 10 degrees from level."""
+    """A person lies straight for 60 frames and then stands, or not; the camera is 10 degrees from
+    level.
+    """
     body = load_body("scope")
     R, t = walk(body, T=60 + standing)
     up = rotations.exp(np.radians([10.0, 0, 0])) @ [0, -1.0, 0]
@@ -169,7 +219,8 @@ def test_people_lying_on_the_floor_do_not_tilt_the_world(standing):
     R[:60], t[:60] = fallen @ R[:60], t[:60] @ fallen.T
     placed = seen_by(body, R, t + np.array([0, 5.0, 0]), np.linalg.inv(truth))
     angle = np.degrees(np.arccos(up_from_standing([placed]) @ up))
-    assert angle < (5 if standing else 12)  # with nothing else to go by, cameras are taken for level
+    # with nothing else to go by, cameras are taken for level
+    assert angle < (5 if standing else 12)
 
 
 def test_soles_lie_under_the_ankles_on_the_ground():
@@ -186,9 +237,16 @@ def test_soles_lie_under_the_ankles_on_the_ground():
 def test_soles_of_another_shape_are_on_its_own_ground():
     body = load_body("scope")
     betas = np.array([1.5, -1.0, *np.zeros(body.P - 2)])
-    R, t = body.forward_kinematics(np.tile(np.eye(3), (1, body.K + 1, 1, 1)), np.zeros((1, 3)), betas)
+    R, t = body.forward_kinematics(
+        np.tile(np.eye(3), (1, body.K + 1, 1, 1)), np.zeros((1, 3)), betas
+    )
     lowest = body.skin(R[0], t[0], betas)[:, 1].min()
-    assert np.abs(contact_point_positions(with_contact_points(body, betas), R, t)[0, :4, 1] - lowest).max() < 0.02
+    assert (
+        np.abs(
+            contact_point_positions(with_contact_points(body, betas), R, t)[0, :4, 1] - lowest
+        ).max()
+        < 0.02
+    )
 
 
 @pytest.mark.parametrize("name", ["scope", "scope_h"])
@@ -205,14 +263,20 @@ def test_palms_lie_under_the_hands_that_are_held_down(name):
 
 
 def test_up_is_normal_to_a_floor_on_which_feet_are_spread_wherever_it_lies():
-    """Soles all over 3 m by 3 m, four metres away: of an error of up, σ² / (σ² + 0.75 m²) = 0.3 is left.
+    """Soles all over 3 m by 3 m, four metres away: of an error of up, σ² / (σ² + 0.75 m²) = 0.3 is
+    left.
 
-    σ = 0.05 m / 5° = 0.57 m is how far the floor's scatter has to lie for the error of up to be as large.
+    σ = 0.05 m / 5° = 0.57 m is how far the floor's scatter has to lie for the error of up to be as
+    large.
     """
     rng = np.random.default_rng(0)
     up = rotations.exp([0.02, 0.0, -0.015]) @ [0.0, -1.0, 0.0]
     across = np.stack([np.cross(up, [0.0, 0.0, 1.0]), np.cross(up, [1.0, 0.0, 0.0])])
-    lower = np.array([0.5, 1.4, 4.0]) + rng.uniform(-1.5, 1.5, (200, 2)) @ across + rng.normal(size=(200, 3)) * 0.005
+    lower = (
+        np.array([0.5, 1.4, 4.0])
+        + rng.uniform(-1.5, 1.5, (200, 2)) @ across
+        + rng.normal(size=(200, 3)) * 0.005
+    )
     feet_cam = np.stack([lower, lower + 0.1 * up], axis=1)  # the other foot is in the air
     found = up_from_floor(feet_cam, np.array([0.0, -1.0, 0.0]))
     assert np.arccos(found @ up) == pytest.approx(0.3 * np.arccos(-up[1]), rel=0.15)
@@ -220,7 +284,9 @@ def test_up_is_normal_to_a_floor_on_which_feet_are_spread_wherever_it_lies():
 
 @pytest.mark.parametrize(("rate", "minutes"), [(30.0, 30.0), (1.0, 1.0)])
 def test_the_floor_of_uneven_ground_is_where_somebody_stands_at_first(rate, minutes):
-    """A slow descent, in a long clip and at one frame a second; the height of the whole clip would be far below."""
+    """A slow descent, in a long clip and at one frame a second; the height of the whole clip would
+    be far below.
+    """
     times = np.arange(round(60 * minutes * rate)) / rate
     contact = np.full((len(times), 4), 0.9)
     contact[:2] = 0.0
@@ -228,7 +294,9 @@ def test_the_floor_of_uneven_ground_is_where_somebody_stands_at_first(rate, minu
     soles[..., 1] = 1.5 + 0.01 * times[:, None]
     rows = _first_contact(contact, times)
     assert rows.any()
-    assert floor_height(soles[rows], contact[rows], np.array([0.0, -1.0, 0.0])) == pytest.approx(-1.5, abs=0.04)
+    assert floor_height(soles[rows], contact[rows], np.array([0.0, -1.0, 0.0])) == pytest.approx(
+        -1.5, abs=0.04
+    )
 
 
 def test_without_contact_every_frame_counts():

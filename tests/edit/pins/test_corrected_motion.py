@@ -4,8 +4,20 @@
 import numpy as np
 import pytest
 from scope.scope_addon.edit.clip import Clip, clip_from_motion
-from scope.scope_addon.edit.pins.corrected_motion import corrections_of, shot_of, uncorrected, with_corrections
-from scope.scope_addon.edit.pins.corrections import Contact, Exchange, FeetOnFloor, Interpolation, Pin, Upright
+from scope.scope_addon.edit.pins.corrected_motion import (
+    corrections_of,
+    shot_of,
+    uncorrected,
+    with_corrections,
+)
+from scope.scope_addon.edit.pins.corrections import (
+    Contact,
+    Exchange,
+    FeetOnFloor,
+    Interpolation,
+    Pin,
+    Upright,
+)
 from scope.scope_addon.edit.pins.solve_pins import missed
 from scope.scope_addon.edit.smooth import smoothed
 from scope.scope_addon.edit.spans import swap_sides
@@ -22,7 +34,9 @@ MOTION = motion_of(TRUTH, noise=0.05)
 
 
 def pin(name="right_wrist", frame=45, shift=(40.0, -25.0)):
-    where = clip_from_motion(BODY, MOTION, raw=False).joints(BODY, MOTION.betas)[frame, NAMES.index(name)]
+    where = clip_from_motion(BODY, MOTION, raw=False).joints(BODY, MOTION.betas)[
+        frame, NAMES.index(name)
+    ]
     return Pin(frame, name, tuple(shot_of(MOTION).project(frame, where) + np.array(shift)))
 
 
@@ -38,7 +52,13 @@ def test_pins_hold_whatever_the_smoothing(strength):
 
 
 def test_the_file_keeps_the_corrections_and_removing_them_restores_the_motion(tmp_path):
-    corrections = (pin(), Contact(60, 66, "left"), Exchange(10, 16), Interpolation(70, 74), FeetOnFloor())
+    corrections = (
+        pin(),
+        Contact(60, 66, "left"),
+        Exchange(10, 16),
+        Interpolation(70, 74),
+        FeetOnFloor(),
+    )
     motion = with_corrections(MOTION, BODY, corrections)
     motion.save(tmp_path / "a.npz")
     back = Motion.load(tmp_path / "a.npz")
@@ -47,7 +67,10 @@ def test_the_file_keeps_the_corrections_and_removing_them_restores_the_motion(tm
     for restored in (with_corrections(back, BODY, ()), uncorrected(back)):
         for name, value in vars(MOTION).items():
             np.testing.assert_array_equal(getattr(restored, name), value, err_msg=name)
-    once, again = with_corrections(back, BODY, corrections[:1]), with_corrections(MOTION, BODY, corrections[:1])
+    once, again = (
+        with_corrections(back, BODY, corrections[:1]),
+        with_corrections(MOTION, BODY, corrections[:1]),
+    )
     np.testing.assert_array_equal(once.poses, again.poses)
 
 
@@ -61,7 +84,9 @@ def test_joints_in_the_camera_are_those_of_the_corrected_pose():
 
 
 def swapped():
-    """A capture whose detector swaps the sides from frame 30 to 50; smoothing mixes them at both ends of the span."""
+    """A capture whose detector swaps the sides from frame 30 to 50; smoothing mixes them at both
+    ends of the span.
+    """
     wrong = swap_sides(TRUTH, BODY, TRUTH.times[30], TRUTH.times[50])
     poses = log(smooth_rotations(wrong.rotations, wrong.times)).reshape(len(TRUTH), -1)
     raw = log(wrong.rotations).reshape(len(TRUTH), -1)
@@ -80,9 +105,13 @@ def test_sides_exchanged_before_smoothing_leave_no_mixed_poses():
 
 @pytest.mark.parametrize("pin_first", [False, True])
 def test_sides_are_exchanged_before_pins(pin_first):
-    """So a pin is on the limb that has its name in the user's eyes, and at the truth it changes nothing."""
+    """So a pin is on the limb that has its name in the user's eyes, and at the truth it changes
+    nothing.
+    """
     captured = swapped()
-    right = Clip(TRUTH.times, smooth_rotations(TRUTH.rotations, TRUTH.times), TRUTH.root).joints(BODY, captured.betas)
+    right = Clip(TRUTH.times, smooth_rotations(TRUTH.rotations, TRUTH.times), TRUTH.root).joints(
+        BODY, captured.betas
+    )
     at = right[40, NAMES.index("left_wrist")]
     pin = Pin(40, "left_wrist", tuple(shot_of(captured).project(40, at)))
     exchange = Exchange(30, 50)
@@ -120,7 +149,11 @@ def test_a_damaged_camera_before_the_corrections_is_an_error(value):
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("pin_frames", np.array([np.inf])), ("pin_uv", np.full((1, 2), "x")), ("pin_reach", np.array(["x"]))],
+    [
+        ("pin_frames", np.array([np.inf])),
+        ("pin_uv", np.full((1, 2), "x")),
+        ("pin_reach", np.array(["x"])),
+    ],
 )
 def test_damaged_pins_are_an_error(name, value):
     motion = with_corrections(MOTION, BODY, (pin(),))

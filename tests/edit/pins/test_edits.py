@@ -21,7 +21,9 @@ STRENGTHS = (0.0, 0.5, 1.0, 2.5)
 
 
 def damaged():
-    """A capture of the walk whose arms and legs are elsewhere in five frames, before and after smoothing."""
+    """A capture of the walk whose arms and legs are elsewhere in five frames, before and after
+    smoothing.
+    """
     clip = walk(3.0)
     clip.rotations[BAD, 1:] = clip.rotations[BAD, 1:] @ exp(np.array([0.5, 0.3, -0.4]))
     clip.root[BAD] += [0.1, 0.0, 0.2]
@@ -29,7 +31,9 @@ def damaged():
 
 
 def raised(height=0.3, sunk=0.0):
-    """A capture of the walk in a world that is too high; ``sunk`` metres lower in half a second of it."""
+    """A capture of the walk in a world that is too high; ``sunk`` metres lower in half a second of
+    it.
+    """
     clip = walk(3.0)
     clip.root[:, 2] += height
     clip.root[60:75, 2] -= sunk
@@ -61,7 +65,10 @@ def test_feet_stay_on_the_floor_in_every_smoothing(strength, world):
     if world is not None:  # an upright line that undoes a tilt
         T = np.eye(4)
         T[:3, :3], T[:3, 3] = exp(np.array(world[0])), world[1]
-        motion, corrections = moved_motion(motion, BODY, np.linalg.inv(T)), (Upright.of(T), *corrections)
+        motion, corrections = (
+            moved_motion(motion, BODY, np.linalg.inv(T)),
+            (Upright.of(T), *corrections),
+        )
     before = smoothed(BODY, motion, strength)
     assert np.abs(lowest(before)).max() > 0.2
     clip = smoothed(BODY, with_corrections(motion, BODY, corrections), strength)
@@ -87,12 +94,17 @@ def test_feet_on_a_floor_that_is_moved_afterwards_move_with_it():
 
 def test_pins_hold_on_edited_frames():
     wrists = TRUTH.joints(BODY, BETAS)[:, NAMES.index("right_wrist")] + [0.05, 0.05, 0.1]
-    pins = [Pin(frame, "right_wrist", position=tuple(float(x) for x in wrists[frame])) for frame in (20, 42)]
+    pins = [
+        Pin(frame, "right_wrist", position=tuple(float(x) for x in wrists[frame]))
+        for frame in (20, 42)
+    ]
     for edits in ((Interpolation(38, 46),), (Interpolation(38, 46), FeetOnFloor())):
         motion = with_corrections(damaged(), BODY, (*pins, *edits))
         for strength in STRENGTHS:
             clip = smoothed(BODY, motion, strength)
-            assert max(missed(clip, BODY, BETAS, pin, shot_of(motion)) for pin in pins) < 0.01, edits
+            assert max(missed(clip, BODY, BETAS, pin, shot_of(motion)) for pin in pins) < 0.01, (
+                edits
+            )
 
 
 def test_interpolations_are_applied_in_their_order():
@@ -109,7 +121,9 @@ def test_interpolations_are_applied_in_their_order():
 @pytest.mark.parametrize("span", [(0, 5), (85, 90), (-20, -10), (200, 300), (-(2**53), 2**53)])
 def test_a_span_without_frames_on_both_sides_changes_nothing(span):
     motion = damaged()
-    np.testing.assert_array_equal(with_corrections(motion, BODY, (Interpolation(*span),)).poses, motion.poses)
+    np.testing.assert_array_equal(
+        with_corrections(motion, BODY, (Interpolation(*span),)).poses, motion.poses
+    )
     with pytest.raises(UsageError):
         interpolated(TRUTH, [Interpolation(*span)], shot_of(motion), strict=True)
 

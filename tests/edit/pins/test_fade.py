@@ -18,7 +18,8 @@ def test_it_meets_what_is_known_and_starts_and_ends_at_rest(known):
     outside = (TIMES < known[0] - 0.4) | (TIMES > known[-1] + 0.4)
     assert (curve[outside] == 0).all()
     speed = np.diff(curve, axis=0) / 0.001
-    assert np.abs(np.diff(speed, axis=0)).max() < 0.2  # no jump: a broken line would have one of 5 per second
+    # no jump: a broken line would have one of 5 per second
+    assert np.abs(np.diff(speed, axis=0)).max() < 0.2
     assert curve.max() <= values.max() + 1e-12
     assert curve.min() >= min(values.min(), 0) - 1e-12
 

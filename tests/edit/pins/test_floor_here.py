@@ -4,7 +4,11 @@
 import numpy as np
 import pytest
 from scope.scope_addon.edit.clip import clip_from_motion
-from scope.scope_addon.edit.pins.corrected_motion import corrections_of, distance_from_pin, with_corrections
+from scope.scope_addon.edit.pins.corrected_motion import (
+    corrections_of,
+    distance_from_pin,
+    with_corrections,
+)
 from scope.scope_addon.edit.pins.corrections import Contact, Floor, Pin, Upright, added, world_of
 from scope.scope_addon.edit.pins.floor_here import LOWER, foot_height
 from scope.scope_addon.edit.pins.moved import moved_clip, moved_motion
@@ -35,16 +39,27 @@ def measured(motion, frame=20, foot=LOWER):
     return Floor(frame, foot_height(clip, BODY, motion.betas, clip.times[frame], foot))
 
 
-@pytest.mark.parametrize(("foot", "parts"), [("lower", slice(0, 4)), ("left", slice(0, 2)), ("right", slice(2, 4))])
+@pytest.mark.parametrize(
+    ("foot", "parts"), [("lower", slice(0, 4)), ("left", slice(0, 2)), ("right", slice(2, 4))]
+)
 def test_the_height_is_that_of_the_lowest_vertex_of_the_foot(foot, parts):
     clip = clip_from_motion(BODY, MOTION, raw=False)
     heights = foot_heights(MOTION, BODY)[20, parts]
-    assert foot_height(clip, BODY, MOTION.betas, clip.times[20], foot) == pytest.approx(heights.min(), abs=1e-6)
+    assert foot_height(clip, BODY, MOTION.betas, clip.times[20], foot) == pytest.approx(
+        heights.min(), abs=1e-6
+    )
     trans = clip.root[[20]] - BODY.rest_joints(MOTION.betas)[0]
     R, t = BODY.forward_kinematics(clip.rotations[[20]], trans, MOTION.betas)
     lowest = []
-    for part in (NAMES.index(n) for n in NAMES if n.endswith(("ankle", "foot")) and (foot == LOWER or foot in n)):
-        own = BODY.rest_vertices(MOTION.betas)[BODY.strongest_joints == part] - BODY.rest_joints(MOTION.betas)[part]
+    for part in (
+        NAMES.index(n)
+        for n in NAMES
+        if n.endswith(("ankle", "foot")) and (foot == LOWER or foot in n)
+    ):
+        own = (
+            BODY.rest_vertices(MOTION.betas)[BODY.strongest_joints == part]
+            - BODY.rest_joints(MOTION.betas)[part]
+        )
         lowest.append((own @ R[0, part].T + t[0, part])[:, 2].min())
     assert heights.min() == pytest.approx(min(lowest), abs=1e-3)
 
@@ -54,8 +69,12 @@ def test_the_foot_rests_on_the_floor_and_the_body_stays_in_the_image():
     fixed = with_corrections(MOTION, BODY, (floor,))
     assert foot_heights(fixed, BODY)[20].min() == pytest.approx(0.0, abs=1e-6)
     np.testing.assert_array_equal(fixed.joints_cam, MOTION.joints_cam)
-    np.testing.assert_allclose(fixed.world_from_camera, raised(-floor.height) @ MOTION.world_from_camera, atol=1e-12)
-    np.testing.assert_allclose(fixed.trans - MOTION.trans, np.tile([0, 0, -floor.height], (len(MOTION), 1)), atol=1e-6)
+    np.testing.assert_allclose(
+        fixed.world_from_camera, raised(-floor.height) @ MOTION.world_from_camera, atol=1e-12
+    )
+    np.testing.assert_allclose(
+        fixed.trans - MOTION.trans, np.tile([0, 0, -floor.height], (len(MOTION), 1)), atol=1e-6
+    )
 
 
 def test_the_file_keeps_the_floor_and_removing_it_restores_the_motion(tmp_path):
@@ -71,7 +90,9 @@ def test_the_file_keeps_the_floor_and_removing_it_restores_the_motion(tmp_path):
 @pytest.mark.parametrize("strength", [0.0, 1.0, 2.5])
 def test_the_floor_moves_every_smoothing_alike(strength):
     floor = measured(MOTION)
-    plain, moved = (smoothed(BODY, with_corrections(MOTION, BODY, c), strength) for c in ((), (floor,)))
+    plain, moved = (
+        smoothed(BODY, with_corrections(MOTION, BODY, c), strength) for c in ((), (floor,))
+    )
     np.testing.assert_allclose(moved.root, moved_clip(plain, floor.transform).root, atol=1e-6)
     assert angle(moved.rotations, plain.rotations).max() < 1e-5
 
@@ -87,7 +108,9 @@ def test_a_second_floor_adds_to_the_first():
 
 def test_a_pin_in_space_moves_along():
     joints = clip_from_motion(BODY, MOTION, raw=False).joints(BODY, MOTION.betas)
-    pin = Pin(30, "left_wrist", position=tuple(joints[30, NAMES.index("left_wrist")] + [0.1, 0.0, 0.05]))
+    pin = Pin(
+        30, "left_wrist", position=tuple(joints[30, NAMES.index("left_wrist")] + [0.1, 0.0, 0.05])
+    )
     fixed = with_corrections(MOTION, BODY, (pin, measured(MOTION)))
     assert distance_from_pin(fixed, pin) < 0.002
 
@@ -98,7 +121,9 @@ def test_a_foot_that_stands_is_put_on_the_corrected_floor():
     fixed = with_corrections(MOTION, BODY, (stands, floor))
     soles = clip_from_motion(BODY, fixed, raw=False).soles(BODY, MOTION.betas)
     assert np.abs(soles[18:25, :2, 2].min(axis=1)).max() < 0.005
-    alone = clip_from_motion(BODY, with_corrections(MOTION, BODY, (stands,)), raw=False).soles(BODY, MOTION.betas)
+    alone = clip_from_motion(BODY, with_corrections(MOTION, BODY, (stands,)), raw=False).soles(
+        BODY, MOTION.betas
+    )
     assert alone[18:25, :2, 2].min(axis=1).max() < -0.2
 
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A motion that is moved in the world, with its camera: every joint and the image stay where they belong."""
+"""A motion that is moved in the world, with its camera: every joint and the image stay where they
+belong.
+"""
 
 from __future__ import annotations
 
@@ -26,10 +28,16 @@ def transform(seed: int) -> np.ndarray:
 def test_joints_move_with_the_world_and_the_image_stays(seed: int, raw: bool) -> None:
     T = transform(seed)
     moved = moved_motion(MOTION, BODY, T)
-    before, after = (clip_from_motion(BODY, m, raw=raw).joints(BODY, BETAS) for m in (MOTION, moved))
+    before, after = (
+        clip_from_motion(BODY, m, raw=raw).joints(BODY, BETAS) for m in (MOTION, moved)
+    )
     np.testing.assert_allclose(after, before @ T[:3, :3].T + T[:3, 3], atol=2e-6)
     seen = [
-        np.einsum("tji,tkj->tki", m.world_from_camera[:, :3, :3], joints - m.world_from_camera[:, None, :3, 3])
+        np.einsum(
+            "tji,tkj->tki",
+            m.world_from_camera[:, :3, :3],
+            joints - m.world_from_camera[:, None, :3, 3],
+        )
         for m, joints in ((MOTION, before), (moved, after))
     ]
     np.testing.assert_allclose(seen[1], seen[0], atol=5e-6)
@@ -49,4 +57,6 @@ def test_there_and_back_nothing_has_changed_and_the_given_motion_never_does() ->
     np.testing.assert_array_equal(MOTION.poses, poses)
     for name in ("trans", "trans_raw", "world_from_camera"):
         np.testing.assert_allclose(getattr(back, name), getattr(MOTION, name), atol=1e-5)
-    np.testing.assert_allclose(exp(back.poses.reshape(-1, 3)), exp(MOTION.poses.reshape(-1, 3)), atol=1e-5)
+    np.testing.assert_allclose(
+        exp(back.poses.reshape(-1, 3)), exp(MOTION.poses.reshape(-1, 3)), atol=1e-5
+    )

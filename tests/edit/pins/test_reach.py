@@ -48,7 +48,9 @@ def test_a_pin_within_reach_stays(refit: PoseRefit) -> None:
         (("right_hip", "right_knee", "right_ankle"), 0.2),
     ],
 )
-def test_a_pin_far_away_is_met_by_the_stretched_limb(refit: PoseRefit, limb: tuple[str, ...], slack: float) -> None:
+def test_a_pin_far_away_is_met_by_the_stretched_limb(
+    refit: PoseRefit, limb: tuple[str, ...], slack: float
+) -> None:
     origin, direction = at(limb[0]), np.array([0.6, 0.0, -0.8])
     place = within_reach(refit, limb[-1], origin + 3.0 * direction, (AT, {}), None, slack)
     np.testing.assert_allclose(place, origin + (length(*limb) + slack) * direction, atol=1e-9)
@@ -59,7 +61,9 @@ def test_a_pin_far_away_is_met_by_the_stretched_limb(refit: PoseRefit, limb: tup
 def test_another_pin_of_the_limb_is_where_the_rest_of_it_turns_about(refit: PoseRefit) -> None:
     elbow, direction = at("left_elbow") + [0.1, 0.0, 0.3], np.array([0.0, 1.0, 0.0])
     place = within_reach(refit, "left_wrist", elbow + direction, (AT, {"left_elbow": elbow}), None)
-    np.testing.assert_allclose(place, elbow + (length("left_elbow", "left_wrist") + SLACK_M) * direction, atol=1e-9)
+    np.testing.assert_allclose(
+        place, elbow + (length("left_elbow", "left_wrist") + SLACK_M) * direction, atol=1e-9
+    )
 
 
 def test_a_pixel_is_moved_to_where_the_stretched_limb_is_seen(refit: PoseRefit) -> None:
@@ -67,7 +71,8 @@ def test_a_pixel_is_moved_to_where_the_stretched_limb_is_seen(refit: PoseRefit) 
     far = origin + [0.0, 0.0, 2.0]
     pixel = within_reach(refit, "left_wrist", pixel_of(CAMERA, far), (AT, {}), CAMERA)
     eye = CAMERA[0][:3, 3]
-    seen_at = eye + np.linspace(0.5, 1.5, 100_001)[:, None] * (far - eye)  # all that is seen in the pixel
+    # all that is seen in the pixel
+    seen_at = eye + np.linspace(0.5, 1.5, 100_001)[:, None] * (far - eye)
     nearest = seen_at[np.linalg.norm(seen_at - origin, axis=1).argmin()]
     reach = length("left_shoulder", "left_elbow", "left_wrist") + SLACK_M
     met = origin + reach * (nearest - origin) / np.linalg.norm(nearest - origin)

@@ -15,7 +15,12 @@ from ..walking import BETAS, BODY, NAMES, RATE, walk
 
 TRUTH = walk(3.0)
 T = len(TRUTH)
-SHOT = Shot(np.arange(T), TRUTH.times, level_camera(T), np.array([[900.0, 0, 320], [0, 900.0, 240], [0, 0, 1]]))
+SHOT = Shot(
+    np.arange(T),
+    TRUTH.times,
+    level_camera(T),
+    np.array([[900.0, 0, 320], [0, 900.0, 240], [0, 0, 1]]),
+)
 JOINTS = TRUTH.joints(BODY, BETAS)
 FIRST, LAST = 30, 60  # the corrupted span
 ARM = [NAMES.index(f"left_{name}") for name in ("elbow", "wrist")]
@@ -23,10 +28,14 @@ ARM = [NAMES.index(f"left_{name}") for name in ("elbow", "wrist")]
 
 def corrupted(joints=("left_shoulder", "left_elbow")):
     """The walk with an arm that turns away by 40 degrees and comes back."""
-    share = np.clip(1.6 * np.sin(np.pi * np.clip((np.arange(T) - FIRST) / (LAST - FIRST), 0, 1)), 0, 1)
+    share = np.clip(
+        1.6 * np.sin(np.pi * np.clip((np.arange(T) - FIRST) / (LAST - FIRST), 0, 1)), 0, 1
+    )
     rotations = TRUTH.rotations.copy()
     for name, axis in zip(joints, ([0.4, 0.3, 0.5], [0.2, -0.5, 0.4]), strict=False):
-        rotations[:, NAMES.index(name)] = rotations[:, NAMES.index(name)] @ exp(share[:, None] * np.array(axis))
+        rotations[:, NAMES.index(name)] = rotations[:, NAMES.index(name)] @ exp(
+            share[:, None] * np.array(axis)
+        )
     return Clip(TRUTH.times, rotations, TRUTH.root.copy())
 
 
@@ -50,12 +59,17 @@ def pixels(clip, joint):
     """Mean distance from the truth in the image over the corrupted span, pixels."""
     at = clip.joints(BODY, BETAS)[:, joint]
     return np.mean(
-        [np.linalg.norm(SHOT.project(f, at[f]) - SHOT.project(f, JOINTS[f, joint])) for f in range(FIRST, LAST + 1)]
+        [
+            np.linalg.norm(SHOT.project(f, at[f]) - SHOT.project(f, JOINTS[f, joint]))
+            for f in range(FIRST, LAST + 1)
+        ]
     )
 
 
 @pytest.mark.parametrize(
-    ("frames", "left"), [((45,), 0.6), ((40, 50), 0.35), ((37, 45, 53), 0.25)], ids=["one", "two", "three"]
+    ("frames", "left"),
+    [((45,), 0.6), ((40, 50), 0.35), ((37, 45, 53), 0.25)],
+    ids=["one", "two", "three"],
 )
 @pytest.mark.parametrize("image", [True, False], ids=["image", "space"])
 def test_pins_at_the_truth_correct_the_span_around_them(frames, left, image):
@@ -72,11 +86,17 @@ def test_pins_at_the_truth_correct_the_span_around_them(frames, left, image):
 def test_other_limbs_and_other_frames_stay():
     bad, pin = corrupted(), pins((45,))[0]
     good = resolve(bad, BODY, BETAS, [pin], SHOT)
-    changed = np.flatnonzero((good.rotations != bad.rotations).any((1, 2, 3)) | (good.root != bad.root).any(1))
+    changed = np.flatnonzero(
+        (good.rotations != bad.rotations).any((1, 2, 3)) | (good.root != bad.root).any(1)
+    )
     near = np.flatnonzero(np.abs(TRUTH.times - TRUTH.times[45]) < pin.reach)
     assert set(changed) <= set(near)
     assert len(changed) > 0.5 * len(near)
-    others = [k for k, name in enumerate(NAMES) if not name.startswith("left_") or "hip" in name or "knee" in name]
+    others = [
+        k
+        for k, name in enumerate(NAMES)
+        if not name.startswith("left_") or "hip" in name or "knee" in name
+    ]
     moved = np.linalg.norm(good.joints(BODY, BETAS) - bad.joints(BODY, BETAS), axis=-1)
     assert moved[:, ARM[1]].max() > 0.1
     assert moved[:, others].max() < 0.005
@@ -89,7 +109,8 @@ def test_the_correction_begins_and_ends_without_a_jump_of_velocity():
     speed = np.linalg.norm(np.diff(change, axis=0), axis=1) * RATE
     moving = np.flatnonzero(speed > 0)
     assert max(speed[moving[0]], speed[moving[-1]]) < 0.25 * speed.max()
-    assert np.linalg.norm(np.diff(change, 2, axis=0), axis=1).max() * RATE < speed.max()  # nor one in between
+    # nor one in between
+    assert np.linalg.norm(np.diff(change, 2, axis=0), axis=1).max() * RATE < speed.max()
 
 
 def test_a_pin_at_the_joint_itself_changes_nothing():
@@ -99,7 +120,9 @@ def test_a_pin_at_the_joint_itself_changes_nothing():
 
 def standing():
     """Somebody who stands with bent knees."""
-    still = Clip(TRUTH.times, np.repeat(TRUTH.rotations[:1], T, axis=0), np.repeat(TRUTH.root[:1], T, axis=0))
+    still = Clip(
+        TRUTH.times, np.repeat(TRUTH.rotations[:1], T, axis=0), np.repeat(TRUTH.root[:1], T, axis=0)
+    )
     knees = [NAMES.index(name) for name in ("left_knee", "right_knee", "left_hip", "right_hip")]
     for joint, angle in zip(knees, (0.8, 0.8, -0.4, -0.4), strict=True):
         still.rotations[:, joint] = exp(np.array([angle, 0, 0]))
@@ -168,7 +191,8 @@ def test_several_limbs_at_once_all_meet_their_pins():
 
 
 def test_a_foot_that_stands_stays_on_the_floor():
-    height = np.median(TRUTH.soles(BODY, BETAS)[50:63, :2, 2], axis=0).min() - 0.03  # 3 cm above the floor
+    # 3 cm above the floor
+    height = np.median(TRUTH.soles(BODY, BETAS)[50:63, :2, 2], axis=0).min() - 0.03
     clip = Clip(TRUTH.times, TRUTH.rotations.copy(), TRUTH.root - [0.0, 0.0, height])
     fixed = resolve(clip, BODY, BETAS, [Contact(50, 62, "left")], SHOT)
     soles = fixed.soles(BODY, BETAS)[50:63, :2]
@@ -179,19 +203,35 @@ def test_a_foot_that_stands_stays_on_the_floor():
     assert changed[-1] < 62 + 0.25 * RATE
 
 
-WAYS = {"side": (1.0, 0.0, 0.0), "front": (0.0, -1.0, 0.0), "up": (0.0, 0.0, 1.0), "across": (-0.96, -0.28, 0.0)}
+WAYS = {
+    "side": (1.0, 0.0, 0.0),
+    "front": (0.0, -1.0, 0.0),
+    "up": (0.0, 0.0, 1.0),
+    "across": (-0.96, -0.28, 0.0),
+}
 
 
 @pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
 @pytest.mark.parametrize("image", [False, True], ids=["space", "image"])
 def test_a_pin_out_of_reach_stretches_the_arm_and_leaves_the_body(way, image):
-    shoulder, elbow, wrist = (JOINTS[45, NAMES.index(f"left_{name}")] for name in ("shoulder", "elbow", "wrist"))
+    shoulder, elbow, wrist = (
+        JOINTS[45, NAMES.index(f"left_{name}")] for name in ("shoulder", "elbow", "wrist")
+    )
     length = np.linalg.norm(elbow - shoulder) + np.linalg.norm(wrist - elbow)
     place = shoulder + (length + 0.6) * np.array(way)  # 60 cm beyond reach
-    pin = Pin(45, "left_wrist", tuple(SHOT.project(45, place)) if image else None, None if image else tuple(place))
+    pin = Pin(
+        45,
+        "left_wrist",
+        tuple(SHOT.project(45, place)) if image else None,
+        None if image else tuple(place),
+    )
     moved = resolve(TRUTH, BODY, BETAS, [pin], SHOT).joints(BODY, BETAS)
     off = np.linalg.norm(moved - JOINTS, axis=-1)
-    others = [k for k, name in enumerate(NAMES) if not name.startswith("left_") or "hip" in name or "knee" in name]
+    others = [
+        k
+        for k, name in enumerate(NAMES)
+        if not name.startswith("left_") or "hip" in name or "knee" in name
+    ]
     assert off[:, others].max() < 0.035
     if way == WAYS["front"] and image:
         return  # towards the camera, where the picture says nothing about the distance
@@ -246,7 +286,9 @@ def test_a_leg_that_is_pinned_leaves_its_foot_above_the_floor(on_floor, name, im
     if image:
         shift = [0.03, -0.05 if name == "left_ankle" else 0.05, -0.04]
     at = on_floor.joints(BODY, BETAS)[45, NAMES.index(name)] + shift
-    pin = Pin(45, name, tuple(SHOT.project(45, at)) if image else None, None if image else tuple(at))
+    pin = Pin(
+        45, name, tuple(SHOT.project(45, at)) if image else None, None if image else tuple(at)
+    )
     corrected = resolve(on_floor, BODY, BETAS, [pin], SHOT)
     assert missed(corrected, BODY, BETAS, pin, SHOT) < (0.5 if image else 0.002)
     assert depth(corrected) < 0.01
@@ -256,7 +298,9 @@ def test_no_floor_is_like_one_far_below(on_floor):
     """As on uneven ground."""
     at = on_floor.joints(BODY, BETAS)[45, NAMES.index("left_ankle")] + [0.0, 0.07, -0.02]
     pin = Pin(45, "left_ankle", None, tuple(at))
-    none, low = (resolve(on_floor, BODY, BETAS, [pin], SHOT, floor=floor) for floor in (-np.inf, -10.0))
+    none, low = (
+        resolve(on_floor, BODY, BETAS, [pin], SHOT, floor=floor) for floor in (-np.inf, -10.0)
+    )
     assert missed(none, BODY, BETAS, pin, SHOT) < 0.002
     np.testing.assert_allclose(none.joints(BODY, BETAS), low.joints(BODY, BETAS), atol=1e-6)
 

@@ -10,13 +10,23 @@ import pytest
 from scope.scope_addon.job.clips.find import find_clips
 
 
-def found_in(folder: Path, *, recursive: bool = False, several_people: bool = False) -> dict[str, Path]:
+def found_in(
+    folder: Path, *, recursive: bool = False, several_people: bool = False
+) -> dict[str, Path]:
     return find_clips(folder, folder / "out", recursive=recursive, several_people=several_people)
 
 
 def test_videos_images_and_sequences_are_found_and_results_are_not(tmp_path):
     (tmp_path / "below" / "deep").mkdir(parents=True)
-    for name in ("a.mp4", "a.mov", "b.mp4", "b.overlay.mp4", "below/c.mp4", "below/deep/d.mp4", ".hidden.mp4"):
+    for name in (
+        "a.mp4",
+        "a.mov",
+        "b.mp4",
+        "b.overlay.mp4",
+        "below/c.mp4",
+        "below/deep/d.mp4",
+        ".hidden.mp4",
+    ):
         (tmp_path / name).write_text("x")
     for folder, names in {
         "walk": [f"frame{i:03}.png" for i in range(3)],
@@ -65,9 +75,9 @@ def test_names_are_unique_where_one_equals_another_without_suffix(tmp_path):
     for name in names:
         (clips / name).write_text("x")
     found = found_in(clips)
-    assert {name: path.name for name, path in found.items()} == {n: n for n in [*names[:5], "b.mp4"]} | {
-        "c.mp4": "c.mp4.mov"
-    }
+    assert {name: path.name for name, path in found.items()} == {
+        n: n for n in [*names[:5], "b.mp4"]
+    } | {"c.mp4": "c.mp4.mov"}
 
 
 def test_names_are_unique_where_one_equals_another_clips_person(tmp_path):

@@ -8,7 +8,12 @@ from pathlib import Path
 
 import pytest
 from scope.scope_addon.job.batch import REPORT_NAME, Batch
-from scope.scope_addon.job.clips.finished import finished_file, read_finished, remove_finished, write_finished
+from scope.scope_addon.job.clips.finished import (
+    finished_file,
+    read_finished,
+    remove_finished,
+    write_finished,
+)
 
 KEY = "0123456789abcdef" * 4
 
@@ -58,14 +63,24 @@ def test_results_elsewhere_do_not_count(written, tmp_path):
 
 @pytest.mark.parametrize(
     "text",
-    ["", "{", "[]", "3", '{"report": 3}', '{"report": {"outputs": 3, "warnings": []}, "stamps": []}', '{"a":' * 10**5],
+    [
+        "",
+        "{",
+        "[]",
+        "3",
+        '{"report": 3}',
+        '{"report": {"outputs": 3, "warnings": []}, "stamps": []}',
+        '{"a":' * 10**5,
+    ],
 )
 def test_a_damaged_record_does_not_count(written, tmp_path, text):
     written[0].write_text(text)
     assert read_finished(written[0], tmp_path) is None
 
 
-@pytest.mark.parametrize("change", [{"outputs": []}, {"outputs": [3]}, {"outputs": "abc"}, {"warnings": None}])
+@pytest.mark.parametrize(
+    "change", [{"outputs": []}, {"outputs": [3]}, {"outputs": "abc"}, {"warnings": None}]
+)
 def test_a_record_of_something_else_does_not_count(written, tmp_path, change):
     record, _, _ = written
     found = json.loads(record.read_text("utf-8"))
@@ -85,7 +100,9 @@ def test_only_the_clips_own_records_are_removed(written, tmp_path):
         write_finished(other, report)
     write_finished(finished_file(tmp_path, "below/a[1]", KEY[::-1]), report)
     remove_finished(tmp_path, "below/a[1]")
-    assert sorted(os.listdir(result.parent)) == sorted([result.name, *(other.name for other in others)])
+    assert sorted(os.listdir(result.parent)) == sorted(
+        [result.name, *(other.name for other in others)]
+    )
 
 
 def test_a_record_that_cannot_be_written_is_left_out(tmp_path):
@@ -127,7 +144,9 @@ def test_a_batch_removes_the_records_without_a_search_of_its_folder(tmp_path, mo
     searched = []
     with monkeypatch.context() as patch:
         patch.setattr(Path, "glob", lambda _, pattern: searched.append(pattern) or iter(()))
-        report = Batch(clips, out, [sys.executable, "-c", PROGRAM], {}, (".npz",)).run(1, recursive=True)
+        report = Batch(clips, out, [sys.executable, "-c", PROGRAM], {}, (".npz",)).run(
+            1, recursive=True
+        )
     assert report["counts"]["skipped"] == 3
     assert [pattern for pattern in searched if "finished" in pattern] == []
     assert there() == results

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Processes of clips: what they print is returned, and they end when they are not wanted any more."""
+"""Processes of clips: what they print is returned, and they end when they are not wanted any
+more.
+"""
 
 import sys
 import threading
@@ -41,7 +43,9 @@ def test_a_process_that_ignores_the_end_of_its_input_is_killed(monkeypatch):
 def test_nothing_starts_after_the_stop():
     processes = ClipProcesses()
     found = []
-    thread = threading.Thread(target=lambda: found.append(processes.run([sys.executable, "-c", WAITING])))
+    thread = threading.Thread(
+        target=lambda: found.append(processes.run([sys.executable, "-c", WAITING]))
+    )
     thread.start()
     wait_for(lambda: processes._running)
     processes.stop()

@@ -12,8 +12,12 @@ from scope.scope_addon.job.clips.runner import LocalRunner
 from ..processes import wait_for
 
 
-def test_clips_that_have_ended_while_nobody_looked_come_in_their_order(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One at a time ends after the other; the last one of them may not be noted yet when the others are taken."""
+def test_clips_that_have_ended_while_nobody_looked_come_in_their_order(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """One at a time ends after the other; the last one of them may not be noted yet when the others
+    are taken.
+    """
     ended = list[str]()
 
     def capture(_: LocalRunner, task: Any) -> dict[str, str]:

@@ -9,7 +9,9 @@ from scope.scope_addon.job.clips.task import CaptureSettings
 
 
 def basis(**options: str | None) -> str:
-    return CaptureSettings({f"--{name}": value for name, value in options.items()}, (".npz",)).basis("version")
+    return CaptureSettings(
+        {f"--{name}": value for name, value in options.items()}, (".npz",)
+    ).basis("version")
 
 
 def test_files_count_by_their_content_and_threads_do_not(tmp_path: Path) -> None:

@@ -51,13 +51,18 @@ def test_cameras_are_listed_with_names_and_largest_sizes(folders):
     node(0, b"USB Camera\n", b"pictures")
     node(1, b"USB Camera\n", b"metadata")
     labels = [camera.label for camera in list_cameras(path / "sys", path / "dev", ioctl)]
-    assert labels == [f"{n}: {name} (MJPG 1920×1080, YUYV 640×480)" for n, name in ((0, "USB Camera"), (10, "Second"))]
+    assert labels == [
+        f"{n}: {name} (MJPG 1920×1080, YUYV 640×480)"
+        for n, name in ((0, "USB Camera"), (10, "Second"))
+    ]
 
 
 def test_a_camera_that_cannot_be_opened_is_listed_without_sizes(folders):
     path, node = folders
     node(0, b"Busy", None)
-    assert [camera.label for camera in list_cameras(path / "sys", path / "dev", ioctl)] == ["0: Busy"]
+    assert [camera.label for camera in list_cameras(path / "sys", path / "dev", ioctl)] == [
+        "0: Busy"
+    ]
 
 
 def test_hostile_names_are_harmless(folders):
@@ -79,8 +84,10 @@ def test_without_cameras_the_list_is_empty(tmp_path):
 @pytest.mark.parametrize(
     ("text", "source"),
     [
-        ("0", "0"), (" 2 ", "2"), ("1: USB Camera: front (MJPG 1920×1080)", "1"), ("/dev/video3", "/dev/video3"),
-        ("front", None), ("1234", None), ("0x", None), ("/dev/sda", None), ("rtsp://a/b", None), ("", None),
+        ("0", "0"), (" 2 ", "2"), ("1: USB Camera: front (MJPG "
+                                   "1920×1080)", "1"), ("/dev/video3", "/dev/video3"),
+        ("front", None), ("1234", None), ("0x", None), ("/dev/sda", None), ("rtsp://a/b", None),
+        ("", None),
     ],
 )  # fmt: skip
 def test_the_source_of_a_label_is_its_number(text, source):

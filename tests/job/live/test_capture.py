@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The real process of a live capture: poses of a playing video, a recording of them, and refused streams."""
+"""The real process of a live capture: poses of a playing video, a recording of them, and refused
+streams.
+"""
 
 import sys
 from dataclasses import replace
@@ -31,11 +33,18 @@ def folder(tmp_path):
 
 
 def test_what_is_recorded_is_what_was_shown(folder, tmp_path, networks, body, monkeypatch):
-    """A busy computer drops most frames, and shows some of the other poses: they are compared with all that came."""
+    """A busy computer drops most frames, and shows some of the other poses: they are compared with
+    all that came.
+    """
     sent, keep = [], LiveProcess._keep
-    monkeypatch.setattr(LiveProcess, "_keep", lambda live, line: sent.append(line) or keep(live, line))
-    source = played_again_and_again(tmp_path / "long.mp4")  # the sample ends before the eighth pose on a busy machine
-    live = LiveProcess(LiveRequest(source, reconnect_s=0.0, threads=1), folder, None, [sys.executable, "-I"])
+    monkeypatch.setattr(
+        LiveProcess, "_keep", lambda live, line: sent.append(line) or keep(live, line)
+    )
+    # the sample ends before the eighth pose on a busy machine
+    source = played_again_and_again(tmp_path / "long.mp4")
+    live = LiveProcess(
+        LiveRequest(source, reconnect_s=0.0, threads=1), folder, None, [sys.executable, "-I"]
+    )
     live.record()
     poses, result = [], []
 
@@ -55,15 +64,22 @@ def test_what_is_recorded_is_what_was_shown(folder, tmp_path, networks, body, mo
     live.close()
     assert motion.frames[0] <= poses[0].frame
     every = [parse_pose(line, body.K + 1, body.P) for line in sent if b'"event": "pose"' in line]
-    seen = {pose.frame: pose.pelvis for pose in every if pose is not None and pose.presence == "seen"}
-    assert all(np.array_equal(pose.pelvis, seen[pose.frame]) for pose in poses if pose.presence == "seen")
+    seen = {
+        pose.frame: pose.pelvis for pose in every if pose is not None and pose.presence == "seen"
+    }
+    assert all(
+        np.array_equal(pose.pelvis, seen[pose.frame]) for pose in poses if pose.presence == "seen"
+    )
     given_s = np.array(list(seen)) / RATE - DELAY_S  # a pose is given that long after its time
     times = motion.frames[motion.valid] / RATE
     assert len(times) >= 4
-    shown = np.stack([np.interp(times, given_s, each) for each in np.array(list(seen.values())).T], axis=1)
+    shown = np.stack(
+        [np.interp(times, given_s, each) for each in np.array(list(seen.values())).T], axis=1
+    )
     recorded = body.rest_joints(motion.betas)[0] + motion.trans[motion.valid]
     np.testing.assert_allclose(recorded[:, :2], shown[:, :2], atol=0.01)
-    np.testing.assert_allclose(recorded[:, 2], shown[:, 2], atol=0.1)  # legs are as long as estimated last
+    # legs are as long as estimated last
+    np.testing.assert_allclose(recorded[:, 2], shown[:, 2], atol=0.1)
 
 
 def test_a_recording_begins_when_it_is_asked_for(folder, body):

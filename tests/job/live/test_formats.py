@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A camera is asked for its formats in a process of its own, which ends with the answer, or without one."""
+"""A camera is asked for its formats in a process of its own, which ends with the answer, or without
+one.
+"""
 
 import json
 import sys
@@ -56,21 +58,43 @@ def test_a_camera_that_does_not_answer_is_given_up(asking, monkeypatch):
     process = asking("time.sleep(600)")
     assert process.answer() is None
     monkeypatch.setattr(formats, "ANSWER_S", 0.0)
-    with pytest.raises(WorkerFailedError, match="camera 2 has not reported its formats within 0 s; if the system asks"):
+    with pytest.raises(
+        WorkerFailedError,
+        match="camera 2 has not reported its formats within 0 s; if the system asks",
+    ):
         process.answer()
 
 
 @pytest.mark.parametrize(
     ("code", "sentence"),
     [
-        ("os.abort()", "camera 2 cannot be asked for its formats; check that it is plugged in"),  # as by its driver
+        # as by its driver
+        ("os.abort()", "camera 2 cannot be asked for its formats; check that it is plugged in"),
         ("print('noise')", "camera 2 cannot be asked for its formats"),
-        ("print(json.dumps({'event': 'error', 'message': 'camera 2 does not exist'}))", "^camera 2 does not exist$"),
-        ("print(json.dumps({'event': 'result', 'name': 'x'}))", "cannot be used .result without a valid formats"),
-        ("print(json.dumps({'event': 'result', 'name': '', 'formats': []}))", "without a valid name"),
-        ("print(json.dumps({'event': 'result', 'name': 'x', 'formats': ['a\\x1b[2J']}))", "without a valid formats"),
-        ("print(json.dumps({'event': 'result', 'name': 'x', 'formats': ['a' * 61]}))", "without a valid formats"),
-        ("print(json.dumps({'event': 'result', 'name': 'x', 'formats': ['a'] * 65}))", "without a valid formats"),
+        (
+            "print(json.dumps({'event': 'error', 'message': 'camera 2 does not exist'}))",
+            "^camera 2 does not exist$",
+        ),
+        (
+            "print(json.dumps({'event': 'result', 'name': 'x'}))",
+            "cannot be used .result without a valid formats",
+        ),
+        (
+            "print(json.dumps({'event': 'result', 'name': '', 'formats': []}))",
+            "without a valid name",
+        ),
+        (
+            "print(json.dumps({'event': 'result', 'name': 'x', 'formats': ['a\\x1b[2J']}))",
+            "without a valid formats",
+        ),
+        (
+            "print(json.dumps({'event': 'result', 'name': 'x', 'formats': ['a' * 61]}))",
+            "without a valid formats",
+        ),
+        (
+            "print(json.dumps({'event': 'result', 'name': 'x', 'formats': ['a'] * 65}))",
+            "without a valid formats",
+        ),
     ],
 )
 def test_what_is_no_answer_is_an_error(asking, code, sentence):

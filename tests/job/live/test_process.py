@@ -39,7 +39,10 @@ def test_a_pose_is_read():
 
 
 def test_nobody_seen_yet_is_no_pose():
-    assert parse_pose(b'{"event": "pose", "person": 0, "frame": 0, "presence": "lost"}\n', 2, 3) is None
+    assert (
+        parse_pose(b'{"event": "pose", "person": 0, "frame": 0, "presence": "lost"}\n', 2, 3)
+        is None
+    )
 
 
 @pytest.mark.parametrize(
@@ -94,7 +97,9 @@ def process(tmp_path):
 
 
 def test_a_pose_that_comes_while_others_are_taken_is_not_lost(process, monkeypatch):
-    """Between finding where to store it and storing it, the reading thread may have to wait for the other one."""
+    """Between finding where to store it and storing it, the reading thread may have to wait for the
+    other one.
+    """
     taken = []
 
     class Interrupted:

@@ -24,7 +24,12 @@ def test_other_requests_are_none():
 
 @pytest.mark.parametrize(
     "text",
-    ['{"live": 3}', '{"live": "0", "online": 1}', '{"live": "0", "vmc": "1.2.3.4:5"}', '{"live": "0", "threads": "x"}']
+    [
+        '{"live": 3}',
+        '{"live": "0", "online": 1}',
+        '{"live": "0", "vmc": "1.2.3.4:5"}',
+        '{"live": "0", "threads": "x"}',
+    ]
     + ['{"live": "0"', "[]", "", "[" * 100_000],
 )
 def test_an_invalid_request_is_an_error(text):

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The remaining time, against what captures have really taken.
 
-`measured_progress.json` has the messages of captures: seconds, stage, done and total. The last is at the end.
+`measured_progress.json` has the messages of captures: seconds, stage, done and total. The last is
+at the end.
 """
 
 import json
@@ -17,7 +18,9 @@ LAST_S = 2.0  # of a capture, in which the estimate does not matter any more
 
 
 def replayed(messages, earlier=None):
-    """Return the time, what is left in truth and the estimate at 400 times of a capture, and its progress."""
+    """Return the time, what is left in truth and the estimate at 400 times of a capture, and its
+    progress.
+    """
     now, rest = [0.0], list(messages)
     progress, found = JobProgress(lambda: now[0], earlier), []
     end = messages[-1][0]
@@ -42,9 +45,13 @@ def of_each_frame(messages):
 @pytest.mark.parametrize("name", MEASURED)
 def test_the_remaining_time_is_right_to_about_a_half_whenever_it_is_shown(name, again):
     found, _ = replayed(MEASURED[name], of_each_frame(MEASURED[name]) if again else None)
-    estimates = [(left, estimate) for _, left, estimate in found if estimate is not None and left > LAST_S]
+    estimates = [
+        (left, estimate) for _, left, estimate in found if estimate is not None and left > LAST_S
+    ]
     margin = OF_SEVERAL * MEASURED[name][-1][0] if "people" in name else 0.0
-    assert [(left, x) for left, x in estimates if not 0.6 * left - margin < x < 1.6 * left + margin] == []
+    assert [
+        (left, x) for left, x in estimates if not 0.6 * left - margin < x < 1.6 * left + margin
+    ] == []
     ratios = [estimate / left for left, estimate in estimates]
     assert abs(np.median(ratios) - 1) < 0.3
     shown = [estimate is not None for _, _, estimate in found]

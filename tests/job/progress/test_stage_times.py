@@ -8,7 +8,9 @@ from scope.scope_addon.job.progress.stage_times import kind_of, load_stage_times
 
 
 def test_times_of_a_frame_are_kept_for_each_kind(tmp_path):
-    best, fast = (kind_of({"quality": quality, "hands": "off", "start": 3}) for quality in ("best", "fast"))
+    best, fast = (
+        kind_of({"quality": quality, "hands": "off", "start": 3}) for quality in ("best", "fast")
+    )
     assert best == kind_of({"quality": "best", "hands": "off", "start": 7})
     save_stage_times(tmp_path, best, {"solving": 3.0, "writing": 0.5}, 100)
     save_stage_times(tmp_path, fast, {"solving": 1.0}, 100)
@@ -27,7 +29,13 @@ def test_kinds_that_were_not_captured_for_long_are_forgotten(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "kinds", [3, [], {"kind": 3}, *({"kind": {"solving": time}} for time in ("x", -1, 1e999, 1e308, None, [0.1]))]
+    "kinds",
+    [
+        3,
+        [],
+        {"kind": 3},
+        *({"kind": {"solving": time}} for time in ("x", -1, 1e999, 1e308, None, [0.1])),
+    ],
 )
 def test_damaged_times_are_none(tmp_path, kinds):
     content = {"format": "scope stage times", "version": 1, "kinds": kinds}

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The expressions of the built-in bodies: on the right side, closing what they should, whatever the shape."""
+"""The expressions of the built-in bodies: on the right side, closing what they should, whatever the
+shape.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,8 @@ def test_there_are_52_in_order_and_only_the_tongue_moves_nothing(body):
     assert [e.name for e in expressions if not len(e.vertices)] == ["tongueOut"]
     for each in expressions:
         assert np.abs(each.offsets).max(initial=0) < 0.05
-        assert (body.v_template[each.vertices, 1] > body.J_template[12, 1] - 0.05).all()  # above the neck's joint
+        # above the neck's joint
+        assert (body.v_template[each.vertices, 1] > body.J_template[12, 1] - 0.05).all()
 
 
 def test_left_is_the_persons_left_and_the_mirror_image_of_right(body):
@@ -55,7 +58,9 @@ def test_the_jaw_opens_downwards_and_a_smile_lifts_the_corner_outwards(body):
 def covered(point: np.ndarray, triangles: np.ndarray) -> bool:
     """Whether one of the triangles (n, 3, 3) lies in front of the point, seen along z."""
     a, b, c = (triangles[:, k, :2] - point[:2] for k in range(3))
-    areas = np.stack([b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0], c[:, 0] * a[:, 1] - c[:, 1] * a[:, 0]], axis=1)
+    areas = np.stack(
+        [b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0], c[:, 0] * a[:, 1] - c[:, 1] * a[:, 0]], axis=1
+    )
     areas = np.concatenate([areas, (a[:, :1] * b[:, 1:] - a[:, 1:] * b[:, :1])], axis=1)
     inside = (areas > 0).all(axis=1) | (areas < 0).all(axis=1)
     depth = (areas * triangles[:, :, 2]).sum(axis=1)[inside] / areas.sum(axis=1)[inside]

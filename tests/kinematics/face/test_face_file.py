@@ -48,7 +48,9 @@ OF_MOUTH = OF_BOTH | {
     "material_colors of fewer materials": lambda d: {"material_colors": d["material_colors"][1:]},
 }
 OF_EXPRESSIONS = OF_BOTH | {
-    "vertices outside": lambda d: {"vertices": changed(d["vertices"].astype(int), int(d["vertex_count"]))},
+    "vertices outside": lambda d: {
+        "vertices": changed(d["vertices"].astype(int), int(d["vertex_count"]))
+    },
     "names in another order": lambda d: {"names": d["names"][::-1]},
     "names too few": lambda d: {"names": d["names"][1:]},
     "vertex_count of two": lambda d: {"vertex_count": np.array([1, 2])},
@@ -93,7 +95,10 @@ def test_a_file_that_lacks_an_array_is_refused(body, tmp_path, monkeypatch):
     for module, use in ((mouth, with_teeth_and_tongue), (expressions, expressions_of)):
         with np.load(module.FILE) as file:
             data = dict(file)
-        np.savez(tmp_path / module.FILE.name, **{key: value for key, value in data.items() if key != "moves"})
+        np.savez(
+            tmp_path / module.FILE.name,
+            **{key: value for key, value in data.items() if key != "moves"},
+        )
         monkeypatch.setattr(module, "FILE", tmp_path / module.FILE.name)
         with pytest.raises(ModelFileError, match="lacks moves"):
             use(body)

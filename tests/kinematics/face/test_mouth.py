@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Teeth and tongue: after the body's own vertices, behind closed lips whatever the shape, and moved by the jaw."""
+"""Teeth and tongue: after the body's own vertices, behind closed lips whatever the shape, and moved
+by the jaw.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +9,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scope.scope_addon.kinematics.face.expressions import body_with_mouth, expressions_of, mouth_faces_of
+from scope.scope_addon.kinematics.face.expressions import (
+    body_with_mouth,
+    expressions_of,
+    mouth_faces_of,
+)
 from scope.solver.loaders.body_file import load_body
 
 from .test_expressions import by_name
@@ -38,10 +44,19 @@ def moved(body, beta, **weights) -> np.ndarray:
 
 
 def nearest_skin(body, vertices: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """The largest z of the skin outside the mouth at each point's x and y; -inf where there is none."""
+    """The largest z of the skin outside the mouth at each point's x and y; -inf where there is
+    none.
+    """
     own = np.setdiff1d(np.arange(body.faces.shape[0]), mouth_faces_of(body))
-    own = own[~np.isin(body.face_material[own], [body.material_names.index(n) for n in ("teeth", "gums", "tongue")])]
-    triangles = vertices[np.concatenate([body.faces[own][:, [0, 1, 2]], body.faces[own][:, [0, 2, 3]]])]
+    own = own[
+        ~np.isin(
+            body.face_material[own],
+            [body.material_names.index(n) for n in ("teeth", "gums", "tongue")],
+        )
+    ]
+    triangles = vertices[
+        np.concatenate([body.faces[own][:, [0, 1, 2]], body.faces[own][:, [0, 2, 3]]])
+    ]
     points = points + [1e-6, 0.0, 0.0]  # off the edges in the middle
     low, high = points.min(axis=0), points.max(axis=0)
     beside = (triangles.max(axis=1) < low)[:, :2] | (triangles.min(axis=1) > high)[:, :2]
@@ -52,10 +67,14 @@ def nearest_skin(body, vertices: np.ndarray, points: np.ndarray) -> np.ndarray:
         x, y = point[:2]
         a, b, c = near[(left <= x) & (x <= right) & (below <= y) & (y <= above)].transpose(1, 0, 2)
         p, q, r = (each[:, :2] - point[:2] for each in (a, b, c))
-        areas = np.stack([q[:, 0] * r[:, 1] - q[:, 1] * r[:, 0], r[:, 0] * p[:, 1] - r[:, 1] * p[:, 0]], axis=1)
+        areas = np.stack(
+            [q[:, 0] * r[:, 1] - q[:, 1] * r[:, 0], r[:, 0] * p[:, 1] - r[:, 1] * p[:, 0]], axis=1
+        )
         areas = np.concatenate([areas, (p[:, :1] * q[:, 1:] - p[:, 1:] * q[:, :1])], axis=1)
         inside = (areas > 0).all(axis=1) | (areas < 0).all(axis=1)
-        z = (areas * np.stack([a[:, 2], b[:, 2], c[:, 2]], axis=1)).sum(axis=1)[inside] / areas[inside].sum(axis=1)
+        z = (areas * np.stack([a[:, 2], b[:, 2], c[:, 2]], axis=1)).sum(axis=1)[inside] / areas[
+            inside
+        ].sum(axis=1)
         out[i] = z.max(initial=-np.inf)
     return out
 
@@ -63,7 +82,13 @@ def nearest_skin(body, vertices: np.ndarray, points: np.ndarray) -> np.ndarray:
 def test_the_body_keeps_its_vertices_faces_and_expressions(plain, body):
     V, F, U = len(plain.v_template), len(plain.faces), len(plain.uv)
     assert len(body.v_template) > V
-    for name, count in (("v_template", V), ("shapedirs", V), ("skin_joints", V), ("skin_weights", V), ("uv", U)):
+    for name, count in (
+        ("v_template", V),
+        ("shapedirs", V),
+        ("skin_joints", V),
+        ("skin_weights", V),
+        ("uv", U),
+    ):
         np.testing.assert_array_equal(getattr(body, name)[:count], getattr(plain, name))
     for name in ("faces", "uv_faces", "face_material"):
         np.testing.assert_array_equal(getattr(body, name)[:F], getattr(plain, name))
@@ -92,7 +117,9 @@ def test_teeth_and_tongue_follow_the_head_alone(plain, body):
     R, t = body.forward_kinematics(rotations, np.array([0.3, 0.1, -0.2]))
     head = body.joint_names.index("head")
     rest = body.v_template[len(plain.v_template) :] - body.J_template[head]
-    np.testing.assert_allclose(body.skin(R, t)[len(plain.v_template) :], rest @ R[head].T + t[head], atol=1e-9)
+    np.testing.assert_allclose(
+        body.skin(R, t)[len(plain.v_template) :], rest @ R[head].T + t[head], atol=1e-9
+    )
 
 
 def test_the_jaw_takes_the_lower_teeth_and_the_tongue(plain, body):
@@ -128,7 +155,10 @@ def test_no_tooth_sticks_through_the_lips_of_any_shape(body, weights):
     rng = np.random.default_rng(2)
     shapes = [np.zeros(body.P), *rng.normal(size=(3, body.P))]
     if body.P > 10:
-        shapes = [np.append(beta[:10], growth) for beta, growth in zip(shapes, (0, -0.3, -0.7, -1), strict=True)]
+        shapes = [
+            np.append(beta[:10], growth)
+            for beta, growth in zip(shapes, (0, -0.3, -0.7, -1), strict=True)
+        ]
     for beta in shapes:
         vertices = moved(body, beta, **weights)
         assert (nearest_skin(body, vertices, vertices[inside]) < vertices[inside, 2]).mean() < 0.02

@@ -31,18 +31,27 @@ def stepped():
         rotations, p = feet.hold(time_s, np.zeros(supported.P), frame, T_world_camera, True)
         held.append(place(rotations[None], seen[k][None])[2][0, :4] @ R.T + t)
         contact.append(p)
-    return true[:, :4] @ R.T + t, np.array(held), np.array(contact), feet, T_world_camera, frame.soles
+    return (
+        true[:, :4] @ R.T + t,
+        np.array(held),
+        np.array(contact),
+        feet,
+        T_world_camera,
+        frame.soles,
+    )
 
 
 def test_a_foot_that_stands_stays_where_it_is_while_the_distance_errs(stepped):
     _, held, contact, *_ = stepped
     assert contact[5:, RIGHT].min() > 0.5
     stands = held[5:, RIGHT]
-    assert np.linalg.norm(stands - stands.mean(axis=0), axis=2).max() < 0.02  # of errors that span 8 cm
+    # of errors that span 8 cm
+    assert np.linalg.norm(stands - stands.mean(axis=0), axis=2).max() < 0.02
 
 
 def taken_for_the_swinging_foot(lift_m):
-    """Right soles (T, 2, 3) of somebody whose left foot swings past, and whose right one seems to follow for 4 frames.
+    """Right soles (T, 2, 3) of somebody whose left foot swings past, and whose right one seems to
+    follow for 4 frames.
 
     :param lift_m: of the body in each of these frames, which then does leave the floor.
     """
@@ -57,7 +66,8 @@ def taken_for_the_swinging_foot(lift_m):
         rotations, raised = omega[k].copy(), 0.0
         if 40 <= k < 44:
             rays[RIGHT, 0] += 0.02
-            rotations[hip] = rotations[hip] @ exp(np.array([0.0, 0.0, 0.09]))  # the foot is 8 cm aside
+            # the foot is 8 cm aside
+            rotations[hip] = rotations[hip] @ exp(np.array([0.0, 0.0, 0.09]))
         if k >= 40:
             raised = lift_m * (k - 39)
         at = root[k] + raised * R[2]
@@ -137,7 +147,8 @@ def test_a_foot_that_is_held_where_the_image_does_not_show_it_is_let_go():
     true = place(omega, root)[2][0, :4]
     feet, away_m, is_held = FootHold(supported), [], True
     for k in range(60):
-        # Fits stay where the feet are held; once nothing is held, they find the person 60 cm behind that place.
+        # Fits stay where the feet are held; once nothing is held, they find the person 60 cm behind
+        # that place.
         is_held = is_held and (k < 10 or feet.is_holding)
         at = root[0] - 0.6 * line_of_sight(root[0]) if is_held else root[0]
         frame = FittedFrame(omega[0], at, np.ones(len(omega[0])), true[:, :2] / true[:, 2:])

@@ -10,11 +10,15 @@ STEP_S = 1 / 600
 
 
 def shown_after_change(at: int, count: int = 400) -> np.ndarray:
-    """Return what is shown (count, 3) of an offset that moves at 0.5 m/s, and is 0 from a frame on."""
+    """Return what is shown (count, 3) of an offset that moves at 0.5 m/s, and is 0 from a frame
+    on.
+    """
     transition, shown = Transition(2, 6.0), []
     where = np.array([True, False])
     for k in range(count):
-        before, now = (np.array([[0.5 * j * STEP_S, 0.0, 0.0], [1.0, 1.0, 1.0]]) for j in (k - 1, k))
+        before, now = (
+            np.array([[0.5 * j * STEP_S, 0.0, 0.0], [1.0, 1.0, 1.0]]) for j in (k - 1, k)
+        )
         zero = np.array([[0.0, 0.0, 0.0], [5.0, 5.0, 5.0]])
         if k == at:
             transition.change(where, (before, now), (zero, zero), STEP_S)
@@ -29,7 +33,8 @@ def test_position_velocity_and_acceleration_continue() -> None:
     velocity = np.diff(shown) / STEP_S
     acceleration = np.diff(velocity) / STEP_S
     assert np.abs(velocity[90:102] - 0.5).max() < 0.05  # as if nothing had changed
-    assert np.abs(acceleration[90:99]).max() < 5.0  # 30000 m/s² if the offset jumped, 300 if the velocity did
+    # 30000 m/s² if the offset jumped, 300 if the velocity did
+    assert np.abs(acceleration[90:99]).max() < 5.0
 
 
 def test_the_remainder_dies_away() -> None:

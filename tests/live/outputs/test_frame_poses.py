@@ -20,9 +20,21 @@ def pose_given(body, index, time_s, delay_s, betas=None):
     nothing, betas = np.zeros((body.K + 1, 3)), np.zeros(body.P) if betas is None else betas
     T = world_from_level_camera(np.array([0.0, -1.0, 0.0]), height=1.0)
     return LivePose(
-        index, time_s, Presence.SEEN, True, betas, R, np.array([then, 0.0, 4.0]), T, nothing, np.zeros(4), R,
-        np.zeros(3), np.full((33, 3), index), np.ones(body.K + 1),
-    )  # fmt: skip
+        index,
+        time_s,
+        Presence.SEEN,
+        True,
+        betas,
+        R,
+        np.array([then, 0.0, 4.0]),
+        T,
+        nothing,
+        np.zeros(4),
+        R,
+        np.zeros(3),
+        np.full((33, 3), index),
+        np.ones(body.K + 1),
+    )
 
 
 @pytest.mark.parametrize("rate", [30.0, 60.0, 24.0, 12.0])
@@ -43,12 +55,16 @@ def test_a_single_pose_stays(body):
 def test_soles_stay_at_their_height_in_the_last_shape(body):
     tall = np.zeros(body.P)
     tall[0] = 1.5
-    poses = in_last_shape([pose_given(body, 0, 0.0, 0.0), pose_given(body, 1, 0.1, 0.0, tall)], body)
+    poses = in_last_shape(
+        [pose_given(body, 0, 0.0, 0.0), pose_given(body, 1, 0.1, 0.0, tall)], body
+    )
     assert all(np.array_equal(pose.betas, tall) for pose in poses)
 
     def height(pose, betas):
         model = with_contact_points(body, betas)
-        R, t = model.forward_kinematics(pose.rotations, pose.root_cam - model.rest_joints(betas)[0], betas)
+        R, t = model.forward_kinematics(
+            pose.rotations, pose.root_cam - model.rest_joints(betas)[0], betas
+        )
         return (contact_point_positions(model, R, t)[:4] @ pose.T_world_camera[2, :3]).min()
 
     before = height(pose_given(body, 0, 0.0, 0.0), np.zeros(body.P))

@@ -24,7 +24,9 @@ def server(body):
 
 
 def connected(server, count):
-    clients = [socket.create_connection(("127.0.0.1", server.port), timeout=300) for _ in range(count)]
+    clients = [
+        socket.create_connection(("127.0.0.1", server.port), timeout=300) for _ in range(count)
+    ]
     files = [client.makefile("rb") for client in clients]
     return clients, files
 
@@ -56,7 +58,9 @@ def test_a_client_gets_a_line_of_each_person(body):
         clients[0].close()
 
 
-def test_a_client_that_reads_nothing_neither_delays_nor_grows_and_others_get_the_newest(server, body):
+def test_a_client_that_reads_nothing_neither_delays_nor_grows_and_others_get_the_newest(
+    server, body
+):
     (slow, quick), files = connected(server, 2)
     files[0].close()
     files[1].readline()
@@ -87,7 +91,9 @@ def test_the_end_gives_clients_what_is_queued(body, monkeypatch):
 
 
 def fill(serving, body):
-    """Send until nothing more fits into the system's buffers: the queue then stays full for a hundred sends."""
+    """Send until nothing more fits into the system's buffers: the queue then stays full for a
+    hundred sends.
+    """
     full = 0
     for _ in range(20_000):  # far more than the buffers hold
         serving.send(numbered(body, 1), 0.0)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The preview in a browser: the footage with the skeleton where the camera sees the joints, for this computer alone."""
+"""The preview in a browser: the footage with the skeleton where the camera sees the joints, for
+this computer alone.
+"""
 
 from __future__ import annotations
 
@@ -53,7 +55,9 @@ def pose(body):
     pose = pose_of(body)
     cam = (pose.joints - pose.T_world_camera[:3, 3]) @ pose.T_world_camera[:3, :3]
     moved = np.array([0.0, 0.0, 4.0]) - cam.mean(axis=0)
-    return replace(pose, joints=pose.joints + moved @ pose.T_world_camera[:3, :3].T, timestamp_s=2.0)
+    return replace(
+        pose, joints=pose.joints + moved @ pose.T_world_camera[:3, :3].T, timestamp_s=2.0
+    )
 
 
 def shades(time_s, value):
@@ -71,13 +75,20 @@ def test_the_page_shows_the_picture_of_the_pose_with_the_skeleton(body, pose):
     pixels = np.round(joints[:, :2] / joints[:, 2:] * 300.0 + [159.5, 119.5]).astype(int)
     drawn = np.abs(image - 90).max(axis=2) > 40
     assert all(drawn[y - 2 : y + 3, x - 2 : x + 3].any() for x, y in pixels)
-    far = np.min([np.hypot(*(np.indices(drawn.shape)[::-1] - p[:, None, None])) for p in pixels], axis=0) > 60
+    far = (
+        np.min(
+            [np.hypot(*(np.indices(drawn.shape)[::-1] - p[:, None, None])) for p in pixels], axis=0
+        )
+        > 60
+    )
     assert not drawn[far].any()
 
 
 def test_who_is_lost_is_not_drawn(body, pose):
     with PreviewPage(body) as page:
-        image = first_picture(page, replace(pose, presence=Presence.LOST), [shades(2.0 - DELAY_S, 90)]).astype(int)
+        image = first_picture(
+            page, replace(pose, presence=Presence.LOST), [shades(2.0 - DELAY_S, 90)]
+        ).astype(int)
     assert np.abs(image - 90).max() < 10
 
 
@@ -96,15 +107,20 @@ def test_another_address_shows_nothing_and_nothing_is_kept_without_a_browser(bod
 
 def test_the_end_shows_the_newest_picture(body, pose, monkeypatch):
     monkeypatch.setattr(preview_page, "_CLOSING_S", 300)  # this computer may be busy
-    monkeypatch.setattr(preview_page, "INTERVAL_S", 300)  # until the next picture, unless the capture ends before
-    with PreviewPage(body) as page, urllib.request.urlopen(page.address + ".mjpeg", timeout=300) as response:
+    # until the next picture, unless the capture ends before
+    monkeypatch.setattr(preview_page, "INTERVAL_S", 300)
+    with (
+        PreviewPage(body) as page,
+        urllib.request.urlopen(page.address + ".mjpeg", timeout=300) as response,
+    ):
         page.begin(SimpleNamespace(sessions=[SimpleNamespace(camera=CAMERA)]), (320, 240))
         wait_for(lambda: page._viewers)
         page.receive(shades(2.0 - DELAY_S, 90))
         page.send(pose, 0.0)
         page.__exit__(None, None, None)
         assert abs(int(read_picture(response)[5, 5, 0]) - 90) <= 2
-        assert response.read() == b"\r\n--picture--\r\n"  # without which browsers wait with the picture
+        # without which browsers wait with the picture
+        assert response.read() == b"\r\n--picture--\r\n"
 
 
 def test_a_browser_that_stays_does_not_keep_the_capture_from_ending(body, pose):

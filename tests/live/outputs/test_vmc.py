@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The VMC protocol, read back by a parser written from the OSC 1.0 specification, and its axes by hand."""
+"""The VMC protocol, read back by a parser written from the OSC 1.0 specification, and its axes by
+hand.
+"""
 
 import socket
 import struct
@@ -23,7 +25,9 @@ R_WORLD_MODEL = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 
 
 def padded_string(data, at):
-    """Read an OSC string, which is filled with zeros to a multiple of four bytes; return it and where it ends."""
+    """Read an OSC string, which is filled with zeros to a multiple of four bytes; return it and
+    where it ends.
+    """
     end = data.index(b"\0", at)
     return data[at:end].decode("ascii"), at + (end - at) // 4 * 4 + 4
 
@@ -55,7 +59,9 @@ def parsed(data):
     return [(address, values)]
 
 
-def pose_of(body, Omega=None, R_world_root=R_WORLD_MODEL, pelvis=(0.0, 0.0, 0.95), presence=Presence.SEEN):
+def pose_of(
+    body, Omega=None, R_world_root=R_WORLD_MODEL, pelvis=(0.0, 0.0, 0.95), presence=Presence.SEEN
+):
     """A pose in a camera whose axes are the world's."""
     R = np.tile(np.eye(3), (body.K + 1, 1, 1)) if Omega is None else Omega
     R[0] = R_world_root
@@ -104,11 +110,15 @@ def test_a_pose_is_read_back_from_the_bytes(receiver, body):
     assert messages[0] == ("/VMC/Ext/OK", [1, 3, 0, 1])
     assert messages[1] == ("/VMC/Ext/T", [0.5])
     assert messages[2] == ("/VMC/Ext/Root/Pos", ["root", 0, 0, 0, 0, 0, 0, 1])
-    bones = {values[0]: values[1:] for address, values in messages if address == "/VMC/Ext/Bone/Pos"}
+    bones = {
+        values[0]: values[1:] for address, values in messages if address == "/VMC/Ext/Bone/Pos"
+    }
     assert len(bones) == 22
-    assert bones["Hips"] == pytest.approx([0, 0.95, 0, 0, 0, 0, 1], abs=1e-6)  # facing the camera, upright
+    # facing the camera, upright
+    assert bones["Hips"] == pytest.approx([0, 0.95, 0, 0, 0, 0, 1], abs=1e-6)
     assert bones["LeftUpperArm"][3:] == pytest.approx([0, 0, 0, 1], abs=1e-6)
-    assert bones["LeftUpperArm"][0] < 0 < bones["RightUpperArm"][0]  # Unity's x axis points to the person's right
+    # Unity's x axis points to the person's right
+    assert bones["LeftUpperArm"][0] < 0 < bones["RightUpperArm"][0]
 
 
 def test_each_receiver_gets_its_own_person(receiver, body):
@@ -120,19 +130,29 @@ def test_each_receiver_gets_its_own_person(receiver, body):
 
 def test_bones_turn_as_in_unity(receiver, body):
     Omega = np.tile(np.eye(3), (body.K + 1, 1, 1))
-    Omega[body.joint_names.index("left_shoulder")] = rotations.exp(np.array([0, 0, np.pi / 2]))  # the left arm upwards
-    Omega[body.joint_names.index("head")] = rotations.exp(np.array([np.pi / 2, 0, 0]))  # the face to the floor
+    # the left arm upwards
+    Omega[body.joint_names.index("left_shoulder")] = rotations.exp(np.array([0, 0, np.pi / 2]))
+    # the face to the floor
+    Omega[body.joint_names.index("head")] = rotations.exp(np.array([np.pi / 2, 0, 0]))
     messages = received(receiver, body, pose_of(body, Omega))
-    bones = {values[0]: values[4:] for address, values in messages if address == "/VMC/Ext/Bone/Pos"}
+    bones = {
+        values[0]: values[4:] for address, values in messages if address == "/VMC/Ext/Bone/Pos"
+    }
     half = np.sqrt(0.5)
-    # A positive turn about z takes x to y, and −x, where Unity's left arm points, to −y: upwards is negative.
+    # A positive turn about z takes x to y, and −x, where Unity's left arm points, to −y: upwards is
+    # negative.
     assert bones["LeftUpperArm"] == pytest.approx([0, 0, -half, half], abs=1e-6)
     assert bones["Head"] == pytest.approx([half, 0, 0, half], abs=1e-6)
 
 
 @pytest.mark.parametrize(
     ("world", "unity"),
-    [((0, 0, 1), (0, 1, 0)), ((0, -1, 0), (0, 0, 1)), ((1, 0, 0), (-1, 0, 0)), ((2, 3, 5), (-2, 5, -3))],
+    [
+        ((0, 0, 1), (0, 1, 0)),
+        ((0, -1, 0), (0, 0, 1)),
+        ((1, 0, 0), (-1, 0, 0)),
+        ((2, 3, 5), (-2, 5, -3)),
+    ],
 )
 def test_positions_by_hand(world, unity):
     # Up stays up; towards the camera is forward; to the camera's right is to the person's left.

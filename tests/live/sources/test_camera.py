@@ -28,7 +28,8 @@ def answering(of_all, of_this=0):
     """An ioctl that answers what a device can do."""
 
     def ioctl(node, request, answer):
-        assert (request & 0xFFFF, len(answer)) == (0x5600, (request >> 16) & 0x3FFF)  # VIDIOC_QUERYCAP and its size
+        # VIDIOC_QUERYCAP and its size
+        assert (request & 0xFFFF, len(answer)) == (0x5600, (request >> 16) & 0x3FFF)
         struct.pack_into("II", answer, 16 + 32 + 32 + 4, of_all, of_this)
 
     return ioctl
@@ -51,7 +52,10 @@ def device(tmp_path):
 @pytest.mark.parametrize(
     ("number", "said"),
     [
-        (errno.EACCES, "may not be used by this user; on most systems, cameras belong to the group 'video'"),
+        (
+            errno.EACCES,
+            "may not be used by this user; on most systems, cameras belong to the group 'video'",
+        ),
         (errno.EPERM, "may not be used by this program, which runs without access to cameras"),
         (errno.EBUSY, "is used by another program; close that"),
         (errno.ENODEV, "is not plugged in any more"),
@@ -64,7 +68,9 @@ def test_why_a_device_cannot_be_opened_is_said(device, monkeypatch, number, said
     assert device_problem(device, answering(CAPTURE)) == said
 
 
-@pytest.mark.parametrize(("number", "said"), [(errno.ENODEV, "not plugged in"), (errno.ENOTTY, "is not a camera")])
+@pytest.mark.parametrize(
+    ("number", "said"), [(errno.ENODEV, "not plugged in"), (errno.ENOTTY, "is not a camera")]
+)
 def test_a_device_that_does_not_answer_is_gone_or_no_camera(device, number, said):
     assert said in device_problem(device, failing(number))
 
@@ -72,7 +78,9 @@ def test_a_device_that_does_not_answer_is_gone_or_no_camera(device, number, said
 @pytest.mark.skipif(not os.access("/dev/null", os.W_OK), reason="/dev/null cannot be opened")
 def test_another_device_is_no_camera():
     source = CameraSource("/dev/null")
-    with pytest.raises(VideoError, match="^camera /dev/null is not a camera; choose another device$"):
+    with pytest.raises(
+        VideoError, match="^camera /dev/null is not a camera; choose another device$"
+    ):
         next(iter(source.pictures(Clock())))
 
 
@@ -80,12 +88,15 @@ def test_the_node_of_a_camera_s_metadata_gives_no_pictures(device):
     both = CAPTURE | METADATA | HAS_OWN_ANSWER
     assert "delivers no images" in device_problem(device, answering(both, METADATA))
     assert device_problem(device, answering(both, CAPTURE)) == ""
-    assert device_problem(device, answering(CAPTURE)) == ""  # of a driver that does not tell its nodes apart
+    # of a driver that does not tell its nodes apart
+    assert device_problem(device, answering(CAPTURE)) == ""
 
 
 @pytest.fixture
 def opened(device, monkeypatch):
-    """Cameras that give a number of pictures each time they are opened, and what happens after these."""
+    """Cameras that give a number of pictures each time they are opened, and what happens after
+    these.
+    """
     lives = []
 
     class Capture:
@@ -102,7 +113,9 @@ def opened(device, monkeypatch):
             self.then()
             return False, None
 
-    monkeypatch.setattr(camera, "cv2", SimpleNamespace(**vars(camera.cv2) | {"VideoCapture": Capture}))
+    monkeypatch.setattr(
+        camera, "cv2", SimpleNamespace(**vars(camera.cv2) | {"VideoCapture": Capture})
+    )
     monkeypatch.setattr("fcntl.ioctl", answering(CAPTURE))
     return lives
 

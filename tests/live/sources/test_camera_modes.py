@@ -17,9 +17,11 @@ HD = (1280, 720)
 
 
 def dshow(format, least, most, of=None, after=""):
-    """A line of `dshow_cycle_formats`: the format, "  min s=%ldx%ld fps=%g max s=%ldx%ld fps=%g", and colours."""
+    """A line of `dshow_cycle_formats`: the format, "  min s=%ldx%ld fps=%g max s=%ldx%ld fps=%g",
+    and colours."""
     low, high = of or ((640, 480), (640, 480))
-    sizes = f"  min s={low[0]}x{low[1]} fps={least:g} max s={high[0]}x{high[1]} fps={most:g}"  # %g of C is Python's
+    # %g of C is Python's
+    sizes = f"  min s={low[0]}x{low[1]} fps={least:g} max s={high[0]}x{high[1]} fps={most:g}"
     return f"  {format}{sizes}{after}\n"
 
 
@@ -34,10 +36,20 @@ DSHOW = (
     + dshow("vcodec=mjpeg", 29.97, 60.0002, ((160, 120), (1920, 1080)))
     + dshow("unknown compression type 0x30313050", 5, float("inf"))
 )
-# `configure_video_device`: "  %dx%d@[%f %f]fps\n" for each rate of each format, of which many have the same.
-MODES = [(1920, 1080, 15, 30), (1920, 1080, 15, 30), (640, 480, 1, 60.00024), (1280, 720, 24, 24), (1280, 720, 1, 60)]
-AVFOUNDATION = "Selected video size (1x1) is not supported by the device.\nSupported modes:\n" + "".join(
-    f"  {width}x{height}@[{least:f} {most:f}]fps\n" for width, height, least, most in MODES
+# `configure_video_device`: "  %dx%d@[%f %f]fps\n" for each rate of each format; many have
+# the same.
+MODES = [
+    (1920, 1080, 15, 30),
+    (1920, 1080, 15, 30),
+    (640, 480, 1, 60.00024),
+    (1280, 720, 24, 24),
+    (1280, 720, 1, 60),
+]
+AVFOUNDATION = (
+    "Selected video size (1x1) is not supported by the device.\nSupported modes:\n"
+    + "".join(
+        f"  {width}x{height}@[{least:f} {most:f}]fps\n" for width, height, least, most in MODES
+    )
 )
 
 
@@ -55,7 +67,8 @@ def test_dshow_tells_formats_sizes_and_rates():
 
 def test_avfoundation_tells_sizes_and_rates():
     modes = parse_modes(AVFOUNDATION, "avfoundation")
-    assert [(*mode.most, mode.least_fps, mode.most_fps) for mode in modes] == MODES[1:]  # the repetition once
+    # the repetition once
+    assert [(*mode.most, mode.least_fps, mode.most_fps) for mode in modes] == MODES[1:]
     assert described(modes) == ["1920×1080", "1280×720", "640×480"]
 
 
@@ -68,7 +81,8 @@ def test_avfoundation_tells_sizes_and_rates():
         "  vcodec=mjpeg  min s=640x480 fps=five max s=640x480 fps=30",
         "  vcodec=mjpeg  min s=640x480 fps=nan max s=640x480 fps=30",
         "  vcodec=mjpeg  min s=640x480 fps=1e+ max s=640x480 fps=30",
-        "  vcodec=mjpeg  min s=640x480 fps=30 max s=640x480 fps=5",  # the greatest rate below the least
+        # the greatest rate below the least
+        "  vcodec=mjpeg  min s=640x480 fps=30 max s=640x480 fps=5",
         "  vcodec=mjpeg  min s=640x480 fps=0 max s=640x480 fps=0",
         "  vcodec=mjpeg  min s=640x480 fps=-5 max s=640x480 fps=30",
         "  vcodec=mjpeg  min s=0x0 fps=5 max s=640x480 fps=30",
@@ -78,7 +92,8 @@ def test_avfoundation_tells_sizes_and_rates():
         "  vcodec=\x1b[2J  min s=640x480 fps=5 max s=640x480 fps=30",
         f"  vcodec={'m' * 5000}  min s=640x480 fps=5 max s=640x480 fps=30",
         "  vcodec=mjpeg  min s=٦٤٠x480 fps=5 max s=640x480 fps=30",  # digits, but not FFmpeg's
-        ' Pin "  vcodec=mjpeg  min s=640x480 fps=5 max s=640x480 fps=30" (alternative pin name "0")',
+        ' Pin "  vcodec=mjpeg  min s=640x480 fps=5 max s=640x480 fps=30" (alternative pin name '
+        '"0")',
         "  min ch=1 bits=8 rate= 11025 max ch=2 bits=16 rate= 44100",  # of a microphone
         "  1280x720@[15.000000]fps",
         "  1280x720@[30.000000 15.000000]fps",

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Streams that lose packets on their way: what is shown is what the camera saw, and it goes on with a key frame."""
+"""Streams that lose packets on their way: what is shown is what the camera saw, and it goes on with
+a key frame.
+"""
 
 from functools import cache
 from itertools import chain
@@ -18,15 +20,19 @@ INTACT = [*range(LOST), *range(2 * GROUP, COUNT)]
 
 @pytest.fixture(autouse=True)
 def patient(monkeypatch):
-    """However long a busy computer does not run a server's thread, its stream does not count as interrupted."""
+    """However long a busy computer does not run a server's thread, its stream does not count as
+    interrupted.
+    """
     monkeypatch.setattr(stream, "STALLED_S", 300.0)
 
 
 @cache
 def walking(count=COUNT):
-    """Grainy pictures of a bar that moves, of which an encoder predicts much, but not everything, from those before.
+    """Grainy pictures of a bar that moves, of which an encoder predicts much, but not everything,
+    from those before.
 
-    Their sides are multiples of 16: with 120 rows, x264 encoded the same pictures otherwise once in a hundred times.
+    Their sides are multiples of 16: with 120 rows, x264 encoded the same pictures otherwise once in
+    a hundred times.
     """
     random = np.random.default_rng(1)
     grain, pictures = random.integers(0, 60, (128, 176, 3)), []
@@ -43,7 +49,8 @@ def _encoded(codec, kind):
 
 
 def encoded_once(codec, kind="mpegts"):
-    """The stream of ``walking``. x264 sometimes encodes the same pictures otherwise, so every test has to get the same.
+    """The stream of ``walking``. x264 sometimes encodes the same pictures otherwise, so every test
+    has to get the same.
 
     (To `cache`, a call without a default value is not that with it.)
     """
@@ -52,7 +59,10 @@ def encoded_once(codec, kind="mpegts"):
 
 def shown(address, clock=None):
     """The pictures that a stream shows, in the place of those that were left out None."""
-    return [None if p is None else p.image_rgb for p in open_source(address).pictures(clock or FakeClock())]
+    return [
+        None if p is None else p.image_rgb
+        for p in open_source(address).pictures(clock or FakeClock())
+    ]
 
 
 def served_pictures(tmp_path, data):
@@ -62,7 +72,9 @@ def served_pictures(tmp_path, data):
 
 @pytest.fixture(scope="module")
 def truth_of(tmp_path_factory):
-    """``truth_of(codec)``: what the stream shows of which nothing is lost, which all tests compare with."""
+    """``truth_of(codec)``: what the stream shows of which nothing is lost, which all tests compare
+    with.
+    """
     folder = tmp_path_factory.mktemp("intact")
     return cache(lambda codec, kind="mpegts": served_pictures(folder, encoded_once(codec, kind)))
 
@@ -80,13 +92,16 @@ def truth_of_camera():
 
 
 def numbers(pictures, truth):
-    """Of each picture that is shown, the number of the undamaged one that it equals; None: of no one."""
+    """Of each picture that is shown, the number of the undamaged one that it equals; None: of no
+    one.
+    """
     known = {true.tobytes(): k for k, true in enumerate(truth)}
     return [known.get(picture.tobytes()) for picture in pictures if picture is not None]
 
 
 def cut(data, picture, packets):
-    """Return a transport stream of H.264 or MPEG without some packets of 188 bytes of one of its pictures.
+    """Return a transport stream of H.264 or MPEG without some packets of 188 bytes of one of its
+    pictures.
 
     :param packets: a slice of those of the picture.
     """
@@ -102,23 +117,33 @@ ALL, MIDDLE, LAST, FIRST = slice(None), slice(2, 4), slice(-2, None), slice(0, 2
 
 
 @pytest.mark.parametrize("codec", ["libx264", "libx265", "mpeg4", "mpeg2video"])
-@pytest.mark.parametrize("packets", [ALL, MIDDLE, LAST, FIRST], ids=["all", "middle", "last", "first"])
-def test_after_lost_packets_nothing_is_shown_until_the_next_key_frame(tmp_path, truth_of, codec, packets):
+@pytest.mark.parametrize(
+    "packets", [ALL, MIDDLE, LAST, FIRST], ids=["all", "middle", "last", "first"]
+)
+def test_after_lost_packets_nothing_is_shown_until_the_next_key_frame(
+    tmp_path, truth_of, codec, packets
+):
     truth = truth_of(codec)
     found = served_pictures(tmp_path, cut(encoded_once(codec), LOST, packets))
     assert numbers(truth, truth) == list(range(COUNT))
-    assert numbers(found, truth) in [[k for k in INTACT if k not in range(LOST - early, LOST)] for early in range(3)]
+    assert numbers(found, truth) in [
+        [k for k in INTACT if k not in range(LOST - early, LOST)] for early in range(3)
+    ]
     assert any(picture is None for picture in found)
 
 
 def test_a_lost_picture_is_noticed_by_the_numbers_of_the_others(tmp_path, truth_of):
-    """As a camera leaves out pictures that its connection is too slow for: no packet says that one is missing."""
+    """As a camera leaves out pictures that its connection is too slow for: no packet says that one
+    is missing.
+    """
     found = served_pictures(tmp_path, without(encoded_once("libx264"), [LOST]))
     assert numbers(found, truth_of("libx264")) == INTACT
     assert sum(picture is None for picture in found) == 2 * GROUP - LOST - 1
 
 
-@pytest.mark.parametrize("packets", [ALL, slice(1, 2), FIRST, LAST], ids=["all", "second", "first", "last"])
+@pytest.mark.parametrize(
+    "packets", [ALL, slice(1, 2), FIRST, LAST], ids=["all", "second", "first", "last"]
+)
 def test_a_network_camera_that_loses_packets(truth_of_camera, packets):
     truth = truth_of_camera()
     pictures, media = rtp_of_h264(encoded_once("libx264"))

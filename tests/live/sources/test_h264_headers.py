@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Numbers of H.264 pictures, as x264 encodes them in several ways: complete streams have no gaps, others do."""
+"""Numbers of H.264 pictures, as x264 encodes them in several ways: complete streams have no gaps,
+others do.
+"""
 
 import io
 import re
@@ -28,7 +30,9 @@ def packets_of(way, count=300):
     kind, options, pixels = WAYS[way]
     random, target = np.random.default_rng(0), io.BytesIO()
     with av.open(target, "w", format=kind) as container:
-        stream = container.add_stream("libx264", rate=30, options={"preset": "ultrafast", "bf": "0"} | options)
+        stream = container.add_stream(
+            "libx264", rate=30, options={"preset": "ultrafast", "bf": "0"} | options
+        )
         stream.height, stream.width, stream.pix_fmt = 64, 64, pixels
         for k in range(count):
             picture = random.integers(0, 255, (64, 64, 3), np.uint8)

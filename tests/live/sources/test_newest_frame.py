@@ -65,7 +65,10 @@ def test_an_interruption_that_lasts_is_said_once():
     with NewestFrame(source, clock, reconnect_s=1.0, say=said.append) as reader:
         all_taken(reader)
     assert source.opened > 3
-    assert said == ["fake has ended; connecting again in 1 s", "fake is gone; connecting again in 1 s"]
+    assert said == [
+        "fake has ended; connecting again in 1 s",
+        "fake is gone; connecting again in 1 s",
+    ]
 
 
 def test_every_opened_source_is_closed():
@@ -89,7 +92,9 @@ def test_a_source_that_cannot_be_opened_at_first_fails_even_if_it_could_be_tried
 def test_an_error_in_a_running_stream_is_said_and_survived():
     said, clock = [], FakeClock()
     source = FakeSource([0.0], error=VideoError("fake was interrupted (timed out)"))
-    with NewestFrame(source, clock, reconnect_s=1.0, say=lambda s: (said.append(s), clock.stopped.set())) as reader:
+    with NewestFrame(
+        source, clock, reconnect_s=1.0, say=lambda s: (said.append(s), clock.stopped.set())
+    ) as reader:
         all_taken(reader)
     assert said == ["fake was interrupted (timed out); connecting again in 1 s"]
 
@@ -107,7 +112,9 @@ def test_stopping_does_not_wait_for_a_source_that_is_stalled():
 
 def test_pictures_of_another_shape_are_given_as_they_are():
     taken = []
-    source = FakeSource(np.arange(5) / 10, ends=True, images=[WIDE, TALL, TALL[::2, ::2], WIDE[::2, ::2], WIDE])
+    source = FakeSource(
+        np.arange(5) / 10, ends=True, images=[WIDE, TALL, TALL[::2, ::2], WIDE[::2, ::2], WIDE]
+    )
     with NewestFrame(source, FakeClock(), received=taken.append) as reader:
         reader._thread.join(300)
     shapes = [(40, 60, 3), (60, 40, 3), (60, 40, 3), (20, 30, 3), (20, 30, 3)]
@@ -126,9 +133,13 @@ def test_damaged_frames_are_counted_and_said_not_again_and_again():
     with NewestFrame(source, clock, say=said.append, received=taken.append) as reader:
         reader._thread.join(300)
     assert (reader.received, reader.damaged) == (6, 4)
-    assert [picture.timestamp_s for picture in taken] == pytest.approx([0.0, 0.1, 0.2, 0.6, 0.7, 0.9])
+    assert [picture.timestamp_s for picture in taken] == pytest.approx(
+        [0.0, 0.1, 0.2, 0.6, 0.7, 0.9]
+    )
     said = [
-        text for text in said if text.startswith("data of fake was lost or damaged in transmission; damaged images")
+        text
+        for text in said
+        if text.startswith("data of fake was lost or damaged in transmission; damaged images")
     ]
     assert len(said) == 2
 
@@ -136,12 +147,16 @@ def test_damaged_frames_are_counted_and_said_not_again_and_again():
 def test_a_source_that_is_frozen_is_said_once_each_time():
     said, clock = [], FakeClock()
     times = np.arange(0, 26, 0.5)
-    images = [WIDE + np.uint8(0 if t < 2 else 1 if t < 10 else 2 + t % 2 if t < 17 else 7) for t in times]
+    images = [
+        WIDE + np.uint8(0 if t < 2 else 1 if t < 10 else 2 + t % 2 if t < 17 else 7) for t in times
+    ]
 
     def before(index):
         clock.time_s = 100.0 + times[index]
 
-    with NewestFrame(FakeSource(times, images=images, before=before), clock, 0.0, said.append) as reader:
+    with NewestFrame(
+        FakeSource(times, images=images, before=before), clock, 0.0, said.append
+    ) as reader:
         reader._thread.join(300)
     assert said == ["fake has shown the same image for 5 s; check whether it is frozen"] * 2
 
@@ -154,7 +169,9 @@ def test_a_computer_that_slept_says_so_and_shows_no_backlog():
         clock.time_s = 100.0 + index / 30 + 3600.0 * (index >= 2)
 
     times = [k / 30 + 3600.0 * (k >= 2) for k in range(5)]
-    with NewestFrame(FakeSource(times, before=before), clock, 0.0, said.append, taken.append) as reader:
+    with NewestFrame(
+        FakeSource(times, before=before), clock, 0.0, said.append, taken.append
+    ) as reader:
         reader._thread.join(300)
         newest = all_taken(reader)
     assert said == ["nothing came from fake for 3600 s, as when a computer sleeps; it goes on"]
@@ -163,7 +180,9 @@ def test_a_computer_that_slept_says_so_and_shows_no_backlog():
 
 
 class Arrivals:
-    """In the place of the reader's condition: whoever waits for a frame gets the next one, at its time."""
+    """In the place of the reader's condition: whoever waits for a frame gets the next one, at its
+    time.
+    """
 
     def __init__(self, clock, rate):
         self.clock, self.rate, self.given, self.reader = clock, rate, 0, None

@@ -35,13 +35,17 @@ def steps_after(frames, rate, seconds):
     return np.diff(frames[frames > seconds * rate])
 
 
-@pytest.mark.parametrize(("rate", "took_s", "every"), [(60, 0.02, 2), (60, 0.03, 2), (120, 0.012, 2), (120, 0.022, 4)])
+@pytest.mark.parametrize(
+    ("rate", "took_s", "every"), [(60, 0.02, 2), (60, 0.03, 2), (120, 0.012, 2), (120, 0.022, 4)]
+)
 def test_frames_that_take_too_long_are_processed_evenly(rate, took_s, every):
     steps = steps_after(processed(rate, 10, lambda _: took_s), rate, IN_TIME_S + 1.0)
     assert set(steps) == {every}
 
 
-@pytest.mark.parametrize(("rate", "took_s", "every"), [(60, 0.06, 4), (60, 0.045, 3), (30, 0.06, 2), (120, 0.045, 6)])
+@pytest.mark.parametrize(
+    ("rate", "took_s", "every"), [(60, 0.06, 4), (60, 0.045, 3), (30, 0.06, 2), (120, 0.045, 6)]
+)
 def test_a_slow_machine_processes_evenly_what_is_hardly_less(rate, took_s, every):
     frames = processed(rate, 20, lambda _: took_s)
     assert set(steps_after(frames, rate, 3.0)) == {every}
@@ -112,7 +116,9 @@ def test_a_machine_that_becomes_faster_processes_every_frame_again_and_does_not_
 
 def test_a_machine_that_is_barely_fast_enough_does_not_waver():
     pace, chosen = Pace(), []
-    processed(60, 20, lambda _: chosen.append(pace.every) or 0.0145 * (1 + 0.1 * (len(chosen) % 3)), pace)
+    processed(
+        60, 20, lambda _: chosen.append(pace.every) or 0.0145 * (1 + 0.1 * (len(chosen) % 3)), pace
+    )
     assert set(chosen[10:]) == {2}
 
 

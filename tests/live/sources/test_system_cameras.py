@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cameras of Windows and macOS, as FFmpeg would list and open them: there are none here, so that it is replaced."""
+"""Cameras of Windows and macOS, as FFmpeg would list and open them: there are none here, so that it
+is replaced.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,9 @@ BLUE = np.full((48, 64, 3), (10, 20, 240), np.uint8)
 
 
 def device(name, description, *media):
-    return SimpleNamespace(name=name, description=description, media_types=list(media), is_default=False)
+    return SimpleNamespace(
+        name=name, description=description, media_types=list(media), is_default=False
+    )
 
 
 SYSTEMS = {
@@ -52,7 +56,8 @@ def system(request, monkeypatch):
             for _ in range(pieces.pop()):
                 yield av.VideoFrame.from_ndarray(BLUE, format="rgb24")
             if pieces:
-                raise av.error.BlockingIOError(11, "Resource temporarily unavailable")  # there is no picture yet
+                # there is no picture yet
+                raise av.error.BlockingIOError(11, "Resource temporarily unavailable")
 
         return nullcontext(SimpleNamespace(decode=decode))
 
@@ -72,7 +77,9 @@ def test_cameras_are_listed_without_microphones_and_screens(system):
 
 def test_the_camera_of_the_list_is_opened_in_720p_and_its_pictures_are_given(system):
     taken = []
-    with pytest.raises(VideoError, match="camera 1 gives no more frames; check that it is plugged in"):
+    with pytest.raises(
+        VideoError, match="camera 1 gives no more frames; check that it is plugged in"
+    ):
         taken.extend(open_source("1").pictures(Clock()))
     assert [(k, file) for k, file, _ in system.asked] == [OPENED[system.name]] * 2
     assert [options for _, _, options in system.asked] == [
@@ -93,7 +100,11 @@ def test_a_camera_that_cannot_be_opened_is_said_by_its_name(system, monkeypatch)
         raise OSError("Input/output error")
 
     monkeypatch.setattr(av, "open", refuse)
-    with pytest.raises(VideoError, match=r"camera 0 \(.* Camera\) cannot be opened \(input/output error\); check"):
+    with pytest.raises(
+        VideoError,
+        match=r"camera 0 \(.* Camera\) cannot be opened \(input/output "
+        r"error\); check",
+    ):
         next(iter(open_source("0").pictures(Clock())))
 
 
@@ -114,12 +125,16 @@ def test_where_nothing_is_listed_opencv_opens_the_number(platform, monkeypatch):
         next(iter(open_source("7").pictures(Clock())))
 
 
-# What FFmpeg says of a camera, in the pieces in which dshow.c and avfoundation.m hand it to the log.
+# What FFmpeg says of a camera, in the pieces in which dshow.c and avfoundation.m hand it to the
+# log.
 LOGS = {
     "win32": [
-        "DirectShow video device options (from video devices)\n", ' Pin "Capture" (alternative pin name "0")\n',
-        "  pixel_format=yuyv422", "  min s=640x480 fps=5 max s=640x480 fps=30", " (tv, bt470bg/bt709/unknown",
-        ", topleft", ")", "\n", "  vcodec=mjpeg", "  min s=960x540 fps=5 max s=960x540 fps=15", "\n",
+        "DirectShow video device options (from video "
+        "devices)\n", ' Pin "Capture" (alternative pin name "0")\n',
+        "  pixel_format=yuyv422", "  min s=640x480 fps=5 max s=640x480 "
+                                  "fps=30", " (tv, bt470bg/bt709/unknown",
+        ", topleft", ")", "\n", "  vcodec=mjpeg", "  min s=960x540 fps=5 max s=960x540 "
+                                                  "fps=15", "\n",
         "  vcodec=mjpeg", "  min s=960x540 fps=5 max s=960x540 fps=15", "\n",
     ],
     "darwin": [
@@ -134,7 +149,9 @@ SHOWN = {"win32": ("yuyv422 640×480", "mjpeg 960×540"), "darwin": ("960×540",
 
 @pytest.fixture
 def telling(system, monkeypatch):
-    """The same system, whose cameras have none of the sizes that they are asked for, and say which they have."""
+    """The same system, whose cameras have none of the sizes that they are asked for, and say which
+    they have.
+    """
     rate = "15.000000" if system.name == "win32" else "15.000015"
 
     def open_device(file, *, format, options, mode):
@@ -161,7 +178,14 @@ def test_a_camera_tells_its_formats_through_ffmpegs_log(telling):
 
 
 def test_a_camera_without_720p_is_opened_in_the_mode_nearest_to_it(telling):
-    assert list(system_cameras.pictures(system_cameras.open_camera(1, (1280, 720), telling.name), Clock())) == []
+    assert (
+        list(
+            system_cameras.pictures(
+                system_cameras.open_camera(1, (1280, 720), telling.name), Clock()
+            )
+        )
+        == []
+    )
     sizes = [options.get("video_size") for _, _, options in telling.asked]
     assert sizes[:2] == ["1280x720"] * 2
     assert sizes[-1] == "960x540"

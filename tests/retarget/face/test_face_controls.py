@@ -6,7 +6,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scope.scope_addon.retarget.expression_map import ExpressionMap
-from scope.scope_addon.retarget.face.face_controls import built_in, control_motions, guess_control_map
+from scope.scope_addon.retarget.face.face_controls import (
+    built_in,
+    control_motions,
+    guess_control_map,
+)
 from scope.scope_addon.retarget.face.face_frame import RestBone, measure_face
 from scope.solver.errors import InputError
 from scope.solver.names import EXPRESSIONS
@@ -33,7 +37,10 @@ def face(size=1.0, turned=(0, 0, 0), seed=0):
     """The face, scaled and turned as a whole, whose bones have any axes."""
     random = np.random.default_rng(seed)
     R = exp(np.array(turned, float))
-    return {n: RestBone(size * R @ np.array(p), R @ exp(random.normal(size=3))) for n, p in PLACES.items()}
+    return {
+        n: RestBone(size * R @ np.array(p), R @ exp(random.normal(size=3)))
+        for n, p in PLACES.items()
+    }
 
 
 def weights(**values):
@@ -47,7 +54,8 @@ def posed(bones, motions):
     """Where each control's head is, (3,), and how it is turned, (3, 3), in the armature's space."""
     return {
         m.bone: (
-            bones[m.bone].head + (bones[m.bone].rotation @ m.locations[0] if m.locations is not None else 0),
+            bones[m.bone].head
+            + (bones[m.bone].rotation @ m.locations[0] if m.locations is not None else 0),
             bones[m.bone].rotation @ m.rotations[0] @ bones[m.bone].rotation.T
             if m.rotations is not None
             else np.eye(3),
@@ -65,15 +73,25 @@ def test_amounts_are_shares_of_the_faces_lengths_along_its_axes():
     }
     found = posed(bones, control_motions(ExpressionMap({}, amounts), weights(jawOpen=0.5), bones))
     mouth, lids, eyes = 0.05, 0.012, 0.06
-    np.testing.assert_allclose(found["lip.B"][0], (0, -0.02 - 0.05 * mouth, 1.59 - 0.25 * mouth), atol=1e-12)
-    np.testing.assert_allclose(found["lid.T.L.002"][0], (0.03, -0.01, 1.706 - 0.5 * lids), atol=1e-12)
-    np.testing.assert_allclose(found["brow.T.L.003"][0], (0.02 + 0.05 * eyes, -0.01, 1.72), atol=1e-12)
+    np.testing.assert_allclose(
+        found["lip.B"][0], (0, -0.02 - 0.05 * mouth, 1.59 - 0.25 * mouth), atol=1e-12
+    )
+    np.testing.assert_allclose(
+        found["lid.T.L.002"][0], (0.03, -0.01, 1.706 - 0.5 * lids), atol=1e-12
+    )
+    np.testing.assert_allclose(
+        found["brow.T.L.003"][0], (0.02 + 0.05 * eyes, -0.01, 1.72), atol=1e-12
+    )
 
 
 def test_turns_go_down_to_the_left_and_left_side_up():
     bones = face()
     ahead, left = np.array([0.0, -1, 0]), np.array([1.0, 0, 0])
-    for channel, from_, to in (("pitch", ahead, (0, 0, -1)), ("yaw", ahead, (1, 0, 0)), ("roll", left, (0, 0, 1))):
+    for channel, from_, to in (
+        ("pitch", ahead, (0, 0, -1)),
+        ("yaw", ahead, (1, 0, 0)),
+        ("roll", left, (0, 0, 1)),
+    ):
         amounts = ExpressionMap({}, {"jaw_master": {channel: {"jawOpen": 90.0}}})
         (_, R) = posed(bones, control_motions(amounts, weights(jawOpen=1), bones))["jaw_master"]
         np.testing.assert_allclose(R @ from_, to, atol=1e-12)
@@ -81,27 +99,45 @@ def test_turns_go_down_to_the_left_and_left_side_up():
 
 def test_an_eye_looks_at_its_target_by_the_angle():
     bones = face()
-    amounts = ExpressionMap({}, {"eye.L": {"yaw": {"eyeLookOutLeft": 20.0}, "pitch": {"eyeLookDownLeft": 10.0}}})
+    amounts = ExpressionMap(
+        {}, {"eye.L": {"yaw": {"eyeLookOutLeft": 20.0}, "pitch": {"eyeLookDownLeft": 10.0}}}
+    )
     for name, angle in (("eyeLookOutLeft", 20), ("eyeLookDownLeft", 10)):
         (motion,) = control_motions(amounts, weights(**{name: 1}), bones)
         assert motion.rotations is None
         seen = posed(bones, [motion])["eye.L"][0] - PLACES["ORG-eye.L"]
-        side = (np.sin(np.radians(20)), 0) if name == "eyeLookOutLeft" else (0, -np.sin(np.radians(10)))
+        side = (
+            (np.sin(np.radians(20)), 0)
+            if name == "eyeLookOutLeft"
+            else (0, -np.sin(np.radians(10)))
+        )
         np.testing.assert_allclose(seen[[0, 2]] / 0.5, side, atol=1e-9)
         assert np.linalg.norm(seen) == pytest.approx(0.5), f"{angle} degrees about the eye"
 
 
 def test_a_scaled_and_turned_face_moves_alike():
-    shown = weights(jawOpen=0.7, eyeBlinkLeft=1, browInnerUp=0.5, eyeLookInLeft=0.8, mouthSmileLeft=0.9)
+    shown = weights(
+        jawOpen=0.7, eyeBlinkLeft=1, browInnerUp=0.5, eyeLookInLeft=0.8, mouthSmileLeft=0.9
+    )
     bones = face()
     plain = posed(bones, control_motions(built_in("rigify"), shown, bones))
-    assert set(plain) == {"lips.L", "lips.R", "lip.B", "lid.T.L.002", "lid.B.L.002", "brow.T.L.003", "jaw_master"} | {
+    assert set(plain) == {
+        "lips.L",
+        "lips.R",
+        "lip.B",
+        "lid.T.L.002",
+        "lid.B.L.002",
+        "brow.T.L.003",
+        "jaw_master",
+    } | {
         "eye.L",
         "eye.R",
     }
     other = face(37.0, (0.4, -0.3, 1.1), seed=1)
     R = exp(np.array((0.4, -0.3, 1.1)))
-    for name, (place, turn) in posed(other, control_motions(built_in("rigify"), shown, other)).items():
+    for name, (place, turn) in posed(
+        other, control_motions(built_in("rigify"), shown, other)
+    ).items():
         np.testing.assert_allclose(place, 37.0 * R @ plain[name][0], atol=1e-9)
         np.testing.assert_allclose(turn, R @ plain[name][1] @ R.T, atol=1e-9)
 
@@ -130,13 +166,18 @@ def test_built_in_maps_are_symmetric_and_know_all_expressions(rig):
     found = built_in(rig)
     found.check()
     mirrored = {
-        (_other(bone), channel, _other_expression(name)): -f if channel in ("left", "yaw", "roll") else f
+        (_other(bone), channel, _other_expression(name)): -f
+        if channel in ("left", "yaw", "roll")
+        else f
         for bone, channels in found.controls.items()
         for channel, factors in channels.items()
         for name, f in factors.items()
     }
     plain = {
-        (b, c, n): f for b, channels in found.controls.items() for c, fs in channels.items() for n, f in fs.items()
+        (b, c, n): f
+        for b, channels in found.controls.items()
+        for c, fs in channels.items()
+        for n, f in fs.items()
     }
     assert plain.keys() == mirrored.keys()
     assert all(plain[entry] == pytest.approx(mirrored[entry], abs=0.011) for entry in plain)
@@ -170,7 +211,9 @@ def test_the_map_of_a_rig_is_guessed_by_its_bones(rig, sign):
 
 def test_a_face_that_cannot_be_measured_says_what_it_needs():
     bones = face()
-    with pytest.raises(InputError, match="no bones for the corners of the mouth of its face; it needs 'lips.L'"):
+    with pytest.raises(
+        InputError, match="no bones for the corners of the mouth of its face; it needs 'lips.L'"
+    ):
         measure_face({name: bone for name, bone in bones.items() if not name.startswith("lips")})
     flat = {name: RestBone(np.zeros(3), bone.rotation) for name, bone in bones.items()}
     with pytest.raises(InputError, match="in one place"):

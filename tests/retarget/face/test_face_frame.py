@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Axes and lengths of a face by its bones at rest, whatever the rig, its size and how it is turned."""
+"""Axes and lengths of a face by its bones at rest, whatever the rig, its size and how it is
+turned.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,9 @@ NAMES = [
 ]
 
 
-def bones(names: tuple[str, ...], size: float = 1.0, R: np.ndarray | None = None) -> dict[str, RestBone]:
+def bones(
+    names: tuple[str, ...], size: float = 1.0, R: np.ndarray | None = None
+) -> dict[str, RestBone]:
     places = zip((*names, "lid.T.L.002", "lid.B.L.002"), (*EYES, *MOUTH, *LIDS), strict=True)
     turned = np.eye(3) if R is None else R
     return {name: RestBone(size * turned @ np.array(place), turned) for name, place in places}
@@ -45,8 +49,17 @@ def test_a_rig_that_is_scaled_and_turned_has_the_same_face() -> None:
 
 def test_controls_are_moved_by_the_length_of_what_is_around_them() -> None:
     frame = measure_face(bones(NAMES[0]))
-    lengths = {name: frame.length(name) for name in ("lid.T.L", "brow.T.R.001", "nose.L", "lips.R", "jaw_master")}
-    expected = {"lid.T.L": 0.012, "brow.T.R.001": 0.06, "nose.L": 0.06, "lips.R": 0.04, "jaw_master": 0.04}
+    lengths = {
+        name: frame.length(name)
+        for name in ("lid.T.L", "brow.T.R.001", "nose.L", "lips.R", "jaw_master")
+    }
+    expected = {
+        "lid.T.L": 0.012,
+        "brow.T.R.001": 0.06,
+        "nose.L": 0.06,
+        "lips.R": 0.04,
+        "jaw_master": 0.04,
+    }
     assert lengths == pytest.approx(expected)
 
 

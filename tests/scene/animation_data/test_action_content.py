@@ -13,7 +13,9 @@ def animated():
     """Return an object with keys that a user has changed by hand."""
     obj = bpy.data.objects.new("Object", None)
     channels = Channels(obj, bpy.data.actions.new("Take"))
-    curves = channels.write("location", np.arange(5.0), np.random.default_rng(0).normal(size=(5, 3)), group="Place")
+    curves = channels.write(
+        "location", np.arange(5.0), np.random.default_rng(0).normal(size=(5, 3)), group="Place"
+    )
     channels.write("scale", np.arange(3.0), np.ones((3, 3)), "BEZIER")
     point = curves[0].keyframe_points[2]
     point.interpolation, point.easing = "ELASTIC", "EASE_OUT"
@@ -23,10 +25,16 @@ def animated():
     curves[0].update()
     curves[1].mute, curves[1].extrapolation, curves[1].color_mode = True, "LINEAR", "CUSTOM"
     noise = curves[2].modifiers.new("NOISE")
-    noise.strength, noise.use_restricted_range, noise.frame_start, noise.frame_end = 0.5, True, 2.0, 4.0
+    noise.strength, noise.use_restricted_range, noise.frame_start, noise.frame_end = (
+        0.5,
+        True,
+        2.0,
+        4.0,
+    )
     envelope = curves[2].modifiers.new("ENVELOPE")
     envelope.control_points.add(3.0)
-    envelope.control_points.foreach_set("min", [-0.5])  # Blender 5.2 can crash on assigning to one point
+    # Blender 5.2 can crash on assigning to one point
+    envelope.control_points.foreach_set("min", [-0.5])
     envelope.control_points.foreach_set("max", [0.25])
     generator = curves[2].modifiers.new("GENERATOR")
     generator.poly_order = 2
@@ -48,7 +56,10 @@ def values(struct):
 
 def content(obj):
     """Return everything that the action holds for an object."""
-    curves = {(c.data_path, c.array_index): {**values(c), "group": c.group and c.group.name} for c in fcurves(obj)}
+    curves = {
+        (c.data_path, c.array_index): {**values(c), "group": c.group and c.group.name}
+        for c in fcurves(obj)
+    }
     action = obj.animation_data.action
     return curves, action.use_frame_range, tuple(action.frame_range)
 

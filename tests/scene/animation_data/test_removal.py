@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""No scene's dependency graph keeps objects that were removed while the window showed another scene."""
+"""No scene's dependency graph keeps objects that were removed while the window showed another
+scene.
+"""
 
 import bpy
 import numpy as np
@@ -11,7 +13,9 @@ from scope.scope_addon.scene.live.live_body import LiveBody
 
 
 def in_graph(scene):
-    """Return how many datablocks the dependency graph of a scene has; the names of removed ones cannot be read."""
+    """Return how many datablocks the dependency graph of a scene has; the names of removed ones
+    cannot be read.
+    """
     return len(scene.view_layers[0].depsgraph.ids)
 
 

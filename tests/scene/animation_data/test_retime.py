@@ -7,7 +7,12 @@ import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.scene.animation_data.actions import fcurves
-from scope.scope_addon.scene.animation_data.retime import Retiming, action_strips, retime_keys, retime_strip
+from scope.scope_addon.scene.animation_data.retime import (
+    Retiming,
+    action_strips,
+    retime_keys,
+    retime_strip,
+)
 
 DOUBLED = Retiming(1.0, 2.0)
 
@@ -47,7 +52,8 @@ def test_keys_near_whole_frames_are_put_on_them() -> None:
 def test_a_span_contains_what_it_contained() -> None:
     assert DOUBLED.span(1, 10) == (1, 19)
     assert Retiming(1.0, 24 / 30).span(2, 9) == (1, 8)
-    assert Retiming(0.0, 1 / 49).span(49, 98) == (1, 2)  # 49 / 49 is less than 1 in double precision
+    # 49 / 49 is less than 1 in double precision
+    assert Retiming(0.0, 1 / 49).span(49, 98) == (1, 2)
 
 
 @pytest.mark.parametrize("factor", [2.0, 0.5])

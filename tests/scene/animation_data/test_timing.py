@@ -51,7 +51,9 @@ def test_impossible_rates_are_refused(rate):
 def test_keys_lie_at_timestamp_times_rate():
     stamps = np.array([0.0, 0.031, 0.07, 0.1])
     np.testing.assert_allclose(timing.key_frames(stamps, 30.0), [0.0, 0.93, 2.1, 3.0])
-    np.testing.assert_allclose(timing.key_frames(stamps, 24.0, start_frame=1.0), [1.0, 1.744, 2.68, 3.4])
+    np.testing.assert_allclose(
+        timing.key_frames(stamps, 24.0, start_frame=1.0), [1.0, 1.744, 2.68, 3.4]
+    )
 
 
 def test_rounded_timestamps_land_on_whole_frames():
@@ -66,7 +68,9 @@ def test_bad_timestamps_are_refused(stamps):
         timing.key_frames(np.array(stamps), 30.0)
 
 
-@pytest.mark.parametrize(("first", "last", "expected"), [(0.0, 9.2, (0, 10)), (500.5, 600.0, (500, 600))])
+@pytest.mark.parametrize(
+    ("first", "last", "expected"), [(0.0, 9.2, (0, 10)), (500.5, 600.0, (500, 600))]
+)
 def test_frame_range_covers_the_keys(first, last, expected):
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 100, 200

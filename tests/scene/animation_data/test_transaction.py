@@ -4,20 +4,30 @@
 import bpy
 import numpy as np
 import pytest
-from scope.scope_addon.scene.animation_data.actions import Channels, fcurves, read_keys, rewrite_keys
+from scope.scope_addon.scene.animation_data.actions import (
+    Channels,
+    fcurves,
+    read_keys,
+    rewrite_keys,
+)
 from scope.scope_addon.scene.animation_data.transaction import all_or_nothing
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 
 
 @pytest.fixture
 def person(body, make_motion):
-    return build_scene([make_motion(body, 12)], body, None, BuildOptions(start_frame=1.0, shape="per_frame")).people[0]
+    return build_scene(
+        [make_motion(body, 12)], body, None, BuildOptions(start_frame=1.0, shape="per_frame")
+    ).people[0]
 
 
 def everything(person):
     """Return the values that must not change."""
     scene, rig, keys = bpy.context.scene, person.armature, person.mesh.data.shape_keys
-    curves = [(c.data_path, c.array_index, read_keys(c).tobytes()) for c in (*fcurves(rig), *fcurves(keys))]
+    curves = [
+        (c.data_path, c.array_index, read_keys(c).tobytes())
+        for c in (*fcurves(rig), *fcurves(keys))
+    ]
     action = rig.animation_data.action
     kinds = ("objects", "actions", "meshes", "collections")
     return {
@@ -25,10 +35,20 @@ def everything(person):
         "action": (action.name, action.use_fake_user, keys.animation_data.action.name),
         # Not only of the same name: undo crashes on a datablock that no step contains.
         "identities": {b.session_uid for kind in kinds for b in getattr(bpy.data, kind)},
-        "place": (rig.parent, np.array(rig.matrix_basis).tobytes(), np.array(rig.matrix_parent_inverse).tobytes()),
+        "place": (
+            rig.parent,
+            np.array(rig.matrix_basis).tobytes(),
+            np.array(rig.matrix_parent_inverse).tobytes(),
+        ),
         "properties": ({k: str(rig[k]) for k in rig.keys()}, dict(rig.pose.bones[3].items())),
         "blocks": {kind: sorted(block.name for block in getattr(bpy.data, kind)) for kind in kinds},
-        "scene": (scene.frame_start, scene.frame_end, scene.frame_current, scene.render.fps, scene.camera),
+        "scene": (
+            scene.frame_start,
+            scene.frame_end,
+            scene.frame_current,
+            scene.render.fps,
+            scene.camera,
+        ),
         "markers": [(m.name, m.frame) for m in scene.timeline_markers],
         "selected": sorted(obj.name for obj in bpy.context.selected_objects),
     }
@@ -41,7 +61,9 @@ def shuffle(person):
         rewrite_keys(curve, np.array([1.0, 2.0]), np.array([0.3, 0.4]))
     empty = bpy.data.objects.new("Root", None)
     scene.collection.objects.link(empty)
-    Channels(empty, bpy.data.actions.new("Trajectory")).write("location", np.array([1.0]), np.array([[1.0, 2.0, 3.0]]))
+    Channels(empty, bpy.data.actions.new("Trajectory")).write(
+        "location", np.array([1.0]), np.array([[1.0, 2.0, 3.0]])
+    )
     rig.parent, rig.location = empty, (1, 2, 3)
     rig["new"], rig["scope_start"], rig.pose.bones[3]["IK_FK"] = 1.0, 99.0, 0.5
     scene.frame_start, scene.frame_end, scene.render.fps = 5, 6, 99

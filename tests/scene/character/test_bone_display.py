@@ -10,7 +10,10 @@ def test_sides_have_their_colours_and_collections(body, make_motion):
     armature = build_scene([make_motion(body, 2)], body).people[0].armature
     bones = armature.data.bones
     assert {bone.color.palette for bone in bones} == {"CUSTOM"}
-    colours = {side: {tuple(bones[n].color.custom.normal) for n in names} for side, names in sides(body).items()}
+    colours = {
+        side: {tuple(bones[n].color.custom.normal) for n in names}
+        for side, names in sides(body).items()
+    }
     assert all(len(found) == 1 for found in colours.values())
     assert len(set.union(*colours.values())) == 3
     collections = {c.name: {b.name for b in c.bones} for c in armature.data.collections}
@@ -20,7 +23,11 @@ def test_sides_have_their_colours_and_collections(body, make_motion):
 def sides(body) -> dict[str, list[str]]:
     left = [n for n in body.joint_names if n.startswith("left")]
     right = [n for n in body.joint_names if n.startswith("right")]
-    return {"Left": left, "Right": right, "Middle": [n for n in body.joint_names if n not in left + right]}
+    return {
+        "Left": left,
+        "Right": right,
+        "Middle": [n for n in body.joint_names if n not in left + right],
+    }
 
 
 def test_rings_lie_around_the_limbs(body, make_motion):
@@ -28,13 +35,18 @@ def test_rings_lie_around_the_limbs(body, make_motion):
     person = build_scene([make_motion(body, 2)], body).people[0]
     rest = np.array([v.co for v in person.mesh.data.shape_keys.reference_key.data])
     for key in person.mesh.data.shape_keys.key_blocks[1:]:
-        rest = rest + key.value * (np.array([v.co for v in key.data]) - [v.co for v in key.relative_key.data])
+        rest = rest + key.value * (
+            np.array([v.co for v in key.data]) - [v.co for v in key.relative_key.data]
+        )
     for name in ("left_hip", "right_knee", "left_elbow", "spine2"):
         bone, posed = person.armature.data.bones[name], person.armature.pose.bones[name]
         head, tail = np.array(bone.head_local), np.array(bone.tail_local)
         along = (tail - head) / bone.length
         groups = person.mesh.vertex_groups[name].index
-        mine = [any(g.group == groups and g.weight > 0.5 for g in v.groups) for v in person.mesh.data.vertices]
+        mine = [
+            any(g.group == groups and g.weight > 0.5 for g in v.groups)
+            for v in person.mesh.data.vertices
+        ]
         offset = rest[mine] - head
         height = offset @ along
         # In a shorter piece of the bone, a mesh of few faces has no vertices on some sides.
@@ -42,7 +54,9 @@ def test_rings_lie_around_the_limbs(body, make_motion):
         reach = np.linalg.norm(offset[near] - np.outer(height[near], along), axis=1)
         ring = posed.custom_shape_scale_xyz[0]
         assert np.median(reach) < ring < 1.6 * reach.max(), name
-        np.testing.assert_allclose(posed.custom_shape_translation, [0, bone.length / 2, 0], atol=1e-6)
+        np.testing.assert_allclose(
+            posed.custom_shape_translation, [0, bone.length / 2, 0], atol=1e-6
+        )
         assert not posed.use_custom_shape_bone_size
 
 
@@ -61,6 +75,8 @@ def test_captures_share_one_ring_that_is_in_no_scene(body, make_motion):
     assert bone_display.RING not in bpy.data.meshes
 
 
-@pytest.mark.parametrize(("name", "side"), [("left_hip", "Left"), ("right_index1", "Right"), ("spine3", "Middle")])
+@pytest.mark.parametrize(
+    ("name", "side"), [("left_hip", "Left"), ("right_index1", "Right"), ("spine3", "Middle")]
+)
 def test_side_of_a_joint(name, side):
     assert bone_display.side_of(name) == side

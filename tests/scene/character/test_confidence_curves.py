@@ -10,7 +10,9 @@ from scope.solver.rotations import exp
 
 @pytest.fixture
 def doubtful(body, make_motion):
-    """Sixty frames; 20-22 not seen, 40-44 far from the footage, with different confidences and contacts per joint."""
+    """Sixty frames; 20-22 not seen, 40-44 far from the footage, with different confidences and
+    contacts per joint.
+    """
     motion = make_motion(body, 60)
     rng = np.random.default_rng(3)
     motion.joint_confidence[:] = rng.uniform(0.5, 1.0, motion.joint_confidence.shape)
@@ -27,7 +29,9 @@ def test_confidence_and_contact_follow_the_timeline(body, doubtful, blender):
         posed = rig.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones
         seen = [posed[name]["confidence"] for name in body.joint_names]
         np.testing.assert_allclose(seen, doubtful.joint_confidence[t], atol=1e-6)
-        ends = [posed[n]["contact"] for n in ("left_ankle", "left_foot", "right_ankle", "right_foot")]
+        ends = [
+            posed[n]["contact"] for n in ("left_ankle", "left_foot", "right_ankle", "right_foot")
+        ]
         np.testing.assert_allclose(ends, doubtful.foot_contact[t], atol=1e-6)
     assert "contact" not in rig.pose.bones["left_knee"]
     ui = rig.pose.bones["left_foot"].id_properties_ui("contact").as_dict()
@@ -35,7 +39,9 @@ def test_confidence_and_contact_follow_the_timeline(body, doubtful, blender):
 
 
 def test_deviations_follow_the_timeline_where_they_are_known(body, doubtful, blender):
-    doubtful.joint_sigma_m[:] = np.random.default_rng(4).uniform(0.01, 0.2, doubtful.joint_sigma_m.shape)
+    doubtful.joint_sigma_m[:] = np.random.default_rng(4).uniform(
+        0.01, 0.2, doubtful.joint_sigma_m.shape
+    )
     doubtful.joint_sigma_m[~doubtful.valid] = np.nan
     rig = build_scene([doubtful], body, options=NEW_SCENE).people[0].armature
     for t in (0, 17, 59):
@@ -63,7 +69,10 @@ def test_markers_at_review_spans(body, doubtful):
     scene = bpy.context.scene
     options = BuildOptions(frame_rate="set", start_frame=101)
     build_scene([doubtful], body, options=options)
-    assert [(m.name, m.frame) for m in scene.timeline_markers] == [("not seen 121-123", 121), ("check 141-145", 141)]
+    assert [(m.name, m.frame) for m in scene.timeline_markers] == [
+        ("not seen 121-123", 121),
+        ("check 141-145", 141),
+    ]
     build_scene([doubtful], body, options=options)
     assert len(scene.timeline_markers) == 2
     build_scene([doubtful, doubtful], body, options=options)
@@ -76,14 +85,19 @@ def test_a_marker_where_a_foot_is_under_the_floor(body, make_motion):
     motion.trans[:, 2] -= lowest  # the lowest vertex of each pose on the floor
     motion.trans[10:15, 2] -= 0.03
     build_scene([motion], body, options=BuildOptions(frame_rate="set"))
-    assert [(m.name, m.frame) for m in bpy.context.scene.timeline_markers] == [("under floor 10-14", 10)]
+    assert [(m.name, m.frame) for m in bpy.context.scene.timeline_markers] == [
+        ("under floor 10-14", 10)
+    ]
 
 
 def under_floor_depth(body, motion):
     """(T,) the height of each pose's lowest vertex."""
     betas = motion.betas.astype(float)
     turns = exp(motion.poses.reshape(len(motion), -1, 3).astype(float))
-    poses = [body.forward_kinematics(R, t, betas) for R, t in zip(turns, motion.trans.astype(float), strict=True)]
+    poses = [
+        body.forward_kinematics(R, t, betas)
+        for R, t in zip(turns, motion.trans.astype(float), strict=True)
+    ]
     return np.array([body.skin(*pose, betas)[:, 2].min() for pose in poses])
 
 

@@ -6,19 +6,36 @@ import json
 import bpy
 import pytest
 from scope.scope_addon.edit.pins.corrected_motion import with_corrections
-from scope.scope_addon.edit.pins.corrections import Contact, Exchange, FeetOnFloor, Interpolation, Pin
+from scope.scope_addon.edit.pins.corrections import (
+    Contact,
+    Exchange,
+    FeetOnFloor,
+    Interpolation,
+    Pin,
+)
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.character.correction_list import listed_corrections
 
 from ...edit.walking import BODY, motion_of, walk
 
-ENTRY = {"kind": "PIN", "text": "Left Wrist", "joint": "left_wrist", "first": 4, "last": 4, "missed": ""}
+ENTRY = {
+    "kind": "PIN",
+    "text": "Left Wrist",
+    "joint": "left_wrist",
+    "first": 4,
+    "last": 4,
+    "missed": "",
+}
 
 
 def test_a_corrected_file_brings_its_list(tmp_path):
     plain = motion_of(walk(2.0))
-    changes = (Pin(20, "left_wrist", (300.0, 200.0)), Contact(30, 34, "right"), Exchange(3, 5, "legs"))
+    changes = (
+        Pin(20, "left_wrist", (300.0, 200.0)),
+        Contact(30, 34, "right"),
+        Exchange(3, 5, "legs"),
+    )
     changes = (*changes, Interpolation(40, 42), FeetOnFloor())
     with_corrections(plain, BODY, changes).save(tmp_path / "a.npz")
     bpy.context.scene.render.fps = 60  # twice the motion's rate
@@ -38,7 +55,10 @@ def test_a_corrected_file_brings_its_list(tmp_path):
     ("stored", "expected"),
     [
         (json.dumps([ENTRY]), [ENTRY]),
-        (json.dumps([ENTRY, {"kind": "PIN"}, 7, dict(ENTRY, first="4"), dict(ENTRY, text=None)]), [ENTRY]),
+        (
+            json.dumps([ENTRY, {"kind": "PIN"}, 7, dict(ENTRY, first="4"), dict(ENTRY, text=None)]),
+            [ENTRY],
+        ),
         (json.dumps({"kind": "PIN"}), []),
         ("[" * 100_000, []),
         ("no json", []),

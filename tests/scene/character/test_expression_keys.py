@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The face in Blender: keys with ARKit's names, keyframes for those that move, and morph targets in files."""
+"""The face in Blender: keys with ARKit's names, keyframes for those that move, and morph targets in
+files.
+"""
 
 from __future__ import annotations
 
@@ -81,21 +83,28 @@ def test_teeth_and_tongue_come_with_the_face(whole_body, motion, make_motion):
     mesh = build_scene([motion], whole_body, options=NEW_SCENE).people[0].mesh
     plain = build_scene([make_motion(whole_body, 4)], whole_body, options=NEW_SCENE).people[0].mesh
     assert len(plain.data.vertices) == len(whole_body.v_template)
-    assert not {"teeth", "gums", "tongue"} & {m.name.partition(".")[0] for m in plain.data.materials}
+    assert not {"teeth", "gums", "tongue"} & {
+        m.name.partition(".")[0] for m in plain.data.materials
+    }
     slots = [m.name.partition(".")[0] for m in mesh.data.materials]
-    inside = [p for p in mesh.data.polygons if slots[p.material_index] in ("teeth", "gums", "tongue")]
+    inside = [
+        p for p in mesh.data.polygons if slots[p.material_index] in ("teeth", "gums", "tongue")
+    ]
     vertices = {v for polygon in inside for v in polygon.vertices}
     assert vertices == set(range(len(plain.data.vertices), len(mesh.data.vertices)))
     head = mesh.vertex_groups["head"].index
     for v in vertices:
         assert [(g.group, g.weight) for g in mesh.data.vertices[v].groups] == [(head, 1.0)]
-    for name, before in plain.data.shape_keys.key_blocks.items():  # the body's own vertices are the same
+    # the body's own vertices are the same
+    for name, before in plain.data.shape_keys.key_blocks.items():
         same = mesh.data.shape_keys.key_blocks[name].data
         assert all(same[v].co == before.data[v].co for v in range(0, len(plain.data.vertices), 97))
 
 
 def primitive_of(path: Path, material: str) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """The positions (n, 3) of a .glb's triangles of a material, and how far each target moves them; without Blender."""
+    """The positions (n, 3) of a .glb's triangles of a material, and how far each target moves them;
+    without Blender.
+    """
     data = path.read_bytes()
     length = struct.unpack("<I", data[12:16])[0]
     gltf, binary = json.loads(data[20 : 20 + length]), data[28 + length :]
@@ -112,22 +121,29 @@ def primitive_of(path: Path, material: str) -> tuple[np.ndarray, dict[str, np.nd
             sparse = accessor["sparse"]
             kind = {5121: "<u1", 5123: "<u2", 5125: "<u4"}[sparse["indices"]["componentType"]]
             starts = [
-                gltf["bufferViews"][sparse[key]["bufferView"]].get("byteOffset", 0) + sparse[key].get("byteOffset", 0)
+                gltf["bufferViews"][sparse[key]["bufferView"]].get("byteOffset", 0)
+                + sparse[key].get("byteOffset", 0)
                 for key in ("indices", "values")
             ]
             rows = np.frombuffer(binary, kind, sparse["count"], starts[0])
-            values[rows] = np.frombuffer(binary, "<f4", 3 * sparse["count"], starts[1]).reshape(-1, 3)
+            values[rows] = np.frombuffer(binary, "<f4", 3 * sparse["count"], starts[1]).reshape(
+                -1, 3
+            )
         return values
 
     (mesh,) = [m for m in gltf["meshes"] if "extras" in m]
     names = [m["name"] for m in gltf["materials"]]
     (found,) = [p for p in mesh["primitives"] if names[p["material"]] == material]
     targets = [floats(t["POSITION"]) for t in found["targets"]]
-    return floats(found["attributes"]["POSITION"]), dict(zip(mesh["extras"]["targetNames"], targets, strict=True))
+    return floats(found["attributes"]["POSITION"]), dict(
+        zip(mesh["extras"]["targetNames"], targets, strict=True)
+    )
 
 
 def test_a_glb_has_teeth_and_a_tongue_that_the_jaw_moves(whole_body, motion, tmp_path):
-    """As the source's targets say: at most 31 mm for the lower teeth, 28 mm for the tongue, 27 mm for its own key."""
+    """As the source's targets say: at most 31 mm for the lower teeth, 28 mm for the tongue, 27 mm
+    for its own key.
+    """
     path = tmp_path / "talk.glb"
     export_motions([motion], whole_body, path)
     teeth, tongue = (primitive_of(path, material) for material in ("teeth", "tongue"))
@@ -144,14 +160,18 @@ def test_a_glb_has_teeth_and_a_tongue_that_the_jaw_moves(whole_body, motion, tmp
 
 
 def morph_animation(path: Path) -> dict[str, np.ndarray]:
-    """The (T,) animated weights of a .glb by target, read without Blender: the file is JSON and float32 arrays."""
+    """The (T,) animated weights of a .glb by target, read without Blender: the file is JSON and
+    float32 arrays.
+    """
     data = path.read_bytes()
     length = struct.unpack("<I", data[12:16])[0]
     gltf, binary = json.loads(data[20 : 20 + length]), data[28 + length :]
     (mesh,) = [m for m in gltf["meshes"] if "extras" in m]
     (animation,) = gltf["animations"]
     (sampler,) = [
-        animation["samplers"][c["sampler"]] for c in animation["channels"] if c["target"]["path"] == "weights"
+        animation["samplers"][c["sampler"]]
+        for c in animation["channels"]
+        if c["target"]["path"] == "weights"
     ]
     accessor = gltf["accessors"][sampler["output"]]
     view = gltf["bufferViews"][accessor["bufferView"]]

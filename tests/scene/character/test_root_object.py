@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The empty that carries an armature's root motion: where it stands, what it stores, and that it goes without trace."""
+"""The empty that carries an armature's root motion: where it stands, what it stores, and that it
+goes without trace.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,9 @@ def empty_file():
     bpy.ops.wm.read_factory_settings(use_empty=True)
 
 
-def made(name: str, kind: str = "ARMATURE", parent: bpy.types.Object | None = None) -> bpy.types.Object:
+def made(
+    name: str, kind: str = "ARMATURE", parent: bpy.types.Object | None = None
+) -> bpy.types.Object:
     obj = bpy.data.objects.new(name, bpy.data.armatures.new(name) if kind == "ARMATURE" else None)
     bpy.context.scene.collection.objects.link(obj)
     obj.parent = parent
@@ -52,7 +56,11 @@ def test_the_armature_follows_the_trajectory_and_its_parent():
     assert root_object(armature) == empty
     assert (empty.name, empty.parent) == ("hero_root", group)
     for row, frame in enumerate((1, 11, 21)):
-        wanted = np.array(Matrix.Translation((0, 0, 10))) @ expected(row) @ np.array(Matrix.Translation((0, 0.3, 0)))
+        wanted = (
+            np.array(Matrix.Translation((0, 0, 10)))
+            @ expected(row)
+            @ np.array(Matrix.Translation((0, 0.3, 0)))
+        )
         np.testing.assert_allclose(place(armature, frame), wanted, atol=1e-5)
     np.testing.assert_allclose(np.array(parent_transform(armature)), place(empty, 21), atol=1e-5)
     actions = len(bpy.data.actions)
@@ -67,7 +75,9 @@ def test_the_trajectory_is_read_back_between_its_keys_too(in_place):
     armature = made("hero")
     empty = parent_to_root_object(armature, FRAMES, POSITIONS, ANGLES, in_place=in_place)
     positions, angles = removed_root_motion(armature, np.array([1.0, 6.0, 21.0]))
-    np.testing.assert_allclose(positions, [[1.0, 2.0, 0.5], [1.5, 2.0, 0.5], [2.0, 4.0, 0.5]], atol=1e-6)
+    np.testing.assert_allclose(
+        positions, [[1.0, 2.0, 0.5], [1.5, 2.0, 0.5], [2.0, 4.0, 0.5]], atol=1e-6
+    )
     np.testing.assert_allclose(angles, [0.0, 0.25, 1.5], atol=1e-6)
     assert (empty.animation_data is None) == in_place
     np.testing.assert_allclose(place(armature, 21), expected(0 if in_place else 2), atol=1e-5)
@@ -86,6 +96,8 @@ def test_another_armature_is_not_moved_along():
     group = made("group", "EMPTY")
     armature = made("hero", parent=group)
     made("villain", parent=group)
-    with pytest.raises(UsageError, match="'hero' is parented to 'group', and 'villain' would move along"):
+    with pytest.raises(
+        UsageError, match="'hero' is parented to 'group', and 'villain' would move along"
+    ):
         parent_to_root_object(armature, FRAMES, POSITIONS, ANGLES)
     assert armature.parent == group

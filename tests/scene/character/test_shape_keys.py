@@ -30,12 +30,18 @@ def test_one_constant_key_each_at_the_first_frame(body, make_motion):
 
 
 def test_every_frame_on_request(body, make_motion):
-    mesh = build_scene([make_motion(body, 7)], body, options=BuildOptions(shape="per_frame")).people[0].mesh
+    mesh = (
+        build_scene([make_motion(body, 7)], body, options=BuildOptions(shape="per_frame"))
+        .people[0]
+        .mesh
+    )
     assert {len(c.keyframe_points) for c in actions.fcurves(mesh.data.shape_keys)} == {7}
 
 
 def test_baked_has_no_keys(body, make_motion):
-    mesh = build_scene([make_motion(body)], body, options=BuildOptions(shape="baked")).people[0].mesh
+    mesh = (
+        build_scene([make_motion(body)], body, options=BuildOptions(shape="baked")).people[0].mesh
+    )
     assert mesh.data.shape_keys is None
 
 
@@ -66,4 +72,6 @@ def test_a_body_without_shape(body, make_motion, truth, blender):
     motion = make_motion(plain)
     person = build_scene([motion], plain).people[0]
     blender.go_to(person.frames[3])
-    np.testing.assert_allclose(blender.vertices(person.mesh), truth(plain, motion).vertices(3), atol=1e-4)
+    np.testing.assert_allclose(
+        blender.vertices(person.mesh), truth(plain, motion).vertices(3), atol=1e-4
+    )

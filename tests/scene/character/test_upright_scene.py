@@ -37,7 +37,17 @@ def test_a_camera_returns_to_where_it_was(scene):
 
 
 @pytest.mark.parametrize(
-    "before", [3, [], [[1, 2]], [["x"] * 13], [[10**400] * 13], [[float("nan")] * 13], [[0] * 13, []], {"0": [0] * 13}]
+    "before",
+    [
+        3,
+        [],
+        [[1, 2]],
+        [["x"] * 13],
+        [[10**400] * 13],
+        [[float("nan")] * 13],
+        [[0] * 13, []],
+        {"0": [0] * 13},
+    ],
 )
 def test_a_place_that_is_none_is_ignored(scene, before):
     camera, armature = scene

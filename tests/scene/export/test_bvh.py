@@ -12,7 +12,9 @@ from ..made_rigs import build_rig
 
 
 @pytest.mark.parametrize(("unit", "per_metre"), [(None, 100.0), ("cm", 100.0), ("m", 1.0)])
-def test_bvh_is_y_up_in_centimetres_and_one_file_a_person(body, make_motion, tmp_path, truth, unit, per_metre):
+def test_bvh_is_y_up_in_centimetres_and_one_file_a_person(
+    body, make_motion, tmp_path, truth, unit, per_metre
+):
     motions = [make_motion(body, 3), make_motion(body, 3, seed=1)]
     options = ExportOptions(bvh_unit=unit) if unit else None
     written, _ = export_motions(motions, body, tmp_path / "pair.bvh", export_options=options)
@@ -23,8 +25,14 @@ def test_bvh_is_y_up_in_centimetres_and_one_file_a_person(body, make_motion, tmp
         assert lines[start + 1] == "Frames: 3"
         rows = np.array([[float(v) for v in line.split()] for line in lines[start + 3 :]])
         pelvis = truth(body, motion).joints[:, 0]
-        np.testing.assert_allclose(rows[:, :3] / per_metre, pelvis[:, [0, 2, 1]] * [1, 1, -1], atol=1e-5)
-        offsets = [[float(v) for v in line.split()[1:]] for line in lines[:start] if line.strip().startswith("OFFSET")]
+        np.testing.assert_allclose(
+            rows[:, :3] / per_metre, pelvis[:, [0, 2, 1]] * [1, 1, -1], atol=1e-5
+        )
+        offsets = [
+            [float(v) for v in line.split()[1:]]
+            for line in lines[:start]
+            if line.strip().startswith("OFFSET")
+        ]
         joints = body.rest_joints(motion.betas)
         knee, hip = (body.joint_names.index(f"left_{part}") for part in ("knee", "hip"))
         thigh = np.linalg.norm(joints[knee] - joints[hip])

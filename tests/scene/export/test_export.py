@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Each format is written, read back by Blender's importer, and compared with the solver's own joints and skin."""
+"""Each format is written, read back by Blender's importer, and compared with the solver's own
+joints and skin.
+"""
 
 import re
 from dataclasses import replace
@@ -23,7 +25,9 @@ SCENE_SUFFIXES = [s for s in SUFFIXES if s != ".npz"]
 
 
 @pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
-def test_joints_and_skin_survive(whole_body, make_motion, truth, joints_world, blender, tmp_path, suffix):
+def test_joints_and_skin_survive(
+    whole_body, make_motion, truth, joints_world, blender, tmp_path, suffix
+):
     body, rate = whole_body, 30000 / 1001
     motion = make_motion(body, 12, rate=rate)
     path = tmp_path / f"walk{suffix}"
@@ -60,12 +64,15 @@ def test_shape_as_morphs_or_baked(body, make_motion, truth, blender, tmp_path, s
         assert list(keys.keys())[1:] == [f"Shape{p:03d}" for p in range(body.P)]
         np.testing.assert_allclose([k.value for k in keys[1:]], motion.betas, atol=1e-4)
     match = corresponding(mesh, body, motion.betas)
-    np.testing.assert_allclose(blender.vertices(mesh), truth(body, motion).vertices(3)[match], atol=SKIN_TOLERANCE)
+    np.testing.assert_allclose(
+        blender.vertices(mesh), truth(body, motion).vertices(3)[match], atol=SKIN_TOLERANCE
+    )
 
 
 @pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
 def test_variable_frame_rate_keeps_its_timing(body, make_motion, truth, blender, tmp_path, suffix):
-    # Frames at every second tick of 30, then at every tick: files of constant rate must hold the whole ticks.
+    # Frames at every second tick of 30, then at every tick: files of constant rate must hold the
+    # whole ticks.
     stamps = np.array([0, 2, 4, 5, 6, 8]) / 30
     motion = make_motion(body, timestamps=stamps, rate=30.0)
     path = tmp_path / f"walk{suffix}"
@@ -79,7 +86,9 @@ def test_variable_frame_rate_keeps_its_timing(body, make_motion, truth, blender,
 
 
 @pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
-def test_a_last_pose_between_whole_frames_is_reached(body, make_motion, truth, blender, tmp_path, suffix):
+def test_a_last_pose_between_whole_frames_is_reached(
+    body, make_motion, truth, blender, tmp_path, suffix
+):
     motion = make_motion(body, timestamps=np.array([0, 1, 2, 3.9]) / 30, rate=30.0)
     path = tmp_path / f"walk{suffix}"
     export_motions([motion], body, path)
@@ -90,7 +99,9 @@ def test_a_last_pose_between_whole_frames_is_reached(body, make_motion, truth, b
 
 @pytest.mark.parametrize("suffix", [".fbx", ".blend", ".bvh"])
 @pytest.mark.parametrize("rate", [24000 / 1001, 25.0, 30000 / 1001, 60000 / 1001])
-def test_formats_that_store_a_frame_rate_store_the_right_one(body, make_motion, tmp_path, suffix, rate):
+def test_formats_that_store_a_frame_rate_store_the_right_one(
+    body, make_motion, tmp_path, suffix, rate
+):
     path = tmp_path / f"walk{suffix}"
     export_motions([make_motion(body, 3, rate=rate)], body, path)
     read_back(path, 24.0)
@@ -103,7 +114,13 @@ def test_usd_counts_time_in_the_scenes_frames_and_lengths_in_metres(body, make_m
     path = tmp_path / "walk.usda"  # the text form of the same writer
     formats.write_usd(path)
     header = path.read_text("utf-8")[:2000]
-    assert float(re.search(r"timeCodesPerSecond = ([\d.]+)", header)[1]) == pytest.approx(30000 / 1001, rel=1e-6)
+    assert float(
+        re.search(
+            r"timeCodesPerSecond = "
+            r"([\d.]+)",
+            header,
+        )[1]
+    ) == pytest.approx(30000 / 1001, rel=1e-6)
     assert re.search(r"metersPerUnit = 1\b", header)
     assert 'upAxis = "Z"' in header
 
@@ -155,10 +172,13 @@ def test_glb_is_upright_in_its_y_up_frame(body, make_motion, tmp_path):
     path = tmp_path / "walk.glb"
     export_motions([make_motion(body, 2)], body, path)
     gltf = glb_json(path)
-    positions = [gltf["accessors"][p["attributes"]["POSITION"]] for p in gltf["meshes"][0]["primitives"]]
+    positions = [
+        gltf["accessors"][p["attributes"]["POSITION"]] for p in gltf["meshes"][0]["primitives"]
+    ]
     low = np.min([p["min"] for p in positions], axis=0)
     high = np.max([p["max"] for p in positions], axis=0)
-    assert low[1] == pytest.approx(0.0, abs=0.15)  # shaped soles lie at 0, the unshaped mesh near it
+    # shaped soles lie at 0, the unshaped mesh near it
+    assert low[1] == pytest.approx(0.0, abs=0.15)
     assert 1.4 < high[1] - low[1] < 2.2
 
 
@@ -168,7 +188,9 @@ def test_the_footages_camera_is_exported_on_request(body, make_motion, tmp_path,
     export_motions([motion], body, path, export_options=ExportOptions(camera=True))
     read_back(path)
     camera = blender.only("CAMERA")
-    np.testing.assert_allclose(camera.matrix_world.translation, motion.world_from_camera[0, :3, 3], atol=1e-5)
+    np.testing.assert_allclose(
+        camera.matrix_world.translation, motion.world_from_camera[0, :3, 3], atol=1e-5
+    )
 
 
 @pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc"])
@@ -200,7 +222,9 @@ def test_blend_opens_with_camera_rate_and_shape_keys(body, make_motion, tmp_path
     export_motions([motion], body, path)
     read_back(path)
     scene = bpy.context.scene
-    assert [(marker.name, marker.frame) for marker in scene.timeline_markers] == [("not seen 3-4", 3)]
+    assert [(marker.name, marker.frame) for marker in scene.timeline_markers] == [
+        ("not seen 3-4", 3)
+    ]
     assert {bone.custom_shape.type for bone in blender.only("ARMATURE").pose.bones} == {"MESH"}
     assert (scene.name, scene.frame_start, scene.frame_end) == ("Capture", 0, 5)
     assert (scene.render.resolution_x, scene.render.resolution_y) == (1080, 1920)
@@ -227,14 +251,26 @@ def test_a_file_for_each_of_several_people(body, make_motion, tmp_path, blender,
     motions = [make_motion(body, 6), late]
     before = sorted(c.name for c in bpy.data.collections)
     written, _ = export_motions(
-        motions, body, tmp_path / f"pair{suffix}", export_options=ExportOptions(separate=True, camera=True)
+        motions,
+        body,
+        tmp_path / f"pair{suffix}",
+        export_options=ExportOptions(separate=True, camera=True),
     )
     assert [p.name for p in written] == [f"pair.person{n}{suffix}" for n in (1, 2)]
     assert sorted(c.name for c in bpy.data.collections) == before
     for path, motion, first in zip(written, motions, (0, 2), strict=True):
         start = read_back(path)
         armature = blender.only("ARMATURE")
-        assert len([o for o in bpy.data.objects if o.type == "MESH" and o.users_scene and o.find_armature()]) == 1
+        assert (
+            len(
+                [
+                    o
+                    for o in bpy.data.objects
+                    if o.type == "MESH" and o.users_scene and o.find_armature()
+                ]
+            )
+            == 1
+        )
         blender.go_to(start + first + 1)
         posed = blender.joints(armature, body.joint_names)
         np.testing.assert_allclose(posed, truth(body, motion).joints[1], atol=2e-3)
@@ -246,20 +282,29 @@ def test_several_people_in_one_file_all_move(body, make_motion, tmp_path, blende
     path = tmp_path / f"three{suffix}"
     export_motions(motions, body, path)
     first = read_back(path)
-    armatures = sorted((obj for obj in bpy.data.objects if obj.type == "ARMATURE"), key=lambda obj: obj.name)
+    armatures = sorted(
+        (obj for obj in bpy.data.objects if obj.type == "ARMATURE"), key=lambda obj: obj.name
+    )
     for t in (0, 3, 5):
         blender.go_to(first + t)
         for armature, motion in zip(armatures, motions, strict=True):
             joints = blender.joints(armature, body.joint_names)
-            np.testing.assert_allclose(joints, truth(body, motion).joints[t], atol=2e-3, err_msg=armature.name)
+            np.testing.assert_allclose(
+                joints, truth(body, motion).joints[t], atol=2e-3, err_msg=armature.name
+            )
 
 
 @pytest.mark.parametrize("first_frame", [0.0, 1.0, 7.0])
-def test_fbx_and_glb_begin_at_zero_and_are_named_after_the_clip(body, make_motion, tmp_path, first_frame):
+def test_fbx_and_glb_begin_at_zero_and_are_named_after_the_clip(
+    body, make_motion, tmp_path, first_frame
+):
     """Read from the files themselves, because importers move and rename animation."""
     parser = package("io_scene_fbx.parse_fbx")
     built = build_scene(
-        [make_motion(body, 5, rate=20.0)], body, None, replace(NEW_SCENE, name="A walk", start_frame=first_frame)
+        [make_motion(body, 5, rate=20.0)],
+        body,
+        None,
+        replace(NEW_SCENE, name="A walk", start_frame=first_frame),
     )
     export(tmp_path / "out.glb", [built.collection])
     export(tmp_path / "out.fbx", [built.collection])
@@ -272,7 +317,12 @@ def test_fbx_and_glb_begin_at_zero_and_are_named_after_the_clip(body, make_motio
     objects, takes = ([e for e in root.elems if e.id == name][0] for name in (b"Objects", b"Takes"))
     second = 46186158000
     times = [
-        t for e in objects.elems if e.id == b"AnimationCurve" for k in e.elems if k.id == b"KeyTime" for t in k.props[0]
+        t
+        for e in objects.elems
+        if e.id == b"AnimationCurve"
+        for k in e.elems
+        if k.id == b"KeyTime"
+        for t in k.props[0]
     ]
     assert min(times) == 0
     assert max(times) / second == pytest.approx(0.2)
@@ -300,10 +350,13 @@ def test_several_files_at_once(body, make_motion, tmp_path):
 def test_exporting_motions_leaves_no_trace(body, make_motion, tmp_path):
     bpy.ops.mesh.primitive_cube_add()
     scene, window = bpy.context.scene, bpy.context.window
-    kinds = "scenes collections objects meshes armatures actions cameras materials shape_keys movieclips".split()
+    kinds = "scenes collections objects meshes armatures actions cameras".split()
+    kinds += "materials shape_keys movieclips".split()
     before = {kind: [b.name for b in getattr(bpy.data, kind)] for kind in kinds}
     sample = Path(scope.__file__).resolve().parent / "assets" / "sample" / "sample.mp4"
-    export_motions([make_motion(body, 2)], body, [tmp_path / "a.glb", tmp_path / "a.usdc"], footage=sample)
+    export_motions(
+        [make_motion(body, 2)], body, [tmp_path / "a.glb", tmp_path / "a.usdc"], footage=sample
+    )
     assert {kind: [b.name for b in getattr(bpy.data, kind)] for kind in kinds} == before
     assert window.scene == scene
     assert bpy.context.view_layer.objects.active.name == "Cube"
@@ -312,5 +365,7 @@ def test_exporting_motions_leaves_no_trace(body, make_motion, tmp_path):
 def test_a_caller_without_a_window_can_export(body, make_motion, tmp_path):
     with bpy.context.temp_override(window=None):  # as in a timer
         assert bpy.context.window is None
-        written, _ = export_motions([make_motion(body, 2)], body, [tmp_path / "a.bvh", tmp_path / "b.glb"])
+        written, _ = export_motions(
+            [make_motion(body, 2)], body, [tmp_path / "a.bvh", tmp_path / "b.glb"]
+        )
     assert all(path.is_file() for path in written)

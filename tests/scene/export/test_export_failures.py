@@ -41,15 +41,20 @@ def test_names_may_be_as_long_as_the_system_lets_them(body, make_motion, tmp_pat
     assert list(tmp_path.iterdir()) == [longest]
     for people in (1, 2):
         too_long = tmp_path / ("x" * (252 if people == 1 else 245) + suffix)
-        with pytest.raises(OutputError, match=f"cannot write .*x(.person1)?{suffix}: .*; choose a shorter name"):
+        with pytest.raises(
+            OutputError, match=f"cannot write .*x(.person1)?{suffix}: .*; choose a shorter name"
+        ):
             export_motions([make_motion(body, 1)] * people, body, too_long)
     assert list(tmp_path.iterdir()) == [longest]
 
 
 @pytest.fixture
 def closed_folder():
-    """A folder in which this process cannot write. Root, whom no mode bits stop, is nobody until the test ends."""
-    with tempfile.TemporaryDirectory() as name:  # tmp_path lies in a folder that nobody else may enter
+    """A folder in which this process cannot write. Root, whom no mode bits stop, is nobody until
+    the test ends.
+    """
+    # tmp_path lies in a folder that nobody else may enter
+    with tempfile.TemporaryDirectory() as name:
         folder, is_root = Path(name), os.geteuid() == 0
         folder.chmod(0o555)
         if is_root:
@@ -67,16 +72,22 @@ def test_an_unwritable_folder_is_named(body, make_motion, closed_folder):
     assert list(closed_folder.iterdir()) == []
 
 
-@pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="needs a folder in which even root cannot make files")
+@pytest.mark.skipif(
+    not Path("/proc/self").is_dir(), reason="needs a folder in which even root cannot make files"
+)
 @pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
 def test_a_folder_that_accepts_no_files_is_named(body, make_motion, suffix):
     with pytest.raises(OutputError, match="cannot write /proc/walk"):
         export_motions([make_motion(body, 1)], body, f"/proc/walk{suffix}")
 
 
-@pytest.mark.skipif(os.name == "nt", reason="Windows has no limit on a file's size that a process could set")
+@pytest.mark.skipif(
+    os.name == "nt", reason="Windows has no limit on a file's size that a process could set"
+)
 @pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
-def test_a_full_disk_is_reported_in_one_sentence_and_leaves_nothing(body, make_motion, tmp_path, suffix):
+def test_a_full_disk_is_reported_in_one_sentence_and_leaves_nothing(
+    body, make_motion, tmp_path, suffix
+):
     import resource
 
     path, motion = tmp_path / f"walk{suffix}", make_motion(body, 200)
@@ -92,7 +103,9 @@ def test_a_full_disk_is_reported_in_one_sentence_and_leaves_nothing(body, make_m
 
 
 @pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
-def test_a_failing_writer_leaves_the_old_file_and_no_other(body, make_motion, tmp_path, monkeypatch, suffix):
+def test_a_failing_writer_leaves_the_old_file_and_no_other(
+    body, make_motion, tmp_path, monkeypatch, suffix
+):
     path = tmp_path / f"walk{suffix}"
     path.write_text("before")
 
@@ -118,8 +131,12 @@ class StoppedExporter(bpy.types.Operator):
         raise KeyboardInterrupt
 
 
-def test_ctrl_c_in_an_exporter_is_not_reported_as_a_failure(body, make_motion, tmp_path, monkeypatch):
-    monkeypatch.setattr(formats, "write_glb", lambda *rest: formats.call_operator(bpy.ops.scope_test.stopped))
+def test_ctrl_c_in_an_exporter_is_not_reported_as_a_failure(
+    body, make_motion, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(
+        formats, "write_glb", lambda *rest: formats.call_operator(bpy.ops.scope_test.stopped)
+    )
     bpy.utils.register_class(StoppedExporter)
     try:
         with pytest.raises(KeyboardInterrupt):
@@ -164,7 +181,9 @@ def test_exporters_are_quiet_without_standard_streams(monkeypatch):
 
 @pytest.mark.skipif(os.name == "nt", reason="C's streams have another library there")
 def test_what_c_code_prints_while_it_is_quiet_is_not_printed_later(capfd):
-    """Without a terminal, it stays in C's buffers, from where it was written behind the program's own output."""
+    """Without a terminal, it stays in C's buffers, from where it was written behind the program's
+    own output.
+    """
     c = ctypes.CDLL(None)
     with formats.quiet():
         c.puts(b"said by an exporter")

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Exporting captures in various states: hidden, at rest, edited, linked, in the NLA, among other objects."""
+"""Exporting captures in various states: hidden, at rest, edited, linked, in the NLA, among other
+objects.
+"""
 
 from dataclasses import replace
 
@@ -42,7 +44,9 @@ def test_only_the_capture_leaves_a_users_scene(body, make_motion, tmp_path, suff
 
 
 @pytest.mark.parametrize("overridden", [False, True])
-def test_a_linked_capture_is_exported_with_its_shape_baked(body, make_motion, tmp_path, blender, truth, overridden):
+def test_a_linked_capture_is_exported_with_its_shape_baked(
+    body, make_motion, tmp_path, blender, truth, overridden
+):
     motion, file, path = make_motion(body, 4), tmp_path / "capture.blend", tmp_path / "walk.usdc"
     name = build_scene([motion], body, options=BuildOptions(frame_rate="set")).collection.name
     bpy.ops.wm.save_as_mainfile(filepath=str(file))
@@ -62,7 +66,9 @@ def test_a_linked_capture_is_exported_with_its_shape_baked(body, make_motion, tm
     mesh = blender.only("MESH")
     assert mesh.data.name == "walk_body"
     match = corresponding(mesh, body, motion.betas)
-    np.testing.assert_allclose(blender.vertices(mesh), truth(body, motion).vertices(3)[match], atol=SKIN_TOLERANCE)
+    np.testing.assert_allclose(
+        blender.vertices(mesh), truth(body, motion).vertices(3)[match], atol=SKIN_TOLERANCE
+    )
 
 
 def _in_rest_position(person, collection):
@@ -83,15 +89,21 @@ def _out_of_renders(person, collection):
 
 
 @pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc", ".bvh"])
-@pytest.mark.parametrize("hide", [_in_rest_position, _in_edit_mode, _out_of_viewports, _out_of_renders])
-def test_motion_disabled_in_the_viewport_is_exported(body, make_motion, tmp_path, blender, truth, suffix, hide):
+@pytest.mark.parametrize(
+    "hide", [_in_rest_position, _in_edit_mode, _out_of_viewports, _out_of_renders]
+)
+def test_motion_disabled_in_the_viewport_is_exported(
+    body, make_motion, tmp_path, blender, truth, suffix, hide
+):
     motion = make_motion(body, 4)
     result = build_scene([motion], body, options=BuildOptions(frame_rate="set"))
     person, collection = result.people[0], result.collection
     hide(person, collection)
 
     def state():
-        hidden = [(o.hide_viewport, o.hide_render) for o in (collection, person.armature, person.mesh)]
+        hidden = [
+            (o.hide_viewport, o.hide_render) for o in (collection, person.armature, person.mesh)
+        ]
         return hidden, person.armature.data.pose_position, person.armature.mode
 
     before, path = state(), tmp_path / f"walk{suffix}"
@@ -116,8 +128,12 @@ def _to_nla(datablock, *starts):
 
 
 @pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc", ".bvh"])
-def test_a_capture_with_a_parent_moves_with_it_in_the_file(body, make_motion, tmp_path, blender, suffix):
-    person = build_scene([make_motion(body, 4)], body, options=BuildOptions(frame_rate="set")).people[0]
+def test_a_capture_with_a_parent_moves_with_it_in_the_file(
+    body, make_motion, tmp_path, blender, suffix
+):
+    person = build_scene(
+        [make_motion(body, 4)], body, options=BuildOptions(frame_rate="set")
+    ).people[0]
     stage = bpy.data.objects.new("Stage", None)
     bpy.context.scene.collection.objects.link(stage)
     stage.rotation_euler, person.armature.parent = (0.2, -0.1, 0.7), stage
@@ -139,13 +155,19 @@ def test_a_capture_with_a_parent_moves_with_it_in_the_file(body, make_motion, tm
 
 
 @pytest.mark.parametrize("suffix", [".glb", ".fbx", ".bvh", ".usdc"])
-def test_a_motion_in_the_nla_is_exported_as_displayed(body, make_motion, tmp_path, blender, truth, suffix):
+def test_a_motion_in_the_nla_is_exported_as_displayed(
+    body, make_motion, tmp_path, blender, truth, suffix
+):
     motion = make_motion(body, 5)
     person = build_scene([motion], body, options=BuildOptions(frame_rate="set")).people[0]
     animation = _to_nla(person.armature, 40)
     actions_before, path = set(bpy.data.actions), tmp_path / f"walk{suffix}"
     export(path)
-    assert (animation.action, animation.use_nla, set(bpy.data.actions)) == (None, True, actions_before)
+    assert (animation.action, animation.use_nla, set(bpy.data.actions)) == (
+        None,
+        True,
+        actions_before,
+    )
     read_back(path)
     armature = blender.only("ARMATURE")
     first, last = actions.frame_range([armature])
@@ -188,7 +210,9 @@ def test_a_face_in_the_nla_moves_in_a_glb(whole_body, make_motion, tmp_path, sha
 
 
 def test_a_solo_track_determines_the_frame_range(body, make_motion):
-    person = build_scene([make_motion(body, 5)], body, options=BuildOptions(frame_rate="set")).people[0]
+    person = build_scene(
+        [make_motion(body, 5)], body, options=BuildOptions(frame_rate="set")
+    ).people[0]
     animation = _to_nla(person.armature, 1, 1000)
     assert actions.frame_range([person.armature])[1] > 1000
     animation.nla_tracks[0].is_solo = True
@@ -239,7 +263,9 @@ def test_an_edit_in_progress_is_exported(body, make_motion, tmp_path, blender):
         joints = blender.joints(blender.only("ARMATURE"), body.joint_names)
         assert before is None or np.abs(joints - before).max() < JOINT_TOLERANCE
         before = joints
-    assert before[0, 0] == pytest.approx(5.0 + motion.trans[3, 0] + body.rest_joints(motion.betas)[0, 0], abs=1e-3)
+    assert before[0, 0] == pytest.approx(
+        5.0 + motion.trans[3, 0] + body.rest_joints(motion.betas)[0, 0], abs=1e-3
+    )
 
 
 def test_a_motion_that_begins_before_frame_0_is_not_cut_off(body, make_motion, tmp_path):

@@ -18,7 +18,9 @@ def test_fbx_objects_have_unit_scale_and_no_leaf_bones(body, make_motion, tmp_pa
 
 
 def test_fbx_is_in_centimetres_without_any_scaling(body, make_motion, tmp_path):
-    """Read with Blender's parser. Unreal interprets lengths as centimetres, whatever unit the file states."""
+    """Read with Blender's parser. Unreal interprets lengths as centimetres, whatever unit the file
+    states.
+    """
     parser = package("io_scene_fbx.parse_fbx")
     path, motion = tmp_path / "walk.fbx", make_motion(body, 4)
     export_motions([motion], body, path, export_options=ExportOptions(camera=True))
@@ -29,13 +31,19 @@ def test_fbx_is_in_centimetres_without_any_scaling(body, make_motion, tmp_path):
         return [e for e in elem.elems if e.id.decode() in names]
 
     def properties(elem):
-        return {p.props[0].decode(): p.props[4:] for block in below(elem, "Properties70") for p in block.elems}
+        return {
+            p.props[0].decode(): p.props[4:]
+            for block in below(elem, "Properties70")
+            for p in block.elems
+        }
 
     assert properties(below(root, "GlobalSettings")[0])["UnitScaleFactor"] == [1.0]
     objects = below(root, "Objects")[0]
     models = {e.props[1].split(b"\0")[0].decode(): properties(e) for e in below(objects, "Model")}
     for name, values in models.items():
-        np.testing.assert_allclose(values.get("Lcl Scaling", [1, 1, 1]), 1.0, atol=1e-4, err_msg=name)
+        np.testing.assert_allclose(
+            values.get("Lcl Scaling", [1, 1, 1]), 1.0, atol=1e-4, err_msg=name
+        )
     joints = body.rest_joints(motion.betas)
     knee, hip = (body.joint_names.index(f"left_{part}") for part in ("knee", "hip"))
     shin = np.linalg.norm(models["left_knee"]["Lcl Translation"])
@@ -46,7 +54,11 @@ def test_fbx_is_in_centimetres_without_any_scaling(body, make_motion, tmp_path):
     shapes = [e for e in below(objects, "Geometry") if e.props[2] == b"Shape"]
     largest = max(np.abs(below(e, "Vertices")[0].props[0]).max() for e in shapes)
     assert largest == pytest.approx(100 * np.abs(body.shapedirs).max(), rel=1e-3)
-    places = [below(n, "Matrix")[0].props[0][12:15] for e in below(objects, "Pose") for n in below(e, "PoseNode")]
+    places = [
+        below(n, "Matrix")[0].props[0][12:15]
+        for e in below(objects, "Pose")
+        for n in below(e, "PoseNode")
+    ]
     assert np.abs(places).max() > 50
     camera = next(properties(e) for e in below(objects, "NodeAttribute") if e.props[2] == b"Camera")
     assert camera["FarPlane"] == [pytest.approx(100 * 1000.0)]

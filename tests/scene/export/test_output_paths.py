@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Paths of exports are checked before anything is captured, and no file is written for the check."""
+"""Paths of exports are checked before anything is captured, and no file is written for the
+check.
+"""
 
 import os
 import subprocess
@@ -51,5 +53,7 @@ def test_the_check_writes_nothing(tmp_path, suffix):
         ("a.glb", 2, True, ["a.person1.glb", "a.person2.glb"]),
     ],
 )
-def test_people_get_files_of_their_own_where_a_format_has_one_person(tmp_path, name, people, separate, expected):
+def test_people_get_files_of_their_own_where_a_format_has_one_person(
+    tmp_path, name, people, separate, expected
+):
     assert person_paths(tmp_path / name, people, separate) == [tmp_path / path for path in expected]

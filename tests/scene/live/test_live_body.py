@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The posed body is SMPL's for every pose and shape, survives what undo does, and leaves nothing behind."""
+"""The posed body is SMPL's for every pose and shape, survives what undo does, and leaves nothing
+behind.
+"""
 
 import bpy
 import numpy as np
@@ -66,17 +68,23 @@ def test_the_rest_pose_becomes_that_of_the_last_shape(live, body):
 
 @pytest.mark.parametrize("change", ["show", "rest"])
 def test_a_body_without_its_scene_is_an_error_that_keeps_what_is_there(live, body, change):
-    """The body is also in another scene, and its mesh was deleted, so that it has to be created again."""
+    """The body is also in another scene, and its mesh was deleted, so that it has to be created
+    again.
+    """
     (rotations, pelvis), betas = pose(2), np.zeros(body.P)
     live.show(quaternion_from_matrix(rotations), pelvis, betas)
     mine, other = bpy.context.scene, bpy.data.scenes.new("other")
     other.collection.children.link(live.armature.users_collection[0])
     bpy.data.scenes.remove(mine)
     if change == "show":
-        bpy.data.objects.remove(next(child for child in live.armature.children if child.type == "MESH"))
+        bpy.data.objects.remove(
+            next(child for child in live.armature.children if child.type == "MESH")
+        )
     before = blocks()
     with pytest.raises(UsageError, match="the scene was removed during the live capture"):
-        live.rest_at_shape() if change == "rest" else live.show(quaternion_from_matrix(rotations), pelvis, betas)
+        live.rest_at_shape() if change == "rest" else live.show(
+            quaternion_from_matrix(rotations), pelvis, betas
+        )
     assert blocks() == before
 
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A rig that follows is posed as the same frame of a retargeted capture, and can be given its pose back."""
+"""A rig that follows is posed as the same frame of a retargeted capture, and can be given its pose
+back.
+"""
 
 import bpy
 import numpy as np
@@ -15,7 +17,9 @@ from ...edit.walking import BODY, RATE, motion_of, walk
 from ..made_rigs import FRAMES, build_rig, captured, seen
 
 
-@pytest.mark.parametrize("options", [RetargetOptions(offset=(1.5, 0, 0)), RetargetOptions(False, "in-place")])
+@pytest.mark.parametrize(
+    "options", [RetargetOptions(offset=(1.5, 0, 0)), RetargetOptions(False, "in-place")]
+)
 def test_the_pose_is_that_of_the_retargeted_frame(options):
     motion = motion_of(walk(2.0))
     rig, bones = build_rig("mixamo")
@@ -29,9 +33,12 @@ def test_the_pose_is_that_of_the_retargeted_frame(options):
         pelvis = BODY.rest_joints(motion.betas)[0] + motion.trans[frame - 1]
         live.show(quaternion_from_matrix(rotations), pelvis, motion.betas)
         posed = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
-        followed.append([np.array(posed.matrix_world @ posed.pose.bones[name].head) for name in bones.values()])
+        followed.append(
+            [np.array(posed.matrix_world @ posed.pose.bones[name].head) for name in bones.values()]
+        )
     retarget(captured(motion), BODY, np.zeros(BODY.P), rig, bone_map, RATE, options)
-    # The pelvis is lowered smoothly in time for stretched legs, and without the later frames a little differently.
+    # The pelvis is lowered smoothly in time for stretched legs, and without the later frames a
+    # little differently.
     np.testing.assert_allclose(followed, seen(rig, bones.values()), atol=0.002)
 
 

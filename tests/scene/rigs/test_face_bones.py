@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Expressions on a face that bones move: a rig that Rigify generates, as Blender evaluates it.
 
-How far the face should move is known from the body's own expressions, which come from shapes made by an artist.
+How far the face should move is known from the body's own expressions, which come from shapes made
+by an artist.
 """
 
 from __future__ import annotations
@@ -13,7 +14,11 @@ from scope.scope_addon.errors import UsageError
 from scope.scope_addon.retarget.expression_map import ExpressionMap
 from scope.scope_addon.scene.animation_data import actions
 from scope.scope_addon.scene.rigs import face_bones
-from scope.scope_addon.scene.rigs.face_bones import guess_face_bones, has_bone_face, retarget_face_bones
+from scope.scope_addon.scene.rigs.face_bones import (
+    guess_face_bones,
+    has_bone_face,
+    retarget_face_bones,
+)
 from scope.scope_addon.scene.rigs.face_retarget import CapturedExpressions
 from scope.solver.names import EXPRESSIONS
 
@@ -63,7 +68,9 @@ def test_lips_that_stay_closed_meet_although_the_jaw_opens(rigify_face):
     assert np.linalg.norm(upper - lower) < 0.06 * np.linalg.norm(corners[0] - corners[1])
 
 
-@pytest.mark.parametrize(("name", "side", "other"), [("eyeBlinkLeft", "L", "R"), ("eyeBlinkRight", "R", "L")])
+@pytest.mark.parametrize(
+    ("name", "side", "other"), [("eyeBlinkLeft", "L", "R"), ("eyeBlinkRight", "R", "L")]
+)
 def test_a_blink_closes_the_eye_of_its_side_alone(rigify_face, name, side, other):
     lids = [f"DEF-lid.{lid}.{s}.002" for s in (side, other) for lid in "TB"]
     moves = moved(rigify_face, *lids, **{name: 1.0})
@@ -126,11 +133,15 @@ def test_a_rig_that_is_scaled_and_turned_behaves_equally(rigify_face):
 def test_the_bodys_keys_stay_and_an_unedited_result_is_replaced(rigify_face):
     first = actions.Channels(rigify_face, bpy.data.actions.new("walk"))
     first.write(actions.bone_path("torso", "location"), FRAMES, np.arange(9.0).reshape(3, 3))
-    action = retarget_face_bones(shown(jawOpen=1.0), rigify_face, guess_face_bones(rigify_face), "talk")
+    action = retarget_face_bones(
+        shown(jawOpen=1.0), rigify_face, guess_face_bones(rigify_face), "talk"
+    )
     assert action.name == "rig_talk"
     assert bpy.data.actions["walk"].use_fake_user  # the user's own, kept
     assert {"torso", "jaw_master"} <= keyed(rigify_face)
-    again = retarget_face_bones(shown(eyeBlinkLeft=1.0), rigify_face, guess_face_bones(rigify_face), "talk")
+    again = retarget_face_bones(
+        shown(eyeBlinkLeft=1.0), rigify_face, guess_face_bones(rigify_face), "talk"
+    )
     assert again.name == "rig_talk"
     assert {action.name for action in bpy.data.actions} == {"walk", "rig_talk"}
     assert keyed(rigify_face) == {"torso", "lid.T.L.002"}
@@ -150,4 +161,6 @@ def test_what_fails_changes_nothing(rigify_face, monkeypatch):
 def test_a_map_of_another_rig_is_refused(rigify_face):
     assert has_bone_face(rigify_face)
     with pytest.raises(UsageError, match="'rig' has none of the controls"):
-        retarget_face_bones(shown(jawOpen=1.0), rigify_face, ExpressionMap({}, {"kiefer": {"up": {"jawOpen": 1.0}}}))
+        retarget_face_bones(
+            shown(jawOpen=1.0), rigify_face, ExpressionMap({}, {"kiefer": {"up": {"jawOpen": 1.0}}})
+        )

@@ -15,7 +15,11 @@ from scope.scope_addon.scene.animation_data import actions
 from scope.scope_addon.scene.build import NEW_SCENE, build_scene
 from scope.scope_addon.scene.export import formats
 from scope.scope_addon.scene.rigs import face_retarget
-from scope.scope_addon.scene.rigs.face_retarget import captured_expressions, faces_of, retarget_expressions
+from scope.scope_addon.scene.rigs.face_retarget import (
+    captured_expressions,
+    faces_of,
+    retarget_expressions,
+)
 from scope.scope_addon.scene.rigs.rig_export import RigExportOptions, export_on_rig
 from scope.solver.names import EXPRESSIONS
 
@@ -50,13 +54,19 @@ def keyed(face):
 @pytest.fixture
 def captured(whole_body, make_motion):
     motion = replace(make_motion(whole_body, 4), face=made_face(4, jawOpen=JAW, eyeBlinkLeft=0.4))
-    return captured_expressions(build_scene([motion], whole_body, options=NEW_SCENE).people[0].armature)
+    return captured_expressions(
+        build_scene([motion], whole_body, options=NEW_SCENE).people[0].armature
+    )
 
 
 def test_expressions_are_read_back_from_the_captured_body(captured):
     np.testing.assert_allclose(captured.frames, np.arange(4))
-    np.testing.assert_allclose(captured.weights[:, face_retarget.EXPRESSIONS.index("jawOpen")], JAW, atol=1e-6)
-    np.testing.assert_allclose(captured.weights[:, face_retarget.EXPRESSIONS.index("eyeBlinkLeft")], 0.4, atol=1e-6)
+    np.testing.assert_allclose(
+        captured.weights[:, face_retarget.EXPRESSIONS.index("jawOpen")], JAW, atol=1e-6
+    )
+    np.testing.assert_allclose(
+        captured.weights[:, face_retarget.EXPRESSIONS.index("eyeBlinkLeft")], 0.4, atol=1e-6
+    )
 
 
 def test_a_capture_without_face_has_no_expressions(whole_body, make_motion):
@@ -65,12 +75,16 @@ def test_a_capture_without_face_has_no_expressions(whole_body, make_motion):
 
 
 def test_arkits_keys_move_as_captured(captured):
-    face = face_mesh(["jawOpen", "eyeBlink_L", "eyeBlink_R", "mouthSmile_L", "mouthSmile_R", "width"])
+    face = face_mesh(
+        ["jawOpen", "eyeBlink_L", "eyeBlink_R", "mouthSmile_L", "mouthSmile_R", "width"]
+    )
     face.data.shape_keys.key_blocks["width"].value = 0.7
     (action,) = retarget_expressions(captured, [face], name="talk")
     assert action.name == "Head_talk"
     assert set(keyed(face)) == {"jawOpen"}  # what never moves has a value alone
-    np.testing.assert_allclose(keyed(face)["jawOpen"], np.stack([np.arange(4), JAW], axis=1), atol=1e-6)
+    np.testing.assert_allclose(
+        keyed(face)["jawOpen"], np.stack([np.arange(4), JAW], axis=1), atol=1e-6
+    )
     values = {block.name: block.value for block in face.data.shape_keys.key_blocks}
     assert values["eyeBlink_L"] == pytest.approx(0.4)
     assert values["width"] == pytest.approx(0.7)
@@ -78,7 +92,9 @@ def test_arkits_keys_move_as_captured(captured):
 
 def test_a_map_adds_up_and_stays_within_0_and_1(captured):
     face = face_mesh(["mund", "lid"])
-    chosen = ExpressionMap({"mund": {"jawOpen": 2.0, "eyeBlinkLeft": -1.0}, "lid": {"eyeBlinkLeft": 0.5}})
+    chosen = ExpressionMap(
+        {"mund": {"jawOpen": 2.0, "eyeBlinkLeft": -1.0}, "lid": {"eyeBlinkLeft": 0.5}}
+    )
     retarget_expressions(captured, [face], chosen)
     np.testing.assert_allclose(keyed(face)["mund"][:, 1], np.clip(2 * JAW - 0.4, 0, 1), atol=1e-6)
     assert face.data.shape_keys.key_blocks["lid"].value == pytest.approx(0.2)
@@ -100,12 +116,17 @@ def test_the_result_of_another_capture_is_kept(captured):
     (second,) = retarget_expressions(captured, [face], name="take 2")
     assert {first.name, second.name} == {"Head_take 1", "Head_take 2"}
     retarget_expressions(captured, [face], name="take 2")
-    assert [a.name for a in bpy.data.actions if a.name.startswith("Head_")] == ["Head_take 1", "Head_take 2"]
+    assert [a.name for a in bpy.data.actions if a.name.startswith("Head_")] == [
+        "Head_take 1",
+        "Head_take 2",
+    ]
 
 
 def before_and(count):
     """The number of actions of the captured body, and ``count``."""
-    return count + len([action for action in bpy.data.actions if not action.name.startswith("Head_")])
+    return count + len(
+        [action for action in bpy.data.actions if not action.name.startswith("Head_")]
+    )
 
 
 def test_a_mesh_without_known_names_is_refused(captured):
@@ -136,7 +157,9 @@ def test_meshes_that_share_their_data_are_one_face():
     assert len(faces_of([face, copy])) == 1
 
 
-@pytest.mark.parametrize(("names", "moving"), [(["viseme_aa", "viseme_O"], "viseme_aa"), (["Key 1"], None)])
+@pytest.mark.parametrize(
+    ("names", "moving"), [(["viseme_aa", "viseme_O"], "viseme_aa"), (["Key 1"], None)]
+)
 def test_a_rig_file_gets_body_and_face(whole_body, tmp_path, names, moving):
     rig, _ = build_rig("mixamo")
     face_mesh(names, rig)
@@ -169,9 +192,15 @@ def test_a_rig_file_whose_bones_move_the_face(whole_body, tmp_path, known_keys):
         formats.write_blend(tmp_path / "hero.blend", bpy.context.scene)
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     motion = motion_of(walk(1.0))
-    motion = replace(motion, face=made_face(len(motion.frames), jawOpen=np.linspace(0, 1, len(motion.frames))))
+    motion = replace(
+        motion, face=made_face(len(motion.frames), jawOpen=np.linspace(0, 1, len(motion.frames)))
+    )
     _, warnings = export_on_rig(
-        [motion], whole_body, [tmp_path / "out.blend"], RigSource(tmp_path / "hero.blend"), RigExportOptions(NEW_SCENE)
+        [motion],
+        whole_body,
+        [tmp_path / "out.blend"],
+        RigSource(tmp_path / "hero.blend"),
+        RigExportOptions(NEW_SCENE),
     )
     assert not [warning for warning in warnings if "face" in warning]
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out.blend"))

@@ -30,7 +30,9 @@ from ..made_rigs import ARMS, FRAMES, build_rig, captured, seen, truth
 
 
 def save_rig(path, scheme="mixamo", armatures=1, animated=False):
-    """Write a file of rigs, each with its mesh, and an unrelated object; the session is empty afterwards."""
+    """Write a file of rigs, each with its mesh, and an unrelated object; the session is empty
+    afterwards.
+    """
     for k in range(armatures):
         rig, bone_of = build_rig(scheme, seed=k)
         rig.name = f"Rig{k}"
@@ -80,13 +82,20 @@ def read(path):
 
 
 def worst_arm(rig, bone_of, offset):
-    """Return the angles between the rig's arms and the body's, degrees; the motion begins at frame ``offset``."""
+    """Return the angles between the rig's arms and the body's, degrees; the motion begins at frame
+    ``offset``.
+    """
     joints, worst = truth()[[f - 1 for f in FRAMES]], 0.0
     frames = [f - 1 + offset for f in FRAMES]
     for a, b in ARMS:
         heads = seen(rig, [bone_of[a], bone_of[b]], frames)
-        ours, theirs = heads[:, 1] - heads[:, 0], joints[:, NAMES.index(b)] - joints[:, NAMES.index(a)]
-        cosine = (ours * theirs).sum(1) / np.linalg.norm(ours, axis=1) / np.linalg.norm(theirs, axis=1)
+        ours, theirs = (
+            heads[:, 1] - heads[:, 0],
+            joints[:, NAMES.index(b)] - joints[:, NAMES.index(a)],
+        )
+        cosine = (
+            (ours * theirs).sum(1) / np.linalg.norm(ours, axis=1) / np.linalg.norm(theirs, axis=1)
+        )
         worst = max(worst, float(np.degrees(np.arccos(np.clip(cosine, -1, 1))).max()))
     return worst
 
@@ -97,15 +106,26 @@ OPTIONS = replace(NEW_SCENE, name="walk")
 @pytest.mark.parametrize("kind", [".blend", ".fbx", ".glb"])
 def test_a_rig_from_a_file_goes_into_every_format(tmp_path, kind):
     source = rig_source(save_rig(tmp_path / f"rig{kind}", animated=kind == ".blend"))
-    targets = [tmp_path / name for name in ("out.blend", "out.fbx", "out.glb", "out.bvh", "out.usdc")]
-    before = {k: len(getattr(bpy.data, k)) for k in ("objects", "meshes", "armatures", "actions", "collections")}
-    written, _ = export_on_rig([motion_of(walk(2.0))], BODY, targets, source, RigExportOptions(OPTIONS))
+    targets = [
+        tmp_path / name for name in ("out.blend", "out.fbx", "out.glb", "out.bvh", "out.usdc")
+    ]
+    before = {
+        k: len(getattr(bpy.data, k))
+        for k in ("objects", "meshes", "armatures", "actions", "collections")
+    }
+    written, _ = export_on_rig(
+        [motion_of(walk(2.0))], BODY, targets, source, RigExportOptions(OPTIONS)
+    )
     assert written == targets
     assert {k: len(getattr(bpy.data, k)) for k in before} == before
     for path in targets[:3]:
         rigs = read(path)
         assert len(rigs) == 1
-        skins = [o for o in bpy.context.scene.objects if o.type == "MESH" and o.find_armature() == rigs[0]]
+        skins = [
+            o
+            for o in bpy.context.scene.objects
+            if o.type == "MESH" and o.find_armature() == rigs[0]
+        ]
         assert len(skins) == 1
         assert "Stone" not in bpy.data.objects
         assert worst_arm(rigs[0], names_of("mixamo"), 0) < 1.0, path
@@ -127,7 +147,9 @@ def test_a_rig_of_a_scene_in_centimetres_has_its_true_size(tmp_path, suffix):
     np.testing.assert_allclose(seen(rig, bones.values(), [11]), wanted, atol=1e-6)
     first = max(read_back(path), suffix == ".usdc")  # which keeps the scene's frames
     read = next(obj for obj in bpy.data.objects if obj.type == "ARMATURE")
-    np.testing.assert_allclose(seen(read, bones.values(), [int(first) + 10]), wanted / 100, atol=1e-3)
+    np.testing.assert_allclose(
+        seen(read, bones.values(), [int(first) + 10]), wanted / 100, atol=1e-3
+    )
 
 
 def test_two_people_have_a_rig_each(tmp_path):
@@ -151,7 +173,11 @@ def test_people_of_different_heights_keep_their_places_in_proportion(tmp_path):
         betas[0] = tall
         rest = BODY.rest_joints(betas)
         clip.root[:, :2] = 2.0 * np.eye(2)[axis]
-        legs.append(np.linalg.norm(np.diff(rest[[NAMES.index(f"left_{n}") for n in ("hip", "knee", "ankle")]], axis=0)))
+        legs.append(
+            np.linalg.norm(
+                np.diff(rest[[NAMES.index(f"left_{n}") for n in ("hip", "knee", "ankle")]], axis=0)
+            )
+        )
         hips = [NAMES.index(f"{side}_hip") for side in ("left", "right")]
         wanted.append(clip.joints(BODY, betas)[9, hips].mean(axis=0))
         motions.append(replace(motion_of(clip), betas=betas, trans=clip.root - rest[0]))
@@ -218,7 +244,9 @@ def test_fingers_that_follow_one_another_matter_only_where_fingers_are_captured(
 
 def test_a_map_of_another_rig_is_refused(tmp_path):
     path = save_rig(tmp_path / "rig.glb")
-    save_bone_map(BoneMap({bone: part for part, bone in names_of("unreal").items()}), tmp_path / "map.json")
+    save_bone_map(
+        BoneMap({bone: part for part, bone in names_of("unreal").items()}), tmp_path / "map.json"
+    )
     with pytest.raises(InputError, match="'pelvis' is not a bone of 'Rig0'"):
         check_rig(rig_source(path, bone_map=tmp_path / "map.json"))
 
@@ -230,11 +258,20 @@ def test_bones_that_are_nowhere_are_refused(tmp_path):
     (length,) = struct.unpack_from("<I", data, 12)
     gltf = json.loads(data[20 : 20 + length])
     accessor = next(each for each in gltf["accessors"] if each["type"] == "MAT4")
-    at = 28 + length + gltf["bufferViews"][accessor["bufferView"]].get("byteOffset", 0) + accessor.get("byteOffset", 0)
-    data[at : at + 64 * accessor["count"]] = np.full(16 * accessor["count"], np.nan, "<f4").tobytes()
+    at = (
+        28
+        + length
+        + gltf["bufferViews"][accessor["bufferView"]].get("byteOffset", 0)
+        + accessor.get("byteOffset", 0)
+    )
+    data[at : at + 64 * accessor["count"]] = np.full(
+        16 * accessor["count"], np.nan, "<f4"
+    ).tobytes()
     path.write_bytes(data)
     with pytest.raises(
-        InputError, match=r"rig\.glb: .*(bones of 'Rig0' have positions that are not numbers|cannot import)"
+        InputError,
+        match=r"rig\.glb: .*(bones of 'Rig0' have positions that are not "
+        r"numbers|cannot import)",
     ):
         check_rig(rig_source(path))
     assert not bpy.data.armatures
@@ -261,7 +298,9 @@ def test_damaged_files_are_refused_in_one_sentence(tmp_path, suffix, damage):
 
 
 def test_an_importer_that_fails_prints_no_traceback(tmp_path, capfd):
-    """The file is whole, but one model's name lacks its class, at which Blender's importer raises."""
+    """The file is whole, but one model's name lacks its class, at which Blender's importer
+    raises.
+    """
     path = save_rig(tmp_path / "rig.fbx")
     path.write_bytes(path.read_bytes().replace(b"\0\x01Model", b"..Model"))
     with pytest.raises(InputError, match=r"rig\.fbx: Blender cannot import this file"):
@@ -279,7 +318,10 @@ def test_root_motion_on_an_object_is_the_same_in_every_format(tmp_path, kind):
         export_on_rig([motion_of(walk(2.0))], BODY, [out], source, RigExportOptions(OPTIONS, root))
         rigs = read(out)
         bone = names_of("mixamo")["pelvis"]
-        paths[root] = seen(rigs[0], [bone], range(2, 60, 8))[:, 0], np.array(rigs[0].pose.bones[bone].head)
+        paths[root] = (
+            seen(rigs[0], [bone], range(2, 60, 8))[:, 0],
+            np.array(rigs[0].pose.bones[bone].head),
+        )
     np.testing.assert_allclose(paths["object"][0], paths["bone"][0], atol=5e-3)
     assert np.ptp(paths["object"][0][:, 1]) > 1.0
     assert np.abs(paths["object"][1][[0, 1]]).max() < 0.1 < np.abs(paths["bone"][1]).max()
@@ -296,7 +338,10 @@ def test_the_command_line_retargets_a_capture(tmp_path):
     argv += ["--retarget-root", "object", "--threads", "1"]
     done = shell(*argv, "-o", tmp_path / "out.glb", "-o", tmp_path / "out.npz")
     assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout)["outputs"] == [str(tmp_path / "out.npz"), str(tmp_path / "out.glb")]
+    assert json.loads(done.stdout)["outputs"] == [
+        str(tmp_path / "out.npz"),
+        str(tmp_path / "out.glb"),
+    ]
     rigs = read(tmp_path / "out.glb")
     assert [rig.name for rig in rigs] == ["Rig0"]
     assert set(names_of("mixamo").values()) <= set(rigs[0].data.bones.keys())
@@ -309,14 +354,17 @@ def test_the_command_line_checks_the_rig_before_the_capture(tmp_path):
     rig = save_rig(tmp_path / "rig.blend", armatures=2)
     done = shell("capture", SAMPLE, "--retarget", rig, "-o", tmp_path / "out.glb")
     assert done.returncode == 2
-    assert sum(line.startswith("scope:") for line in done.stderr.splitlines()) == 1  # Blender 5.2 has its own lines
+    # Blender 5.2 has its own lines
+    assert sum(line.startswith("scope:") for line in done.stderr.splitlines()) == 1
     assert "Traceback" not in done.stderr
     assert "--rig-object" in done.stderr
     before = rig.read_bytes()
     done = shell("capture", SAMPLE, "--retarget", rig, "--rig-object", "Rig1", "-o", rig)
     assert done.returncode == 2
     assert "rig's own file" in done.stderr
-    done = shell("capture", SAMPLE, "--retarget", rig, "--rig-object", "Rig1", "-o", tmp_path / "out.npz")
+    done = shell(
+        "capture", SAMPLE, "--retarget", rig, "--rig-object", "Rig1", "-o", tmp_path / "out.npz"
+    )
     assert done.returncode == 2
     assert rig.read_bytes() == before
     assert sorted(p.name for p in tmp_path.iterdir()) == ["rig.blend"]
@@ -324,7 +372,9 @@ def test_the_command_line_checks_the_rig_before_the_capture(tmp_path):
 
 def test_a_batch_refuses_a_bad_rig_once(tmp_path):
     (tmp_path / "clips").mkdir()
-    done = shell("batch", tmp_path / "clips", "--out", tmp_path / "out", "--retarget", tmp_path / "rig.fbx")
+    done = shell(
+        "batch", tmp_path / "clips", "--out", tmp_path / "out", "--retarget", tmp_path / "rig.fbx"
+    )
     assert done.returncode == 1
     assert sum(line.startswith("scope:") for line in done.stderr.splitlines()) == 1
     assert "rig.fbx" in done.stderr
@@ -335,5 +385,7 @@ def test_footage_of_a_distorting_lens_does_not_stay_in_the_session(tmp_path):
     source = rig_source(save_rig(tmp_path / "rig.blend"))
     motion = motion_of(walk(0.2))
     motion.dist[0] = -0.1
-    export_on_rig([motion], BODY, [tmp_path / "out.bvh"], source, RigExportOptions(NEW_SCENE), SAMPLE)
+    export_on_rig(
+        [motion], BODY, [tmp_path / "out.bvh"], source, RigExportOptions(NEW_SCENE), SAMPLE
+    )
     assert list(bpy.data.movieclips) == []

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How bones of a small armature move together, with and without constraints that its hierarchy does not show."""
+"""How bones of a small armature move together, with and without constraints that its hierarchy does
+not show.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +49,9 @@ def test_parents_come_before_their_children_and_places_are_those_at_rest(rig):
     with at_rest(rig):
         skeleton = probe(rig, PARTS)
     assert parents(skeleton) == {"hips": None, "spine": "hips", "head": "spine", "prop": None}
-    assert skeleton.names.index("hips") < skeleton.names.index("spine") < skeleton.names.index("head")
+    assert (
+        skeleton.names.index("hips") < skeleton.names.index("spine") < skeleton.names.index("head")
+    )
     np.testing.assert_allclose(skeleton.heads, [HEADS[name] for name in skeleton.names], atol=1e-6)
     assert all(np.allclose(rig.pose.bones[name].matrix_basis, np.eye(4)) for name in HEADS)
 
@@ -63,7 +67,10 @@ def test_a_bone_that_a_constraint_makes_follow_another_is_its_child(rig):
 def test_a_bone_that_does_not_turn_is_named(rig):
     limit = rig.pose.bones["head"].constraints.new("LIMIT_ROTATION")
     limit.use_limit_x = limit.use_limit_y = limit.use_limit_z = True
-    with at_rest(rig), pytest.raises(InputError, match="'head' of 'rig' does not move when it is rotated"):
+    with (
+        at_rest(rig),
+        pytest.raises(InputError, match="'head' of 'rig' does not move when it is rotated"),
+    ):
         probe(rig, PARTS)
 
 

@@ -26,14 +26,22 @@ def direction_error(rig, bone_of, pairs, frames=FRAMES):
         ours = seen(rig, [bone_of[a], bone_of[b]], frames)
         ours = ours[:, 1] - ours[:, 0]
         theirs = joints[:, NAMES.index(b)] - joints[:, NAMES.index(a)]
-        cosine = (ours * theirs).sum(1) / np.linalg.norm(ours, axis=1) / np.linalg.norm(theirs, axis=1)
+        cosine = (
+            (ours * theirs).sum(1) / np.linalg.norm(ours, axis=1) / np.linalg.norm(theirs, axis=1)
+        )
         worst = max(worst, float(np.degrees(np.arccos(np.clip(cosine, -1, 1))).max()))
     return worst
 
 
 def run(source, rig, bone_map=None, **options):
     return retarget(
-        source, BODY, np.zeros(BODY.P), rig, bone_map or guess_bone_map(rig), RATE, RetargetOptions(**options)
+        source,
+        BODY,
+        np.zeros(BODY.P),
+        rig,
+        bone_map or guess_bone_map(rig),
+        RATE,
+        RetargetOptions(**options),
     )
 
 
@@ -68,14 +76,17 @@ def _disabled_in_viewports(rig):
     rig.hide_viewport = True
 
 
-@pytest.mark.parametrize("hide", [_in_rest_position, _in_edit_mode, _disabled_in_viewports, _in_a_hidden_collection])
+@pytest.mark.parametrize(
+    "hide", [_in_rest_position, _in_edit_mode, _disabled_in_viewports, _in_a_hidden_collection]
+)
 def test_a_hidden_or_edited_rig_moves(source, hide):
     rig, bone_of = build_rig("mixamo")
     hide(rig)
     collections, hidden = rig.users_collection, rig.hide_viewport
     run(source, rig, feet=False)
     assert (rig.users_collection, rig.hide_viewport) == (collections, hidden)
-    assert (rig.mode, rig.data.pose_position) == ("OBJECT", "POSE")  # it would not be seen to move otherwise
+    # it would not be seen to move otherwise
+    assert (rig.mode, rig.data.pose_position) == ("OBJECT", "POSE")
     rig.hide_viewport = collections[0].hide_viewport = False
     assert direction_error(rig, bone_of, ARMS + LEGS) < 1.0
 
@@ -138,7 +149,11 @@ def test_rigify(rigify_rigs):
 def test_bones_are_guessed(scheme):
     rig, bone_of = build_rig(scheme)
     found = guess_bone_map(rig)
-    wrong = {bone: found.parts.get(bone) for part, bone in bone_of.items() if found.parts.get(bone) != part}
+    wrong = {
+        bone: found.parts.get(bone)
+        for part, bone in bone_of.items()
+        if found.parts.get(bone) != part
+    }
     assert not wrong
     assert all(0 < c <= 1 for c in found.confidence.values())
 

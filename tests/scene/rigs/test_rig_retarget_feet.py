@@ -27,7 +27,9 @@ def contacts(stands):
 
 
 def points(rig, feet):
-    """Return for each (foot, ball): heel and ball (T, 2, 3) in the world, and their positions at rest."""
+    """Return for each (foot, ball): heel and ball (T, 2, 3) in the world, and their positions at
+    rest.
+    """
     heels_of_bones, rests, moved = [], [], []
     for foot, ball in feet:
         ankle = np.array(rig.matrix_world @ rig.data.bones[foot].head_local)
@@ -35,28 +37,38 @@ def points(rig, feet):
         heel = ankle + (ankle - rest_ball) * [1, 1, 0] * 0.3
         heel[2] = 0.0
         heels_of_bones.append(
-            np.linalg.inv(np.array(rig.matrix_world @ rig.data.bones[foot].matrix_local)) @ [*heel, 1]
+            np.linalg.inv(np.array(rig.matrix_world @ rig.data.bones[foot].matrix_local))
+            @ [*heel, 1]
         )
         rests.append(np.array([heel, rest_ball]))
     for frame in range(1, len(STANDS["left"]) + 1):
         bpy.context.scene.frame_set(frame)
         posed = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
         world, bones = np.array(posed.matrix_world), posed.pose.bones
-        heels = [world @ np.array(bones[foot].matrix) @ at for (foot, _), at in zip(feet, heels_of_bones, strict=True)]
+        heels = [
+            world @ np.array(bones[foot].matrix) @ at
+            for (foot, _), at in zip(feet, heels_of_bones, strict=True)
+        ]
         balls = [world @ [*bones[ball].head, 1] for _, ball in feet]
         moved.append([[heel[:3], ball[:3]] for heel, ball in zip(heels, balls, strict=True)])
     return list(zip(np.swapaxes(moved, 0, 1), rests, strict=True))
 
 
 def leg_length(rig, spell):
-    places = [rig.matrix_world @ rig.data.bones[spell("left", part)].head_local for part in ("thigh", "shin", "foot")]
+    places = [
+        rig.matrix_world @ rig.data.bones[spell("left", part)].head_local
+        for part in ("thigh", "shin", "foot")
+    ]
     return (places[1] - places[0]).length + (places[2] - places[1]).length
 
 
 def check_contacts(rig, spell):
-    """Check that in every contact a point slides and rises by less than 1 cm, and that steps scale."""
+    """Check that in every contact a point slides and rises by less than 1 cm, and that steps
+    scale.
+    """
     scale = leg_length(rig, spell) / sum(
-        np.linalg.norm(joint(f"left_{a}") - joint(f"left_{b}")) for a, b in (("hip", "knee"), ("knee", "ankle"))
+        np.linalg.norm(joint(f"left_{a}") - joint(f"left_{b}"))
+        for a, b in (("hip", "knee"), ("knee", "ankle"))
     )
     feet = points(rig, [(spell(side, "foot"), spell(side, "toe")) for side in STANDS])
     for side, (moved, rest) in zip(STANDS, feet, strict=True):
@@ -83,7 +95,9 @@ def test_feet_in_contact_stay_in_place(source, scheme, size):
 @pytest.mark.parametrize("loose", [("thigh",), ("",)], ids=["thighs", "every bone"])
 def test_a_rig_whose_bones_do_not_inherit_rotation_moves_as_one_whose_bones_do(loose):
     clip, frames = walk(2.0), range(1, 60, 6)
-    clip.rotations[:, 0] = exp(0.4 * np.sin(5 * clip.times)[:, None] * [0.3, 1.0, 0.5]) @ clip.rotations[:, 0]
+    clip.rotations[:, 0] = (
+        exp(0.4 * np.sin(5 * clip.times)[:, None] * [0.3, 1.0, 0.5]) @ clip.rotations[:, 0]
+    )
     source = captured(motion_of(clip))
     rig, bone_of = build_rig("unreal")
     run(source, rig)

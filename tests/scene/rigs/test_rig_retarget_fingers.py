@@ -17,7 +17,8 @@ from ..made_rigs import FBX, FRAMES, build_rig, captured, seen, truth
 
 HANDS = load_body("scope_h")
 FINGERS = ("thumb", "index", "middle", "ring", "pinky")
-# Knuckle, the two joints after it and the tip: along the arm, across to the thumb's side, down; metres from the wrist.
+# Knuckle, the two joints after it and the tip: along the arm, across to the thumb's side, down;
+# metres from the wrist.
 SHAPE = {
     "thumb": ((0.02, 0.03, 0.01), (0.05, 0.06, 0.02), (0.075, 0.075, 0.03), (0.095, 0.085, 0.035)),
     "index": ((0.1, 0.03, 0), (0.14, 0.032, 0), (0.165, 0.034, 0.004), (0.185, 0.035, 0.01)),
@@ -29,12 +30,18 @@ UNITY = {1: "Proximal", 2: "Intermediate", 3: "Distal"}
 SPELL = {
     "mixamo": lambda f, k, side: f"mixamorig:{side.title()}Hand{f.title()}{k}",
     "unreal": lambda f, k, side: f"{f}_{k:02d}_{side[0]}",
-    "unity": lambda f, k, side: f"{side.title()}{'Little' if f == 'pinky' else f.title()}{UNITY[k]}",
+    "unity": lambda f, k, side: (
+        f"{side.title()}{'Little' if f == 'pinky' else f.title()}{UNITY[k]}"
+    ),
     "mpfb": lambda f, k, side: f"finger{FINGERS.index(f) + 1}-{k}.{side[0].upper()}",
     "smpl": lambda f, k, side: f"{side}_{f}{k}",
     "biped": lambda f, k, side: f"Bip01 {side[0].upper()} Finger{FINGERS.index(f)}{k - 1 or ''}",
-    "vroid": lambda f, k, side: f"J_Bip_{side[0].upper()}_{'Little' if f == 'pinky' else f.title()}{k}",
-    "character creator": lambda f, k, side: f"CC_Base_{side[0].upper()}_{'Mid' if f == 'middle' else f.title()}{k}",
+    "vroid": lambda f, k, side: (
+        f"J_Bip_{side[0].upper()}_{'Little' if f == 'pinky' else f.title()}{k}"
+    ),
+    "character creator": lambda f, k, side: (
+        f"CC_Base_{side[0].upper()}_{'Mid' if f == 'middle' else f.title()}{k}"
+    ),
     "nameless": lambda f, k, side: f"{side[0]}{'qwert'[FINGERS.index(f)]}{'uvw'[k - 1]}",
 }
 PALM = {
@@ -44,7 +51,9 @@ PALM = {
 
 
 def build_hands(scheme, twist=0.6, **options):
-    """Build a rig with fingers and rotated palms; return it with the bones of the phalanges by part."""
+    """Build a rig with fingers and rotated palms; return it with the bones of the phalanges by
+    part.
+    """
     rig, bone_of = build_rig(scheme, **options)
     to_armature = rig.matrix_world.inverted()
     size, rng = options.get("size", 1.3), np.random.default_rng(5)
@@ -54,7 +63,12 @@ def build_hands(scheme, twist=0.6, **options):
 
     def bone(name, parent, head, tail):
         new = edit.new(name)
-        new.head, new.tail, new.parent, new.roll = to_armature @ head, to_armature @ tail, parent, rng.uniform(-3, 3)
+        new.head, new.tail, new.parent, new.roll = (
+            to_armature @ head,
+            to_armature @ tail,
+            parent,
+            rng.uniform(-3, 3),
+        )
         return new
 
     for side in ("left", "right"):
@@ -65,11 +79,15 @@ def build_hands(scheme, twist=0.6, **options):
         turn = Matrix.Rotation(twist if side == "left" else -twist, 3, along)
         axes = [along, turn @ Vector((0, -1, 0)), turn @ down.normalized()]
         for finger in FINGERS:
-            offsets = [sum((c * a for c, a in zip(p, axes, strict=True)), Vector()) for p in SHAPE[finger]]
+            offsets = [
+                sum((c * a for c, a in zip(p, axes, strict=True)), Vector()) for p in SHAPE[finger]
+            ]
             points = [start + size * offset for offset in offsets]
             above = wrist
             if scheme in PALM and finger != "thumb":
-                above = bone(PALM[scheme](finger, side), wrist, start.lerp(points[0], 0.2), points[0])
+                above = bone(
+                    PALM[scheme](finger, side), wrist, start.lerp(points[0], 0.2), points[0]
+                )
             for k in (1, 2, 3):
                 above = bone(spell(finger, k, side), above, points[k - 1], points[k])
                 found[f"{side}_{finger}{k}"] = above.name
@@ -91,7 +109,9 @@ def gesture():
             rotations[:, i] = plain.rotations[:, BODY.joint_names.index(name)]
         sign = 1.0 if side == "left" else -1.0
         if part == "wrist":
-            rotations[:, i] = exp(np.stack([0.5 * np.sin(phase), 0 * phase, 0.3 * sign * np.cos(phase)], axis=1))
+            rotations[:, i] = exp(
+                np.stack([0.5 * np.sin(phase), 0 * phase, 0.3 * sign * np.cos(phase)], axis=1)
+            )
         elif part[:-1] in FINGERS:
             bend = 0.5 * (1 + np.sin(phase + FINGERS.index(part[:-1])))
             axis = [0, sign, 0] if part.startswith("thumb") else [0, 0, -sign]
@@ -105,7 +125,9 @@ def source():
 
 
 def run(source, rig, body=HANDS):
-    return retarget(source, body, np.zeros(body.P), rig, guess_bone_map(rig), RATE, RetargetOptions())
+    return retarget(
+        source, body, np.zeros(body.P), rig, guess_bone_map(rig), RATE, RetargetOptions()
+    )
 
 
 def angles(a, b):
@@ -155,7 +177,9 @@ def test_fingers_of_rigify(source, rigify_rigs):
             bone_of[f"{side}_wrist"] = f"{prefix}hand.{side[0].upper()}"
             for f in FINGERS:
                 name = f if f == "thumb" else f"f_{f}"
-                bone_of |= {f"{side}_{f}{k}": f"{prefix}{name}.{k:02d}.{side[0].upper()}" for k in (1, 2, 3)}
+                bone_of |= {
+                    f"{side}_{f}{k}": f"{prefix}{name}.{k:02d}.{side[0].upper()}" for k in (1, 2, 3)
+                }
         run(source, rig)
         check_hands(rig, bone_of)
 
@@ -178,8 +202,12 @@ def test_a_capture_without_fingers_leaves_them_as_they_are():
 
 
 def test_a_rig_of_the_same_shape_deforms_the_same_mesh(source, blender):
-    """The captured body's skeleton with other names: its mesh must coincide with the captured one."""
-    person = build_scene([motion_of(gesture(), body=HANDS)], HANDS, None, BuildOptions(start_frame=1.0)).people[0]
+    """The captured body's skeleton with other names: its mesh must coincide with the captured
+    one.
+    """
+    person = build_scene(
+        [motion_of(gesture(), body=HANDS)], HANDS, None, BuildOptions(start_frame=1.0)
+    ).people[0]
     rig, mesh = person.armature, person.mesh
     rig.animation_data_clear()
     for name in HANDS.joint_names:
@@ -188,7 +216,15 @@ def test_a_rig_of_the_same_shape_deforms_the_same_mesh(source, blender):
             rig.data.bones[name].name = SPELL["unreal"](part[:-1], int(part[-1]), side)
     for bone in rig.pose.bones:
         bone.matrix_basis = Matrix()
-    retarget(source, HANDS, np.zeros(HANDS.P), rig, guess_bone_map(rig), RATE, RetargetOptions(feet=False))
+    retarget(
+        source,
+        HANDS,
+        np.zeros(HANDS.P),
+        rig,
+        guess_bone_map(rig),
+        RATE,
+        RetargetOptions(feet=False),
+    )
     captured = next(o for o in source.children if o.type == "MESH")
     for frame in (1, 12, 23, 40):
         bpy.context.scene.frame_set(frame)

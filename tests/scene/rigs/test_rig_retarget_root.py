@@ -19,7 +19,9 @@ from scope.scope_addon.scene.rigs.rig_retarget import RetargetOptions, guess_bon
 from ...edit.walking import BODY, RATE, motion_of, walk
 from ..made_rigs import FBX, build_rig, captured, seen
 
-TURNED = Matrix.LocRotScale((2.0, 1.0, 0.0), Matrix.Rotation(math.pi, 3, "Z").to_quaternion(), (1.0,) * 3)
+TURNED = Matrix.LocRotScale(
+    (2.0, 1.0, 0.0), Matrix.Rotation(math.pi, 3, "Z").to_quaternion(), (1.0,) * 3
+)
 
 
 @pytest.fixture
@@ -31,7 +33,9 @@ def source():
 
 
 def run(source, rig, **options):
-    return retarget(source, BODY, np.zeros(BODY.P), rig, guess_bone_map(rig), RATE, RetargetOptions(**options))
+    return retarget(
+        source, BODY, np.zeros(BODY.P), rig, guess_bone_map(rig), RATE, RetargetOptions(**options)
+    )
 
 
 def between_hips(armature, bone_of=None):
@@ -61,13 +65,17 @@ def test_on_an_object_the_rig_looks_the_same(source, matrix):
         np.testing.assert_allclose(seen(rig, bones), before, atol=1e-3)
         roots = [obj for obj in bpy.data.objects if "scope_root" in obj]
         assert roots == [root_object(rig)]
-        # The rig's origin is below the pelvis, and the rig faces in its own object where it faces at rest.
+        # The rig's origin is below the pelvis, and the rig faces in its own object where it faces
+        # at rest.
         places = rigs_matrices(rig)
         pelvis = seen(rig, [bone_of["pelvis"]], (1, 20, 50))[:, 0]
         np.testing.assert_allclose(places[:, :2, 3], pelvis[:, :2], atol=1e-3)
         hips = seen(rig, [bone_of["left_hip"], bone_of["right_hip"]], (1, 20, 50))
         left = np.einsum("tji,tj->ti", places[:, :3, :3], hips[:, 0] - hips[:, 1])
-        rest = rig.data.bones[bone_of["left_hip"]].head_local - rig.data.bones[bone_of["right_hip"]].head_local
+        rest = (
+            rig.data.bones[bone_of["left_hip"]].head_local
+            - rig.data.bones[bone_of["right_hip"]].head_local
+        )
         cosine = left @ np.array(rest) / np.linalg.norm(left, axis=1) / rest.length
         assert cosine.min() > math.cos(math.radians(8))  # the heading is the hips' smoothed one
     run(source, rig)
@@ -104,7 +112,9 @@ def test_the_rig_follows_where_the_user_puts_the_captured_armature(source, root)
     bones = list(bone_of.values())
     run(source, rig, root=root)
     before = seen(rig, bones)
-    place = Matrix.LocRotScale((3.0, -1.0, 0.5), Matrix.Rotation(1.1, 3, "Z").to_quaternion(), (1.0,) * 3)
+    place = Matrix.LocRotScale(
+        (3.0, -1.0, 0.5), Matrix.Rotation(1.1, 3, "Z").to_quaternion(), (1.0,) * 3
+    )
     source.matrix_world = place
     run(source, rig, root=root, offset=(0.0, 0.0, 0.25))
     wanted = before @ np.array(place)[:3, :3].T + np.array(place.translation) + [0, 0, 0.25]
@@ -130,7 +140,9 @@ def test_the_path_of_a_rig_with_three_factors_of_scale_is_the_captured_one(sourc
     rig.scale, rig.rotation_euler = scale, (0.0, 0.0, 0.5)
     travel = run(source, rig).travel
     path, wanted = between_hips(rig, bone_of), between_hips(source)
-    np.testing.assert_allclose((path - path[0])[:, :2], travel * (wanted - wanted[0])[:, :2], atol=2e-3)
+    np.testing.assert_allclose(
+        (path - path[0])[:, :2], travel * (wanted - wanted[0])[:, :2], atol=2e-3
+    )
 
 
 def test_a_mirrored_rig_moves_as_the_one_that_it_mirrors(source):
@@ -141,7 +153,9 @@ def test_a_mirrored_rig_moves_as_the_one_that_it_mirrors(source):
     bpy.context.view_layer.update()
     run(source, rig)
     swap = {"left": "right", "right": "left"}
-    mirrored = [bone_of["_".join(swap.get(word, word) for word in part.split("_"))] for part in bone_of]
+    mirrored = [
+        bone_of["_".join(swap.get(word, word) for word in part.split("_"))] for part in bone_of
+    ]
     np.testing.assert_allclose(seen(rig, mirrored), wanted, atol=1e-3)
 
 

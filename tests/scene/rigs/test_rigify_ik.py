@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Retargeting to a generated Rigify rig: the limbs show the same pose by IK as by FK, as evaluated by Blender."""
+"""Retargeting to a generated Rigify rig: the limbs show the same pose by IK as by FK, as evaluated
+by Blender.
+"""
 
 import bpy
 import numpy as np
@@ -9,7 +11,11 @@ from scope.scope_addon.scene.rigs.rig_retarget import RetargetOptions, guess_bon
 from ...edit.walking import BODY, NAMES, RATE, motion_of, walk
 from ..made_rigs import captured
 
-LIMBS = [(f"{name}.{side}", kind) for side in "LR" for name, kind in (("thigh", "leg"), ("upper_arm", "arm"))]
+LIMBS = [
+    (f"{name}.{side}", kind)
+    for side in "LR"
+    for name, kind in (("thigh", "leg"), ("upper_arm", "arm"))
+]
 BONES = {"leg": ("thigh", "shin", "foot", "toe"), "arm": ("upper_arm", "forearm", "hand")}
 
 
@@ -37,13 +43,20 @@ def posed(rig, frames):
 @pytest.mark.parametrize("root", ["bone", "object"])
 def test_ik_shows_the_pose_of_fk(rigify_rigs, root):
     motion = motion_of(walk(1.0))
-    elbows = motion.poses.reshape(len(motion), -1, 3)[:, [NAMES.index("left_elbow"), NAMES.index("right_elbow")]]
-    elbows += [[0.4, -1.2, 0.3], [0.5, 0.7, 0.6]]  # not about the axis about which the rig's IK bends the elbow
-    motion.poses.reshape(len(motion), -1, 3)[:, [NAMES.index("left_elbow"), NAMES.index("right_elbow")]] = elbows
+    elbows = motion.poses.reshape(len(motion), -1, 3)[
+        :, [NAMES.index("left_elbow"), NAMES.index("right_elbow")]
+    ]
+    # not about the axis about which the rig's IK bends the elbow
+    elbows += [[0.4, -1.2, 0.3], [0.5, 0.7, 0.6]]
+    motion.poses.reshape(len(motion), -1, 3)[
+        :, [NAMES.index("left_elbow"), NAMES.index("right_elbow")]
+    ] = elbows
     source = captured(motion)
     rig = rigify_rigs[1][0]
     rig.pose.bones["foot_heel_ik.L"].rotation_euler = (0.4, 0.2, 0.1)  # left by the user
-    retarget(source, BODY, np.zeros(BODY.P), rig, guess_bone_map(rig), RATE, RetargetOptions(root=root))
+    retarget(
+        source, BODY, np.zeros(BODY.P), rig, guess_bone_map(rig), RATE, RetargetOptions(root=root)
+    )
     frames = range(1, 31, 3)
     switch(rig, IK_FK=1.0)
     by_fk = posed(rig, frames)
@@ -52,7 +65,11 @@ def test_ik_shows_the_pose_of_fk(rigify_rigs, root):
         by_ik = posed(rig, frames)
         assert np.linalg.norm(by_ik - by_fk, axis=-1).max() < 0.01
         lines = [ends[:, :, 1] - ends[:, :, 0] for ends in (by_fk, by_ik)]
-        cosine = (lines[0] * lines[1]).sum(-1) / np.linalg.norm(lines[0], axis=-1) / np.linalg.norm(lines[1], axis=-1)
+        cosine = (
+            (lines[0] * lines[1]).sum(-1)
+            / np.linalg.norm(lines[0], axis=-1)
+            / np.linalg.norm(lines[1], axis=-1)
+        )
         assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).max() < 2.0
     assert np.linalg.norm(by_fk[0] - by_fk[-1], axis=-1).max() > 0.1  # it moves
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Processes that have numba already: forked from one that has compiled something, which takes half a second."""
+"""Processes that have numba already: forked from one that has compiled something, which takes half
+a second.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,8 @@ Done = subprocess.CompletedProcess[str]
 
 TIMEOUT_S = 600  # after which a process is ended, and fails its test
 
-# Takes code, folder, variables, seconds, and two file descriptors for what is printed; answers with the exit status.
+# Takes code, folder, variables, seconds, and two file descriptors for what is printed; answers with
+# the exit status.
 SERVER = """
 import gc, json, os, signal, socket, sys
 from numba import njit
@@ -48,7 +51,9 @@ while (received := socket.recv_fds(server, 1 << 20, 2))[0]:
 
 @pytest.fixture(scope="session")
 def run_code() -> Iterator[Callable[[str, Path, Mapping[str, str]], Done]]:
-    """Run code in a process of its own, in a folder and with the given environment variables alone."""
+    """Run code in a process of its own, in a folder and with the given environment variables
+    alone.
+    """
     if sys.platform != "linux":
         yield _started
         return
@@ -61,7 +66,9 @@ def run_code() -> Iterator[Callable[[str, Path, Mapping[str, str]], Done]]:
         def run(code: str, folder: Path, variables: Mapping[str, str]) -> Done:
             # Numba takes the processor's name and features when it first compiles.
             is_other = any(name.startswith("NUMBA_CPU") for name in variables)
-            return (_started if is_other else lambda *given: _forked(ours, *given))(code, folder, variables)
+            return (_started if is_other else lambda *given: _forked(ours, *given))(
+                code, folder, variables
+            )
 
         yield run
         process.kill()
@@ -70,7 +77,13 @@ def run_code() -> Iterator[Callable[[str, Path, Mapping[str, str]], Done]]:
 def _started(code: str, folder: Path, variables: Mapping[str, str]) -> Done:
     command = [sys.executable, "-c", code]
     return subprocess.run(
-        command, cwd=folder, env=dict(variables), capture_output=True, text=True, check=True, timeout=TIMEOUT_S
+        command,
+        cwd=folder,
+        env=dict(variables),
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=TIMEOUT_S,
     )
 
 

@@ -6,7 +6,10 @@ from pathlib import Path
 
 import scope.solver
 
-FILES = tuple(f"compiled/{name}.py" for name in ("kernel", "pipeline", "code_cache", "code_files", "code_folders"))
+FILES = tuple(
+    f"compiled/{name}.py"
+    for name in ("kernel", "pipeline", "code_cache", "code_files", "code_folders")
+)
 # The callee is too long to be inlined: calls count much where LLVM decides that.
 _LINES = "".join(f"    total += math.sin(x + {k}.0)\n" for k in range(30))
 LONG_CALLEE = f"""

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Kernels work whatever has become of their code on disk, and code that cannot be used is compiled and kept again."""
+"""Kernels work whatever has become of their code on disk, and code that cannot be used is compiled
+and kept again.
+"""
 
 import os
 import pickle
@@ -9,7 +11,12 @@ import sys
 
 import pytest
 from scope.solver.compiled.code_files import SUFFIX, read_code, write_code
-from scope.solver.compiled.code_folders import SOLVER, WITHOUT_KERNELS, can_run_shipped, shipped_processor
+from scope.solver.compiled.code_folders import (
+    SOLVER,
+    WITHOUT_KERNELS,
+    can_run_shipped,
+    shipped_processor,
+)
 from scope.solver.processes import computer
 
 from .small_package import LONG_CALLEE, make_package
@@ -34,7 +41,9 @@ RESULTS = [1.0 + n for n in range(COUNT)]
 def run(run_code):
     def run(folder, cache, before="", **environment):
         """Return which kernels came from disk, and what was written to stderr."""
-        done = run_code(before + RUN, folder, dict(os.environ, **{"NUMBA_CACHE_DIR": str(cache), **environment}))
+        done = run_code(
+            before + RUN, folder, dict(os.environ, **{"NUMBA_CACHE_DIR": str(cache), **environment})
+        )
         results, hits = map(eval, done.stdout.splitlines())
         assert results == RESULTS
         return hits, done.stderr
@@ -61,7 +70,9 @@ def folder(made, tmp_path):
 def code_files(cache):
     """Return the file of each kernel, in order."""
     files = sorted(cache.rglob("*.code"))
-    assert [path.name.partition("-")[0] for path in files] == [f"kernels.add{n}" for n in range(COUNT)]
+    assert [path.name.partition("-")[0] for path in files] == [
+        f"kernels.add{n}" for n in range(COUNT)
+    ]
     return files
 
 
@@ -80,7 +91,11 @@ def test_damaged_code_is_replaced(run, folder):
 
 def test_content_that_numba_cannot_use_is_replaced(run, folder):
     """Its checksum is right."""
-    contents = [b"", b"no pickle", *map(pickle.dumps, (None, (), (1, 2), (("",) * 9, set()), (({},) * 9, set())))]
+    contents = [
+        b"",
+        b"no pickle",
+        *map(pickle.dumps, (None, (), (1, 2), (("",) * 9, set()), (({},) * 9, set()))),
+    ]
     for n, (path, content) in enumerate(zip(code_files(folder / "cache"), contents, strict=True)):
         key = repr((("package.kernels", f"add{n}", 3 + 4 * n), "(float64,)"))
         assert read_code(path, key, trusted=False)
@@ -126,7 +141,9 @@ def test_a_full_disk_leaves_no_part_of_a_file(run, folder):
     assert [path for path in (folder / "full").rglob("*") if path.is_file()] == []
 
 
-def test_code_is_kept_whatever_the_times_of_the_sources_and_what_a_killed_compile_has_left_is_removed(run, folder):
+def test_code_is_kept_whatever_the_times_of_the_sources_and_what_a_killed_compile_left_is_removed(
+    run, folder
+):
     first = code_files(folder / "cache")[0]
     ended = subprocess.Popen([sys.executable, "-c", ""])
     ended.wait()
@@ -135,7 +152,8 @@ def test_code_is_kept_whatever_the_times_of_the_sources_and_what_a_killed_compil
         (own / f"{first.stem}{SUFFIX}.{name}-1a2b3c4d").write_bytes(first.read_bytes()[:100])
     assert run(folder, folder / "cache") == ([1] * COUNT, "")
     drafts = {path.suffix[1:] for path in own.iterdir() if path.suffix != SUFFIX}
-    assert drafts == {f"{name}-1a2b3c4d" for name in others}  # another computer's, and one that is being written
+    # another computer's, and one that is being written
+    assert drafts == {f"{name}-1a2b3c4d" for name in others}
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows reports no owner")
@@ -156,7 +174,10 @@ def test_code_that_others_could_have_written_is_not_run(run, folder):
 @pytest.mark.skipif(not can_run_shipped(), reason="no code is shipped for this processor")
 def test_shipped_code_is_used_and_nothing_written(run, folder):
     shipped = folder / "assets" / "kernels"
-    assert run(folder, shipped, NUMBA_CPU_NAME=shipped_processor(), NUMBA_CPU_FEATURES="")[0] == [0] * COUNT
+    assert (
+        run(folder, shipped, NUMBA_CPU_NAME=shipped_processor(), NUMBA_CPU_FEATURES="")[0]
+        == [0] * COUNT
+    )
     assert run(folder, folder / "other") == ([1] * COUNT, "")
     assert not (folder / "other").exists()
     code_files(shipped)[0].write_bytes(b"damaged")

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cached machine code is dropped when any file of the solver changes, not only the kernel's own; who waits is told."""
+"""Cached machine code is dropped when any file of the solver changes, not only the kernel's own;
+who waits is told.
+"""
 
 import os
 
@@ -9,9 +11,11 @@ from .small_package import make_package
 
 SOURCE = {
     "__init__.py": "",
-    "inner.py": "from .compiled.kernel import kernel\n\n\n@kernel\ndef inner(x):\n    return x + {value}.0\n",
+    "inner.py": "from .compiled.kernel import kernel\n\n\n@kernel\ndef inner(x):\n    return x + "
+    "{value}.0\n",
     "outer.py": (
-        "from .compiled.kernel import kernel\nfrom .inner import inner\n\n@kernel\ndef outer(x):\n    return inner(x)\n"
+        "from .compiled.kernel import kernel\nfrom .inner import inner\n\n@kernel\ndef outer(x):\n "
+        "   return inner(x)\n"
     ),
 }
 
@@ -28,7 +32,9 @@ announce_compilation(outer)
 
 @pytest.fixture(scope="module")
 def runs(run_code, tmp_path_factory):
-    """What is printed, and how often it is said that the solver is compiled: twice each, before and after a change."""
+    """What is printed, and how often it is said that the solver is compiled: twice each, before and
+    after a change.
+    """
     folder = tmp_path_factory.mktemp("kernels")
     package = make_package(folder)
     found = []
@@ -43,7 +49,12 @@ def runs(run_code, tmp_path_factory):
 
 
 def test_a_changed_callee_reaches_its_cached_caller(runs):
-    assert [printed for printed, _ in runs] == [["1.0", "0"], ["1.0", "1"], ["22.0", "0"], ["22.0", "1"]]
+    assert [printed for printed, _ in runs] == [
+        ["1.0", "0"],
+        ["1.0", "1"],
+        ["22.0", "0"],
+        ["22.0", "1"],
+    ]
 
 
 def test_compiling_is_announced_once(runs):

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rows in vector registers, against numpy: widths, offsets inside larger arrays, and nothing beside them written."""
+"""Rows in vector registers, against numpy: widths, offsets inside larger arrays, and nothing beside
+them written.
+"""
 
 import numpy as np
 import pytest
@@ -30,7 +32,9 @@ def test_operations_are_those_of_numpy(n: int) -> None:
     found = before.copy()
     _all(a, d, src, s, n, found)
     np.testing.assert_allclose(found, expected, rtol=1e-13, atol=1e-13)
-    untouched = np.isin(np.arange(4000), [k + d + i for k in (0, 1000, 2000, 3000) for i in range(n)], invert=True)
+    untouched = np.isin(
+        np.arange(4000), [k + d + i for k in (0, 1000, 2000, 3000) for i in range(n)], invert=True
+    )
     np.testing.assert_array_equal(found[untouched], before[untouched])
 
 

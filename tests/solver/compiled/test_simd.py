@@ -27,6 +27,8 @@ def test_a_formula_gives_what_numpy_gives() -> None:
     table, state = rng.normal(size=at + 2 * width + 3), rng.normal(size=3 * width)
     before = state.copy()
     given = [table[at + k * width : at + (k + 1) * width] for k in range(2)]
-    expected = np.concatenate(_formula(given.__getitem__, [before[:width], before[width : 2 * width]]))
+    expected = np.concatenate(
+        _formula(given.__getitem__, [before[:width], before[width : 2 * width]])
+    )
     _run(table, at, state)
     np.testing.assert_allclose(state, expected, rtol=1e-14)

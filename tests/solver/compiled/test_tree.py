@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Nothing is hard-wired to a body: any number of joints, any tree, any number of shape coefficients."""
+"""Nothing is hard-wired to a body: any number of joints, any tree, any number of shape
+coefficients.
+"""
 
 import numpy as np
 import pytest
@@ -45,12 +47,18 @@ def check_recovery(body, state, K, atol=1e-5):
     turned = state[2] @ rotations.exp(min(0.05, 0.5 / K) * rng.standard_normal((K, 3)))
     near = State(state[0], state[1] + 0.02, turned, 0.9 * state[3])
     found = fit(body, seen, init=near, priors=Priors(), options=TIGHT)
-    placed = np.einsum("mij,mj->mi", found.R_camera_part[body.keypoint_part], body.V @ found.state.beta + body.v_bar)
+    placed = np.einsum(
+        "mij,mj->mi",
+        found.R_camera_part[body.keypoint_part],
+        body.V @ found.state.beta + body.v_bar,
+    )
     np.testing.assert_allclose(placed + found.t_camera_part[body.keypoint_part], points, atol=atol)
     return found
 
 
-@pytest.mark.parametrize(("K", "kind"), [(1, "chain"), (2, "star"), (23, "random"), (51, "star"), (100, "chain")])
+@pytest.mark.parametrize(
+    ("K", "kind"), [(1, "chain"), (2, "star"), (23, "random"), (51, "star"), (100, "chain")]
+)
 @pytest.mark.parametrize("P", [0, 1, 10])
 def test_trees_and_shapes(K, kind, P):
     rng = np.random.default_rng(K + P)
@@ -81,7 +89,8 @@ def test_three_hundred_coefficients_over_a_clip():
     assert found.beta.shape == (300,)
     assert np.isfinite(found.beta).all()
     residual = [
-        forward(body, f.state.R_camera_root, f.state.t_camera_root, f.state.Omega, found.beta)[2] - m.keypoints3d.points
+        forward(body, f.state.R_camera_root, f.state.t_camera_root, f.state.Omega, found.beta)[2]
+        - m.keypoints3d.points
         for f, m in zip(found.frames, clip, strict=True)
     ]
     assert np.sqrt(np.mean(np.square(residual))) < 0.01

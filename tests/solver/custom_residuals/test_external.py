@@ -45,17 +45,23 @@ TRUTH = State(R0, T0, OMEGA, BETA)
 
 
 def solved(m, weights=Weights()):  # noqa: B008 - frozen
-    """Fit to the last digit, from the truth and without robust kernels, so that there is one minimum to find."""
+    """Fit to the last digit, from the truth and without robust kernels, so that there is one
+    minimum to find.
+    """
     options = Options(stages=[Stage(weights, 1e-14, 200)], robust_keypoints3d=np.inf, report=True)
     return fit(BODY, m, init=TRUTH, priors=Priors(), options=options)
 
 
 own_residual.register()
 register_residual("own_floor", kernel=floor.accumulate, ints=1, floats=6, indexes="points")
-register_residual("own_contact", kernel=foot_contact.accumulate.py_func, ints=1, floats=4, indexes="points")
+register_residual(
+    "own_contact", kernel=foot_contact.accumulate.py_func, ints=1, floats=4, indexes="points"
+)
 register_residual(
     "slow_joint",
-    function=lambda part, ints, f: np.sqrt(f[9]) * rotations.log(f[:9].reshape(3, 3).T @ part.Omega),
+    function=lambda part, ints, f: (
+        np.sqrt(f[9]) * rotations.log(f[:9].reshape(3, 3).T @ part.Omega)
+    ),
     floats=10,
     indexes="joints",
 )
@@ -88,11 +94,15 @@ POINT_ROWS = {
 }
 SAME = {
     "floor": replace(SEEN, floor=Floor(np.arange(M), UP, -0.1, contact=np.full(M, 0.5))),
-    "foot_contact": replace(SEEN, foot_contacts=FootContacts(np.arange(4), POINTS[:4] + 0.1, np.ones(4))),
+    "foot_contact": replace(
+        SEEN, foot_contacts=FootContacts(np.arange(4), POINTS[:4] + 0.1, np.ones(4))
+    ),
 }
 
 
-@pytest.mark.parametrize(("own", "built_in"), [("own_floor", "floor"), ("own_contact", "foot_contact")])
+@pytest.mark.parametrize(
+    ("own", "built_in"), [("own_floor", "floor"), ("own_contact", "foot_contact")]
+)
 def test_a_registered_kernel_fits_as_the_same_kernel_within_the_solver(own, built_in):
     """One that numba has compiled already, and one as plain Python."""
     b = solved(SAME[built_in], Weights(**{built_in: 4e4}))
@@ -114,7 +124,11 @@ def test_a_python_residual_of_a_joint_fits_as_the_solvers_own_kernel():
 def test_a_python_residual_of_a_part_fits_as_the_solvers_own_kernel():
     parts, R, t = np.array([0, 3]), rotations.exp(np.eye(3)[:2]), POINTS[:2]
     a = fitted("slow_pose", pose_prior.pack(parts, R, t, [40.0, 9.0], [10.0, 300.0]), 3.0)
-    assert_same(a, solved(replace(SEEN, pose_priors=PosePriors(parts, R, t, [120.0, 27.0], [30.0, 900.0]))), 1e-6)
+    assert_same(
+        a,
+        solved(replace(SEEN, pose_priors=PosePriors(parts, R, t, [120.0, 27.0], [30.0, 900.0]))),
+        1e-6,
+    )
     assert a.cost_by_term["slow_pose"] > 1.0
 
 
@@ -157,14 +171,22 @@ def forward_height(part):
 
 
 def test_derivatives_by_differences_are_those_of_the_equation():
-    """A residual linear in everything, whose derivatives are known; the part's origin moves with the shape."""
+    """A residual linear in everything, whose derivatives are known; the part's origin moves with
+    the shape.
+    """
     rng = np.random.default_rng(5)
     part = Part(
-        rotations.exp(rng.standard_normal(3)), rng.standard_normal(3), rng.standard_normal((3, P)),
-        rotations.exp(rng.standard_normal(3)), rotations.exp(rng.standard_normal(3)), rng.standard_normal(3),
+        rotations.exp(rng.standard_normal(3)),
+        rng.standard_normal(3),
+        rng.standard_normal((3, P)),
+        rotations.exp(rng.standard_normal(3)),
+        rotations.exp(rng.standard_normal(3)),
+        rng.standard_normal(3),
         rng.standard_normal(P),
-    )  # fmt: skip
-    found = numeric.differentiate(lambda p: np.concatenate([p.t, p.beta, rotations.log(p.Omega @ part.Omega.T)]), part)
+    )
+    found = numeric.differentiate(
+        lambda p: np.concatenate([p.t, p.beta, rotations.log(p.Omega @ part.Omega.T)]), part
+    )
     e = part.t - part.origin
     np.testing.assert_allclose(found.J_x[:3], np.hstack([-rotations.hat(e), np.eye(3)]), atol=1e-8)
     np.testing.assert_allclose(found.J_beta[:3], part.D, atol=1e-8)
@@ -180,8 +202,14 @@ def test_what_a_python_residual_raises_reaches_the_caller_once():
 
     register_residual("broken", function=broken, floats=0)
     m = replace(SEEN, tables={"broken": (np.array([[1]]), np.zeros((1, 0)))})
-    for attempt in (lambda: fit(BODY, m), lambda: fit_clip(BODY, [m]), lambda: fit_batch(BODY, [m])):
-        with pytest.raises(InvalidValueError, match="residual 'broken' raised KeyError: \"a mistake of the user's"):
+    for attempt in (
+        lambda: fit(BODY, m),
+        lambda: fit_clip(BODY, [m]),
+        lambda: fit_batch(BODY, [m]),
+    ):
+        with pytest.raises(
+            InvalidValueError, match="residual 'broken' raised KeyError: \"a mistake of the user's"
+        ):
             attempt()
     assert fit(BODY, SEEN).status is Status.CONVERGED
 
@@ -193,12 +221,22 @@ def test_what_it_raises_in_a_thread_reaches_the_caller_of_a_long_motion():
     register_residual("broken", function=broken, floats=0)
     last = replace(SEEN, tables={"broken": (np.array([[1]]), np.zeros((1, 0)))})
     with pytest.raises(InvalidValueError, match="residual 'broken' raised KeyError"):
-        fit_motion(BODY, [SEEN] * 39 + [last], np.arange(40) / 30, init=[TRUTH] * 40, priors=Priors())
+        fit_motion(
+            BODY, [SEEN] * 39 + [last], np.arange(40) / 30, init=[TRUTH] * 40, priors=Priors()
+        )
 
 
 @pytest.mark.parametrize(
     ("returned", "message"),
-    [("text", "must return numbers"), (1.0, r"shape \(n,\), but returned shape \(\)"), ([np.nan], "finite numbers")],
+    [
+        ("text", "must return numbers"),
+        (
+            1.0,
+            r"shape \(n,\), but returned shape "
+            r"\(\)",
+        ),
+        ([np.nan], "finite numbers"),
+    ],
 )
 def test_what_a_python_residual_must_return_is_said(returned, message):
     register_residual("broken", function=lambda part, ints, floats: returned)
@@ -213,25 +251,40 @@ def test_a_kernel_that_does_not_compile_is_refused():
 
     register_residual("broken", kernel=wrong)
     m = replace(SEEN, tables={"broken": (np.array([[1]]), np.zeros((1, 1)))})
-    with pytest.raises(InvalidValueError, match="kernel of residual 'broken' does not compile: .*nothing_of_the_sort"):
+    with pytest.raises(
+        InvalidValueError,
+        match="kernel of residual 'broken' does not compile: .*nothing_of_the_sort",
+    ):
         fit(BODY, m)
 
 
 def test_rows_that_do_not_fit_are_refused_as_the_solvers_own():
     for part in (-1, K + 1):
-        with pytest.raises(ShapeError, match=rf"Parts of 'height' must lie in 0..{K}, but go from {part}"):
+        with pytest.raises(
+            ShapeError,
+            match=rf"Parts of 'height' must lie in 0..{K}, but go from "
+            rf"{part}",
+        ):
             fitted("height", (np.array([[part]]), np.ones((1, 2))))
     for point in (-1, M + K + 1):
-        with pytest.raises(ShapeError, match=rf"Points of 'own_floor' must lie in 0..{M + K}, but go from {point}"):
+        with pytest.raises(
+            ShapeError,
+            match=rf"Points of 'own_floor' must lie in 0..{M + K}, but "
+            rf"go from {point}",
+        ):
             fitted("own_floor", (np.array([[point]]), np.ones((1, 6))))
     with pytest.raises(ShapeError, match=r"\(n, 1\) and \(n, 2\), but got \(1, 1\) and \(1, 3\)"):
         fitted("height", (np.array([[1]]), np.ones((1, 3))))
 
 
 def test_an_unknown_name_is_answered_with_the_known_ones():
-    for make in (lambda: Weights(tables={"hight": 1.0}), lambda: fit(BODY, replace(SEEN, tables={"hight": ([], [])}))):
+    for make in (
+        lambda: Weights(tables={"hight": 1.0}),
+        lambda: fit(BODY, replace(SEEN, tables={"hight": ([], [])})),
+    ):
         with pytest.raises(
-            InvalidValueError, match="no residual named 'hight'; .* pose_prior, .* floor, outline, height"
+            InvalidValueError,
+            match="no residual named 'hight'; .* pose_prior, .* floor, outline, height",
         ):
             make()
 
@@ -249,10 +302,22 @@ def nothing(*_):
         ({"name": "mine"}, "exactly one callable"),
         ({"name": "mine", "kernel": nothing, "function": nothing}, "exactly one callable"),
         ({"name": "mine", "kernel": "nothing"}, "exactly one callable"),
-        ({"name": "mine", "kernel": nothing, "ints": 0}, "ints of 'mine' must be a whole number of at least 1"),
-        ({"name": "mine", "kernel": nothing, "floats": 1.5}, "floats of 'mine' must be a whole number of at least 0"),
-        ({"name": "mine", "kernel": nothing, "indexes": "bones"}, "one of points, parts, joints, but is 'bones'"),
-        ({"name": "mine", "function": nothing, "indexes": "points"}, "one of parts, joints, but is 'points'"),
+        (
+            {"name": "mine", "kernel": nothing, "ints": 0},
+            "ints of 'mine' must be a whole number of at least 1",
+        ),
+        (
+            {"name": "mine", "kernel": nothing, "floats": 1.5},
+            "floats of 'mine' must be a whole number of at least 0",
+        ),
+        (
+            {"name": "mine", "kernel": nothing, "indexes": "bones"},
+            "one of points, parts, joints, but is 'bones'",
+        ),
+        (
+            {"name": "mine", "function": nothing, "indexes": "points"},
+            "one of parts, joints, but is 'points'",
+        ),
     ],
 )
 def test_registrations_that_cannot_work_are_refused(arguments, message):
@@ -264,7 +329,9 @@ def test_registering_again_replaces_and_other_threads_see_it():
     rows = np.array([[3]]), np.array([[0.9, 1.0]])
     register_residual("again", kernel=own_residual.accumulate, floats=2)
     before = fitted("again", rows, 1e4)
-    register_residual("again", function=lambda part, ints, floats: part.t[1:2] - floats[0], floats=2)
+    register_residual(
+        "again", function=lambda part, ints, floats: part.t[1:2] - floats[0], floats=2
+    )
     after = []
     thread = threading.Thread(target=lambda: after.append(fitted("again", rows, 1e4)))
     thread.start()
@@ -273,12 +340,15 @@ def test_registering_again_replaces_and_other_threads_see_it():
 
 
 def test_the_solvers_machine_code_on_disk_stays_good():
-    """A first fit with an external residual finds `optimize` compiled by the sessions without it."""
+    """A first fit with an external residual finds `optimize` compiled by the sessions without
+    it.
+    """
     code = """
 from scope.solver.examples import own_residual
 from scope.solver.gauss_newton.optimizer import optimize
 own_residual.main()
-assert sum(optimize.stats.cache_hits.values()) == 1 and not optimize.stats.cache_misses, optimize.stats
+stats = optimize.stats
+assert sum(stats.cache_hits.values()) == 1 and not stats.cache_misses, stats
 """
     own_residual.main()
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
@@ -298,4 +368,6 @@ def test_there_is_room_for_sixteen_and_each_can_be_replaced(monkeypatch):
     with pytest.raises(InvalidValueError, match="room for 16 residuals"):
         register_residual("number 16", function=lambda part, ints, floats: part.t)
     register_residual("number 3", function=lambda part, ints, floats: part.beta)
-    assert sorted(residual.slot for residual in external.external_residuals().values()) == list(range(16))
+    assert sorted(residual.slot for residual in external.external_residuals().values()) == list(
+        range(16)
+    )

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames and clips on several threads: the same results in the same order, and really at the same time."""
+"""Frames and clips on several threads: the same results in the same order, and really at the same
+time.
+"""
 
 import sys
 import threading
@@ -73,9 +75,9 @@ def test_other_threads_run_while_the_kernels_do():
             ticks.append(None)
             time.sleep(0)
 
-    # Of a fit's milliseconds Python sees the first and last few microseconds: many ticks mean that the kernel let go.
-    # How many fits that takes, a busy computer decides, which may not let the thread run.
-    # Meanwhile, Python does not switch threads by itself.
+    # Of a fit's milliseconds Python sees the first and last few microseconds: many ticks mean that
+    # the kernel let go. How many fits that takes, a busy computer decides, which may not let the
+    # thread run. Meanwhile, Python does not switch threads by itself.
     interval = sys.getswitchinterval()
     sys.setswitchinterval(1000.0)
     counter = threading.Thread(target=count)

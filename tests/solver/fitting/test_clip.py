@@ -38,7 +38,9 @@ SCALE = 1.12
 
 
 def clip(seed, noise=0.0, scale=SCALE, frames=T):
-    """A walk through random states seen by a camera whose focal length is `scale` times what the solver is told."""
+    """A walk through random states seen by a camera whose focal length is `scale` times what the
+    solver is told.
+    """
     rng = np.random.default_rng(seed)
     body = random_body(rng, K, P, M)
     R0, t0, Omega, beta = random_state(rng, K, P, angle=0.3)
@@ -55,19 +57,29 @@ def clip(seed, noise=0.0, scale=SCALE, frames=T):
         pixels = project(p, true) + 2.0 * noise * rng.standard_normal((M, 2))
         points = p + 0.01 * noise * rng.standard_normal((M, 3))
         measurements.append(
-            Measurements(INTRINSICS, Keypoints2D(index, pixels, ones), Keypoints3D(index, points, ones))
+            Measurements(
+                INTRINSICS, Keypoints2D(index, pixels, ones), Keypoints3D(index, points, ones)
+            )
         )
     return body, states, measurements, beta
 
 
 def refined(body, measurements, focal=True):
-    """The clip fitted with the default weights, then with hardly any prior; the focal length's scale."""
+    """The clip fitted with the default weights, then with hardly any prior; the focal length's
+    scale.
+    """
     first = fit_clip(body, measurements, focal=focal, priors=Priors())
     known = INTRINSICS.copy()
     known[:2, :2] *= first.focal_scale
     again = [replace(m, intrinsics=known) for m in measurements]
     second = fit_clip(
-        body, again, init=[f.state for f in first.frames], options=WEAK, priors=Priors(), focal=focal, focal_weight=1e-6
+        body,
+        again,
+        init=[f.state for f in first.frames],
+        options=WEAK,
+        priors=Priors(),
+        focal=focal,
+        focal_weight=1e-6,
     )
     return second, first.focal_scale * second.focal_scale
 
@@ -95,7 +107,8 @@ def test_noise_leaves_errors_of_the_size_the_information_says(seed):
     body, _, measurements, beta = clip(seed, noise=1.0)
     found, scale = refined(body, measurements)
     error = found.beta - beta
-    # noise variance times weight: (2 px / 1100)^2 1e6 = 3.3 and 0.01^2 24000 = 2.4; chi^2 of P degrees of freedom
+    # noise variance times weight: (2 px / 1100)^2 1e6 = 3.3 and 0.01^2 24000 = 2.4; chi^2 of P
+    # degrees of freedom
     assert error @ found.beta_information @ error / 3.3 < 22.0
     assert abs(scale - SCALE) < 0.02
 
@@ -113,20 +126,33 @@ def test_joint_step_is_the_dense_step_of_the_whole_clip():
     rng = np.random.default_rng(0)
     options = Options()
     beta = rng.standard_normal(P)
-    starts = [State(R0, t0, Om @ rotations.exp(0.02 * rng.standard_normal((K, 3))), beta) for R0, t0, Om, _ in states]
+    starts = [
+        State(R0, t0, Om @ rotations.exp(0.02 * rng.standard_normal((K, 3))), beta)
+        for R0, t0, Om, _ in states
+    ]
     tree = make_tree(body, focal=True)
     flat = Options(stages=[Stage(Weights(joint_prior=0.0, joint_limits=0.0))])
     joint = _Joint(
-        tree, [_Frame(tree, make_terms(tree, m, Priors()), s) for m, s in zip(measurements, starts, strict=True)],
-        Priors(), flat, 7.0,
-    )  # fmt: skip
+        tree,
+        [
+            _Frame(tree, make_terms(tree, m, Priors()), s)
+            for m, s in zip(measurements, starts, strict=True)
+        ],
+        Priors(),
+        flat,
+        7.0,
+    )
     joint.cost = joint._linearize(0, trial=False)
     predicted = joint._step(0, 20.0)
     n, G = 6 + 3 * K, P + 1
     H, g = np.zeros((frames * n + G,) * 2), np.zeros(frames * n + G)
     cost = 0.5 * 100.0 * beta @ beta
     for k, (m, s) in enumerate(zip(measurements, starts, strict=True)):
-        data = {"pixels": m.keypoints2d.pixels, "points": m.keypoints3d.points, "directions": np.ones((M, 3))}
+        data = {
+            "pixels": m.keypoints2d.pixels,
+            "points": m.keypoints3d.points,
+            "directions": np.ones((M, 3)),
+        }
         state = (s.R_camera_root, s.t_camera_root, s.Omega, s.beta)
         raw = residuals(body, data, focal=True)
         sigmas, weights = (
@@ -137,7 +163,9 @@ def test_joint_step_is_the_dense_step_of_the_whole_clip():
         cost += part_cost
 
         def stacked(moved, d, raw=raw, factors=factors):
-            return np.concatenate([(f[:, None] * r).ravel() for f, r in zip(factors, raw(moved, d), strict=False)])
+            return np.concatenate(
+                [(f[:, None] * r).ravel() for f, r in zip(factors, raw(moved, d), strict=False)]
+            )
 
         J, r = jacobian(body, state, stacked, extra=1), np.real(stacked(state, np.zeros(n + G)))
         at = np.r_[k * n : (k + 1) * n, frames * n : frames * n + G]
@@ -159,7 +187,9 @@ def test_joint_step_is_the_dense_step_of_the_whole_clip():
 
 
 def test_carried_information_equals_what_the_frames_say_together():
-    """With the pose eliminated at the same states, information adds up; the causal estimate nears the joint one."""
+    """With the pose eliminated at the same states, information adds up; the causal estimate nears
+    the joint one.
+    """
     body, _, measurements, beta = clip(6, noise=1.0, scale=1.0)
     priors, last = Priors(), None
     for m in measurements:
@@ -215,14 +245,19 @@ def test_a_gap_and_a_clip_without_measurements_end_well():
 
 
 def from_behind():
-    """The default body with its back to the camera, where a start from the rest pose ends a metre beside the truth."""
+    """The default body with its back to the camera, where a start from the rest pose ends a metre
+    beside the truth.
+    """
     body = load_body("scope")
     state = person.pose(body, seed=3, bend=0.1)
     turn = np.diag([1.0, -1.0, -1.0]) @ rotations.exp([0.0, np.pi - 0.3, 0.0])
     R, t = person.place(body, replace(state, R_camera_root=turn))
     index = np.array(list(body.keypoint_set("blazepose").values()))
     points, ones = body.keypoints(R, t, state.beta)[index], np.ones(len(index))
-    image, space = Keypoints2D(index, person.project(points), ones), Keypoints3D(index, points, ones)
+    image, space = (
+        Keypoints2D(index, person.project(points), ones),
+        Keypoints3D(index, points, ones),
+    )
     return body, t, Measurements(person.INTRINSICS, image, space)
 
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fitting one frame: recovery, invariance, prediction, determinism, and an honest end whatever is measured."""
+"""Fitting one frame: recovery, invariance, prediction, determinism, and an honest end whatever is
+measured.
+"""
 
 from dataclasses import replace
 
@@ -52,7 +54,10 @@ def measured(body, state, noise=0.0, seed=0):
         Keypoints2D(index, project(p) + noise * rng.standard_normal((n, 2)), ones),
         Keypoints3D(index, p + 0.005 * noise * rng.standard_normal((n, 3)), ones),
         OrientationField(
-            n + body.keypoint_part, index, p - t[body.keypoint_part] + 0.002 * noise * rng.standard_normal((n, 3)), ones
+            n + body.keypoint_part,
+            index,
+            p - t[body.keypoint_part] + 0.002 * noise * rng.standard_normal((n, 3)),
+            ones,
         ),
     )
 
@@ -76,7 +81,9 @@ def test_recovers_pose_and_shape_without_noise(seed):
 
 
 def test_a_fit_that_begins_at_its_minimum_has_converged_though_its_tolerance_is_zero():
-    """What is left to gain is rounding: without a limit to that, steps would be damped until the fit stalls."""
+    """What is left to gain is rounding: without a limit to that, steps would be damped until the
+    fit stalls.
+    """
     body, state = scene(3)
     m = measured(body, state, noise=1.0)
     options = Options(stages=[Stage(FREE, 0.0, 200)])
@@ -104,7 +111,13 @@ def test_one_kind_of_measurement_is_enough_to_start(kind):
     only = Measurements(INTRINSICS, **{kind: getattr(m, kind)})
     found = fit(body, only)
     assert found.status is Status.CONVERGED
-    _, t, p = forward(body, found.state.R_camera_root, found.state.t_camera_root, found.state.Omega, found.state.beta)
+    _, t, p = forward(
+        body,
+        found.state.R_camera_root,
+        found.state.t_camera_root,
+        found.state.Omega,
+        found.state.beta,
+    )
     _, t_true, p_true = forward(body, *state)
     if kind == "keypoints2d":
         assert np.median(np.linalg.norm(project(p) - project(p_true), axis=1)) < 10.0
@@ -112,7 +125,9 @@ def test_one_kind_of_measurement_is_enough_to_start(kind):
         assert np.linalg.norm(p - p_true, axis=1).max() < 0.03
     else:
         bone, true = p - t[body.keypoint_part], p_true - t_true[body.keypoint_part]
-        cosines = np.sum(bone * true, 1) / np.linalg.norm(bone, axis=1) / np.linalg.norm(true, axis=1)
+        cosines = (
+            np.sum(bone * true, 1) / np.linalg.norm(bone, axis=1) / np.linalg.norm(true, axis=1)
+        )
         assert np.median(cosines) > 0.98
 
 
@@ -122,7 +137,9 @@ def test_an_outlier_moves_the_fit_less_than_without_the_robust_kernel():
     bad = Keypoints3D(m.keypoints3d.indices, m.keypoints3d.points.copy(), m.keypoints3d.confidence)
     bad.points[10] += [0.0, 0.8, 0.0]
     m = replace(m, keypoints3d=bad)
-    plain = Options(robust_keypoints2d=np.inf, robust_keypoints3d=np.inf, robust_orientation_field=np.inf)
+    plain = Options(
+        robust_keypoints2d=np.inf, robust_keypoints3d=np.inf, robust_orientation_field=np.inf
+    )
     _, t, _ = forward(body, *state)
     error = [np.abs(fit(body, m, options=o).t_camera_part - t).max() for o in (Options(), plain)]
     assert error[0] < 0.3 * error[1]
@@ -151,7 +168,9 @@ def test_moving_camera_and_person_together_leaves_the_iterates_unchanged():
     m2 = replace(
         m,
         keypoints3d=replace(m.keypoints3d, points=m.keypoints3d.points @ G.T + shift),
-        orientation_field=replace(m.orientation_field, directions=m.orientation_field.directions @ G.T),
+        orientation_field=replace(
+            m.orientation_field, directions=m.orientation_field.directions @ G.T
+        ),
     )
     for a, b in zip(
         run_iterates(body, start, m),
@@ -169,11 +188,20 @@ def test_predicted_decrease_is_the_actual_one_near_the_solution(damping):
     body, state = scene(4)
     m = measured(body, state)
     tree = make_tree(body)
-    off = Options(robust_keypoints2d=np.inf, robust_keypoints3d=np.inf, robust_orientation_field=np.inf)
+    off = Options(
+        robust_keypoints2d=np.inf, robust_keypoints3d=np.inf, robust_orientation_field=np.inf
+    )
     table, _, _ = off.stage_table([Stage(FREE)])
     terms = make_terms(tree, m, Priors())
-    start = State(state[0] @ rotations.exp([1e-4, -2e-4, 1e-4]), state[1] + 1e-4, state[2], state[3] + 1e-3)
-    pose, trial, blocks, work = start.pose(tree), make_pose(tree), make_blocks(tree), make_workspace(tree)
+    start = State(
+        state[0] @ rotations.exp([1e-4, -2e-4, 1e-4]), state[1] + 1e-4, state[2], state[3] + 1e-3
+    )
+    pose, trial, blocks, work = (
+        start.pose(tree),
+        make_pose(tree),
+        make_blocks(tree),
+        make_workspace(tree),
+    )
     cost = linearize(tree, terms, table[0], 0.0, pose, blocks, work.scratch)
     predicted = step(tree, pose, blocks, damping, 1 / 0.3, work)
     retract(tree, pose, work, trial)
@@ -185,7 +213,10 @@ def test_the_cost_never_rises_with_more_iterations():
     body, state = scene(5)
     m = measured(body, state, noise=3.0)
     start = State.rest(K, P)
-    costs = [fit(body, m, init=start, options=Options(stages=[Stage(Weights(), 0.0, n)])).cost for n in range(0, 40, 3)]
+    costs = [
+        fit(body, m, init=start, options=Options(stages=[Stage(Weights(), 0.0, n)])).cost
+        for n in range(0, 40, 3)
+    ]
     assert all(b <= a for a, b in zip(costs[:-1], costs[1:], strict=True))
     assert costs[-1] < 0.1 * costs[0]
 
@@ -195,7 +226,9 @@ def test_second_order_correction_reaches_the_same_minimum():
     m = measured(body, state, noise=1.0)
     init = fit(body, m).state
     tight = [Stage(Weights(), 1e-13, 300)]
-    first, second = (fit(body, m, init=init, options=Options(stages=tight, triggs=t)) for t in (0.0, 0.9))
+    first, second = (
+        fit(body, m, init=init, options=Options(stages=tight, triggs=t)) for t in (0.0, 0.9)
+    )
     assert second.cost == pytest.approx(first.cost, rel=1e-7)
 
 
@@ -219,7 +252,9 @@ def test_joint_limit_keeps_a_knee_from_bending_forwards():
     origin = np.array([0, 0, 3.0])
     knee = origin + up @ [0, -0.4, 0]
     m = Measurements(
-        keypoints3d=Keypoints3D([0, 1, 2], np.stack([origin, knee, knee + forwards]), [1.0, 1.0, 1.0]),
+        keypoints3d=Keypoints3D(
+            [0, 1, 2], np.stack([origin, knee, knee + forwards]), [1.0, 1.0, 1.0]
+        ),
         pose_priors=PosePriors([0], up[None], origin[None], [1e6], [1e6]),
     )
     init = State(up, origin, np.tile(np.eye(3), (2, 1, 1)), np.zeros(0))
@@ -263,11 +298,16 @@ def single_point(m):
 
 
 def single_place(m):
-    return Measurements(INTRINSICS, keypoints3d=Keypoints3D(np.arange(M), np.tile([0.0, 0.0, 2.0], (M, 1)), np.ones(M)))
+    return Measurements(
+        INTRINSICS,
+        keypoints3d=Keypoints3D(np.arange(M), np.tile([0.0, 0.0, 2.0], (M, 1)), np.ones(M)),
+    )
 
 
 def at_the_camera(m):
-    return Measurements(INTRINSICS, m.keypoints2d, Keypoints3D(np.arange(M), np.zeros((M, 3)), np.ones(M)))
+    return Measurements(
+        INTRINSICS, m.keypoints2d, Keypoints3D(np.arange(M), np.zeros((M, 3)), np.ones(M))
+    )
 
 
 def contradictory(m):
@@ -286,7 +326,10 @@ def huge_pixels(m):
 
 def opposite_directions(m):
     o = m.orientation_field
-    both = [np.concatenate([a, b]) for a, b in ((o.starts, o.starts), (o.ends, o.ends), (o.directions, -o.directions))]
+    both = [
+        np.concatenate([a, b])
+        for a, b in ((o.starts, o.starts), (o.ends, o.ends), (o.directions, -o.directions))
+    ]
     return Measurements(orientation_field=OrientationField(*both, np.ones(2 * M)))
 
 
@@ -325,12 +368,23 @@ def test_no_measurement_can_break_it(spoil, warm, priors, robust):
         options = replace(options, stages=[Stage(FREE, 1e-5, 50)])
     found = fit(body, m, init=State.rest(K, P) if warm else None, options=options)
     s = found.state
-    for array in (s.R_camera_root, s.t_camera_root, s.Omega, s.beta, found.R_camera_part, found.t_camera_part):
+    for array in (
+        s.R_camera_root,
+        s.t_camera_root,
+        s.Omega,
+        s.beta,
+        found.R_camera_part,
+        found.t_camera_part,
+    ):
         assert np.isfinite(array).all()
     assert np.isfinite(found.cost)
     eye = np.tile(np.eye(3), (K, 1, 1))
     np.testing.assert_allclose(s.Omega @ np.swapaxes(s.Omega, 1, 2), eye, atol=1e-9)
-    allowed = BAD[spoil] if priors else BAD[spoil] | {Status.CONVERGED, Status.STALLED, Status.MAX_ITERATIONS}
+    allowed = (
+        BAD[spoil]
+        if priors
+        else BAD[spoil] | {Status.CONVERGED, Status.STALLED, Status.MAX_ITERATIONS}
+    )
     if BAD[spoil] == {Status.NO_MEASUREMENTS}:
         allowed = BAD[spoil]
     assert found.status in allowed
@@ -355,26 +409,53 @@ def test_nothing_measured_returns_the_initial_state():
 
 def test_a_state_that_is_not_finite_is_reported():
     body, state = scene(9)
-    found = fit(body, measured(body, state), init=State(state[0], np.array([0.0, np.nan, 1.0]), *state[2:]))
+    found = fit(
+        body, measured(body, state), init=State(state[0], np.array([0.0, np.nan, 1.0]), *state[2:])
+    )
     assert found.status is Status.NON_FINITE
 
 
 @pytest.mark.parametrize(
     ("measurements", "message"),
     [
-        (Measurements(INTRINSICS, Keypoints2D([0, 1], [[0.0, 0.0]], [1.0, 1.0])), r"\(2, 2\), but got shape \(1, 2\)"),
+        (
+            Measurements(INTRINSICS, Keypoints2D([0, 1], [[0.0, 0.0]], [1.0, 1.0])),
+            r"\(2, 2\), but "
+            r"got shape \(1, "
+            r"2\)",
+        ),
         (Measurements(None, Keypoints2D([0], [[0.0, 0.0]], [1.0])), "intrinsics"),
-        (Measurements(np.eye(4), Keypoints2D([0], [[0.0, 0.0]], [1.0])), r"\(3, 3\), but got shape \(4, 4\)"),
-        (Measurements(keypoints3d=Keypoints3D([0], [[0.0, 0.0]], [1.0])), r"\(1, 3\), but got shape \(1, 2\)"),
-        (Measurements(keypoints3d=Keypoints3D([M + K + 1], [[0.0, 0.0, 1.0]], [1.0])), f"0..{M + K}"),
+        (
+            Measurements(np.eye(4), Keypoints2D([0], [[0.0, 0.0]], [1.0])),
+            r"\(3, 3\), but got shape "
+            r"\(4, 4\)",
+        ),
+        (
+            Measurements(keypoints3d=Keypoints3D([0], [[0.0, 0.0]], [1.0])),
+            r"\(1, 3\), but got "
+            r"shape \(1, 2\)",
+        ),
+        (
+            Measurements(keypoints3d=Keypoints3D([M + K + 1], [[0.0, 0.0, 1.0]], [1.0])),
+            f"0..{M + K}",
+        ),
         (Measurements(keypoints3d=Keypoints3D([0.5], [[0.0, 0.0, 1.0]], [1.0])), "integers"),
         (
             Measurements(orientation_field=OrientationField([0], [M - 1], [[0, 0, 1.0]], [1.0])),
             "no body part has in common",
         ),
-        (Measurements(pose_priors=PosePriors([0], np.eye(3), np.zeros((1, 3)), [1.0], [1.0])), r"\(1, 3, 3\)"),
-        (Measurements(tables={"nonesuch": (np.zeros((0, 1)), np.zeros((0, 1)))}), "pose_prior, joint_prior"),
-        (Measurements(tables={"joint_limits": (np.zeros((1, 1), int), np.zeros((1, 3)))}), "joint_limits"),
+        (
+            Measurements(pose_priors=PosePriors([0], np.eye(3), np.zeros((1, 3)), [1.0], [1.0])),
+            r"\(1, 3, 3\)",
+        ),
+        (
+            Measurements(tables={"nonesuch": (np.zeros((0, 1)), np.zeros((0, 1)))}),
+            "pose_prior, joint_prior",
+        ),
+        (
+            Measurements(tables={"joint_limits": (np.zeros((1, 1), int), np.zeros((1, 3)))}),
+            "joint_limits",
+        ),
     ],
 )
 def test_wrong_shapes_are_refused_with_what_was_expected(measurements, message):
@@ -400,7 +481,11 @@ def test_rows_of_tables_that_point_outside_the_body_are_refused(name):
             fit(body, replace(measured(body, state), tables={name: table}))
         if name in ("joint_limits", "joint_flow"):
             with pytest.raises(ShapeError, match=message):
-                fit(body, measured(body, state), priors=Priors(**{name.removeprefix("joint_"): table}))
+                fit(
+                    body,
+                    measured(body, state),
+                    priors=Priors(**{name.removeprefix("joint_"): table}),
+                )
 
 
 @pytest.mark.parametrize("prior", ["limits", "flow"])
@@ -409,7 +494,11 @@ def test_tables_of_priors_of_other_widths_are_refused(prior):
     module = RESIDUALS[f"joint_{prior}"]
     message = rf"'joint_{prior}' must have shapes \(n, {module.INTS}\) and \(n, {module.FLOATS}\)"
     right = np.ones((1, module.INTS), int), np.ones((1, module.FLOATS))
-    for table in ((right[0], np.ones((1, 3))), (right[0][0], right[1]), (right[0], np.ones((2, module.FLOATS)))):
+    for table in (
+        (right[0], np.ones((1, 3))),
+        (right[0][0], right[1]),
+        (right[0], np.ones((2, module.FLOATS))),
+    ):
         with pytest.raises(ShapeError, match=message):
             fit(body, measured(body, state), priors=Priors(**{prior: table}))
 
@@ -417,12 +506,18 @@ def test_tables_of_priors_of_other_widths_are_refused(prior):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Weights(tables={"nosuch": 5.0}), "no residual named 'nosuch'; the registered ones are pose_prior"),
+        (
+            lambda: Weights(tables={"nosuch": 5.0}),
+            "no residual named 'nosuch'; the registered ones are pose_prior",
+        ),
         (lambda: Weights(tables={"keypoints2d": 5.0}), "no residual named 'keypoints2d'"),
         (lambda: Options(damping=np.nan), "damping must be positive and finite, but is nan"),
         (lambda: Options(damping=0.0), "damping must be positive"),
         (lambda: Options(root_length=0), "root_length must be positive and finite, but is 0"),
-        (lambda: Options(root_length=np.inf), "root_length must be positive and finite, but is inf"),
+        (
+            lambda: Options(root_length=np.inf),
+            "root_length must be positive and finite, but is inf",
+        ),
         (lambda: Options(triggs=5), "triggs must lie in 0..1, but is 5"),
         (lambda: Options(triggs=np.nan), "triggs must lie in 0..1, but is nan"),
     ],
@@ -443,14 +538,20 @@ def test_an_empty_schedule_is_refused_and_none_is_the_default(warm):
         with pytest.raises(InvalidValueError, match="at least one stage"):
             fit_clip(body, [m], init=[init] if warm else None, options=Options(stages=stages))
     default = WARM_STAGES if warm else COLD_STAGES
-    costs = [fit(body, m, init=init, options=Options(stages=stages)).cost for stages in (None, default)]
+    costs = [
+        fit(body, m, init=init, options=Options(stages=stages)).cost for stages in (None, default)
+    ]
     assert costs[0] == costs[1]
 
 
 def test_wrong_states_priors_and_trees_are_refused():
     body, state = scene(11)
     m = measured(body, state)
-    with pytest.raises(ShapeError, match=r"Omega must have shape \(23, 3, 3\), but got shape \(22, 3, 3\)"):
+    with pytest.raises(
+        ShapeError,
+        match=r"Omega must have shape \(23, 3, 3\), but got shape \(22, "
+        r"3, 3\)",
+    ):
         fit(body, m, init=State(state[0], state[1], state[2][1:], state[3]))
     with pytest.raises(ShapeError, match="shape prior"):
         fit(body, m, priors=Priors(shape_mean=np.zeros(3)))

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whatever is measured, of whatever body: a finite pose, an honest status, and the same bits again."""
+"""Whatever is measured, of whatever body: a finite pose, an honest status, and the same bits
+again.
+"""
 
 from dataclasses import replace
 
@@ -31,18 +33,25 @@ BODIES = {"P0": (23, 0), "K51": (51, 10), "P300": (23, 300), "one joint": (1, 0)
 def masked(m, value):
     """Every kind of measurement with `value` in place of its confidence."""
     kinds = ("keypoints2d", "keypoints3d", "orientation_field")
-    fields = {k: replace(getattr(m, k), confidence=np.full(len(getattr(m, k).confidence), value)) for k in kinds}
+    fields = {
+        k: replace(getattr(m, k), confidence=np.full(len(getattr(m, k).confidence), value))
+        for k in kinds
+    }
     return replace(m, **fields)
 
 
 def contradiction(m):
     k = m.keypoints3d
     indices, ones = np.tile(k.indices, 2), np.ones(2 * len(k.indices))
-    return replace(m, keypoints3d=Keypoints3D(indices, np.concatenate([k.points, 1.0 - k.points[::-1]]), ones))
+    return replace(
+        m, keypoints3d=Keypoints3D(indices, np.concatenate([k.points, 1.0 - k.points[::-1]]), ones)
+    )
 
 
 def beneath_its_own_floor(m):
-    """A floor above the head, and feet that are said to stand still far away in two places at once."""
+    """A floor above the head, and feet that are said to stand still far away in two places at
+    once.
+    """
     feet = np.array([0, 1, 0, 1])
     where = np.array([[5.0, 0, 0], [-5.0, 0, 0], [-5.0, 0, 0], [5.0, 0, 0]])
     floor = Floor(np.arange(2), [0.0, -1.0, 0.0], 50.0, np.ones(2))
@@ -51,7 +60,10 @@ def beneath_its_own_floor(m):
 
 def half_turned(m):
     """A pose prior against the measurements: half a turn away, and stronger."""
-    return replace(m, pose_priors=PosePriors([0], np.diag([-1.0, -1.0, 1.0])[None], [[0.0, 0, -3]], [1e7], [1e7]))
+    return replace(
+        m,
+        pose_priors=PosePriors([0], np.diag([-1.0, -1.0, 1.0])[None], [[0.0, 0, -3]], [1e7], [1e7]),
+    )
 
 
 def mirrored(m):
@@ -68,7 +80,10 @@ SPOILED = {
     "nothing": (lambda m: Measurements(), {Status.NO_MEASUREMENTS}),
     "no confidence": (lambda m: masked(m, 0.0), {Status.NO_MEASUREMENTS}),
     "confidence not a number": (lambda m: masked(m, np.nan), {Status.NO_MEASUREMENTS}),
-    "one point": (lambda m: Measurements(INTRINSICS, Keypoints2D([0], [[100.0, 100.0]], [1.0])), STOPPED),
+    "one point": (
+        lambda m: Measurements(INTRINSICS, Keypoints2D([0], [[100.0, 100.0]], [1.0])),
+        STOPPED,
+    ),
     "behind the camera": (mirrored, STOPPED),
     "all in the camera": (gathered, STOPPED),
     "contradictory": (contradiction, STOPPED),
@@ -93,14 +108,25 @@ def test_any_body_ends_in_a_finite_pose(scene, spoiled, warm):
     spoil, allowed = spoiled
     found, again = (fit(body, spoil(m), init=rest if warm else None) for _ in range(2))
     s = found.state
-    for array in (s.R_camera_root, s.t_camera_root, s.Omega, s.beta, found.t_camera_part, found.beta_information):
+    for array in (
+        s.R_camera_root,
+        s.t_camera_root,
+        s.Omega,
+        s.beta,
+        found.t_camera_part,
+        found.beta_information,
+    ):
         assert np.isfinite(array).all()
     assert np.isfinite(found.cost)
     assert np.abs(s.Omega @ np.swapaxes(s.Omega, 1, 2) - np.eye(3)).max() < 1e-9
     assert found.status in allowed
     assert found.rejected <= found.iterations
     np.testing.assert_array_equal(found.state.Omega, again.state.Omega)
-    assert (found.cost, found.status, found.iterations) == (again.cost, again.status, again.iterations)
+    assert (found.cost, found.status, found.iterations) == (
+        again.cost,
+        again.status,
+        again.iterations,
+    )
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e160, -1e40])
@@ -109,7 +135,11 @@ def test_one_bad_value_masks_its_own_measurement_and_nothing_else(bad):
     body = random_body(rng, 23, 10, 48)
     m = measured(body, random_state(rng, 23, 10, 0.4))
     spoiled, without = masked(m, 1.0), masked(m, 1.0)
-    for name, field in (("keypoints2d", "pixels"), ("keypoints3d", "points"), ("orientation_field", "directions")):
+    for name, field in (
+        ("keypoints2d", "pixels"),
+        ("keypoints3d", "points"),
+        ("orientation_field", "directions"),
+    ):
         broken = np.array(getattr(getattr(m, name), field))
         broken[5, 1] = bad
         getattr(without, name).confidence[5] = 0.0
@@ -144,7 +174,9 @@ def test_no_value_however_large_spoils_the_frames_of_a_clip(size):
         if size >= LARGEST:
             assert found.iterations > 0
             assert found.frames[1].measurements == found.frames[0].measurements
-            np.testing.assert_allclose(found.frames[1].t_camera_part, found.frames[0].t_camera_part, atol=0.05)
+            np.testing.assert_allclose(
+                found.frames[1].t_camera_part, found.frames[0].t_camera_part, atol=0.05
+            )
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])

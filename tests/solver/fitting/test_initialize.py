@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The first guess: exact where the measurements fix it, and in front of the camera where they do not."""
+"""The first guess: exact where the measurements fix it, and in front of the camera where they do
+not.
+"""
 
 import numpy as np
 import pytest
@@ -28,10 +30,15 @@ def test_points_in_space_give_the_root_where_joints_and_shape_are_known():
 
 
 def test_directions_alone_give_the_roots_rotation():
-    starts = np.array([j for j in range(M - 1) if BODY.keypoint_part[j] == BODY.keypoint_part[j + 1]])
+    starts = np.array(
+        [j for j in range(M - 1) if BODY.keypoint_part[j] == BODY.keypoint_part[j + 1]]
+    )
     lines = POINTS[starts + 1] - POINTS[starts]
-    # Longer lines say more, but a guess from unit vectors is exact too: all levers are turned by the same rotation.
-    field = OrientationField(starts, starts + 1, lines / np.linalg.norm(lines, axis=1)[:, None], CONFIDENCE[starts])
+    # Longer lines say more, but a guess from unit vectors is exact too: all levers are turned by
+    # the same rotation.
+    field = OrientationField(
+        starts, starts + 1, lines / np.linalg.norm(lines, axis=1)[:, None], CONFIDENCE[starts]
+    )
     found = guess(Measurements(orientation_field=field))
     assert len(starts) > K
     np.testing.assert_allclose(found.R_camera_root, R0, atol=1e-9, rtol=0)
@@ -39,7 +46,9 @@ def test_directions_alone_give_the_roots_rotation():
 
 
 def in_the_image(t):
-    """Return pixels of the upright body that faces the camera, at t: what a guess without depths assumes."""
+    """Return pixels of the upright body that faces the camera, at t: what a guess without depths
+    assumes.
+    """
     return project(forward(BODY, np.diag([1.0, -1.0, -1.0]), np.array(t), OMEGA, BETA)[2])
 
 
@@ -54,4 +63,6 @@ def test_pixels_that_fit_only_behind_the_camera_give_a_position_on_their_mean_ra
     inside_out = 2 * pixels.mean(axis=0) - pixels  # each pixel opposite to where it should be
     found = guess(Measurements(INTRINSICS, Keypoints2D(np.arange(M), inside_out, np.ones(M))))
     assert found.t_camera_root[2] > 1
-    np.testing.assert_allclose(project(found.t_camera_root[None])[0], pixels.mean(axis=0), atol=1e-6)
+    np.testing.assert_allclose(
+        project(found.t_camera_root[None])[0], pixels.mean(axis=0), atol=1e-6
+    )

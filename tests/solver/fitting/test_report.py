@@ -1,11 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a fit tells of itself: what the cost is made of, how many steps were rejected, why it stopped."""
+"""What a fit tells of itself: what the cost is made of, how many steps were rejected, why it
+stopped.
+"""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from scope.solver import FootContacts, Options, Stage, Status, Temporal, default_priors, fit, fit_clip, load_body
+from scope.solver import (
+    FootContacts,
+    Options,
+    Stage,
+    Status,
+    Temporal,
+    default_priors,
+    fit,
+    fit_clip,
+    load_body,
+)
 from scope.solver.fitting.report import COLUMNS
 
 from ..residuals.test_foot_contact import BODY, FEET, INTRINSICS, points, seen, standing
@@ -43,12 +55,16 @@ def test_a_clips_shares_count_the_shape_once(focal):
     found = fit_clip(BODY, frames, options=REPORT, temporal=Temporal(), focal=focal)
     assert sum(found.cost_by_term.values()) == pytest.approx(found.cost, rel=1e-9)
     beta = found.beta
-    assert found.cost_by_term["shape_prior"] == pytest.approx(0.5 * 100.0 * float(beta @ beta), rel=1e-9)
+    assert found.cost_by_term["shape_prior"] == pytest.approx(
+        0.5 * 100.0 * float(beta @ beta), rel=1e-9
+    )
     assert ("focal_prior" in found.cost_by_term) == focal
 
 
 def test_rejected_steps_are_counted_among_the_iterations():
-    """Keypoints that contradict each other, from a bad start and hardly damped: not every step can be right."""
+    """Keypoints that contradict each other, from a bad start and hardly damped: not every step can
+    be right.
+    """
     body, state = scene(4, angle=1.5)
     m = measured(body, state, noise=30.0)
     found = fit(body, m, options=Options(damping=1e-9))
@@ -60,6 +76,11 @@ def test_rejected_steps_are_counted_among_the_iterations():
 
 def test_priors_of_a_real_body_show_in_the_report():
     body = load_body("scope")
-    found = fit(body, replace(seen(standing(2)), intrinsics=INTRINSICS), priors=default_priors(body), options=REPORT)
+    found = fit(
+        body,
+        replace(seen(standing(2)), intrinsics=INTRINSICS),
+        priors=default_priors(body),
+        options=REPORT,
+    )
     assert found.cost_by_term["joint_flow"] > 0.0
     assert np.isfinite(list(found.cost_by_term.values())).all()

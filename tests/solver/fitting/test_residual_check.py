@@ -25,7 +25,24 @@ def kernel(gradient, curvature):
             r = pose.t[i, 1] - floats[k, 0]
             cost += 0.5 * w * r * r
             W, f = curvature * w, gradient * w * r
-            add_to_point(tree, pose, blocks, tree.keypoints + i, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, W, 0.0, 0.0, 0.0, f, 0.0)
+            add_to_point(
+                tree,
+                pose,
+                blocks,
+                tree.keypoints + i,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                W,
+                0.0,
+                0.0,
+                0.0,
+                f,
+                0.0,
+            )
         return cost
 
     return accumulate
@@ -47,12 +64,21 @@ def tables():
     rng = np.random.default_rng(2)
     yield "height", ROWS
     yield "slow_height", ROWS
-    yield "own_floor_checked", floor.pack([3, 7], np.array([0.6, 0.0, 0.8]), 9.0, [2.0, 1.0], [3.0, 3.0])
-    yield "own_pose_checked", pose_prior.pack([0, 3], np.tile(np.eye(3), (2, 1, 1)), rng.random((2, 3)), [2, 1], [1, 3])
+    yield (
+        "own_floor_checked",
+        floor.pack([3, 7], np.array([0.6, 0.0, 0.8]), 9.0, [2.0, 1.0], [3.0, 3.0]),
+    )
+    yield (
+        "own_pose_checked",
+        pose_prior.pack([0, 3], np.tile(np.eye(3), (2, 1, 1)), rng.random((2, 3)), [2, 1], [1, 3]),
+    )
     prior = load_joint_prior()
     names = ["pelvis", *prior.names[:K]]
     yield "joint_flow", prior.tables(names)
-    yield "joint_limits", (np.array([[2]]), np.array([[0.6, 0.0, 0.8, -0.02, 0.02, 0.02, 1.0, 2.0]]))
+    yield (
+        "joint_limits",
+        (np.array([[2]]), np.array([[0.6, 0.0, 0.8, -0.02, 0.02, 0.02, 1.0, 2.0]])),
+    )
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -75,7 +101,11 @@ def test_each_kind_of_mistake_shows():
 
 def test_a_residual_without_a_cost_at_the_state_says_nothing():
     wide = np.array([[2]]), np.array([[1.0, 0.0, 0.0, -9.0, 9.0, 9.0, 1.0, 1.0]])
-    with pytest.raises(InvalidValueError, match=r"cost of 'joint_limits' must be positive .* is 0 .* seed 3"):
+    with pytest.raises(
+        InvalidValueError,
+        match=r"cost of 'joint_limits' must be positive .* is 0 "
+        r".* seed 3",
+    ):
         check_residual(BODY, "joint_limits", *wide, seed=3)
     with pytest.raises(InvalidValueError, match="no residual named 'nothing'"):
         check_residual(BODY, "nothing", *ROWS)
@@ -83,7 +113,11 @@ def test_a_residual_without_a_cost_at_the_state_says_nothing():
 
 @pytest.mark.parametrize("name", ["nan_gradient", "nan_curvature"])
 def test_derivatives_that_are_not_finite_are_refused(name):
-    with pytest.raises(InvalidValueError, match=rf"derivatives .* of '{name}' must be finite, .* seed 2"):
+    with pytest.raises(
+        InvalidValueError,
+        match=rf"derivatives .* of '{name}' must be finite, .* "
+        rf"seed 2",
+    ):
         check_residual(BODY, name, *ROWS, seed=2)
 
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Gauss-Newton leaves out of the joints' Hessians: learned exactly, added safely, and taken away in the end."""
+"""What Gauss-Newton leaves out of the joints' Hessians: learned exactly, added safely, and taken
+away in the end.
+"""
 
 from dataclasses import replace
 
@@ -71,7 +73,9 @@ def small():
 
 @pytest.mark.parametrize("accepted", [True, False])
 def test_three_steps_teach_the_hessian_of_a_quadratic(small, accepted):
-    """A rank-one update finds a symmetric 3 x 3 matrix from three independent steps, in whatever axes they come."""
+    """A rank-one update finds a symmetric 3 x 3 matrix from three independent steps, in whatever
+    axes they come.
+    """
     rng, tree, curvature = small
     true, known = symmetric(rng, K + 1), np.tile(2.0 * np.eye(3), (K + 1, 1, 1))
     at = rng.standard_normal((K + 1, 3))
@@ -134,19 +138,24 @@ def test_residuals_that_couple_joint_and_part_teach_nothing(small):
 
 
 def noisy(body, seed):
-    """A start near, and noisy measurements of, a person whose joints are drawn from the learned prior."""
+    """A start near, and noisy measurements of, a person whose joints are drawn from the learned
+    prior.
+    """
     rng, prior = np.random.default_rng(seed), load_joint_prior()
     R, t, _, beta = random_state(rng, 23, 10)
     Omega = np.array([prior.sample(name, 1, rng)[0] for name in body.joint_names[1:]])
     points = forward(body, R, t, Omega, beta)[2]
     seen = points + 0.02 * rng.standard_normal(points.shape)
     start = State(R, t, Omega @ rotations.exp(0.1 * rng.standard_normal((23, 3))), beta)
-    return start, Measurements(keypoints3d=Keypoints3D(np.arange(len(seen)), seen, np.full(len(seen), 0.1)))
+    return start, Measurements(
+        keypoints3d=Keypoints3D(np.arange(len(seen)), seen, np.full(len(seen), 0.1))
+    )
 
 
 def test_the_default_stop_is_close_to_the_end(body):
-    """Cost within 0.1 % and joints within 1 mm of the same start run to the end; Gauss-Newton alone stops short of
-    that in one such frame of ten."""
+    """Cost within 0.1 % and joints within 1 mm of the same start run to the end; Gauss-Newton alone
+    stops short of that in one such frame of ten.
+    """
     solver, close = FrameSolver(body), []
     end = Options(stages=(Stage(Weights(), 1e-13, 500),))
     for seed in range(80):
@@ -161,15 +170,21 @@ def test_the_default_stop_is_close_to_the_end(body):
 def test_without_it_the_minimum_is_the_same(body, seed):
     start, m = noisy(body, seed)
     to_the_end = (Stage(Weights(), 1e-14, 1000),)
-    found, plain = (fit(body, m, init=start, options=Options(to_the_end, curvature=on)) for on in (True, False))
+    found, plain = (
+        fit(body, m, init=start, options=Options(to_the_end, curvature=on)) for on in (True, False)
+    )
     assert plain.cost == pytest.approx(found.cost, rel=1e-8)
     np.testing.assert_allclose(plain.t_camera_part, found.t_camera_part, atol=1e-4)
     assert plain.iterations != found.iterations
 
 
 def test_without_it_every_step_is_a_dense_gauss_newton_step():
-    """Three steps from the definitions, by complex-step Jacobians, hardly damped; with it, the third is another."""
-    _, arrays, state, _, _, _, raw, sigmas, scales, priors, weights, measurements = problem(1, 7, 4, 30)
+    """Three steps from the definitions, by complex-step Jacobians, hardly damped; with it, the
+    third is another.
+    """
+    _, arrays, state, _, _, _, raw, sigmas, scales, priors, weights, measurements = problem(
+        1, 7, 4, 30
+    )
     options = Options([Stage(weights, 0.0, 3)], damping=MIN_DAMPING)
     start = State(*state)
     for _ in range(3):
@@ -179,7 +194,9 @@ def test_without_it_every_step_is_a_dense_gauss_newton_step():
         R_parent, u = R[arrays.parents[1:]], d[6:27].reshape(7, 3)
         Omega = rotations.exp(np.einsum("iba,ib->ia", R_parent, u)) @ state[2]
         state = rotations.exp(d[:3]) @ state[0], state[1] + d[3:6], Omega, state[3] + d[27:]
-    plain = fit(arrays, measurements, init=start, priors=priors, options=replace(options, curvature=False))
+    plain = fit(
+        arrays, measurements, init=start, priors=priors, options=replace(options, curvature=False)
+    )
     assert (plain.iterations, plain.rejected) == (3, 0)
     for found, expected in zip(vars(plain.state).values(), state, strict=True):
         np.testing.assert_allclose(found, expected, atol=1e-7)
@@ -188,14 +205,19 @@ def test_without_it_every_step_is_a_dense_gauss_newton_step():
 
 
 def test_clips_and_batches_heed_the_option(body):
-    """Frames of both come out as `fit` gives them with the same option, and otherwise than without it."""
+    """Frames of both come out as `fit` gives them with the same option, and otherwise than without
+    it.
+    """
     start, m = noisy(body, 1)
     off = Options(curvature=False)
     plain, found = (fit(body, m, init=start, options=options) for options in (off, Options()))
     assert plain.iterations != found.iterations
     (alone,) = fit_batch(body, [m], init=[start], options=off)
     np.testing.assert_array_equal(alone.t_camera_part, plain.t_camera_part)
-    first, then = (fit_clip(body, [m, m], options=options).frames[0].state.Omega for options in (off, Options()))
+    first, then = (
+        fit_clip(body, [m, m], options=options).frames[0].state.Omega
+        for options in (off, Options())
+    )
     assert np.abs(first - then).max() > 1e-9
 
 
@@ -209,4 +231,6 @@ def test_the_information_on_the_shape_is_gauss_newtons(body):
     linearize(tree, make_terms(tree, m, priors), table[0], 0.0, pose, blocks, work.scratch)
     eliminate(tree, pose, blocks, MIN_DAMPING, 1.0 / 0.3, work)
     expected = work.C[:10, :10] - table[0, 0, SHAPE_PRIOR] * np.eye(10)
-    np.testing.assert_allclose(found.beta_information, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
+    np.testing.assert_allclose(
+        found.beta_information, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max()
+    )

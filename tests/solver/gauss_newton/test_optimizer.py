@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The damping follows Nielsen's rule: the better a step was predicted, the less the next one is damped."""
+"""The damping follows Nielsen's rule: the better a step was predicted, the less the next one is
+damped.
+"""
 
 import numpy as np
 import pytest

@@ -18,7 +18,9 @@ ROOT_SCALE = 3.0
 
 
 def problem(seed, K, P, M, focal=False):
-    """A random problem in which every residual takes part: what the solver gets, and what the dense step needs."""
+    """A random problem in which every residual takes part: what the solver gets, and what the dense
+    step needs.
+    """
     rng = np.random.default_rng(seed)
     body = random_body(rng, K, P, M)
     state = random_state(rng, K, P)
@@ -45,14 +47,20 @@ def problem(seed, K, P, M, focal=False):
         PosePriors([data["part"]], [data["R_hat"]], [data["t_hat"]], [70.0], [90.0]),
     )
     L = rng.standard_normal((P, P))
-    priors = Priors(data["joint_mean"], data["joint_weights"], rng.standard_normal(P), L @ L.T + np.eye(P))
+    priors = Priors(
+        data["joint_mean"], data["joint_weights"], rng.standard_normal(P), L @ L.T + np.eye(P)
+    )
     options = Options()
     weights = Weights(joint_limits=0.0)
     tree = make_tree(body, focal)
     table, _, _ = options.stage_table([Stage(weights)])
     terms = make_terms(tree, measurements, priors)
     raw = residuals(body, data, focal)
-    sigmas = [options.robust_keypoints2d, options.robust_keypoints3d, options.robust_orientation_field] + [np.inf] * 3
+    sigmas = [
+        options.robust_keypoints2d,
+        options.robust_keypoints3d,
+        options.robust_orientation_field,
+    ] + [np.inf] * 3
     scales = [
         weights.keypoints2d * confidence[0],
         weights.keypoints3d * confidence[1],
@@ -61,7 +69,20 @@ def problem(seed, K, P, M, focal=False):
         np.array([70.0]),
         np.array([90.0]),
     ]
-    return rng, body, state, tree, terms, table[0], raw, sigmas, scales, priors, weights, measurements
+    return (
+        rng,
+        body,
+        state,
+        tree,
+        terms,
+        table[0],
+        raw,
+        sigmas,
+        scales,
+        priors,
+        weights,
+        measurements,
+    )
 
 
 def dense_system(body, state, raw, sigmas, scales, priors, weights, extra=0):
@@ -71,8 +92,14 @@ def dense_system(body, state, raw, sigmas, scales, priors, weights, extra=0):
 
     def stacked(moved_state, d):
         blocks = [f[:, None] * r for f, r in zip(factors, raw(moved_state, d), strict=True)]
-        root = np.sqrt(weights.shape) * np.linalg.cholesky(priors.shape_information).T if P else np.zeros((0, 0))
-        return np.concatenate([b.ravel() for b in blocks] + [root @ (moved_state[3] - priors.shape_mean)])
+        root = (
+            np.sqrt(weights.shape) * np.linalg.cholesky(priors.shape_information).T
+            if P
+            else np.zeros((0, 0))
+        )
+        return np.concatenate(
+            [b.ravel() for b in blocks] + [root @ (moved_state[3] - priors.shape_mean)]
+        )
 
     J = jacobian(body, state, stacked, extra)
     r = np.real(stacked(state, np.zeros(6 + 3 * K + P + extra)))
@@ -85,16 +112,22 @@ def dense_system(body, state, raw, sigmas, scales, priors, weights, extra=0):
     ("K", "P", "M"), [(23, 10, 40), (23, 0, 40), (51, 10, 60), (51, 0, 60), (1, 3, 20), (7, 5, 24)]
 )
 def test_step_equals_dense_step(K, P, M, seed):
-    rng, body, state, tree, terms, stage, raw, sigmas, scales, priors, weights, _ = problem(seed, K, P, M)
+    rng, body, state, tree, terms, stage, raw, sigmas, scales, priors, weights, _ = problem(
+        seed, K, P, M
+    )
     J_terms, r_terms, cost = dense_system(body, state, raw, sigmas, scales, priors, weights)
     for damping, coupled in product((0.0, 40.0), (False, True)):
         J, r = J_terms, r_terms
         pose, blocks, work = State(*state).pose(tree), make_blocks(tree), make_workspace(tree)
-        assert linearize(tree, terms, stage, 0.0, pose, blocks, work.scratch) == pytest.approx(cost, rel=1e-11)
+        assert linearize(tree, terms, stage, 0.0, pose, blocks, work.scratch) == pytest.approx(
+            cost, rel=1e-11
+        )
         if coupled:
             J_extra, r_extra = random_coupling(rng, tree, blocks, pose.t, pose.t[0])
             J, r = np.vstack([J, J_extra]), np.concatenate([r, r_extra])
-        Lambda = damping * np.concatenate([np.ones(3), np.full(3, ROOT_SCALE**2), np.ones(3 * K), np.zeros(P)])
+        Lambda = damping * np.concatenate(
+            [np.ones(3), np.full(3, ROOT_SCALE**2), np.ones(3 * K), np.zeros(P)]
+        )
         expected = -np.linalg.solve(J.T @ J + np.diag(Lambda), J.T @ r)
         predicted = step(tree, pose, blocks, damping, ROOT_SCALE, work)
         found = np.concatenate([work.x[0], work.u[1:].ravel(), work.dbeta[:P]])
@@ -105,11 +138,15 @@ def test_step_equals_dense_step(K, P, M, seed):
 
 @pytest.mark.parametrize("damping", [0.0, 40.0])
 def test_focal_length_is_one_more_column(damping):
-    rng, body, state, tree, terms, stage, raw, sigmas, scales, priors, weights, _ = problem(3, 23, 10, 40, focal=True)
+    rng, body, state, tree, terms, stage, raw, sigmas, scales, priors, weights, _ = problem(
+        3, 23, 10, 40, focal=True
+    )
     J, r, _ = dense_system(body, state, raw, sigmas, scales, priors, weights, extra=1)
     pose, blocks, work = State(*state).pose(tree), make_blocks(tree), make_workspace(tree)
     linearize(tree, terms, stage, 0.0, pose, blocks, work.scratch)
-    Lambda = damping * np.concatenate([np.ones(3), np.full(3, ROOT_SCALE**2), np.ones(69), np.zeros(11)])
+    Lambda = damping * np.concatenate(
+        [np.ones(3), np.full(3, ROOT_SCALE**2), np.ones(69), np.zeros(11)]
+    )
     expected = -np.linalg.solve(J.T @ J + np.diag(Lambda), J.T @ r)
     step(tree, pose, blocks, damping, ROOT_SCALE, work)
     found = np.concatenate([work.x[0], work.u[1:].ravel(), work.dbeta[:11]])
@@ -118,7 +155,12 @@ def test_focal_length_is_one_more_column(damping):
 
 def test_twists_of_parts_follow_from_the_step():
     _, body, state, tree, terms, stage, *_ = problem(5, 23, 10, 40)
-    pose, trial, blocks, work = State(*state).pose(tree), make_pose(tree), make_blocks(tree), make_workspace(tree)
+    pose, trial, blocks, work = (
+        State(*state).pose(tree),
+        make_pose(tree),
+        make_blocks(tree),
+        make_workspace(tree),
+    )
     linearize(tree, terms, stage, 0.0, pose, blocks, work.scratch)
     step(tree, pose, blocks, 1.0, ROOT_SCALE, work)
     for array in (work.x, work.u, work.dbeta):

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small random bodies in the layouts of the published files, an independent SMPL formula, and stand-in classes to
-write pickles as scipy, chumpy and Python 2 write them, with none of these installed."""
+"""Small random bodies in the layouts of the published files, an independent SMPL formula, and
+stand-in classes to write pickles as scipy, chumpy and Python 2 write them, with none of these
+installed.
+"""
 
 from __future__ import annotations
 
@@ -18,10 +20,14 @@ import pytest
 # Rest joints of a person of 1.7 m in T-pose, the pelvis at the origin: SMPL's 22 body joints.
 BODY = np.array(
     [
-        (0, 0, 0), (0.07, -0.09, 0), (-0.07, -0.09, 0), (0, 0.11, -0.02), (0.1, -0.47, 0), (-0.1, -0.47, 0),
-        (0, 0.25, 0), (0.09, -0.87, -0.03), (-0.09, -0.87, -0.03), (0, 0.3, 0.02), (0.12, -0.92, 0.09),
-        (-0.12, -0.92, 0.09), (0, 0.51, -0.02), (0.08, 0.42, -0.01), (-0.08, 0.42, -0.01), (0, 0.58, 0.02),
-        (0.19, 0.45, -0.03), (-0.19, 0.45, -0.03), (0.45, 0.44, -0.05), (-0.45, 0.44, -0.05), (0.7, 0.44, -0.05),
+        (0, 0, 0), (0.07, -0.09, 0), (-0.07, -0.09, 0), (0, 0.11, -0.02), (0.1, -0.47, 0),
+        (-0.1, -0.47, 0),
+        (0, 0.25, 0), (0.09, -0.87, -0.03), (-0.09, -0.87, -0.03), (0, 0.3, 0.02),
+        (0.12, -0.92, 0.09),
+        (-0.12, -0.92, 0.09), (0, 0.51, -0.02), (0.08, 0.42, -0.01), (-0.08, 0.42, -0.01),
+        (0, 0.58, 0.02),
+        (0.19, 0.45, -0.03), (-0.19, 0.45, -0.03), (0.45, 0.44, -0.05), (-0.45, 0.44, -0.05),
+        (0.7, 0.44, -0.05),
         (-0.7, 0.44, -0.05),
     ]
 )  # fmt: skip
@@ -44,7 +50,11 @@ def _fingers(first: int) -> tuple[list[tuple[float, float, float]], list[int]]:
 def skeleton(family: str) -> tuple[np.ndarray, list[int]]:
     """Rest joints (K+1, 3) and parents."""
     if family in ("smpl", "star"):
-        return np.vstack([BODY, [(0.79, 0.44, -0.05), (-0.79, 0.44, -0.05)]]), [*BODY_PARENTS, 20, 21]
+        return np.vstack([BODY, [(0.79, 0.44, -0.05), (-0.79, 0.44, -0.05)]]), [
+            *BODY_PARENTS,
+            20,
+            21,
+        ]
     if family == "smplh":
         joints, parents = _fingers(22)
         return np.vstack([BODY, joints]), BODY_PARENTS + parents
@@ -56,12 +66,16 @@ def skeleton(family: str) -> tuple[np.ndarray, list[int]]:
     return rng.normal(size=(9, 3)), [-1, 0, 1, 1, 0, 4, 3, 6, 2]
 
 
-def make_tables(family: str, vertices: int = 300, betas: int = 10, seed: int = 0) -> dict[str, np.ndarray]:
+def make_tables(
+    family: str, vertices: int = 300, betas: int = 10, seed: int = 0
+) -> dict[str, np.ndarray]:
     """The arrays of a model file; posedirs as wide as the family's."""
     rng = np.random.default_rng(seed)
     joints, parents = skeleton(family)
     n = len(joints)
-    owner = np.concatenate([np.repeat(np.arange(n), 3), rng.integers(0, n, max(0, vertices - 3 * n))])[:vertices]
+    owner = np.concatenate(
+        [np.repeat(np.arange(n), 3), rng.integers(0, n, max(0, vertices - 3 * n))]
+    )[:vertices]
     v_template = joints[owner] + rng.normal(scale=0.03, size=(vertices, 3))
     regressor = np.zeros((n, vertices))
     weights = np.zeros((vertices, n))
@@ -73,7 +87,8 @@ def make_tables(family: str, vertices: int = 300, betas: int = 10, seed: int = 0
         weights[v, others] = rng.uniform(0, 0.3, 3)
         weights[v, owner[v]] += 1.0
     weights /= weights.sum(axis=1, keepdims=True)
-    kintree = np.array([parents, range(n)], np.int64).astype(np.uint32)  # the root's parent becomes 2**32 - 1
+    # the root's parent becomes 2**32 - 1
+    kintree = np.array([parents, range(n)], np.int64).astype(np.uint32)
     pose_width = 4 * (n - 1) + 1 if family == "star" else 9 * (n - 1)
     return {
         "v_template": v_template,
@@ -89,13 +104,16 @@ def make_tables(family: str, vertices: int = 300, betas: int = 10, seed: int = 0
 def smpl_formula(
     tables: dict[str, np.ndarray], betas: np.ndarray, rotations: np.ndarray, trans: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices and joints by SMPL's formula in homogeneous matrices, vertex by vertex, without pose correctives."""
+    """Vertices and joints by SMPL's formula in homogeneous matrices, vertex by vertex, without pose
+    correctives.
+    """
     v = tables["v_template"] + tables["shapedirs"][:, :, : len(betas)] @ betas
     J = tables["J_regressor"] @ v
     chain: list[np.ndarray] = []
     for i, R in enumerate(rotations):
         local = np.eye(4)
-        parent = int(tables["kintree_table"][0, i]) if i else 0  # the root has none, and its entry is not used
+        # the root has none, and its entry is not used
+        parent = int(tables["kintree_table"][0, i]) if i else 0
         local[:3, :3], local[:3, 3] = R, J[i] - (J[parent] if i else 0)
         chain.append(chain[parent] @ local if i else local)
     from_rest = []
@@ -140,7 +158,9 @@ def dump_python2(value: object, protocol: int) -> bytes:
 
 @pytest.fixture
 def stand_ins(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], type]:
-    """Make an importable empty class of any dotted name, e.g. ``chumpy.ch.Ch``, so that the pickler can name it."""
+    """Make an importable empty class of any dotted name, e.g. ``chumpy.ch.Ch``, so that the pickler
+    can name it.
+    """
 
     def make(dotted: str) -> type:
         module, name = dotted.rsplit(".", 1)

@@ -14,7 +14,8 @@ from scope.solver.loaders.archive import npz_keys, read_members
 from scope.solver.loaders.npz import read_npz
 
 HEADER = "{'descr': '<f8', 'fortran_order': False, 'shape': (2, 3), }"
-# What numpy's reader raises at these: TokenError, IndentationError, SyntaxError, TypeError, OverflowError, ValueError.
+# What numpy's reader raises at these: TokenError, IndentationError, SyntaxError, TypeError,
+# OverflowError, ValueError.
 KNOWN = (
     "('''",
     "{\n  1\n 2}",
@@ -28,13 +29,18 @@ KNOWN = (
 def archive(path: Path, header: str) -> Path:
     text = header.encode("latin1") + b"\n"
     with zipfile.ZipFile(path, "w") as file:
-        file.writestr("a.npy", b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text + bytes(48))
+        file.writestr(
+            "a.npy", b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text + bytes(48)
+        )
     return path
 
 
 def check(path: Path) -> None:
     """Read the array in both ways: either gives it or one sentence."""
-    for read in (lambda: read_members(path, ["a"], ""), lambda: read_npz(path, ModelFileError, "body file")):
+    for read in (
+        lambda: read_members(path, ["a"], ""),
+        lambda: read_npz(path, ModelFileError, "body file"),
+    ):
         with suppress(ModelFileError):
             read()
 
@@ -42,7 +48,10 @@ def check(path: Path) -> None:
 @pytest.mark.parametrize("header", KNOWN)
 def test_headers_at_which_numpy_fails(tmp_path, header):
     path = archive(tmp_path / "a.npz", header)
-    for read in (lambda: read_members(path, ["a"], ""), lambda: read_npz(path, ModelFileError, "body file")):
+    for read in (
+        lambda: read_members(path, ["a"], ""),
+        lambda: read_npz(path, ModelFileError, "body file"),
+    ):
         with pytest.raises(ModelFileError, match=r"a\.npz .*(is not a readable|cannot be used)"):
             read()
 
@@ -50,7 +59,10 @@ def test_headers_at_which_numpy_fails(tmp_path, header):
 def test_a_long_header_is_refused_in_one_line(tmp_path):
     """Numpy says so in three."""
     path = archive(tmp_path / "a.npz", HEADER + " " * 30_000)
-    for read in (lambda: read_members(path, ["a"], ""), lambda: read_npz(path, ModelFileError, "body file")):
+    for read in (
+        lambda: read_members(path, ["a"], ""),
+        lambda: read_npz(path, ModelFileError, "body file"),
+    ):
         with pytest.raises(ModelFileError) as caught:
             read()
         assert "\n" not in str(caught.value)
@@ -62,7 +74,9 @@ def test_random_headers_never_give_a_traceback(tmp_path):
     for _ in range(300):
         characters = list(HEADER)
         for _ in range(chance.randint(1, 4)):
-            characters[chance.randrange(len(characters))] = chance.choice("'\"()[]{}\n\t \\,:0e#\x00é;=")
+            characters[chance.randrange(len(characters))] = chance.choice(
+                "'\"()[]{}\n\t \\,:0e#\x00é;="
+            )
         check(archive(tmp_path / "a.npz", "".join(characters)))
 
 

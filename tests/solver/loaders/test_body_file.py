@@ -21,12 +21,18 @@ def test_a_body_knows_its_file_unless_it_is_built_in(tmp_path):
 
 
 def arrays_of(body):
-    return {field.name: value for field in fields(body) if isinstance(value := getattr(body, field.name), np.ndarray)}
+    return {
+        field.name: value
+        for field in fields(body)
+        if isinstance(value := getattr(body, field.name), np.ndarray)
+    }
 
 
 @pytest.mark.parametrize("which", ["scope", "scope_h"])
 def test_a_built_in_body_is_kept_in_memory_as_its_file_has_it(tmp_path, which):
-    """The order of an array in memory changes the last bits of what is calculated from it, and the time it takes."""
+    """The order of an array in memory changes the last bits of what is calculated from it, and the
+    time it takes.
+    """
     path = tmp_path / "mine.npz"
     shutil.copy(BUILT_IN[which], path)
     own = load_body(path)
@@ -52,10 +58,18 @@ def test_a_change_of_a_bodys_arrays_leaves_the_next_one_alone(which):
 
 def test_a_missing_or_damaged_file_of_growth_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr(body_file, "GROWTH", tmp_path / "growth.npz")
-    with pytest.raises(ModelFileError, match=r"file of children's growth .*growth\.npz cannot .*; reinstall Scope"):
+    with pytest.raises(
+        ModelFileError,
+        match=r"file of children's growth .*growth\.npz cannot .*; "
+        r"reinstall Scope",
+    ):
         load_body("scope_child")
     (tmp_path / "growth.npz").write_bytes(b"PK damaged")
-    with pytest.raises(ModelFileError, match=r"growth\.npz is not a readable file of children's growth"):
+    with pytest.raises(
+        ModelFileError,
+        match=r"growth\.npz is not a readable file of children's "
+        r"growth",
+    ):
         load_body("scope_child")
 
 
@@ -71,5 +85,9 @@ def test_a_body_without_joints_is_refused(tmp_path):
         "skin_joints": np.zeros((vertices, 4), np.uint8),
     }
     np.savez(tmp_path / "none.npz", **arrays)
-    with pytest.raises(ModelFileError, match=r"none\.npz: kintree_table must list each joint after its parent"):
+    with pytest.raises(
+        ModelFileError,
+        match=r"none\.npz: kintree_table must list each joint after "
+        r"its parent",
+    ):
         load_body(tmp_path / "none.npz")

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keypoints of users' bodies: known vertices on published meshes, geometry on any other, rigid and linear in shape."""
+"""Keypoints of users' bodies: known vertices on published meshes, geometry on any other, rigid and
+linear in shape.
+"""
 
 from __future__ import annotations
 
@@ -11,12 +13,16 @@ from scope.solver.loaders.body_file import load_body
 
 # Vertex numbers, as found in several public projects.
 OF_SMPL = {
-    "nose": 332, "left_eye": 2800, "right_eye": 6260, "left_ear": 583, "right_ear": 4071, "left_big_toe": 3216,
-    "left_small_toe": 3226, "left_heel": 3387, "right_big_toe": 6617, "right_small_toe": 6624, "right_heel": 6787,
+    "nose": 332, "left_eye": 2800, "right_eye": 6260, "left_ear": 583, "right_ear": 4071,
+    "left_big_toe": 3216,
+    "left_small_toe": 3226, "left_heel": 3387, "right_big_toe": 6617, "right_small_toe": 6624,
+    "right_heel": 6787,
 }  # fmt: skip
 OF_SMPLX = {
-    "nose": 9120, "left_eye": 9448, "right_eye": 9929, "left_ear": 6, "right_ear": 616, "left_big_toe": 5770,
-    "left_small_toe": 5780, "left_heel": 8846, "right_big_toe": 8463, "right_small_toe": 8474, "right_heel": 8635,
+    "nose": 9120, "left_eye": 9448, "right_eye": 9929, "left_ear": 6, "right_ear": 616,
+    "left_big_toe": 5770,
+    "left_small_toe": 5780, "left_heel": 8846, "right_big_toe": 8463, "right_small_toe": 8474,
+    "right_heel": 8635,
 }  # fmt: skip
 PUBLISHED = {
     ("smpl", 6890): OF_SMPL,
@@ -45,7 +51,9 @@ def test_published_meshes_use_their_known_vertices(tmp_path, tables_of, family, 
 
 
 def as_smpl_file(body: Body) -> dict[str, np.ndarray]:
-    """The default body as an SMPL-like file: a regressor that gives its joints exactly, for every shape."""
+    """The default body as an SMPL-like file: a regressor that gives its joints exactly, for every
+    shape.
+    """
     V, n = len(body.v_template), body.K + 1
     basis = np.column_stack([body.v_template, body.shapedirs.reshape(V, -1), np.ones(V)])
     wanted = np.column_stack([body.J_template, body.J_shapedirs.reshape(n, -1), np.ones(n)])
@@ -63,7 +71,9 @@ def as_smpl_file(body: Body) -> dict[str, np.ndarray]:
 
 @pytest.fixture(scope="module", params=["scope", "scope_h"])
 def pair(request, tmp_path_factory) -> tuple[Body, Body]:
-    """The default body with its own keypoints, and the same mesh loaded as a user's file of unknown topology."""
+    """The default body with its own keypoints, and the same mesh loaded as a user's file of unknown
+    topology.
+    """
     own = load_body(request.param)
     path = tmp_path_factory.mktemp("body") / "body.npz"
     np.savez(path, **as_smpl_file(own))
@@ -89,13 +99,17 @@ def test_the_heel_is_on_the_sole_even_if_the_ankle_protrudes_further_back(tmp_pa
     plain, leaning = load_model(tmp_path / "plain.npz"), load_model(tmp_path / "leaning.npz")
     for name in ("coco/left_heel", "coco/right_heel"):
         i = own.keypoint_names.index(name)
-        np.testing.assert_allclose(leaning.keypoint_template[i], plain.keypoint_template[i], atol=1e-12)
+        np.testing.assert_allclose(
+            leaning.keypoint_template[i], plain.keypoint_template[i], atol=1e-12
+        )
 
 
 def test_keypoints_follow_the_shape_as_the_true_ones_do(pair):
     own, loaded = pair
     joints = [i for i, n in enumerate(own.keypoint_names) if n.split("/")[1] in own.joint_names]
-    np.testing.assert_allclose(loaded.keypoint_shapedirs[joints], own.keypoint_shapedirs[joints], atol=1e-9)
+    np.testing.assert_allclose(
+        loaded.keypoint_shapedirs[joints], own.keypoint_shapedirs[joints], atol=1e-9
+    )
     for axis in range(3):
         betas = np.zeros(own.P)
         betas[axis] = 2.0
@@ -121,7 +135,9 @@ def test_keypoints_turn_with_their_part(pair):
     assert on_head.sum() == 16  # 11 of BlazePose, 5 of COCO
 
 
-@pytest.mark.parametrize(("family", "vertices"), [("smpl", 72), ("smpl", 200), ("smplh", 160), ("smplx", 400)])
+@pytest.mark.parametrize(
+    ("family", "vertices"), [("smpl", 72), ("smpl", 200), ("smplh", 160), ("smplx", 400)]
+)
 def test_coarse_random_meshes_still_get_every_keypoint(tmp_path, tables_of, family, vertices):
     np.savez(tmp_path / "body.npz", **tables_of(family, vertices=vertices))
     body = load_model(tmp_path / "body.npz")

@@ -43,13 +43,19 @@ def save(path: Path, tables: dict[str, np.ndarray], **more: ArrayLike) -> Path:
         ("tree", 5, 0, 0),
     ],
 )
-def test_kinematics_and_skinning_follow_the_smpl_formula(tmp_path, tables_of, formula, family, stored, asked, kept):
+def test_kinematics_and_skinning_follow_the_smpl_formula(
+    tmp_path, tables_of, formula, family, stored, asked, kept
+):
     tables = tables_of(family, betas=stored)
     body = load_model(save(tmp_path / "tree.npz", tables), max_betas=asked)
     assert body.name == family
     assert body.P == kept
     rng = np.random.default_rng(2)
-    betas, trans, rotations = rng.normal(size=kept), rng.normal(size=3), random_rotations(body.K + 1)
+    betas, trans, rotations = (
+        rng.normal(size=kept),
+        rng.normal(size=3),
+        random_rotations(body.K + 1),
+    )
     R, t = body.forward_kinematics(rotations, trans, betas)
     vertices, joints = formula(tables, betas, rotations, trans)
     np.testing.assert_allclose(t, joints, atol=1e-12)
@@ -61,7 +67,11 @@ def test_kinematics_and_skinning_follow_the_smpl_formula(tmp_path, tables_of, fo
     ("family", "count", "some"),
     [
         ("smpl", 24, {0: "pelvis", 15: "head", 22: "left_hand", 23: "right_hand"}),
-        ("smplh", 52, {22: "left_index1", 28: "left_pinky1", 36: "left_thumb3", 37: "right_index1"}),
+        (
+            "smplh",
+            52,
+            {22: "left_index1", 28: "left_pinky1", 36: "left_thumb3", 37: "right_index1"},
+        ),
         ("smplx", 55, {22: "jaw", 23: "left_eye_smplhf", 25: "left_index1", 54: "right_thumb3"}),
         ("tree", 9, {0: "joint_00", 8: "joint_08"}),
     ],
@@ -83,7 +93,9 @@ def test_any_tree_keeps_the_names_in_the_file(tmp_path, tables_of):
 
 def test_joints_may_be_numbered_freely(tmp_path, tables_of):
     tables = tables_of("smpl")
-    renumbered = np.where(tables["kintree_table"] < 24, tables["kintree_table"] * 7 + 5, 2**32 - 1).astype(np.uint32)
+    renumbered = np.where(
+        tables["kintree_table"] < 24, tables["kintree_table"] * 7 + 5, 2**32 - 1
+    ).astype(np.uint32)
     body = load_model(save(tmp_path / "body.npz", {**tables, "kintree_table": renumbered}))
     np.testing.assert_array_equal(body.parents[1:], tables["kintree_table"][0, 1:])
 
@@ -93,7 +105,10 @@ def test_the_root_may_be_marked_in_any_way(tmp_path, tables_of, root):
     tables = tables_of("smpl")
     kintree = tables["kintree_table"].astype(np.int64)
     kintree[0, 0] = root
-    assert load_model(save(tmp_path / "body.npz", {**tables, "kintree_table": kintree})).parents[0] == -1
+    assert (
+        load_model(save(tmp_path / "body.npz", {**tables, "kintree_table": kintree})).parents[0]
+        == -1
+    )
 
 
 def test_more_than_four_weights_are_reduced_to_the_largest(tmp_path, tables_of):
@@ -109,7 +124,9 @@ def test_more_than_four_weights_are_reduced_to_the_largest(tmp_path, tables_of):
 
 def test_pickled_tables_that_nobody_needs_do_not_disturb(tmp_path, tables_of):
     tables = tables_of("smplx", betas=400)
-    path = save(tmp_path / "SMPLX_NEUTRAL.npz", tables, joint2num=np.array({"pelvis": 0}, dtype=object))
+    path = save(
+        tmp_path / "SMPLX_NEUTRAL.npz", tables, joint2num=np.array({"pelvis": 0}, dtype=object)
+    )
     assert load_model(path).name == "smplx"
 
 
@@ -119,12 +136,16 @@ def test_other_number_types_are_read(tmp_path, tables_of, dtype):
     cast = {k: v.astype(dtype) if v.dtype.kind == "f" else v for k, v in tables.items()}
     body = load_model(save(tmp_path / "body.npz", cast))
     assert body.v_template.dtype == np.float64
-    np.testing.assert_allclose(body.J_template, tables["J_regressor"] @ tables["v_template"], atol=5e-3)
+    np.testing.assert_allclose(
+        body.J_template, tables["J_regressor"] @ tables["v_template"], atol=5e-3
+    )
 
 
 def test_fortran_order_and_compression_are_read(tmp_path, tables_of):
     tables = tables_of("smpl")
-    np.savez_compressed(tmp_path / "body.npz", **{k: np.asfortranarray(v) for k, v in tables.items()})
+    np.savez_compressed(
+        tmp_path / "body.npz", **{k: np.asfortranarray(v) for k, v in tables.items()}
+    )
     np.testing.assert_array_equal(load_model(tmp_path / "body.npz").shapedirs, tables["shapedirs"])
 
 
@@ -160,9 +181,20 @@ BROKEN = {
     "flat vertices": (put("v_template", lambda a: a.ravel()), "v_template must have shape"),
     "quads": (put("f", np.zeros((4, 4), np.uint32)), "f must have shape"),
     "a scalar": (put("v_template", np.float64(3)), "v_template must have shape"),
-    "no tree": (put("kintree_table", np.int64(3)), r"kintree_table must have shape \(2, any\), but has \(\)"),
-    "flat tree": (put("kintree_table", np.arange(24)), r"kintree_table must have shape \(2, any\), but has \(24,\)"),
-    "empty": (put("v_template", np.zeros((0, 3))), "0 vertices and 24 joints do not match any supported body"),
+    "no tree": (
+        put("kintree_table", np.int64(3)),
+        r"kintree_table must have shape \(2, any\), but "
+        r"has \(\)",
+    ),
+    "flat tree": (
+        put("kintree_table", np.arange(24)),
+        r"kintree_table must have shape \(2, any\), "
+        r"but has \(24,\)",
+    ),
+    "empty": (
+        put("v_template", np.zeros((0, 3))),
+        "0 vertices and 24 joints do not match any supported body",
+    ),
     "no joints": (
         put("kintree_table", np.zeros((2, 0), int)),
         "300 vertices and 0 joints do not match any supported body",
@@ -170,7 +202,10 @@ BROKEN = {
     "flat shapedirs": (put("shapedirs", np.zeros((900, 10))), "shapedirs must have shape"),
     "text": (put("v_template", np.full((300, 3), "x")), "v_template must hold numbers"),
     "complex": (put("weights", lambda a: a.astype(complex)), "weights must hold numbers"),
-    "fractional tree": (put("kintree_table", lambda a: a.astype(float)), "kintree_table must hold whole numbers"),
+    "fractional tree": (
+        put("kintree_table", lambda a: a.astype(float)),
+        "kintree_table must hold whole numbers",
+    ),
     "NaN vertex": (poke("v_template", (3, 1), np.nan), "v_template contains NaN"),
     "NaN weight": (poke("weights", (3, 1), np.nan), "weights contains NaN"),
     "infinite shape": (poke("shapedirs", (3, 1, 0), np.inf), "shapedirs contains NaN or infinity"),
@@ -197,11 +232,17 @@ def test_contradictory_files_are_refused_with_the_reason(tmp_path, tables_of, na
     assert str(path) in str(caught.value)
 
 
-@pytest.mark.parametrize("factors", [(1, 1, 0), (0, 1, 1), (1e-3, 1e-3, 1e-3), (1000, 1000, 1000), (1, 1e30, 1)])
+@pytest.mark.parametrize(
+    "factors", [(1, 1, 0), (0, 1, 1), (1e-3, 1e-3, 1e-3), (1000, 1000, 1000), (1, 1e30, 1)]
+)
 def test_flat_tiny_and_huge_bodies_are_refused(tmp_path, tables_of, factors):
     tables = tables_of("smpl")
     tables["v_template"] = tables["v_template"] * np.array(factors)
-    with pytest.raises(ModelFileError, match=r"body\.npz: v_template measures .* m, which no body does; .* metre"):
+    with pytest.raises(
+        ModelFileError,
+        match=r"body\.npz: v_template measures .* m, which no body "
+        r"does; .* metre",
+    ):
         load_model(save(tmp_path / "body.npz", tables))
 
 
@@ -223,7 +264,9 @@ def rewrite(path: Path, key: str, content: bytes, compression: int = zipfile.ZIP
 
 def header(shape: tuple[int, ...], descr: str = "<f8") -> bytes:
     file = io.BytesIO()
-    np.lib.format.write_array_header_1_0(file, {"descr": descr, "fortran_order": False, "shape": shape})
+    np.lib.format.write_array_header_1_0(
+        file, {"descr": descr, "fortran_order": False, "shape": shape}
+    )
     return file.getvalue()
 
 
@@ -251,7 +294,9 @@ def test_lying_arrays_are_refused_before_memory_is_taken(tmp_path, tables_of, co
 def test_a_zip_bomb_is_refused(tmp_path, monkeypatch, tables_of):
     monkeypatch.setattr(archive, "LARGEST_ARRAY", 10_000_000)
     path = save(tmp_path / "body.npz", tables_of("smpl"))
-    rewrite(path, "weights", header((30_000_000, 1), "|u1") + bytes(30_000_000), zipfile.ZIP_DEFLATED)
+    rewrite(
+        path, "weights", header((30_000_000, 1), "|u1") + bytes(30_000_000), zipfile.ZIP_DEFLATED
+    )
     assert path.stat().st_size < 2_000_000
     with pytest.raises(ModelFileError, match="more than a body needs or the file holds"):
         load_model(path)

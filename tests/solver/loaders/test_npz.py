@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Plain arrays from .npz files of anyone: what is read, and what is refused in one line of the caller's error."""
+"""Plain arrays from .npz files of anyone: what is read, and what is refused in one line of the
+caller's error.
+"""
 
 import io
 import zipfile
@@ -16,7 +18,11 @@ class OwnError(InputError):
     """As each kind of file has its own."""
 
 
-ARRAYS = {"a": np.arange(6.0).reshape(2, 3), "text": np.array("walk"), "flags": np.array([True, False])}
+ARRAYS = {
+    "a": np.arange(6.0).reshape(2, 3),
+    "text": np.array("walk"),
+    "flags": np.array([True, False]),
+}
 
 
 def saved(path: Path, **more: np.ndarray) -> Path:
@@ -74,7 +80,11 @@ def test_what_would_unpack_to_too_much_is_refused_before(tmp_path, monkeypatch):
     path = tmp_path / "bomb.npz"
     np.savez_compressed(path, a=np.zeros(1 << 20))
     assert path.stat().st_size < 1 << 16
-    with pytest.raises(OwnError, match=r"bomb\.npz would unpack to 8 MiB, too large for a motion file"):
+    with pytest.raises(
+        OwnError,
+        match=r"bomb\.npz would unpack to 8 MiB, too large for a motion "
+        r"file",
+    ):
         read_npz(path, OwnError, "motion file")
 
 

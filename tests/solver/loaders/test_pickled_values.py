@@ -30,7 +30,11 @@ def compressed(cls: type, dense: np.ndarray, by_column: bool, **names: object) -
                 data.append(value)
                 indices.append(i)
         indptr.append(len(data))
-    arrays = {"data": np.array(data), "indices": np.array(indices, np.int32), "indptr": np.array(indptr, np.int32)}
+    arrays = {
+        "data": np.array(data),
+        "indices": np.array(indices, np.int32),
+        "indptr": np.array(indptr, np.int32),
+    }
     return with_state(cls, _shape=dense.shape, maxprint=50, **arrays, **names)
 
 
@@ -38,12 +42,16 @@ def assert_same_model(path, tables):
     body = load_model(path)
     np.testing.assert_allclose(body.v_template, tables["v_template"])
     np.testing.assert_allclose(body.shapedirs, tables["shapedirs"])
-    np.testing.assert_allclose(body.J_template, tables["J_regressor"] @ tables["v_template"], atol=1e-14)
+    np.testing.assert_allclose(
+        body.J_template, tables["J_regressor"] @ tables["v_template"], atol=1e-14
+    )
     dense = np.zeros_like(tables["weights"])
     np.put_along_axis(dense, body.skin_joints, body.skin_weights, axis=1)
     heavy = body.skin_weights > 0
     rows = np.repeat(np.arange(len(dense)), 4).reshape(-1, 4)
-    np.testing.assert_allclose(tables["weights"][rows[heavy], body.skin_joints[heavy]], body.skin_weights[heavy])
+    np.testing.assert_allclose(
+        tables["weights"][rows[heavy], body.skin_joints[heavy]], body.skin_weights[heavy]
+    )
     np.testing.assert_array_equal(body.faces, tables["f"])
     return body
 
@@ -51,9 +59,27 @@ def assert_same_model(path, tables):
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_plain_arrays_of_python_3(tmp_path, tables_of, protocol):
     tables = tables_of("smpl")
-    extra = {"bs_style": "lbs", "bs_type": "lrotmin", "scale": np.float64(1.5), "count": 3, "pi": 3.14, "big": 10**12}
-    extra |= {"neg": -7, "none": None, "yes": True, "list": [1, (2,), (), (1, 2), (1, 2, 3), (1, 2, 3, 4)]}
-    extra |= {"text": "žluť\n", "raw": b"\x00\xff\n", "set": {1, 2}, "frozen": frozenset((1,)), "empty": b""}
+    extra = {
+        "bs_style": "lbs",
+        "bs_type": "lrotmin",
+        "scale": np.float64(1.5),
+        "count": 3,
+        "pi": 3.14,
+        "big": 10**12,
+    }
+    extra |= {
+        "neg": -7,
+        "none": None,
+        "yes": True,
+        "list": [1, (2,), (), (1, 2), (1, 2, 3), (1, 2, 3, 4)],
+    }
+    extra |= {
+        "text": "žluť\n",
+        "raw": b"\x00\xff\n",
+        "set": {1, 2},
+        "frozen": frozenset((1,)),
+        "empty": b"",
+    }
     extra |= {"bytes": bytearray(b"ab")}
     (tmp_path / "body.pkl").write_bytes(pickle.dumps({**tables, **extra}, protocol))
     assert_same_model(tmp_path / "body.pkl", tables)
@@ -75,9 +101,19 @@ def test_the_official_layout(tmp_path, monkeypatch, tables_of, stand_ins, protoc
     else:
         matrix = compressed(sparse, dense, kind == "csc", format=kind)
     shapedirs = with_state(
-        ch, x=tables["shapedirs"], _dirty_vars={"x"}, _itr=None, _depends_on_deps={"r": {"deps": {"x"}, "value": None}}
+        ch,
+        x=tables["shapedirs"],
+        _dirty_vars={"x"},
+        _itr=None,
+        _depends_on_deps={"r": {"deps": {"x"}, "value": None}},
     )
-    written = {**tables, "shapedirs": shapedirs, "J_regressor": matrix, "weights_prior": matrix, "J": np.zeros((24, 3))}
+    written = {
+        **tables,
+        "shapedirs": shapedirs,
+        "J_regressor": matrix,
+        "weights_prior": matrix,
+        "J": np.zeros((24, 3)),
+    }
     (tmp_path / "body.pkl").write_bytes(pickle.dumps(written, protocol))
     for name in [n for n in sys.modules if n.split(".")[0] in ("chumpy", "scipy")]:
         monkeypatch.setitem(sys.modules, name, None)  # importing one of them now would fail
@@ -88,9 +124,14 @@ def test_the_official_layout(tmp_path, monkeypatch, tables_of, stand_ins, protoc
 def test_python_2_pickles(tmp_path, tables_of, stand_ins, python2, protocol):
     tables = tables_of("smpl")
     shapedirs = with_state(stand_ins("chumpy.ch.Ch"), x=tables["shapedirs"])
-    matrix = compressed(stand_ins("scipy.sparse.csc.csc_matrix"), tables["J_regressor"], by_column=True)
-    data = python2({**tables, "shapedirs": shapedirs, "J_regressor": matrix, "gender": "female"}, protocol)
-    again = pickle.loads(data, encoding="latin1")  # written by this test: it is a pickle that Python reads too
+    matrix = compressed(
+        stand_ins("scipy.sparse.csc.csc_matrix"), tables["J_regressor"], by_column=True
+    )
+    data = python2(
+        {**tables, "shapedirs": shapedirs, "J_regressor": matrix, "gender": "female"}, protocol
+    )
+    # written by this test: it is a pickle that Python reads too
+    again = pickle.loads(data, encoding="latin1")
     np.testing.assert_array_equal(again["weights"], tables["weights"])
     (tmp_path / "body.pkl").write_bytes(data)
     assert_same_model(tmp_path / "body.pkl", tables)
@@ -100,9 +141,16 @@ def test_a_chumpy_slice_is_the_slice(tmp_path, tables_of, stand_ins):
     tables = tables_of("smpl", betas=20)
     ch, select = stand_ins("chumpy.ch.Ch"), stand_ins("chumpy.reordering.Select")
     kept = np.arange(tables["shapedirs"].size).reshape(tables["shapedirs"].shape)[:, :, :7]
-    sliced = with_state(select, a=with_state(ch, x=tables["shapedirs"]), idxs=kept.ravel(), preferred_shape=kept.shape)
+    sliced = with_state(
+        select,
+        a=with_state(ch, x=tables["shapedirs"]),
+        idxs=kept.ravel(),
+        preferred_shape=kept.shape,
+    )
     (tmp_path / "body.pkl").write_bytes(pickle.dumps({**tables, "shapedirs": sliced}, 2))
-    np.testing.assert_array_equal(load_model(tmp_path / "body.pkl").shapedirs, tables["shapedirs"][:, :, :7])
+    np.testing.assert_array_equal(
+        load_model(tmp_path / "body.pkl").shapedirs, tables["shapedirs"][:, :, :7]
+    )
 
 
 def test_repeated_sparse_entries_add_up(tmp_path, tables_of, stand_ins):
@@ -136,7 +184,9 @@ def test_a_sparse_entry_outside_the_matrix_is_refused(tmp_path, tables_of, stand
 @pytest.mark.parametrize("family", ["smplh", "smplx", "star"])
 def test_other_families_as_pickles(tmp_path, tables_of, family):
     tables = tables_of(family)
-    (tmp_path / "body.pkl").write_bytes(pickle.dumps({k: np.asfortranarray(v) for k, v in tables.items()}, 2))
+    (tmp_path / "body.pkl").write_bytes(
+        pickle.dumps({k: np.asfortranarray(v) for k, v in tables.items()}, 2)
+    )
     assert assert_same_model(tmp_path / "body.pkl", tables).name == family
 
 

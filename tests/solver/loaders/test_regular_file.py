@@ -19,7 +19,11 @@ def test_files_folders_and_what_does_not_exist_pass(tmp_path):
 def test_a_large_file_is_refused(tmp_path):
     with (tmp_path / "a.npz").open("wb") as file:
         file.truncate(5 << 20)
-    with pytest.raises(ModelFileError, match=r"a\.npz has 5 MiB, too large for a body file; choose another file"):
+    with pytest.raises(
+        ModelFileError,
+        match=r"a\.npz has 5 MiB, too large for a body file; choose "
+        r"another file",
+    ):
         check_regular(tmp_path / "a.npz", ModelFileError, "body file", (5 << 20) - 1)
 
 
@@ -28,6 +32,8 @@ def test_a_pipe_and_a_device_are_refused(tmp_path):
     os.mkfifo(tmp_path / "a.npz")
     for path in (tmp_path / "a.npz", Path(os.devnull)):
         with pytest.raises(
-            InputError, match=rf"{path} is a pipe or a device, not a regular file; choose a motion file"
+            InputError,
+            match=rf"{path} is a pipe or a device, not a regular file; choose a motion "
+            rf"file",
         ):
             check_regular(path, InputError, "motion file", 1 << 30)

@@ -13,7 +13,9 @@ from scope.solver.errors import ModelFileError
 from scope.solver.loaders import load_model, restricted_pickle
 
 RECONSTRUCT = b"cnumpy.core.multiarray\n_reconstruct\ncnumpy\nndarray\nK\x00\x85U\x01b\x87R"
-F8 = b"cnumpy\ndtype\nU\x02f8K\x00K\x01\x87R(K\x03U\x01<NNNJ\xff\xff\xff\xffJ\xff\xff\xff\xffK\x00tb"
+F8 = (
+    b"cnumpy\ndtype\nU\x02f8K\x00K\x01\x87R(K\x03U\x01<NNNJ\xff\xff\xff\xffJ\xff\xff\xff\xffK\x00tb"
+)
 
 
 def array(shape: bytes, raw: bytes, dtype: bytes = F8) -> bytes:
@@ -32,7 +34,16 @@ def under(key: str, value: bytes) -> bytes:
 
 def csc(shape: bytes, data: bytes, indices: bytes, indptr: bytes) -> bytes:
     """A table with a CSC matrix of these parts."""
-    entries = text("_shape") + shape + text("data") + data + text("indices") + indices + text("indptr") + indptr
+    entries = (
+        text("_shape")
+        + shape
+        + text("data")
+        + data
+        + text("indices")
+        + indices
+        + text("indptr")
+        + indptr
+    )
     return under("J_regressor", b"cscipy.sparse.csc\ncsc_matrix\n)\x81}(" + entries + b"ub")
 
 
@@ -50,7 +61,8 @@ def global_call(module: str, name: str, *arguments: str) -> bytes:
     return f"c{module}\n{name}\n(".encode() + b"".join(text(a) for a in arguments) + b"tR."
 
 
-# Code that creates the file SENTINEL when the pickle is really loaded. The third: whether plain Python falls for it.
+# Code that creates the file SENTINEL when the pickle is really loaded. The third: whether plain
+# Python falls for it.
 WRITE = "open('SENTINEL', 'w').close()"
 TOUCH = global_call("os", "system", "touch SENTINEL")
 RUNS_CODE = {
@@ -58,19 +70,47 @@ RUNS_CODE = {
     "posix.system": (global_call("posix", "system", "touch SENTINEL"), r"posix\.system", True),
     "eval": (global_call("builtins", "eval", WRITE), r"builtins\.eval", True),
     "exec, Python 2 name": (global_call("__builtin__", "exec", WRITE), r"__builtin__\.exec", True),
-    "stack global": (b"\x80\x04" + text("os") + text("system") + b"\x93(" + TOUCH.split(b"(")[1], r"os\.system", True),
+    "stack global": (
+        b"\x80\x04" + text("os") + text("system") + b"\x93(" + TOUCH.split(b"(")[1],
+        r"os\.system",
+        True,
+    ),
     "inst": (b"(" + text("touch SENTINEL") + b"ios\nsystem\n.", r"os\.system", True),
     "obj": (b"(cos\nsystem\n" + text("touch SENTINEL") + b"o.", r"os\.system", True),
-    "subprocess": (b"csubprocess\ngetoutput\n(" + text("touch SENTINEL") + b"tR.", r"subprocess\.getoutput", True),
-    "numpy's own exec": (global_call("numpy.testing._private.utils", "runstring", WRITE), "runstring", False),
-    "new object": (b"\x80\x02csubprocess\nPopen\n(" + text("touch SENTINEL") + b"t\x81.", r"subprocess\.Popen", False),
-    "new object with keywords": (b"\x80\x04csubprocess\nPopen\n)}\x92.", r"subprocess\.Popen", False),
+    "subprocess": (
+        b"csubprocess\ngetoutput\n(" + text("touch SENTINEL") + b"tR.",
+        r"subprocess\.getoutput",
+        True,
+    ),
+    "numpy's own exec": (
+        global_call("numpy.testing._private.utils", "runstring", WRITE),
+        "runstring",
+        False,
+    ),
+    "new object": (
+        b"\x80\x02csubprocess\nPopen\n(" + text("touch SENTINEL") + b"t\x81.",
+        r"subprocess\.Popen",
+        False,
+    ),
+    "new object with keywords": (
+        b"\x80\x04csubprocess\nPopen\n)}\x92.",
+        r"subprocess\.Popen",
+        False,
+    ),
     "hidden in an array's state": (under("f", array(b")", TOUCH[:-1])), r"os\.system", True),
     "hidden in a table's key": (b"}" + TOUCH[:-1] + b"Ns.", r"os\.system", True),
     "after the model": (b"}0" + TOUCH, r"os\.system", True),
-    "dotted name": (b"\x80\x04" + text("numpy") + text("ndarray.__class__") + b"\x93.", r"ndarray\.__class__", False),
-    "class change": (b"cnumpy\nndarray\n}" + text("__class__") + b"Nsb.", "sets attributes of a function", False),
-}  # fmt: skip
+    "dotted name": (
+        b"\x80\x04" + text("numpy") + text("ndarray.__class__") + b"\x93.",
+        r"ndarray\.__class__",
+        False,
+    ),
+    "class change": (
+        b"cnumpy\nndarray\n}" + text("__class__") + b"Nsb.",
+        "sets attributes of a function",
+        False,
+    ),
+}
 
 
 @pytest.mark.parametrize("name", RUNS_CODE)
@@ -96,13 +136,20 @@ def test_the_attacks_are_real(tmp_path, monkeypatch, name):
 
 
 FORBIDDEN = [
-    "numpy.load", "numpy.fromfile", "numpy.save", "numpy.core.multiarray.fromfile", "numpy.core.numeric.ones",
-    "numpy.memmap", "numpy.ndarray.tofile", "numpy.core.records.recarray", "numpy.matrix", "builtins.getattr",
-    "builtins.open", "builtins.__import__", "builtins.type", "builtins.dict", "collections.OrderedDict",
-    "copyreg.__newobj__", "functools.partial", "operator.attrgetter", "pickle.loads", "_pickle.Unpickler",
-    "importlib.import_module", "types.FunctionType", "ctypes.CDLL", "scipy.sparse.csc.os", "scipy.sparse.dok_matrix",
-    "scipy.sparse.lil.lil_matrix", "chumpy.ch.ChLambda", "chumpy.ch.wraps", "chumpy.utils.timer", "codecs.encode",
-    "_codecs.decode", "scope.solver.loaders.load_model", "pathlib.PosixPath", "bpy.ops.wm.quit_blender", ".", "numpy.",
+    "numpy.load", "numpy.fromfile", "numpy.save", "numpy.core.multiarray.fromfile",
+    "numpy.core.numeric.ones",
+    "numpy.memmap", "numpy.ndarray.tofile", "numpy.core.records.recarray", "numpy.matrix",
+    "builtins.getattr",
+    "builtins.open", "builtins.__import__", "builtins.type", "builtins.dict",
+    "collections.OrderedDict",
+    "copyreg.__newobj__", "functools.partial", "operator.attrgetter", "pickle.loads",
+    "_pickle.Unpickler",
+    "importlib.import_module", "types.FunctionType", "ctypes.CDLL", "scipy.sparse.csc.os",
+    "scipy.sparse.dok_matrix",
+    "scipy.sparse.lil.lil_matrix", "chumpy.ch.ChLambda", "chumpy.ch.wraps", "chumpy.utils.timer",
+    "codecs.encode",
+    "_codecs.decode", "scope.solver.loaders.load_model", "pathlib.PosixPath",
+    "bpy.ops.wm.quit_blender", ".", "numpy.",
 ]  # fmt: skip
 
 
@@ -162,25 +209,39 @@ REFUSED = {
     "attributes of a set": b"\x80\x04\x8fN}" + text("add") + b"Ns\x86b.",
     "the array class as an instance": b"cnumpy\nndarray\n)\x81.",
     "the array class called": b"cnumpy\nndarray\n(J\xff\xff\xff\x7ftR.",
-    "a subclass to reconstruct": b"cnumpy.core.multiarray\n_reconstruct\ncnumpy\ndtype\nK\x00\x85U\x01b\x87R.",
-    "reconstructor with another base": b"ccopy_reg\n_reconstructor\n(cchumpy.ch\nCh\ncnumpy\nndarray\nNtR.",
-    "reconstructor with a value": b"ccopy_reg\n_reconstructor\n(cchumpy.ch\nCh\nc__builtin__\nobject\nK\x01tR.",
-    "reconstructor of an array": b"ccopy_reg\n_reconstructor\n(cnumpy\nndarray\nc__builtin__\nobject\nNtR.",
+    "a subclass to "
+    "reconstruct": b"cnumpy.core.multiarray\n_reconstruct\ncnumpy\ndtype\nK\x00\x85U\x01b\x87R.",
+    "reconstructor with another "
+    "base": b"ccopy_reg\n_reconstructor\n(cchumpy.ch\nCh\ncnumpy\nndarray\nNtR.",
+    "reconstructor with a "
+    "value": b"ccopy_reg\n_reconstructor\n(cchumpy.ch\nCh\nc__builtin__\nobject\nK\x01tR.",
+    "reconstructor of an "
+    "array": b"ccopy_reg\n_reconstructor\n(cnumpy\nndarray\nc__builtin__\nobject\nNtR.",
     "recoding by another codec": b"c_codecs\nencode\n(" + text("abc") + text("zlib_codec") + b"tR.",
     "bytes of a size": b"cbuiltins\nbytes\n(J\xff\xff\xff\x7ftR.",
     "state of an array: none": under("f", RECONSTRUCT + b"Nb"),
     "state of an array: short": under("f", RECONSTRUCT + b")b"),
     "array without state": under("f", RECONSTRUCT),
     "array without type": under("f", array(b"K\x00\x85", b"U\x00", b"N")),
-    "array of objects": under("f", array(b"K\x01\x85", b"](K\x01e", b"cnumpy\ndtype\nU\x02O8K\x00K\x01\x87R")),
+    "array of objects": under(
+        "f", array(b"K\x01\x85", b"](K\x01e", b"cnumpy\ndtype\nU\x02O8K\x00K\x01\x87R")
+    ),
     "array of plain objects": under("f", array(b"K\x01\x85", b"](K\x01e")),
     "type with fields": under("f", array(b")", b"U\x00", b"cnumpy\ndtype\nU\x02V8K\x00K\x01\x87R")),
-    "type with fields in the state": under("f", array(b")", b"U\x00", NEW_F8 + b"(K\x03U\x01<N)}K\x08K\x01K\x00tb")),
-    "type by expression": under("f", array(b")", b"U\x00", b"cnumpy\ndtype\n" + text("f8,O") + b"K\x00K\x01\x87R")),
+    "type with fields in the state": under(
+        "f", array(b")", b"U\x00", NEW_F8 + b"(K\x03U\x01<N)}K\x08K\x01K\x00tb")
+    ),
+    "type by expression": under(
+        "f", array(b")", b"U\x00", b"cnumpy\ndtype\n" + text("f8,O") + b"K\x00K\x01\x87R")
+    ),
     "type as a table": under("f", array(b")", b"U\x00", b"cnumpy\ndtype\n}K\x00K\x01\x87R")),
-    "type of deep nesting": under("f", array(b")", b"U\x00", b"cnumpy\ndtype\n" + b"]" + b"\x85" * DEEP + b"\x85R")),
+    "type of deep nesting": under(
+        "f", array(b")", b"U\x00", b"cnumpy\ndtype\n" + b"]" + b"\x85" * DEEP + b"\x85R")
+    ),
     "enormous shape": under("f", array(b"\x8a\x0a" + b"\xff" * 9 + b"\x7f\x85", b"U\x00")),
-    "enormous shape, no elements": under("f", array(b"(K\x00\x8a\x09" + b"\xff" * 8 + b"\x7ft", b"U\x00")),
+    "enormous shape, no elements": under(
+        "f", array(b"(K\x00\x8a\x09" + b"\xff" * 8 + b"\x7ft", b"U\x00")
+    ),
     "negative shape": under("f", array(b"J\xff\xff\xff\xff\x85", b"U\x00")),
     "shape of texts": under("f", array(text("a") + b"\x85", b"U\x00")),
     "too many axes": under("f", array(b"(" + b"K\x01" * 70 + b"t", b"U\x08AAAAAAAA")),
@@ -209,7 +270,12 @@ REFUSED = {
     "chumpy with a list for state": under("f", b"cchumpy.ch\nCh\n)\x81]b"),
     "too many instructions": b"N0" * 200_000 + b"}.",
     "billions of lists": b"(" + b"]" * 300_000 + b"l.",
-    "repeated recoding": b"X" + struct.pack("<I", 1000) + b"a" * 1000 + b"q\x000" + RECODE * 50 + b".",
+    "repeated recoding": b"X"
+    + struct.pack("<I", 1000)
+    + b"a" * 1000
+    + b"q\x000"
+    + RECODE * 50
+    + b".",
     "sparse without state": under("J_regressor", b"cscipy.sparse.csc\ncsc_matrix\n)\x81"),
     "enormous sparse": csc(b"J\xff\xff\xff\x7fJ\xff\xff\xff\x7f\x86", *NO_ARRAYS),
     "empty but enormous sparse": csc(b"K\x00J\xff\xff\xff\x7f\x86", *NO_ARRAYS),
@@ -218,10 +284,14 @@ REFUSED = {
     "sparse with real indices": csc(b"K\x01K\x01\x86", EMPTY_ARRAY, EMPTY_ARRAY, TWO_ZEROS),
     "sparse in itself": under(
         "J_regressor",
-        b"cscipy.sparse.csc\ncsc_matrix\n)\x81q\x00}(" + text("_shape") + b"K\x01K\x01\x86" + text("data") + b"h\x00ub",
+        b"cscipy.sparse.csc\ncsc_matrix\n)\x81q\x00}("
+        + text("_shape")
+        + b"K\x01K\x01\x86"
+        + text("data")
+        + b"h\x00ub",
     ),
     "sparse of texts": csc(b"K\x01K\x01\x86", text("a"), EMPTY_ARRAY, EMPTY_ARRAY),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", REFUSED)
@@ -242,7 +312,8 @@ def test_a_sparse_index_that_multiplies_its_data_is_refused(tmp_path):
 
 def test_memory_stays_within_a_small_multiple_of_the_file(tmp_path):
     block = b"T" + struct.pack("<i", 8_000_000) + bytes(8_000_000) + b"q\x000"
-    arrays = array(b"J" + struct.pack("<i", 1_000_000) + b"\x85", b"h\x00") * 300  # 2.4 GB if each were a copy
+    # 2.4 GB if each were a copy
+    arrays = array(b"J" + struct.pack("<i", 1_000_000) + b"\x85", b"h\x00") * 300
     path = tmp_path / "body.pkl"
     path.write_bytes(b"\x80\x02" + block + b"(" + arrays + b"l.")
     tracemalloc.start()
@@ -256,7 +327,11 @@ def test_memory_stays_within_a_small_multiple_of_the_file(tmp_path):
 
 def test_sizes_that_a_file_states_are_not_allocated(tmp_path):
     path = tmp_path / "body.pkl"
-    for data in (REFUSED[name] for name in REFUSED if "not there" in name or "memo" in name or "count" in name):
+    for data in (
+        REFUSED[name]
+        for name in REFUSED
+        if "not there" in name or "memo" in name or "count" in name
+    ):
         path.write_bytes(data)
         tracemalloc.start()
         try:
@@ -277,7 +352,9 @@ def test_an_oversized_file_is_refused(tmp_path, monkeypatch):
 def test_calls_made_by_python_itself_are_refused(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for protocol in range(6):
-        data = pickle.dumps({"v_template": np.zeros(3), "trap": Calls(open, "SENTINEL", "w")}, protocol)
+        data = pickle.dumps(
+            {"v_template": np.zeros(3), "trap": Calls(open, "SENTINEL", "w")}, protocol
+        )
         (tmp_path / "body.pkl").write_bytes(data)
         with pytest.raises(ModelFileError, match="open"):
             load_model(tmp_path / "body.pkl")
@@ -290,7 +367,11 @@ def test_random_damage_never_gives_a_traceback(tmp_path, tables_of, stand_ins):
     ch.x = tables["shapedirs"]
     sparse = stand_ins("scipy.sparse.csr.csr_matrix")()
     rows, columns = np.nonzero(tables["J_regressor"])
-    sparse.__dict__ |= {"_shape": (24, 90), "data": tables["J_regressor"][rows, columns], "indices": columns}
+    sparse.__dict__ |= {
+        "_shape": (24, 90),
+        "data": tables["J_regressor"][rows, columns],
+        "indices": columns,
+    }
     sparse.indptr = np.searchsorted(rows, np.arange(25))
     small = {k: v for k, v in tables.items() if k != "posedirs"}
     rng = np.random.default_rng(0)
@@ -301,7 +382,11 @@ def test_random_damage_never_gives_a_traceback(tmp_path, tables_of, stand_ins):
         assert load_model(path).name == "smpl"
         # Damage what is not array data, which is most of the bytes and the least of the grammar.
         words = (b"numpy", b"_matrix", b"tb")
-        grammar = [i for i in range(len(whole)) if any(word in whole[max(0, i - 60) : i + 60] for word in words)]
+        grammar = [
+            i
+            for i in range(len(whole))
+            if any(word in whole[max(0, i - 60) : i + 60] for word in words)
+        ]
         for _ in range(250):
             damaged = bytearray(whole)
             for position in rng.choice(grammar, rng.integers(1, 4)):

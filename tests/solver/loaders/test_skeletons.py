@@ -5,8 +5,10 @@ import numpy as np
 import pytest
 from scope.solver.loaders.skeletons import LANDMARK_VERTICES, SKELETONS, recognise_skeleton
 
-BODY = [-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19]  # kintree_table[0] of SMPL
-LEFT_HAND = [20, 22, 23, 20, 25, 26, 20, 28, 29, 20, 31, 32, 20, 34, 35]  # of SMPL+H; the right follows
+# kintree_table[0] of SMPL
+BODY = [-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19]
+# of SMPL+H; the right follows
+LEFT_HAND = [20, 22, 23, 20, 25, 26, 20, 28, 29, 20, 31, 32, 20, 34, 35]
 RIGHT_HAND = [21, 37, 38, 21, 40, 41, 21, 43, 44, 21, 46, 47, 21, 49, 50]
 KINTREES = {
     "smpl": [*BODY, 20, 21],
@@ -33,7 +35,10 @@ def test_a_tree_that_differs_in_one_joint_is_not(name: str) -> None:
 
 def test_left_and_right_have_the_same_joints() -> None:
     for skeleton in SKELETONS.values():
-        sides = [{n.split("_", 1)[1] for n in skeleton.joint_names if n.startswith(s)} for s in ("left_", "right_")]
+        sides = [
+            {n.split("_", 1)[1] for n in skeleton.joint_names if n.startswith(s)}
+            for s in ("left_", "right_")
+        ]
         assert sides[0] == sides[1]
         for i, name in enumerate(skeleton.joint_names):
             parent = skeleton.joint_names[skeleton.parents[i]]

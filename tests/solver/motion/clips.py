@@ -34,7 +34,10 @@ PRIOR = MotionPrior(
     joints=np.linspace(0.1, 0.3, K), root_rotation=0.4, root_position=5.0, robust_joints=300.0,
     robust_root_rotation=200.0, robust_root_position=50.0, contact=800.0,
 )  # fmt: skip
-CAMERAS = [(np.eye(3), np.zeros(3)), (rotations.exp(np.array([0.1, 0.7, -0.2])), np.array([-2.5, 0.3, 1.5]))]
+CAMERAS = [
+    (np.eye(3), np.zeros(3)),
+    (rotations.exp(np.array([0.1, 0.7, -0.2])), np.array([-2.5, 0.3, 1.5])),
+]
 
 
 def walk(rng, frames, body=None, step=0.05):
@@ -69,7 +72,15 @@ class Clip:
             views = []
             for k, (R, t) in enumerate(self.cameras):
                 points = Keypoints3D(index, self.points[f], ones) if k == 0 else None
-                views.append(View(Measurements(INTRINSICS, Keypoints2D(index, self.pixels[k][f], ones), points), R, t))
+                views.append(
+                    View(
+                        Measurements(
+                            INTRINSICS, Keypoints2D(index, self.pixels[k][f], ones), points
+                        ),
+                        R,
+                        t,
+                    )
+                )
             out.append(views)
         return out
 
@@ -84,7 +95,11 @@ class Clip:
         problem = ClipProblem(tree, views, motion, shared, settings, pool)
         poses = make_poses(tree, problem.frames)
         for f, s in enumerate(self.starts):
-            poses.R[f, 0], poses.t[f, 0], poses.Omega[f, 1:] = s.R_camera_root, s.t_camera_root, s.Omega
+            poses.R[f, 0], poses.t[f, 0], poses.Omega[f, 1:] = (
+                s.R_camera_root,
+                s.t_camera_root,
+                s.Omega,
+            )
         poses.beta[:P] = self.starts[0].beta
         return problem, poses, problem.make_system()
 
@@ -106,7 +121,8 @@ def noisy_clip(seed, frames=6, cameras=2):
 
 
 def gauss_newton_residuals(clip, prior=PRIOR, focal=True):
-    """The function (d of all frames and globals) -> list of (residuals (n, w), weights (n,), sigmas (n,)).
+    """The function (d of all frames and globals) -> list of (residuals (n, w), weights (n,), sigmas
+    (n,)).
 
     From the definition; analytic, so that complex steps give its Jacobian.
     """
@@ -131,19 +147,36 @@ def gauss_newton_residuals(clip, prior=PRIOR, focal=True):
             for (R_c, t_c), pixels in zip(clip.cameras, clip.pixels, strict=True):
                 q = points @ R_c.T + t_c
                 uv = (pixels[f] - INTRINSICS[:2, 2]) / np.diag(INTRINSICS)[:2]
-                out.append((np.exp(log_focal) * q[:, :2] / q[:, 2:] - uv, np.full(M, 1e6), np.full(M, 0.01)))
+                out.append(
+                    (
+                        np.exp(log_focal) * q[:, :2] / q[:, 2:] - uv,
+                        np.full(M, 1e6),
+                        np.full(M, 0.01),
+                    )
+                )
             out.append((points - clip.points[f], np.full(M, 24000.0), np.full(M, 0.01)))
         for f in range(2, T):
             mean = 0.5 * (h[f - 1] + h[f - 2])
             a, b, c = poses[f - 2], poses[f - 1], poses[f]
-            rows = [(velocity(b[0][0], c[0][0], h[f - 1]) - velocity(a[0][0], b[0][0], h[f - 2])) / mean]
+            rows = [
+                (velocity(b[0][0], c[0][0], h[f - 1]) - velocity(a[0][0], b[0][0], h[f - 2])) / mean
+            ]
             for k in range(K):
-                rows.append((velocity(b[2][k], c[2][k], h[f - 1]) - velocity(a[2][k], b[2][k], h[f - 2])) / mean)
+                rows.append(
+                    (velocity(b[2][k], c[2][k], h[f - 1]) - velocity(a[2][k], b[2][k], h[f - 2]))
+                    / mean
+                )
             rows.append(((c[1][0] - b[1][0]) / h[f - 1] - (b[1][0] - a[1][0]) / h[f - 2]) / mean)
             out.append((np.array(rows), table[:, 0] * mean, 1.0 / table[:, 1]))
         for f in range(1, T):
             rows = poses[f][3][indices] - poses[f - 1][3][indices]
-            out.append((rows, prior.contact * np.minimum(p[f], p[f - 1]) / h[f - 1], np.full(len(indices), np.inf)))
+            out.append(
+                (
+                    rows,
+                    prior.contact * np.minimum(p[f], p[f - 1]) / h[f - 1],
+                    np.full(len(indices), np.inf),
+                )
+            )
         beta = clip.starts[0].beta + shared[:P]
         out.append((beta[:, None], np.full(P, Weights().shape), np.full(P, np.inf)))
         if focal:

@@ -14,7 +14,9 @@ DAMPING, ROOT_SCALE = 3.0, 1 / 0.3
 
 
 def dense_step(clip):
-    """Return (poses' steps (T, n), globals' step, predicted decrease) by one dense solve, and the Hessian."""
+    """Return (poses' steps (T, n), globals' step, predicted decrease) by one dense solve, and the
+    Hessian.
+    """
     residuals = gauss_newton_residuals(clip)
     n, T = 6 + 3 * K, len(clip.times)
     size = T * n + P + 1
@@ -22,7 +24,9 @@ def dense_step(clip):
     factors = [np.sqrt(w * kernel(r, sigma)[1])[:, None] for r, w, sigma in at_rest]
 
     def stacked(d):
-        return np.concatenate([(a * r).ravel() for a, (r, _, _) in zip(factors, residuals(d), strict=True)])
+        return np.concatenate(
+            [(a * r).ravel() for a, (r, _, _) in zip(factors, residuals(d), strict=True)]
+        )
 
     J = np.empty((len(stacked(np.zeros(size))), size))
     for k in range(size):
@@ -31,7 +35,9 @@ def dense_step(clip):
         J[:, k] = np.imag(stacked(d)) / H
     JTJ, g = J.T @ J, J.T @ np.real(stacked(np.zeros(size)))
     damped = np.zeros(size)
-    damped[: T * n] = np.tile(DAMPING * np.r_[np.ones(3), np.full(3, ROOT_SCALE**2), np.ones(3 * K)], T)
+    damped[: T * n] = np.tile(
+        DAMPING * np.r_[np.ones(3), np.full(3, ROOT_SCALE**2), np.ones(3 * K)], T
+    )
     d = -np.linalg.solve(JTJ + np.diag(damped), g)
     return d[: T * n].reshape(T, n), d[T * n :], -g @ d - 0.5 * d @ JTJ @ d, JTJ
 

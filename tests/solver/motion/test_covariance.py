@@ -19,11 +19,15 @@ def test_covariance_is_that_of_the_dense_inverse():
     clip = noisy_clip(4, frames=7)
     problem, poses, system = clip.problem()
     problem.linearize(0, poses, system)
-    found, from_root, shared = joint_covariances(problem.tree, system, poses, 1.0, make_factor(system))
+    found, from_root, shared = joint_covariances(
+        problem.tree, system, poses, 1.0, make_factor(system)
+    )
     _, _, _, H = dense_step(clip)
     n, T = 6 + 3 * K, len(clip.times)
     S = np.linalg.inv(H + MIN_DAMPING * np.diag(np.r_[np.ones(T * n), np.zeros(P + 1)]))
-    np.testing.assert_allclose(shared, S[T * n :, T * n :], rtol=1e-6, atol=1e-9 * np.abs(shared).max())
+    np.testing.assert_allclose(
+        shared, S[T * n :, T * n :], rtol=1e-6, atol=1e-9 * np.abs(shared).max()
+    )
     for f, s in enumerate(clip.starts):
         state = (s.R_camera_root, s.t_camera_root, s.Omega, s.beta)
         rows = np.r_[f * n : (f + 1) * n, T * n : T * n + P]
@@ -33,10 +37,14 @@ def test_covariance_is_that_of_the_dense_inverse():
             d[k] = 1j * TINY
             J[:, :, k] = np.imag(forward(clip.body, *moved(clip.body, state, d))[1]) / TINY
         expected = J @ S[np.ix_(rows, rows)] @ J.transpose(0, 2, 1)
-        np.testing.assert_allclose(found[f], expected, rtol=1e-6, atol=1e-9 * np.abs(expected).max())
+        np.testing.assert_allclose(
+            found[f], expected, rtol=1e-6, atol=1e-9 * np.abs(expected).max()
+        )
         J -= J[:1].copy()
         expected = J @ S[np.ix_(rows, rows)] @ J.transpose(0, 2, 1)
-        np.testing.assert_allclose(from_root[f], expected, rtol=1e-6, atol=1e-9 * np.abs(expected).max())
+        np.testing.assert_allclose(
+            from_root[f], expected, rtol=1e-6, atol=1e-9 * np.abs(expected).max()
+        )
 
 
 def dense_matrix(system, T):
@@ -53,7 +61,9 @@ def dense_matrix(system, T):
             w, _, J, columns, counts = system.contacts
             for k, m in enumerate(counts):
                 own, before = J[f, k, :, :m], J[f - 1, k, :, :m]
-                A[np.ix_((f - 1) * n + columns[k, :m], f * n + columns[k, :m])] -= w[f, k] * before.T @ own
+                A[np.ix_((f - 1) * n + columns[k, :m], f * n + columns[k, :m])] -= (
+                    w[f, k] * before.T @ own
+                )
         if f > 1:
             for block, at in zip(system.B2[f], slots, strict=True):
                 A[(f - 2) * n + at : (f - 2) * n + at + 3, f * n + at : f * n + at + 3] = block.T
@@ -65,12 +75,15 @@ def dense_matrix(system, T):
 def test_covariances_far_from_the_middle_of_a_long_clip_are_exact():
     T, n = 60, 6 + 3 * K
     clip = noisy_clip(4, frames=T, cameras=1)
-    stiff = replace(PRIOR, joints=30.0, root_rotation=30.0, root_position=500.0, robust_joints=np.inf)
+    stiff = replace(
+        PRIOR, joints=30.0, root_rotation=30.0, root_position=500.0, robust_joints=np.inf
+    )
     problem, poses, system = clip.problem(stiff)
     problem.linearize(0, poses, system)
     found, _, _ = joint_covariances(problem.tree, system, poses, 1.0, make_factor(system))
     S = np.linalg.inv(dense_matrix(system, T))
     for f in (0, 30, T - 1):
-        expected = S[f * n + 3 : f * n + 6, f * n + 3 : f * n + 6]  # the pelvis moves as its twist says
+        # the pelvis moves as its twist says
+        expected = S[f * n + 3 : f * n + 6, f * n + 3 : f * n + 6]
         np.testing.assert_allclose(found[f, 0], expected, rtol=1e-6)
         assert (np.linalg.eigvalsh(found[f]) > 0.0).all()

@@ -4,7 +4,17 @@
 from dataclasses import replace
 
 import numpy as np
-from scope.solver import Keypoints2D, Measurements, Options, Stage, State, Weights, fit_motion, load_body, rotations
+from scope.solver import (
+    Keypoints2D,
+    Measurements,
+    Options,
+    Stage,
+    State,
+    Weights,
+    fit_motion,
+    load_body,
+    rotations,
+)
 from scope.solver.examples import person
 
 

@@ -34,7 +34,9 @@ SMOOTH = MotionPrior(robust_joints=np.inf, robust_root_rotation=np.inf, robust_r
 
 def joints(body, states):
     """The joints (T, K+1, 3) of states, from the definition."""
-    return np.array([forward(body, s.R_camera_root, s.t_camera_root, s.Omega, s.beta)[1] for s in states])
+    return np.array(
+        [forward(body, s.R_camera_root, s.t_camera_root, s.Omega, s.beta)[1] for s in states]
+    )
 
 
 def smooth_walk(rng, frames, rate):
@@ -59,31 +61,50 @@ def markers(body, states, rng, noise=0.01):
     for s in states:
         points = forward(body, s.R_camera_root, s.t_camera_root, s.Omega, s.beta)[2]
         out.append(
-            Keypoints3D(np.arange(MARKERS), points + noise * rng.standard_normal(points.shape), np.ones(MARKERS))
+            Keypoints3D(
+                np.arange(MARKERS),
+                points + noise * rng.standard_normal(points.shape),
+                np.ones(MARKERS),
+            )
         )
     return out
 
 
 def test_covariance_and_estimate_of_linear_motion_in_closed_form():
-    """One point with no joints: the estimate is the linear smoother's, y -> A^-1 w y with A = w I + D'D w_a / h^3."""
+    """One point with no joints: the estimate is the linear smoother's, y -> A^-1 w y with A = w I +
+    D'D w_a / h^3.
+    """
     T, h, weight, w_a = 24, 1 / 30, 24000.0, 40.0
     rng = np.random.default_rng(0)
     empty = np.zeros((1, 3, 1))
-    body = RandomBody(np.array([-1]), empty, np.zeros((1, 3)), np.array([0]), np.zeros((1, 3)), empty)
+    body = RandomBody(
+        np.array([-1]), empty, np.zeros((1, 3)), np.array([0]), np.zeros((1, 3)), empty
+    )
     truth = np.array([0.1, 0.2, 4.0]) + np.arange(T)[:, None] * h * np.array([1.0, -0.5, 0.3])
     y = truth + rng.standard_normal((T, 3)) / np.sqrt(weight)
     frames = [Measurements(keypoints3d=Keypoints3D([0], y[f : f + 1], [1.0])) for f in range(T)]
     init = [State(np.eye(3), p, np.zeros((0, 3, 3)), np.zeros(1)) for p in y]
     prior = replace(SMOOTH, root_position=w_a)
     exact = replace(TIGHT, robust_keypoints3d=np.inf)
-    found = fit_motion(body, frames, np.arange(T) * h, init=init, priors=Priors(), options=exact, motion=prior,
-                       covariance=True)  # fmt: skip
+    found = fit_motion(
+        body,
+        frames,
+        np.arange(T) * h,
+        init=init,
+        priors=Priors(),
+        options=exact,
+        motion=prior,
+        covariance=True,
+    )
     second = np.diff(np.eye(T), 2, axis=0)
     A = weight * np.eye(T) + w_a / h**3 * second.T @ second
     np.testing.assert_allclose(found.t_world_part[:, 0], np.linalg.solve(A, weight * y), atol=1e-8)
     expected = np.diag(np.linalg.inv(A))
-    np.testing.assert_allclose(found.joint_covariance[:, 0], expected[:, None, None] * np.eye(3), rtol=1e-6, atol=1e-12)
-    # an error of linear motion is as large as the covariance says, or smaller: the acceleration's prior is right too
+    np.testing.assert_allclose(
+        found.joint_covariance[:, 0], expected[:, None, None] * np.eye(3), rtol=1e-6, atol=1e-12
+    )
+    # an error of linear motion is as large as the covariance says, or smaller: the acceleration's
+    # prior is right too
     chi = np.mean((found.t_world_part[:, 0] - truth) ** 2 / expected[:, None])
     assert 0.2 < chi < 1.5
     assert expected[T // 2] < 0.3 / weight
@@ -96,8 +117,15 @@ def test_reversed_in_time_the_motion_is_the_same():
     stands = rng.uniform(0.0, 1.0, (20, 1))
     forwards = fit_motion(body, frames, times, init=states, priors=Priors(), options=TIGHT,
                           stands=StandingPoints([2], stands))  # fmt: skip
-    backwards = fit_motion(body, frames[::-1], -times[::-1], init=states[::-1], priors=Priors(), options=TIGHT,
-                           stands=StandingPoints([2], stands[::-1]))  # fmt: skip
+    backwards = fit_motion(
+        body,
+        frames[::-1],
+        -times[::-1],
+        init=states[::-1],
+        priors=Priors(),
+        options=TIGHT,
+        stands=StandingPoints([2], stands[::-1]),
+    )
     np.testing.assert_allclose(backwards.t_world_part[::-1], forwards.t_world_part, atol=1e-6)
     np.testing.assert_allclose(backwards.beta, forwards.beta, atol=1e-5)
     assert forwards.status is Status.CONVERGED
@@ -108,7 +136,12 @@ def test_windows_agree_with_the_whole_clip(known):
     rng = np.random.default_rng(2)
     body, states, times = smooth_walk(rng, 120, 15.0)
     frames = [Measurements(keypoints3d=m) for m in markers(body, states, rng)]
-    given = {"init": states, "priors": Priors(), "options": TIGHT, "shape": states[0].beta if known else None}
+    given = {
+        "init": states,
+        "priors": Priors(),
+        "options": TIGHT,
+        "shape": states[0].beta if known else None,
+    }
     whole = fit_motion(body, frames, times, **given)
     cut = fit_motion(body, frames, times, window=3.0, overlap=1.0, **given)
     difference = np.linalg.norm(cut.t_world_part - whole.t_world_part, axis=-1)
@@ -121,15 +154,32 @@ def test_moved_with_its_cameras_the_motion_moves_along():
     clip = noisy_clip(5, frames=5)
     G, g = rotations.exp(np.array([0.4, -0.8, 0.3])), np.array([1.0, -2.0, 0.5])
     frames, elsewhere = [], []
-    for first, *others in clip.frames():  # without 3D keypoints, which are in the first camera's axes
-        views = [replace(first, measurements=replace(first.measurements, keypoints3d=None)), *others]
+    # without 3D keypoints, which are in the first camera's axes
+    for first, *others in clip.frames():
+        views = [
+            replace(first, measurements=replace(first.measurements, keypoints3d=None)),
+            *others,
+        ]
         frames.append(views)
         elsewhere.append(
-            [View(v.measurements, v.R_camera_world @ G.T, v.t_camera_world - v.R_camera_world @ G.T @ g) for v in views]
+            [
+                View(
+                    v.measurements,
+                    v.R_camera_world @ G.T,
+                    v.t_camera_world - v.R_camera_world @ G.T @ g,
+                )
+                for v in views
+            ]
         )
-    starts = [State(G @ s.R_camera_root, G @ s.t_camera_root + g, s.Omega, s.beta) for s in clip.starts]
-    still = fit_motion(clip.body, frames, clip.times, init=clip.starts, priors=Priors(), options=TIGHT)
-    turned = fit_motion(clip.body, elsewhere, clip.times, init=starts, priors=Priors(), options=TIGHT)
+    starts = [
+        State(G @ s.R_camera_root, G @ s.t_camera_root + g, s.Omega, s.beta) for s in clip.starts
+    ]
+    still = fit_motion(
+        clip.body, frames, clip.times, init=clip.starts, priors=Priors(), options=TIGHT
+    )
+    turned = fit_motion(
+        clip.body, elsewhere, clip.times, init=starts, priors=Priors(), options=TIGHT
+    )
     np.testing.assert_allclose(turned.t_world_part, still.t_world_part @ G.T + g, atol=1e-6)
 
 
@@ -143,12 +193,18 @@ def test_markers_come_and_go():
     for f in range(40):
         if f % 3 and frames[f] and f not in range(15, 21):
             keep = rng.permutation(MARKERS)[: MARKERS // 2]
-            frames[f] = Measurements(keypoints3d=Keypoints3D(keep, measured[f].points[keep], np.ones(len(keep))))
+            frames[f] = Measurements(
+                keypoints3d=Keypoints3D(keep, measured[f].points[keep], np.ones(len(keep)))
+            )
     found = fit_motion(body, frames, times, priors=Priors(), options=TIGHT)
     error = np.linalg.norm(found.t_world_part - joints(body, states), axis=-1)
     assert error[:15].max() < 0.02
     assert error[15:21, 0].max() < 0.02
-    assert list(found.measurements[14:22]) == [len(frames[14].keypoints3d.indices), *[0] * 6, MARKERS]
+    assert list(found.measurements[14:22]) == [
+        len(frames[14].keypoints3d.indices),
+        *[0] * 6,
+        MARKERS,
+    ]
 
 
 def test_several_cameras_without_a_state_to_start_from():
@@ -161,11 +217,26 @@ def test_several_cameras_without_a_state_to_start_from():
     error = np.linalg.norm(found.t_world_part - joints(clip.body, clip.starts), axis=-1)
     assert np.median(error) < 0.03
     # one camera elsewhere in the world, alone
-    alone = [[replace(v[1], measurements=replace(v[1].measurements, keypoints3d=Keypoints3D(
-        np.arange(M), clip.points[f] @ np.asarray(v[1].R_camera_world).T + v[1].t_camera_world, np.ones(M))))]
-        for f, v in enumerate(frames)]  # fmt: skip
+    alone = [
+        [
+            replace(
+                v[1],
+                measurements=replace(
+                    v[1].measurements,
+                    keypoints3d=Keypoints3D(
+                        np.arange(M),
+                        clip.points[f] @ np.asarray(v[1].R_camera_world).T + v[1].t_camera_world,
+                        np.ones(M),
+                    ),
+                ),
+            )
+        ]
+        for f, v in enumerate(frames)
+    ]
     one = fit_motion(clip.body, alone, clip.times, priors=Priors(), options=TIGHT, motion=loose)
-    assert np.median(np.linalg.norm(one.t_world_part - joints(clip.body, clip.starts), axis=-1)) < 0.05
+    assert (
+        np.median(np.linalg.norm(one.t_world_part - joints(clip.body, clip.starts), axis=-1)) < 0.05
+    )
 
 
 def test_a_standing_point_stands():
@@ -173,11 +244,29 @@ def test_a_standing_point_stands():
     body, states, times = smooth_walk(rng, 20, 30.0)
     frames = [Measurements(keypoints3d=m) for m in markers(body, states, rng, noise=0.003)]
     held = StandingPoints([3], np.ones((20, 1)))
-    found = fit_motion(body, frames, times, init=states, priors=Priors(), options=TIGHT, stands=held,
-                       motion=MotionPrior(contact=1e7))  # fmt: skip
-    points = np.array([forward(body, s.R_camera_root, s.t_camera_root, s.Omega, s.beta)[2][3] for s in found.states])
+    found = fit_motion(
+        body,
+        frames,
+        times,
+        init=states,
+        priors=Priors(),
+        options=TIGHT,
+        stands=held,
+        motion=MotionPrior(contact=1e7),
+    )
+    points = np.array(
+        [
+            forward(body, s.R_camera_root, s.t_camera_root, s.Omega, s.beta)[2][3]
+            for s in found.states
+        ]
+    )
     loose = fit_motion(body, frames, times, init=states, priors=Priors(), options=TIGHT)
-    free = np.array([forward(body, s.R_camera_root, s.t_camera_root, s.Omega, s.beta)[2][3] for s in loose.states])
+    free = np.array(
+        [
+            forward(body, s.R_camera_root, s.t_camera_root, s.Omega, s.beta)[2][3]
+            for s in loose.states
+        ]
+    )
     assert np.linalg.norm(np.diff(points, axis=0), axis=1).max() < 1e-3
     assert np.linalg.norm(np.diff(free, axis=0), axis=1).max() > 5e-3
 
@@ -193,7 +282,9 @@ def test_what_cannot_be_used_is_refused():
         fit_motion(body, frames, times, init=states[:2])
     with pytest.raises(InvalidValueError, match="overlap of windows"):
         fit_motion(body, frames, times, overlap=12.0)
-    with pytest.raises(InvalidValueError, match="window must be a positive number of seconds.* but is 0"):
+    with pytest.raises(
+        InvalidValueError, match="window must be a positive number of seconds.* but is 0"
+    ):
         fit_motion(body, frames, times, window=0.0)
     with pytest.raises(InvalidValueError, match="leave `shape` out"):
         fit_motion(body, frames, times, shape=np.zeros(P), focal=True)
@@ -211,13 +302,34 @@ def test_what_cannot_be_used_is_refused():
 TURNED = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 FRAMES_REFUSED = {
     "no frame": (None, "frames[1] must be Measurements or a list of View, but is None"),
-    "a view": (View(Measurements()), "frames[1] must be Measurements or a list of View, but is a View"),
-    "measurements among views": ([Measurements()], "frames[1][0] must be View, but is a Measurements"),
-    "a view of None": ([View(None)], "measurements of frames[1][0] must be Measurements, but is None"),  # type: ignore[arg-type]
-    "scaled": ([View(Measurements()), View(Measurements(), 2.0 * TURNED)], "R_camera_world of frames[1][1] must be"),
-    "mirrored": ([View(Measurements(), np.diag([1.0, 1.0, -1.0]))], "R_camera_world of frames[1][0] must be rotation"),
-    "flat": ([View(Measurements(), TURNED, np.zeros(2))], "t_camera_world of frames[1][0] must have shape (3,)"),
-    "far": ([View(Measurements(), TURNED, [0.0, np.inf, 0.0])], "t_camera_world of frames[1][0] must be finite"),
+    "a view": (
+        View(Measurements()),
+        "frames[1] must be Measurements or a list of View, but is a View",
+    ),
+    "measurements among views": (
+        [Measurements()],
+        "frames[1][0] must be View, but is a Measurements",
+    ),
+    "a view of None": (
+        [View(None)],
+        "measurements of frames[1][0] must be Measurements, but is None",
+    ),  # type: ignore[arg-type]
+    "scaled": (
+        [View(Measurements()), View(Measurements(), 2.0 * TURNED)],
+        "R_camera_world of frames[1][1] must be",
+    ),
+    "mirrored": (
+        [View(Measurements(), np.diag([1.0, 1.0, -1.0]))],
+        "R_camera_world of frames[1][0] must be rotation",
+    ),
+    "flat": (
+        [View(Measurements(), TURNED, np.zeros(2))],
+        "t_camera_world of frames[1][0] must have shape (3,)",
+    ),
+    "far": (
+        [View(Measurements(), TURNED, [0.0, np.inf, 0.0])],
+        "t_camera_world of frames[1][0] must be finite",
+    ),
 }
 
 

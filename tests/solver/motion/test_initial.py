@@ -28,7 +28,9 @@ CAMERAS = [
 ]
 
 
-def seen(world: np.ndarray, camera: int, index: np.ndarray, noise: float = 0.0, confidence: float = 1.0) -> View:
+def seen(
+    world: np.ndarray, camera: int, index: np.ndarray, noise: float = 0.0, confidence: float = 1.0
+) -> View:
     R, t = CAMERAS[camera]
     points = world[index] @ R.T + t
     pixels = (points / points[:, 2:] @ K.T)[:, :2]
@@ -55,7 +57,9 @@ def test_exact_rays_meet_in_the_points(world: np.ndarray) -> None:
     np.testing.assert_allclose(np.asarray(found.points), world, atol=1e-9)
 
 
-def test_points_that_one_camera_sees_or_whose_rays_are_parallel_are_left_out(world: np.ndarray) -> None:
+def test_points_that_one_camera_sees_or_whose_rays_are_parallel_are_left_out(
+    world: np.ndarray,
+) -> None:
     first, second = np.arange(8), np.arange(4, POINTS)
     found = points_of([seen(world, 0, first), seen(world, 1, second)])
     np.testing.assert_array_equal(found.indices, np.arange(4, 8))
@@ -66,7 +70,13 @@ def test_points_that_one_camera_sees_or_whose_rays_are_parallel_are_left_out(wor
 def test_nothing_seen_and_nan_count_for_nothing(world: np.ndarray) -> None:
     every = np.arange(POINTS)
     views = [seen(world, 0, every), seen(world, 1, every)]
-    views.append(View(Measurements(K, keypoints2d=Keypoints2D(every, np.full((POINTS, 2), np.nan), np.ones(POINTS)))))
+    views.append(
+        View(
+            Measurements(
+                K, keypoints2d=Keypoints2D(every, np.full((POINTS, 2), np.nan), np.ones(POINTS))
+            )
+        )
+    )
     views.append(seen(world + 5.0, 2, every, confidence=0.0))
     np.testing.assert_allclose(np.asarray(points_of(views).points), world, atol=1e-9)
 
@@ -89,7 +99,16 @@ def test_the_error_in_the_image_is_minimized(world: np.ndarray) -> None:
         best = world[k].copy()
         for _ in range(5):
             steps = 1e-6 * np.eye(3)
-            J = np.stack([pixel_errors(views, best + h, k) - pixel_errors(views, best - h, k) for h in steps], 1) / 2e-6
+            J = (
+                np.stack(
+                    [
+                        pixel_errors(views, best + h, k) - pixel_errors(views, best - h, k)
+                        for h in steps
+                    ],
+                    1,
+                )
+                / 2e-6
+            )
             best -= np.linalg.lstsq(J, pixel_errors(views, best, k), rcond=None)[0]
         assert np.linalg.norm(found[k] - best) < 0.03 * np.linalg.norm(world[k] - best)
 
@@ -107,7 +126,9 @@ INDEX = np.array(list(BODY.keypoint_set("blazepose").values()))
 
 
 def filmed(frame: int, *cameras: int) -> tuple[list[View], np.ndarray]:
-    """One frame of a person who moves, as some cameras see it, and the person's joints in the world."""
+    """One frame of a person who moves, as some cameras see it, and the person's joints in the
+    world.
+    """
     start = person.pose(BODY, seed=9)
     state = replace(start, t_camera_root=np.array([0.1 * frame, 0.0, 0.0]))
     R, joints = person.place(BODY, state)
@@ -116,8 +137,12 @@ def filmed(frame: int, *cameras: int) -> tuple[list[View], np.ndarray]:
 
 
 def started(clip: list[tuple[list[View], np.ndarray]]) -> np.ndarray:
-    """How far the joints (T, K+1) of the states are from the true ones, where a clip's optimization starts."""
-    states = initial_states(make_tree(BODY), [views for views, _ in clip], default_priors(BODY), Options())
+    """How far the joints (T, K+1) of the states are from the true ones, where a clip's optimization
+    starts.
+    """
+    states = initial_states(
+        make_tree(BODY), [views for views, _ in clip], default_priors(BODY), Options()
+    )
     found = [person.place(BODY, state)[1] for state in states]
     return np.linalg.norm(np.array(found) - [joints for _, joints in clip], axis=-1)
 
@@ -127,11 +152,14 @@ def test_one_camera_that_does_not_see_the_person_holds_them_in_the_world() -> No
     clip = [filmed(0), filmed(0, 1), filmed(1), filmed(1), filmed(2, 1)]
     errors = started(clip)
     np.testing.assert_allclose(errors[0], errors[1], atol=1e-6)
-    assert errors.mean() < 0.25  # depth is uncertain; elsewhere in the world they would be metres away
+    # depth is uncertain; elsewhere in the world they would be metres away
+    assert errors.mean() < 0.25
 
 
 def test_cameras_that_take_turns_start_from_one_person_in_the_world() -> None:
-    """The state of the frame before was taken into the next frame's camera as it was, at another angle."""
+    """The state of the frame before was taken into the next frame's camera as it was, at another
+    angle.
+    """
     turns = started([filmed(f, f % 3) for f in range(6)]).mean(axis=1)
     for camera in range(3):
         alone = started([filmed(f, camera) for f in range(6)]).mean(axis=1)
@@ -140,4 +168,6 @@ def test_cameras_that_take_turns_start_from_one_person_in_the_world() -> None:
 
 def test_cameras_in_one_place_say_as_much_as_one_of_them() -> None:
     """Nothing can be triangulated: the clip started from the pose at rest, somewhere."""
-    np.testing.assert_allclose(started([filmed(f, 1, 1) for f in range(2)]), started([filmed(f, 1) for f in range(2)]))
+    np.testing.assert_allclose(
+        started([filmed(f, 1, 1) for f in range(2)]), started([filmed(f, 1) for f in range(2)])
+    )

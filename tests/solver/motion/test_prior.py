@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tables of a motion's prior: one number for all joints or each, kernels turned off, and standing since when."""
+"""The tables of a motion's prior: one number for all joints or each, kernels turned off, and
+standing since when.
+"""
 
 import math
 
@@ -10,7 +12,13 @@ from scope.solver.motion.prior import MotionPrior, StandingPoints
 
 
 def test_weights_and_kernels_have_their_rows() -> None:
-    prior = MotionPrior([1.0, 2.0, 3.0], 4.0, 5.0, robust_joints=[10.0, 20.0, math.inf], robust_root_position=math.inf)
+    prior = MotionPrior(
+        [1.0, 2.0, 3.0],
+        4.0,
+        5.0,
+        robust_joints=[10.0, 20.0, math.inf],
+        robust_root_position=math.inf,
+    )
     table = prior.packed(3)
     np.testing.assert_array_equal(table[:, 0], [4.0, 1.0, 2.0, 3.0, 5.0])
     np.testing.assert_allclose(table[:, 1], [1 / 4e4, 1 / 10, 1 / 20, 0.0, 0.0])

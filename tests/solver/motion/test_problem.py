@@ -51,9 +51,11 @@ def test_a_weight_means_the_same_at_any_frame_rate():
             s = clip.starts[0]
             angle = 0.3 * np.sin(3.0 * t) * np.ones((K, 3))
             clip.starts[f] = type(s)(
-                rotations.exp(np.array([0.0, 0.5 * np.sin(2.0 * t), 0.0])), np.array([0.2 * np.sin(4.0 * t), 0.0, 4.0]),
-                rotations.exp(angle), s.beta,
-            )  # fmt: skip
+                rotations.exp(np.array([0.0, 0.5 * np.sin(2.0 * t), 0.0])),
+                np.array([0.2 * np.sin(4.0 * t), 0.0, 4.0]),
+                rotations.exp(angle),
+                s.beta,
+            )
         clip.times = times
         problem, poses, system = clip.problem(focal=False)
         problem.motion.probability[1:] = 0.5

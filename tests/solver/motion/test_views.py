@@ -29,11 +29,16 @@ def seen(rng, points):
     confidence = np.r_[0.0, np.ones(n - 1)]
     joint = M + int(rng.integers(1, K + 1))
     return Measurements(
-        INTRINSICS, Keypoints2D(points, 500.0 * rng.random((n, 2)), confidence),
+        INTRINSICS,
+        Keypoints2D(points, 500.0 * rng.random((n, 2)), confidence),
         Keypoints3D(points[:2], rng.standard_normal((2, 3)), np.ones(2)),
-        OrientationField([M], [joint], rng.standard_normal((1, 3)), np.ones(1)) if len(points) > 3 else None,
-        floor=Floor(points[:1], np.array([0.0, -1.0, 0.0]), 0.1, np.ones(1)) if len(points) % 2 else None,
-    )  # fmt: skip
+        OrientationField([M], [joint], rng.standard_normal((1, 3)), np.ones(1))
+        if len(points) > 3
+        else None,
+        floor=Floor(points[:1], np.array([0.0, -1.0, 0.0]), 0.1, np.ones(1))
+        if len(points) % 2
+        else None,
+    )
 
 
 def test_the_terms_of_every_view_are_those_it_has_alone():
@@ -43,10 +48,16 @@ def test_the_terms_of_every_view_are_those_it_has_alone():
     tree, priors = make_tree(body), Priors(limits=None)
     sets = [np.arange(5), np.arange(5), np.array([7, 2, 9]), np.arange(5), np.array([1, 4])]
     single = [seen(rng, some) for some in sets]
-    pair = [View(seen(rng, sets[k]), rotations.exp(np.array([0.1, k, 0.0])), np.ones(3)) for k in (0, 2)]
+    pair = [
+        View(seen(rng, sets[k]), rotations.exp(np.array([0.1, k, 0.0])), np.ones(3)) for k in (0, 2)
+    ]
     frames = [*single, pair, []]
     views, counts = pack_frames(tree, frames, pack_priors(tree, priors))
-    flat = [(m, priors) for m in single] + [(v.measurements, None) for v in pair] + [(Measurements(), priors)]
+    flat = (
+        [(m, priors) for m in single]
+        + [(v.measurements, None) for v in pair]
+        + [(Measurements(), priors)]
+    )
     assert views.of_frame.tolist() == [0, 1, 2, 3, 4, 5, 7, 8]
     assert views.own_axes.tolist() == [True] * 5 + [False] * 2 + [True]
     assert (counts > 0).tolist() == [True] * 6 + [False]

@@ -7,8 +7,12 @@ from scope.solver.motion.windows import overlapping, tiles
 
 
 @pytest.mark.parametrize("seed", range(5))
-@pytest.mark.parametrize(("span", "length", "overlap"), [(10.0, 3.0, 1.0), (60.0, 8.0, 2.0), (8.1, 8.0, 2.0)])
-def test_every_frame_is_kept_once_and_has_neighbours(seed: int, span: float, length: float, overlap: float) -> None:
+@pytest.mark.parametrize(
+    ("span", "length", "overlap"), [(10.0, 3.0, 1.0), (60.0, 8.0, 2.0), (8.1, 8.0, 2.0)]
+)
+def test_every_frame_is_kept_once_and_has_neighbours(
+    seed: int, span: float, length: float, overlap: float
+) -> None:
     rng = np.random.default_rng(seed)
     steps = rng.uniform(0.2, 1.8, round(60 * span))
     times = span * np.cumsum(steps) / steps.sum() + rng.uniform(-100, 100)
@@ -42,13 +46,17 @@ def test_a_gap_longer_than_a_window_leaves_none_empty() -> None:
 
 @pytest.mark.parametrize(("rate", "length"), [(5.0, 0.6), (10.0, 0.1)])
 def test_windows_without_overlap_lose_no_frame_to_rounding(rate: float, length: float) -> None:
-    """The end of one and the start of the next are one time, computed in two ways: a frame may lie between them."""
+    """The end of one and the start of the next are one time, computed in two ways: a frame may lie
+    between them.
+    """
     for count in range(20, 300):
         times = np.arange(count) / rate
         windows = overlapping(times, length, 0.0)
         kept = np.concatenate([np.arange(count)[w.kept] for w in windows])
         np.testing.assert_array_equal(kept, np.arange(count))
-        assert all(w.frames.start <= w.kept.start < w.kept.stop <= w.frames.stop for w in windows), count
+        assert all(
+            w.frames.start <= w.kept.start < w.kept.stop <= w.frames.stop for w in windows
+        ), count
 
 
 def test_tiles_are_what_is_kept() -> None:

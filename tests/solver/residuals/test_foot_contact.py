@@ -26,7 +26,8 @@ BODY = load_body("scope")
 NAMES = list(BODY.keypoint_names)
 SOLES = ("left_heel", "left_foot_index", "right_heel", "right_foot_index")
 FEET = np.array([NAMES.index(f"blazepose/{name}") for name in SOLES])
-UP = rotations.exp([0.2, 0.0, 0.1]) @ np.array([0.0, -1.0, 0.0])  # a camera that looks down and is not quite level
+# a camera that looks down and is not quite level
+UP = rotations.exp([0.2, 0.0, 0.1]) @ np.array([0.0, -1.0, 0.0])
 INTRINSICS = np.array([[1000.0, 0.0, 500.0], [0.0, 1000.0, 500.0], [0.0, 0.0, 1.0]])
 
 
@@ -51,7 +52,9 @@ def seen(state, noise=0.0, seed=0, **more):
     rng = np.random.default_rng(seed)
     p = points(state)
     return Measurements(
-        keypoints3d=Keypoints3D(np.arange(len(p)), p + noise * rng.standard_normal(p.shape), np.full(len(p), 0.02)),
+        keypoints3d=Keypoints3D(
+            np.arange(len(p)), p + noise * rng.standard_normal(p.shape), np.full(len(p), 0.02)
+        ),
         **more,
     )
 
@@ -62,8 +65,14 @@ def test_a_standing_foot_stays_where_it_stands_although_it_is_seen_to_slide():
     slid = seen(state)
     slid.keypoints3d.points[FEET[:2]] += [0.06, 0.0, 0.03]
     free = fit(BODY, slid, init=state)
-    held = fit(BODY, replace(slid, foot_contacts=FootContacts(FEET[:2], p[FEET[:2]], [1.0, 1.0])), init=state)
-    off_free, off_held = (np.linalg.norm(points(f.state)[FEET[:2]] - p[FEET[:2]], axis=1).max() for f in (free, held))
+    held = fit(
+        BODY,
+        replace(slid, foot_contacts=FootContacts(FEET[:2], p[FEET[:2]], [1.0, 1.0])),
+        init=state,
+    )
+    off_free, off_held = (
+        np.linalg.norm(points(f.state)[FEET[:2]] - p[FEET[:2]], axis=1).max() for f in (free, held)
+    )
     assert off_free > 0.025
     assert off_held < 0.25 * off_free
     # The other foot stays where the same points lead it without the contact.
@@ -76,26 +85,38 @@ def test_nobody_sinks_into_the_floor_and_nobody_in_the_air_is_pulled_down():
     p = points(state)
     height = (p[FEET] @ UP).min()
     raised = Floor(FEET, UP, height + 0.05, np.zeros(4))
-    lowest = (points(fit(BODY, seen(state, floor=raised), init=state).state)[FEET] @ UP).min() - (height + 0.05)
+    lowest = (points(fit(BODY, seen(state, floor=raised), init=state).state)[FEET] @ UP).min() - (
+        height + 0.05
+    )
     assert lowest > -0.01
     far_below = Floor(FEET, UP, height - 0.3, np.zeros(4))
     found, plain = (fit(BODY, m, init=state) for m in (seen(state, floor=far_below), seen(state)))
     np.testing.assert_array_equal(found.t_camera_part, plain.t_camera_part)
     touching = Floor(FEET, UP, height - 0.03, np.ones(4))
-    held = points(fit(BODY, seen(state, floor=touching), init=state).state)[FEET] @ UP - (height - 0.03)
+    held = points(fit(BODY, seen(state, floor=touching), init=state).state)[FEET] @ UP - (
+        height - 0.03
+    )
     free = points(fit(BODY, seen(state), init=state).state)[FEET] @ UP - (height - 0.03)
     assert np.abs(held).max() < 0.3 * np.abs(free).max()
 
 
 def test_points_may_be_left_free_below_the_floor():
-    """On a stair that leads down, or where the floor is uncertain: no weight below, no contact, no pull."""
+    """On a stair that leads down, or where the floor is uncertain: no weight below, no contact, no
+    pull.
+    """
     state = standing()
     height = (points(state)[FEET] @ UP).min() + 0.05
-    free = fit(BODY, seen(state, floor=Floor(FEET, UP, height, np.zeros(4), below=np.zeros(4))), init=state)
+    free = fit(
+        BODY, seen(state, floor=Floor(FEET, UP, height, np.zeros(4), below=np.zeros(4))), init=state
+    )
     plain = fit(BODY, seen(state), init=state)
     np.testing.assert_array_equal(free.t_camera_part, plain.t_camera_part)
     half, full = (
-        fit(BODY, seen(state, floor=Floor(FEET, UP, height, np.zeros(4), below=np.full(4, w))), init=state)
+        fit(
+            BODY,
+            seen(state, floor=Floor(FEET, UP, height, np.zeros(4), below=np.full(4, w))),
+            init=state,
+        )
         for w in (0.02, 1.0)
     )
     low = [(points(f.state)[FEET] @ UP - height).min() for f in (plain, half, full)]
@@ -103,16 +124,27 @@ def test_points_may_be_left_free_below_the_floor():
 
 
 def test_each_point_may_have_a_plane_of_its_own():
-    """One plane for all points is the same as a copy for each; a point below its own plane alone is raised."""
+    """One plane for all points is the same as a copy for each; a point below its own plane alone is
+    raised.
+    """
     state = standing()
     p = points(state)
     height = (p[FEET] @ UP).min() + 0.05
     one = fit(BODY, seen(state, floor=Floor(FEET, UP, height, np.zeros(4))), init=state)
     copies = Floor(FEET, np.tile(UP, (4, 1)), np.full(4, height), np.zeros(4))
-    np.testing.assert_array_equal(fit(BODY, seen(state, floor=copies), init=state).t_camera_part, one.t_camera_part)
+    np.testing.assert_array_equal(
+        fit(BODY, seen(state, floor=copies), init=state).t_camera_part, one.t_camera_part
+    )
     sideways = np.array([1.0, 0.0, 0.0])
-    normals, offsets = np.array([sideways, -sideways]), np.array([1.0, -1.0]) * (p[FEET[:2], 0] + [0.05, 0.05])
-    found = points(fit(BODY, seen(state, floor=Floor(FEET[:2], normals, offsets, np.zeros(2))), init=state).state)
+    normals, offsets = (
+        np.array([sideways, -sideways]),
+        np.array([1.0, -1.0]) * (p[FEET[:2], 0] + [0.05, 0.05]),
+    )
+    found = points(
+        fit(
+            BODY, seen(state, floor=Floor(FEET[:2], normals, offsets, np.zeros(2))), init=state
+        ).state
+    )
     plain = points(fit(BODY, seen(state), init=state).state)
     moved = (found - plain)[FEET[:2], 0]
     assert moved[0] > 0.02
@@ -121,7 +153,9 @@ def test_each_point_may_have_a_plane_of_its_own():
 
 @pytest.mark.parametrize("size", [-1.5, 1.5])
 def test_the_floor_tells_the_depth_that_a_picture_does_not(size):
-    """With 2D alone, distance and size are one; a floor of known height below somebody small or tall decides."""
+    """With 2D alone, distance and size are one; a floor of known height below somebody small or
+    tall decides.
+    """
     state = replace(standing(3), beta=size * np.eye(10)[0])
     p = points(state)
     pixels = p @ INTRINSICS.T
@@ -143,7 +177,10 @@ def test_contacts_hold_through_a_clip_with_one_shape():
     frames = [seen(state, 0.02, seed) for seed in range(6)]
     contact = FootContacts(FEET, stand, np.ones(4))
     slide = {}
-    for name, clip in (("free", frames), ("held", [replace(m, foot_contacts=contact) for m in frames])):
+    for name, clip in (
+        ("free", frames),
+        ("held", [replace(m, foot_contacts=contact) for m in frames]),
+    ):
         feet = np.array([points(f.state)[FEET] for f in fit_clip(BODY, clip).frames])
         slide[name] = np.linalg.norm(np.diff(feet, axis=0), axis=-1).max()
     assert slide["held"] < 0.2 * slide["free"]
@@ -154,11 +191,19 @@ def test_a_point_that_is_not_finite_is_left_out_and_no_probability_is_no_contact
     m = seen(state)
     plain = fit(BODY, m, init=state)
     stand = points(state)[FEET[:2]] + 1.0
-    for where, probability in ((stand, [0.0, 0.0]), (stand * np.nan, [1.0, 1.0]), (stand, [np.nan, np.nan])):
-        found = fit(BODY, replace(m, foot_contacts=FootContacts(FEET[:2], where, probability)), init=state)
+    for where, probability in (
+        (stand, [0.0, 0.0]),
+        (stand * np.nan, [1.0, 1.0]),
+        (stand, [np.nan, np.nan]),
+    ):
+        found = fit(
+            BODY, replace(m, foot_contacts=FootContacts(FEET[:2], where, probability)), init=state
+        )
         np.testing.assert_array_equal(found.t_camera_part, plain.t_camera_part)
     floor = Floor(FEET, UP, 100.0, np.full(4, np.nan))
-    np.testing.assert_array_equal(fit(BODY, replace(m, floor=floor), init=state).t_camera_part, plain.t_camera_part)
+    np.testing.assert_array_equal(
+        fit(BODY, replace(m, floor=floor), init=state).t_camera_part, plain.t_camera_part
+    )
 
 
 @pytest.mark.parametrize(
@@ -167,11 +212,22 @@ def test_a_point_that_is_not_finite_is_left_out_and_no_probability_is_no_contact
         ({"floor": Floor(FEET, 2.0 * UP, 0.0, np.zeros(4))}, "length 2"),
         ({"floor": Floor(FEET, UP, np.nan, np.zeros(4))}, "offset nan"),
         ({"floor": Floor(FEET, UP, 0.0, np.zeros(3))}, r"\(4,\)"),
-        ({"floor": Floor(FEET, UP, 0.0, np.zeros(4), below=np.zeros(5))}, r"\(4,\), but got shape \(5,\)"),
+        (
+            {"floor": Floor(FEET, UP, 0.0, np.zeros(4), below=np.zeros(5))},
+            r"\(4,\), but got shape "
+            r"\(5,\)",
+        ),
         ({"floor": Floor([10000], UP, 0.0, [0.0])}, "10000"),
-        ({"floor": Floor(FEET, np.tile(UP, (3, 1)), np.zeros(4), np.zeros(4))}, r"Normal .* \(4, 3\)"),
+        (
+            {"floor": Floor(FEET, np.tile(UP, (3, 1)), np.zeros(4), np.zeros(4))},
+            r"Normal .* \(4, "
+            r"3\)",
+        ),
         ({"floor": Floor(FEET, np.tile(UP, (4, 1)), 0.0, np.zeros(4))}, r"Offset .* \(4,\)"),
-        ({"floor": Floor(FEET, [[1.0, 0.0, 0.0], [0.0, 1.0]], np.zeros(4), np.zeros(4))}, "Normal of the floor"),
+        (
+            {"floor": Floor(FEET, [[1.0, 0.0, 0.0], [0.0, 1.0]], np.zeros(4), np.zeros(4))},
+            "Normal of the floor",
+        ),
         ({"floor": Floor(FEET, np.outer([1, 1, 3, 1], UP), np.zeros(4), np.zeros(4))}, "length 3"),
         ({"foot_contacts": FootContacts(FEET, np.zeros((3, 3)), np.ones(4))}, r"\(4, 3\)"),
     ],

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The joint flow as a density on SO(3): a diffeomorphism, its volume, half turns, and the vector kernel."""
+"""The joint flow as a density on SO(3): a diffeomorphism, its volume, half turns, and the vector
+kernel.
+"""
 
 import numpy as np
 import pytest
@@ -34,7 +36,9 @@ def test_log_determinant_is_that_of_the_numeric_derivative():
     down = [jf.transform(FLOW, rotations.exp(-h * e) @ Omega) for e in np.eye(3)]
     numeric = np.stack([(a[0] - b[0]) / (2 * h) for a, b in zip(up, down, strict=True)], -1)
     np.testing.assert_allclose(J, numeric, atol=1e-7 * np.abs(numeric).max())
-    np.testing.assert_allclose(log_det, np.linalg.slogdet(numeric)[1] - np.log(HAAR_PER_RADIAN3), atol=1e-6)
+    np.testing.assert_allclose(
+        log_det, np.linalg.slogdet(numeric)[1] - np.log(HAAR_PER_RADIAN3), atol=1e-6
+    )
     assert (np.linalg.det(J) > 0).all() or (np.linalg.det(J) < 0).all()
     numeric = np.stack([(a[2] - b[2]) / (2 * h) for a, b in zip(up, down, strict=True)], -1)
     np.testing.assert_allclose(gradient, numeric, atol=1e-7 * np.abs(numeric).max())
@@ -56,7 +60,9 @@ def test_samples_have_the_density():
 
 
 def test_residual_grows_to_the_half_turn_and_stays_finite_there():
-    """|z| rises over the last part of the way, J stays finite, and the states within 1e-4 of pi count as at that."""
+    """|z| rises over the last part of the way, J stays finite, and the states within 1e-4 of pi
+    count as at that.
+    """
     axis = np.array([0.6, -0.48, 0.64])
     angles = np.pi - np.array([0.5, 0.1, 1e-2, 1e-3, 2e-4])
     length = [np.linalg.norm(jf.transform(FLOW, MEAN @ rotations.exp(a * axis))[0]) for a in angles]
@@ -87,7 +93,9 @@ def test_vector_kernel_agrees_with_numpy_joint_by_joint_also_at_half_turns():
     weights[5] = 0.0
     for h in (0.0, 0.8):
         blocks = make_blocks(tree)
-        cost = jf.accumulate(tree, *jf.pack(np.arange(1, K + 1), flows, weights, h), 1.3, 0.0, 0.0, pose, blocks)
+        cost = jf.accumulate(
+            tree, *jf.pack(np.arange(1, K + 1), flows, weights, h), 1.3, 0.0, 0.0, pose, blocks
+        )
         expected = 0.0
         for i in range(1, K + 1):
             z, J, log_det, gradient = jf.transform(flows[i - 1], pose.Omega[i])
@@ -96,10 +104,14 @@ def test_vector_kernel_agrees_with_numpy_joint_by_joint_also_at_half_turns():
             g = J.T @ z - h * half / np.sqrt(a * a + 1.0) * gradient
             w, R = 1.3 * weights[i - 1], pose.R[tree.parents[i]]
             expected += w * (0.5 * z @ z + h * half)
-            np.testing.assert_allclose(blocks.H_u[i, :, 6], w * R @ g, rtol=1e-6, atol=1e-9, err_msg=str(i))
+            np.testing.assert_allclose(
+                blocks.H_u[i, :, 6], w * R @ g, rtol=1e-6, atol=1e-9, err_msg=str(i)
+            )
             if h == 0.0:
                 H = w * R @ J.T @ J @ R.T
-                np.testing.assert_allclose(blocks.H_uu[i], H, rtol=1e-6, atol=1e-9 * np.abs(H).max() + 1e-12)
+                np.testing.assert_allclose(
+                    blocks.H_uu[i], H, rtol=1e-6, atol=1e-9 * np.abs(H).max() + 1e-12
+                )
         assert cost == pytest.approx(expected, rel=1e-6)
 
 

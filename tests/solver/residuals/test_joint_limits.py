@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The limits of knees and elbows against anatomy: which way they bend, how far, and mirrored left and right."""
+"""The limits of knees and elbows against anatomy: which way they bend, how far, and mirrored left
+and right.
+"""
 
 import numpy as np
 import pytest
@@ -7,8 +9,10 @@ from scope.solver import rotations
 from scope.solver.compiled.part import Part
 from scope.solver.residuals.joint_limits import HINGES, evaluate
 
-REST = {"knee": [0.0, -1.0, 0.0], "left_elbow": [1.0, 0.0, 0.0], "right_elbow": [-1.0, 0.0, 0.0]}  # T-pose
-BENT = {"knee": [0.0, 0.0, -1.0], "elbow": [0.0, 0.0, 1.0]}  # at 90 degrees: the shin backwards, the forearm forwards
+# T-pose
+REST = {"knee": [0.0, -1.0, 0.0], "left_elbow": [1.0, 0.0, 0.0], "right_elbow": [-1.0, 0.0, 0.0]}
+# at 90 degrees: the shin backwards, the forearm forwards
+BENT = {"knee": [0.0, 0.0, -1.0], "elbow": [0.0, 0.0, 1.0]}
 
 
 def cost(name, rotation_vector):

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A contributor's residual: one new file, its import and one line in the registry, tried on a copy of the solver."""
+"""A contributor's residual: one new file, its import and one line in the registry, tried on a copy
+of the solver.
+"""
 
 import os
 import shutil
@@ -26,11 +28,13 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):
         r, w = pose.t[ints[k, 0], 1] - floats[k, 0], weight * floats[k, 1]
         cost += 0.5 * w * r * r
         point = tree.keypoints + ints[k, 0]
-        add_to_point(tree, pose, blocks, point, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, w, 0.0, 0.0, 0.0, w * r, 0.0)
+        add_to_point(tree, pose, blocks, point, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, w, 0.0, 0.0,
+                     0.0, w * r, 0.0)
     return cost
 '''
 
-# Only the sum over the residuals is compiled, called as `linearize` calls it: to compile the rest takes twice as long.
+# Only the sum over the residuals is compiled, called as `linearize` calls it: to compile the rest
+# takes twice as long.
 USE = """
 import gc, sys
 import numpy as np
@@ -50,11 +54,14 @@ tree = make_tree(body)
 
 def terms_of(part):
     rows = np.array([[part]]), np.array([[-0.5, 1.0]])
-    return make_terms(tree, solver.Measurements(tables={"toy": rows}), solver.Priors(joint_weights=np.zeros(2)))
+    priors = solver.Priors(joint_weights=np.zeros(2))
+    return make_terms(tree, solver.Measurements(tables={"toy": rows}), priors)
 
 @kernel
 def add_tables(tree, terms, stage, triggs, pose, blocks):
-    return registry.accumulate_tables(tree, terms.ints, terms.floats, stage[0], stage[1], triggs, pose, blocks)
+    return registry.accumulate_tables(
+        tree, terms.ints, terms.floats, stage[0], stage[1], triggs, pose, blocks
+    )
 
 pose, blocks = make_pose(tree), make_blocks(tree)
 pose.t[0] = 0.1, 0.2, 3.0
@@ -75,7 +82,9 @@ for part, declared in ((3, True), (-1, True), (-1, False)):
 
 def test_one_file_its_import_and_one_line_add_a_residual(tmp_path):
     copied = tmp_path / "copied"
-    shutil.copytree(ROOT / "solver", copied / "solver", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(
+        ROOT / "solver", copied / "solver", ignore=shutil.ignore_patterns("__pycache__")
+    )
     shutil.copytree(ROOT / "assets" / "body", copied / "assets" / "body")
     (copied / "__init__.py").touch()
     (copied / "solver" / "residuals" / "toy.py").write_text(RESIDUAL)
@@ -85,15 +94,20 @@ def test_one_file_its_import_and_one_line_add_a_residual(tmp_path):
     # To compile these takes long; the prior of the joints is asked for.
     for name in ("pose_prior", "joint_limits", "joint_flow", "foot_contact", "floor", "outline"):
         text = text.replace(f'    "{name}": {name},\n', "")
-    registry.write_text(text.replace("import floor,", "import toy, floor,"))  # the import is what the line needs
+    # the import is what the line needs
+    registry.write_text(text.replace("import floor,", "import toy, floor,"))
     environment = dict(os.environ, NUMBA_OPT="0")  # compiles sooner
     command = [sys.executable, "-c", USE, str(tmp_path)]
-    empty = tmp_path / "empty"  # compiled code is bound to all sources in its folder, here the current one
+    # compiled code is bound to all sources in its folder, here the current one
+    empty = tmp_path / "empty"
     empty.mkdir()
-    done = subprocess.run(command, env=environment, cwd=empty, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        command, env=environment, cwd=empty, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
     first, *refused = done.stdout.splitlines()
-    # At rest part 2 lies at (0.5, 0.5, 3), (0.4, 0.3, 0) from the pelvis: r = 0.5 - (-0.5), the force is w r upwards.
+    # At rest part 2 lies at (0.5, 0.5, 3), (0.4, 0.3, 0) from the pelvis: r = 0.5 - (-0.5), the
+    # force is w r upwards.
     cost, *gradient = map(float, first.split())
     np.testing.assert_allclose(cost, 0.5 * 8.0)
     np.testing.assert_allclose(gradient, [0.0, 0.0, 0.4 * 8.0, 0.0, 8.0, 0.0], atol=1e-12)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every residual through one derivative helper, and every kernel against its residual's JᵀJ and Jᵀr."""
+"""Every residual through one derivative helper, and every kernel against its residual's JᵀJ and
+Jᵀr.
+"""
 
 import inspect
 
@@ -41,11 +43,21 @@ def random_part(rng, scale=1.0):
     Omega = rotations.exp(scale * rng.standard_normal(3))
     t = np.array([0.2, -0.1, 3.0]) + 0.3 * rng.standard_normal(3)
     D = 0.1 * rng.standard_normal((3, P))
-    return Part(R_parent @ Omega, t, D, Omega, R_parent, t + 0.4 * rng.standard_normal(3), rng.standard_normal(P))
+    return Part(
+        R_parent @ Omega,
+        t,
+        D,
+        Omega,
+        R_parent,
+        t + 0.4 * rng.standard_normal(3),
+        rng.standard_normal(P),
+    )
 
 
 def moved(part, x, u, dbeta):
-    """The part moved by a twist about its origin of twists, with its joint and the shape, by their definition."""
+    """The part moved by a twist about its origin of twists, with its joint and the shape, by their
+    definition.
+    """
     w, nu = x[:3], x[3:]
     E = rotations.exp(w)
     return Part(
@@ -67,13 +79,18 @@ def check_derivatives(evaluate, part, atol=2e-7, h=1e-6):
         for k in range(size):
             d = [np.zeros(6), np.zeros(3), np.zeros(P)]
             d[place][k] = h
-            numeric[:, k] = (evaluate(moved(part, *d)).r - evaluate(moved(part, *(-v for v in d))).r) / (2 * h)
+            numeric[:, k] = (
+                evaluate(moved(part, *d)).r - evaluate(moved(part, *(-v for v in d))).r
+            ) / (2 * h)
         scale = max(1.0, np.abs(numeric).max())
         np.testing.assert_allclose(getattr(found, name), numeric, atol=atol * scale, err_msg=name)
     return found
 
 
-V_BAR, V = 0.2 * np.random.default_rng(8).standard_normal(3), 0.05 * np.random.default_rng(9).standard_normal((3, P))
+V_BAR, V = (
+    0.2 * np.random.default_rng(8).standard_normal(3),
+    0.05 * np.random.default_rng(9).standard_normal((3, P)),
+)
 L = np.random.default_rng(10).standard_normal((P, P))
 HAT = rotations.exp([0.2, -0.5, 0.3])
 FLOW = random_flow(np.random.default_rng(11), HAT)
@@ -82,11 +99,15 @@ CASES = {
     "keypoint2d": lambda part, w: keypoint2d.evaluate(part, V_BAR, V, np.array([0.1, 0.2]), w, 1.2),
     "keypoint3d": lambda part, w: keypoint3d.evaluate(part, V_BAR, V, np.array([0.1, 0.2, 3.1]), w),
     "orientation_field": lambda part, w: orientation_field.evaluate(part, V_BAR, V, AXIS, w),
-    "foot_contact": lambda part, w: foot_contact.evaluate(part, V_BAR, V, np.array([0.1, 0.2, 3.1]), w),
+    "foot_contact": lambda part, w: foot_contact.evaluate(
+        part, V_BAR, V, np.array([0.1, 0.2, 3.1]), w
+    ),
     "floor": lambda part, w: floor.evaluate(part, V_BAR, V, AXIS, 9.0, 2.0, 0.0, w),
     "floor_above": lambda part, w: floor.evaluate(part, V_BAR, V, AXIS, -9.0, 2.0, 3.0, w),
     "outline": lambda part, w: outline.evaluate(part, V_BAR, V, CONTOUR, NORMAL, w),
-    "pose_prior": lambda part, w: pose_prior.evaluate(part, HAT, np.array([0.1, 0.1, 2.5]), 2.0, 3.0, w),
+    "pose_prior": lambda part, w: pose_prior.evaluate(
+        part, HAT, np.array([0.1, 0.1, 2.5]), 2.0, 3.0, w
+    ),
     "joint_prior": lambda part, w: joint_prior.evaluate(part, HAT, w),
     "joint_flow": lambda part, w: joint_flow.evaluate(part, FLOW, w),
     "joint_flow_log_det": lambda part, w: joint_flow.evaluate(part, FLOW, w, 0.6),
@@ -101,7 +122,9 @@ def test_derivatives_at_random_states(name, seed):
     check_derivatives(lambda part: CASES[name](part, 1.7), random_part(np.random.default_rng(seed)))
 
 
-@pytest.mark.parametrize("name", ["joint_prior", "joint_flow", "joint_flow_log_det", "pose_prior", "joint_limits"])
+@pytest.mark.parametrize(
+    "name", ["joint_prior", "joint_flow", "joint_flow_log_det", "pose_prior", "joint_limits"]
+)
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-5, 1e-2, 3.0, np.pi - 1e-3])
 def test_derivatives_near_identity_and_near_pi(name, angle):
     rng = np.random.default_rng(3)
@@ -113,7 +136,9 @@ def test_derivatives_near_identity_and_near_pi(name, angle):
     else:
         part.Omega = (np.eye(3) if name == "joint_limits" else HAT) @ turn
     if name == "joint_limits":  # the swing's kink is not at zero angle
-        check_derivatives(lambda p: joint_limits.evaluate(p, AXIS, -2.9, 0.4, 0.3, 2.0, 3.0), part, atol=2e-5)
+        check_derivatives(
+            lambda p: joint_limits.evaluate(p, AXIS, -2.9, 0.4, 0.3, 2.0, 3.0), part, atol=2e-5
+        )
     else:
         check_derivatives(lambda p: CASES[name](p, 1.0), part, atol=2e-5)
 
@@ -135,7 +160,14 @@ def test_weight_is_linear_in_the_cost(name):
 
 
 def test_every_registered_residual_is_in_these_tests():
-    others = {"keypoint2d", "keypoint3d", "orientation_field", "shape_prior", "joint_flow_log_det", "floor_above"}
+    others = {
+        "keypoint2d",
+        "keypoint3d",
+        "orientation_field",
+        "shape_prior",
+        "joint_flow_log_det",
+        "floor_above",
+    }
     assert set(registry.RESIDUALS) | others == set(CASES)
     for module in registry.RESIDUALS.values():
         assert module.INDEXES in ("points", "parts", "joints")
@@ -154,7 +186,9 @@ def chain(seed=0):
 
 def part_of(tree, pose, i):
     j = max(tree.parents[i], 0)
-    return Part(pose.R[i], pose.t[i], pose.D[i, :, :P], pose.Omega[i], pose.R[j], pose.t[0], pose.beta[:P])
+    return Part(
+        pose.R[i], pose.t[i], pose.D[i, :, :P], pose.Omega[i], pose.R[j], pose.t[0], pose.beta[:P]
+    )
 
 
 def check_blocks(tree, blocks, cost, i, found):
@@ -178,7 +212,14 @@ def check_blocks(tree, blocks, cost, i, found):
     "name",
     [
         *("pose_prior", "joint_prior", "joint_flow", "joint_flow_log_det", "joint_limits"),
-        *("foot_contact", "floor", "floor_above", "foot_contact_of_a_joint", "outline", "outline_inside"),
+        *(
+            "foot_contact",
+            "floor",
+            "floor_above",
+            "foot_contact_of_a_joint",
+            "outline",
+            "outline_inside",
+        ),
     ],
 )
 def test_table_kernels_accumulate_their_residual(name, seed):
@@ -210,12 +251,17 @@ def test_table_kernels_accumulate_their_residual(name, seed):
         found = floor.evaluate(part, v_bar, shape, AXIS, offset, 2.0, 3.0, w)
         name = "floor"
     elif name.startswith("outline"):
-        delta, normal = np.array([0.02, -0.01, 0.03]), NORMAL * (-1.0 if name.endswith("inside") else 1.0)
+        delta, normal = (
+            np.array([0.02, -0.01, 0.03]),
+            NORMAL * (-1.0 if name.endswith("inside") else 1.0),
+        )
         found = outline.evaluate(part, v_bar + delta, shape, CONTOUR, normal, 1.0)
         inside = bool(found.r[0] < 0)
         never = [[np.inf], [np.inf]]
         tables = outline.pack([k], delta[None], CONTOUR[None], normal[None], ([2.0], [3.0]), never)
-        found = outline.evaluate(part, v_bar + delta, shape, CONTOUR, normal, (3.0 if inside else 2.0) * w)
+        found = outline.evaluate(
+            part, v_bar + delta, shape, CONTOUR, normal, (3.0 if inside else 2.0) * w
+        )
         name = "outline"
     else:
         tables = joint_limits.pack([i], AXIS[None], [-0.1], [0.1], [0.05], [2.0], [3.0])
@@ -228,7 +274,9 @@ def test_table_kernels_accumulate_their_residual(name, seed):
 MEASURED = {
     "image": (lambda i: {"keypoints2d": Keypoints2D([i], [[700.0, 300.0]], [0.5])}),
     "space": (lambda i: {"keypoints3d": Keypoints3D([i], [[0.2, 0.1, 4.2]], [0.5])}),
-    "direction": (lambda i: {"orientation_field": OrientationField([10 + i // 2], [i], [AXIS], [0.5])}),
+    "direction": (
+        lambda i: {"orientation_field": OrientationField([10 + i // 2], [i], [AXIS], [0.5])}
+    ),
 }
 
 
@@ -245,19 +293,34 @@ def test_measurement_kernel_accumulates_its_residual(way, behind):
     if way == "direction":
         measurements.orientation_field.starts = [10 + i]
     weights = Weights(
-        shape=0.0, joint_prior=0.0, joint_limits=0.0, keypoints2d=30.0, keypoints3d=40.0, orientation_field=50.0
+        shape=0.0,
+        joint_prior=0.0,
+        joint_limits=0.0,
+        keypoints2d=30.0,
+        keypoints3d=40.0,
+        orientation_field=50.0,
     )
-    off = Options(robust_keypoints2d=np.inf, robust_keypoints3d=np.inf, robust_orientation_field=np.inf)
+    off = Options(
+        robust_keypoints2d=np.inf, robust_keypoints3d=np.inf, robust_orientation_field=np.inf
+    )
     table, _, _ = off.stage_table([Stage(weights)])
     blocks = make_blocks(tree)
     cost = linearize(
-        tree, make_terms(tree, measurements, Priors()), table[0], 0.0, pose, blocks, make_workspace(tree).scratch
+        tree,
+        make_terms(tree, measurements, Priors()),
+        table[0],
+        0.0,
+        pose,
+        blocks,
+        make_workspace(tree).scratch,
     )
     part = part_of(tree, pose, i)
     uv = np.array([(700.0 - 640.0) / 1100.0, (300.0 - 360.0) / 1080.0])
     found = {
         "image": lambda: keypoint2d.evaluate(part, body.v_bar[j], body.V[j], uv, 15.0),
-        "space": lambda: keypoint3d.evaluate(part, body.v_bar[j], body.V[j], np.array([0.2, 0.1, 4.2]), 20.0),
+        "space": lambda: keypoint3d.evaluate(
+            part, body.v_bar[j], body.V[j], np.array([0.2, 0.1, 4.2]), 20.0
+        ),
         "direction": lambda: orientation_field.evaluate(part, body.v_bar[j], body.V[j], AXIS, 25.0),
     }[way]()
     check_blocks(tree, blocks, cost, i, found)
@@ -269,13 +332,17 @@ def test_direction_between_two_joints_and_between_two_keypoints_of_one_part():
     body.parents = np.array([-1, 0, 0, 1, 2])
     tree = make_tree(body)
     pose = State(*random_state(rng, 4, P)).pose(tree)
-    points = np.einsum("mij,mj->mi", pose.R[tree.point_part], tree.V[:, :, :P] @ pose.beta[:P] + tree.v_bar)
+    points = np.einsum(
+        "mij,mj->mi", pose.R[tree.point_part], tree.V[:, :, :P] @ pose.beta[:P] + tree.v_bar
+    )
     points += pose.t[tree.point_part]
     table, _, _ = Options().stage_table([Stage(Weights(shape=0.0, joint_prior=0.0))])
     for start, end in ((11, 12), (10, 11), (11, 13), (6, 7), (13, 6), (6, 13)):
         field = OrientationField([start], [end], [points[end] - points[start]], [1.0])
         terms = make_terms(tree, Measurements(orientation_field=field), Priors())
-        cost = linearize(tree, terms, table[0], 0.0, pose, make_blocks(tree), make_workspace(tree).scratch)
+        cost = linearize(
+            tree, terms, table[0], 0.0, pose, make_blocks(tree), make_workspace(tree).scratch
+        )
         assert cost == pytest.approx(0.0, abs=1e-20), (start, end)
 
 
@@ -284,7 +351,9 @@ def test_geman_mcclure_and_its_derivative():
         rho, slope = robust.geman_mcclure(s, 1 / 0.02)
         assert rho == pytest.approx(0.02 * s / (0.02 + s))
         h = 1e-7
-        numeric = (robust.geman_mcclure(s + h, 50.0)[0] - robust.geman_mcclure(s - h, 50.0)[0]) / (2 * h)
+        numeric = (robust.geman_mcclure(s + h, 50.0)[0] - robust.geman_mcclure(s - h, 50.0)[0]) / (
+            2 * h
+        )
         assert slope == pytest.approx(numeric, rel=1e-6)
     assert robust.geman_mcclure(5.0, 0.0) == (5.0, 1.0)
 
@@ -317,7 +386,9 @@ def test_triggs_correction_is_the_second_derivative_along_the_residual(way):
 
 
 def test_knees_and_elbows_bend_the_right_way():
-    """In SMPL's T-pose (x left, y up, z forward) a bent knee takes the foot back, a bent elbow the hand forward."""
+    """In SMPL's T-pose (x left, y up, z forward) a bent knee takes the foot back, a bent elbow the
+    hand forward.
+    """
     rest = {
         "left_knee": [0, -1.0, 0],
         "right_knee": [0, -1.0, 0],

@@ -16,7 +16,9 @@ def made_take(hip_m, knee_m, m_per_s=0.0, source="elsewhere", name="a"):
     for k, x in ((0, 0.1), (3, -0.1)):
         ahead = np.sqrt(0.42**2 - min(0.42, hip_m - knee_m) ** 2)
         for j, (y, forwards) in enumerate(((hip_m, 0.0), (knee_m, ahead), (0.0, ahead))):
-            positions[:, k + j] = np.hstack([np.full((60, 1), x), np.full((60, 1), y + 0.08), z + forwards])
+            positions[:, k + j] = np.hstack(
+                [np.full((60, 1), x), np.full((60, 1), y + 0.08), z + forwards]
+            )
     return Take(name, "s", 30.0, NAMES, positions, source)
 
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fitting our body to motion: the fit is compared with the source's own bones, and with what bodies can do."""
+"""Fitting our body to motion: the fit is compared with the source's own bones, and with what bodies
+can do.
+"""
 
 import numpy as np
 import pytest
@@ -94,7 +96,9 @@ def test_hinges_bend_the_human_way_and_palms_face_the_thighs(fitted, body):
 
 def test_poses_and_trans_give_the_joints_back(fitted, body):
     for fit in fitted:
-        _, t = body.forward_kinematics(exp(fit.poses.reshape(len(fit.poses), -1, 3)), fit.trans, fit.betas)
+        _, t = body.forward_kinematics(
+            exp(fit.poses.reshape(len(fit.poses), -1, 3)), fit.trans, fit.betas
+        )
         np.testing.assert_allclose(t, fit.t, atol=1e-6)
 
 
@@ -103,7 +107,9 @@ def test_a_broken_recording_is_marked(body):
     assert fit_body.plausible(body, Omega, 30.0).all()
     ankle, hip = (body.joint_names.index(n) for n in ("left_ankle", "left_hip"))
     Omega[3, ankle] = exp([0.0, 0.0, np.pi])
-    np.testing.assert_array_equal(fit_body.plausible(body, Omega, 30.0), [True] * 2 + [False] * 3 + [True] * 4)
+    np.testing.assert_array_equal(
+        fit_body.plausible(body, Omega, 30.0), [True] * 2 + [False] * 3 + [True] * 4
+    )
     Omega[3, ankle] = np.eye(3)
     Omega[7:, hip] = exp([1.5, 0.0, 0.0])
     np.testing.assert_array_equal(np.flatnonzero(~fit_body.plausible(body, Omega, 30.0)), [6, 7])

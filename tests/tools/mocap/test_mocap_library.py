@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The shorter files of the real archives: lengths, scale, left and right, and gait that any walking person has."""
+"""The shorter files of the real archives: lengths, scale, left and right, and gait that any walking
+person has.
+"""
 
 from collections import Counter
 
@@ -14,7 +16,10 @@ SIDED = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist", "foot_end")
 BONES = (("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist"))
 
 # Of each archive, the last file that is read, and how many characters a file may have.
-PARTS = {"cmu_asf_amc": ("01/01.asf", 2_300_000), "cmu_expmap": ("cmu_mocap/train/walking/walking_3.txt", 1_000_000)}
+PARTS = {
+    "cmu_asf_amc": ("01/01.asf", 2_300_000),
+    "cmu_expmap": ("cmu_mocap/train/walking/walking_3.txt", 1_000_000),
+}
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +35,11 @@ def texts(shared):
 def takes(shared, texts):
     read = library.read_archive
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(library, "read_archive", lambda path: texts.get(path.name.partition(".")[0]) or read(path))
+        patch.setattr(
+            library,
+            "read_archive",
+            lambda path: texts.get(path.name.partition(".")[0]) or read(path),
+        )
         return library.load_library(shared / "data" / "mocap", fps=30)
 
 
@@ -42,16 +51,24 @@ def test_the_takes_are_as_long_as_their_files_and_none_is_there_twice(takes, tex
     frames = Counter()
     for take in takes:
         frames[take.source] += len(take) * (not take.mirrored)
-    # A line with its number alone begins a frame of an .amc; the first line of the others is a reference pose.
-    written = {name: sum(map(str.isdigit, text.splitlines())) for name, text in texts["cmu_asf_amc"].items()}
-    assert frames["cmu_asf_amc"] == sum(-(-count // 4) for count in written.values())  # 30 of 120 a second
+    # A line with its number alone begins a frame of an .amc; the first line of the others is a
+    # reference pose.
+    written = {
+        name: sum(map(str.isdigit, text.splitlines()))
+        for name, text in texts["cmu_asf_amc"].items()
+    }
+    # 30 of 120 a second
+    assert frames["cmu_asf_amc"] == sum(-(-count // 4) for count in written.values())
     others = {name: len(text.splitlines()) - 1 for name, text in texts["cmu_expmap"].items()}
-    assert others.pop("cmu_mocap/train/walking/walking_1.txt") == written["02/02_01.amc"]  # the same recording
+    # the same recording
+    assert others.pop("cmu_mocap/train/walking/walking_1.txt") == written["02/02_01.amc"]
     assert frames["cmu_expmap"] == sum(-(-count // 4) for count in others.values())
     seconds = sum(t.seconds for t in takes if t.source == "deepmimic" and not t.mirrored)
     assert seconds / 60 == pytest.approx(4.5, abs=0.2)
     assert len({t.name for t in takes}) == len(takes)
-    assert len(library.without_doubles([*takes, *[t for t in takes if t.source != "deepmimic"][:5]])) == len(takes)
+    assert len(
+        library.without_doubles([*takes, *[t for t in takes if t.source != "deepmimic"][:5]])
+    ) == len(takes)
 
 
 def test_bones_are_rigid_and_of_human_length(takes):
@@ -66,7 +83,9 @@ def test_bones_are_rigid_and_of_human_length(takes):
 def test_orientations_are_rotations_that_carry_the_bones(takes):
     for take in takes[::10]:
         R = take.orientations[:, [take.index("left_hip"), take.index("right_elbow")]]
-        np.testing.assert_allclose(R @ np.swapaxes(R, -1, -2), np.broadcast_to(np.eye(3), R.shape), atol=1e-9)
+        np.testing.assert_allclose(
+            R @ np.swapaxes(R, -1, -2), np.broadcast_to(np.eye(3), R.shape), atol=1e-9
+        )
         assert (np.linalg.det(R) > 0).all()
         shank = take.joint("left_ankle") - take.joint("left_knee")
         local = np.einsum("tji,tj->ti", take.orientations[:, take.index("left_knee")], shank)
@@ -96,10 +115,13 @@ def test_walkers_walk_forwards_at_walking_pace_with_left_on_the_left(takes):
         left = (take.joint("left_hip") - take.joint("right_hip"))[step:]
         forward = np.cross(left, [0.0, 1.0, 0.0])  # x left, y up, z forward
         forwards.append((np.einsum("ti,ti->t", forward, velocity)[moving] > 0).mean())
-        for side in ("left", "right"):  # knees never bend forwards, so the ankle lies behind the line of the thigh
+        # knees never bend forwards, so the ankle lies behind the line of the thigh
+        for side in ("left", "right"):
             thigh = (take.joint(f"{side}_knee") - take.joint(f"{side}_hip"))[step:]
             shank = (take.joint(f"{side}_ankle") - take.joint(f"{side}_knee"))[step:]
-            assert (np.einsum("ti,ti->t", np.cross(thigh, shank), left) > -1e-4).mean() > 0.95, take.name
+            assert (np.einsum("ti,ti->t", np.cross(thigh, shank), left) > -1e-4).mean() > 0.95, (
+                take.name
+            )
     assert len(speeds) > 50
     assert np.mean(np.array(forwards) > 0.95) > 0.9  # some go sideways for a while
     assert np.min(forwards) > 0.7
@@ -113,7 +135,10 @@ def test_mirrored_takes_mirror_their_originals(takes):
     for take in mirrored:
         original = by_name[take.name.removesuffix("_mirror")]
         for joint in SIDED:
-            a, b = (t.joint(n) - t.joint("pelvis") for t, n in ((take, f"left_{joint}"), (original, f"right_{joint}")))
+            a, b = (
+                t.joint(n) - t.joint("pelvis")
+                for t, n in ((take, f"left_{joint}"), (original, f"right_{joint}"))
+            )
             # about the start's heading, which both share, the sides exchange
             assert np.abs(a * [-1, 1, 1] - b).max() < 0.02, take.name
 

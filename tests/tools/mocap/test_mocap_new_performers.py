@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Recordings of new performers: joints where the files have them, segments that bend as they do, and the body."""
+"""Recordings of new performers: joints where the files have them, segments that bend as they do,
+and the body.
+"""
 
 from __future__ import annotations
 
@@ -42,8 +44,12 @@ Frame Time: 0.01
 """
 
 
-def standing(knee_deg: float = 0.0, elbow_deg: float = 0.0, turn_deg: float = 0.0) -> dict[str, np.ndarray]:
-    """Return the joints of somebody who faces +z with arms hanging, knees and elbows bent, and the body turned."""
+def standing(
+    knee_deg: float = 0.0, elbow_deg: float = 0.0, turn_deg: float = 0.0
+) -> dict[str, np.ndarray]:
+    """Return the joints of somebody who faces +z with arms hanging, knees and elbows bent, and the
+    body turned.
+    """
     joints: dict[str, Any] = {
         "pelvis": [0.0, 1.0, 0.0],
         "chest": [0.0, 1.2, 0.0],
@@ -55,7 +61,10 @@ def standing(knee_deg: float = 0.0, elbow_deg: float = 0.0, turn_deg: float = 0.
         joints[f"{side}_hip"], joints[f"{side}_knee"] = [x, 0.95, 0.0], [x, 0.53, 0.0]
         ankle = joints[f"{side}_ankle"] = [x, 0.53 - 0.43 * np.cos(knee), -0.43 * np.sin(knee)]
         joints[f"{side}_foot_end"] = np.add(ankle, [0.0, -0.06, 0.15])
-        joints[f"{side}_collar"], joints[f"{side}_shoulder"] = [0.5 * x, 1.45, 0.0], [1.8 * x, 1.43, 0.0]
+        joints[f"{side}_collar"], joints[f"{side}_shoulder"] = (
+            [0.5 * x, 1.45, 0.0],
+            [1.8 * x, 1.43, 0.0],
+        )
         joints[f"{side}_elbow"] = [1.8 * x, 1.15, 0.0]
         joints[f"{side}_wrist"] = [1.8 * x, 1.15 - 0.25 * np.cos(elbow), 0.25 * np.sin(elbow)]
     R = exp(np.array([0.0, np.radians(turn_deg), 0.0]))
@@ -66,8 +75,10 @@ def test_bvh_joints_follow_their_channels():
     found, fps = bvh.joint_positions(BVH)
     assert fps == pytest.approx(100.0)
     np.testing.assert_allclose(found["Hips"], [[0, 90, 0], [5, 90, 7]])
-    np.testing.assert_allclose(found["Chest"], [[0, 100, 0], [-5, 90, 7]], atol=1e-9)  # turned by 90 degrees about z
-    np.testing.assert_allclose(found["Chest_end"], [[0, 105, 0], [-5, 90, 12]], atol=1e-9)  # then about its own x
+    # turned by 90 degrees about z
+    np.testing.assert_allclose(found["Chest"], [[0, 100, 0], [-5, 90, 7]], atol=1e-9)
+    # then about its own x
+    np.testing.assert_allclose(found["Chest_end"], [[0, 105, 0], [-5, 90, 12]], atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -82,15 +93,23 @@ def test_somebody_who_stands_has_upright_segments_and_bends_forwards():
     straight = take_from_joints("a_0", "a", "made", 30.0, standing())
     assert straight.orientations is not None
     for name in ("pelvis", "chest", "left_hip", "right_knee", "left_shoulder", "right_elbow"):
-        np.testing.assert_allclose(straight.orientations[0, straight.index(name)], np.eye(3), atol=1e-9, err_msg=name)
-    bent = take_from_joints("a_0", "a", "made", 30.0, standing(knee_deg=70, elbow_deg=80, turn_deg=40))
+        np.testing.assert_allclose(
+            straight.orientations[0, straight.index(name)], np.eye(3), atol=1e-9, err_msg=name
+        )
+    bent = take_from_joints(
+        "a_0", "a", "made", 30.0, standing(knee_deg=70, elbow_deg=80, turn_deg=40)
+    )
     assert bent.orientations is not None
     R = exp(np.array([0.0, np.radians(40), 0.0]))
     knee, elbow = (exp(np.array([np.radians(angle), 0, 0])) for angle in (70, -80))
     for side in ("left", "right"):
         np.testing.assert_allclose(bent.orientations[0, bent.index(f"{side}_hip")], R, atol=1e-9)
-        np.testing.assert_allclose(bent.orientations[0, bent.index(f"{side}_knee")], R @ knee, atol=1e-9)
-        np.testing.assert_allclose(bent.orientations[0, bent.index(f"{side}_elbow")], R @ elbow, atol=1e-9)
+        np.testing.assert_allclose(
+            bent.orientations[0, bent.index(f"{side}_knee")], R @ knee, atol=1e-9
+        )
+        np.testing.assert_allclose(
+            bent.orientations[0, bent.index(f"{side}_elbow")], R @ elbow, atol=1e-9
+        )
 
 
 def test_other_rates_become_30_frames_a_second():
@@ -101,28 +120,55 @@ def test_other_rates_become_30_frames_a_second():
 
 
 def test_the_body_stands_as_the_joints_do(body):
-    fitted = fit_performer(body, [take_from_joints("a_0", "a", "made", 30.0, standing(knee_deg=30, elbow_deg=60))])[0]
+    fitted = fit_performer(
+        body, [take_from_joints("a_0", "a", "made", 30.0, standing(knee_deg=30, elbow_deg=60))]
+    )[0]
     assert fitted.valid.all()
     assert np.nanmax(fitted.error) < 0.03
     at = fitted.t[0]
     ankle, knee = at[body.joint_names.index("left_ankle")], at[body.joint_names.index("left_knee")]
     assert knee[2] - ankle[2] == pytest.approx(0.43 * np.sin(np.radians(30)), abs=0.03)
-    wrist, elbow = at[body.joint_names.index("right_wrist")], at[body.joint_names.index("right_elbow")]
+    wrist, elbow = (
+        at[body.joint_names.index("right_wrist")],
+        at[body.joint_names.index("right_elbow")],
+    )
     assert wrist[2] - elbow[2] == pytest.approx(0.25 * np.sin(np.radians(60)), abs=0.04)
 
 
 def made_markers() -> dict[str, np.ndarray]:
     """Return Plug-in Gait markers, millimetres, z up, of somebody with outstretched arms.
 
-    The person faces -y, with the left side towards +x. In the frame with y up, left is +z, and ahead is -x.
+    The person faces -y, with the left side towards +x. In the frame with y up, left is +z, and
+    ahead is -x.
     """
-    at = {"C7": [0, 80, 1430], "T10": [0, 100, 1200], "CLAV": [0, -60, 1420], "STRN": [0, -90, 1250]}
+    at = {
+        "C7": [0, 80, 1430],
+        "T10": [0, 100, 1200],
+        "CLAV": [0, -60, 1420],
+        "STRN": [0, -90, 1250],
+    }
     for s, x in (("L", 1), ("R", -1)):
-        at |= {f"{s}FHD": [70 * x, -80, 1650], f"{s}BHD": [70 * x, 80, 1650], f"{s}SHO": [170 * x, 0, 1470]}
+        at |= {
+            f"{s}FHD": [70 * x, -80, 1650],
+            f"{s}BHD": [70 * x, 80, 1650],
+            f"{s}SHO": [170 * x, 0, 1470],
+        }
         at |= {f"{s}UPA": [300 * x, 40, 1430], f"{s}ELB": [450 * x, 40, 1420]}
-        at |= {f"{s}WRA": [690 * x, -40, 1420], f"{s}WRB": [690 * x, 40, 1420], f"{s}FWT": [130 * x, -90, 1000]}
-        at |= {f"{s}BWT": [50 * x, 90, 1010], f"{s}THI": [170 * x, 0, 720], f"{s}KNE": [145 * x, 0, 520]}
-        at |= {f"{s}SHN": [140 * x, 0, 300], f"{s}ANK": [130 * x, 0, 90], f"{s}HEL": [90 * x, 60, 50]}
+        at |= {
+            f"{s}WRA": [690 * x, -40, 1420],
+            f"{s}WRB": [690 * x, 40, 1420],
+            f"{s}FWT": [130 * x, -90, 1000],
+        }
+        at |= {
+            f"{s}BWT": [50 * x, 90, 1010],
+            f"{s}THI": [170 * x, 0, 720],
+            f"{s}KNE": [145 * x, 0, 520],
+        }
+        at |= {
+            f"{s}SHN": [140 * x, 0, 300],
+            f"{s}ANK": [130 * x, 0, 90],
+            f"{s}HEL": [90 * x, 60, 50],
+        }
         at |= {f"{s}TOE": [100 * x, -150, 50], f"{s}MT5": [140 * x, -130, 45]}
     return {name: np.tile(np.array(place, float), (T, 1)) for name, place in at.items()}
 
@@ -156,14 +202,29 @@ def test_climbs_with_other_joints_are_refused():
 
 
 def made_gait(up: int) -> dict:
-    """Return the file of a gait, here of a person standing still, with ``up`` as its vertical axis."""
+    """Return the file of a gait, here of a person standing still, with ``up`` as its vertical
+    axis.
+    """
     joints = standing()
-    order = {"hip": "hip", "knee": "knee", "ankle": "ankle", "heel": "ankle", "toe": "foot_end", "shoulder": "shoulder"}
+    order = {
+        "hip": "hip",
+        "knee": "knee",
+        "ankle": "ankle",
+        "heel": "ankle",
+        "toe": "foot_end",
+        "shoulder": "shoulder",
+    }
     frames = []
     for t in range(T):
-        place = {f"{s}_{j}": joints[f"{s}_{ours}"][t] * 1000 for s in ("left", "right") for j, ours in order.items()}
+        place = {
+            f"{s}_{j}": joints[f"{s}_{ours}"][t] * 1000
+            for s in ("left", "right")
+            for j, ours in order.items()
+        }
         turned = {key: value if up == 1 else value[[2, 0, 1]] for key, value in place.items()}
-        frames.append({"landmark_positions": {key: value.tolist() for key, value in turned.items()}})
+        frames.append(
+            {"landmark_positions": {key: value.tolist() for key, value in turned.items()}}
+        )
     return {"angle_frames": frames, "fps": 30.0}
 
 
@@ -173,7 +234,9 @@ def test_gaits_stand_upright_whichever_axis_is_up(up):
     assert take.joint("neck")[0, 1] - take.joint("pelvis")[0, 1] == pytest.approx(0.52, abs=0.01)
     assert take.joint("left_hip")[0, 0] > take.joint("right_hip")[0, 0]
     with pytest.raises(MotionFileError, match="malformed"):
-        new_performers.gait({"angle_frames": [{"landmark_positions": {}}], "fps": 30.0}, "patient_a")
+        new_performers.gait(
+            {"angle_frames": [{"landmark_positions": {}}], "fps": 30.0}, "patient_a"
+        )
 
 
 def test_gaits_are_read_out_of_a_source_archive(tmp_path: Path):
@@ -197,7 +260,11 @@ def test_files_are_read_out_of_a_debian_package(tmp_path: Path):
         info = tarfile.TarInfo("./usr/share/models/a.csm")
         info.size = 5
         files.addfile(info, io.BytesIO(b"hello"))
-    members = {"debian-binary": b"2.0\n", "control.tar.xz": b"odd", "data.tar.xz": packed.getvalue()}
+    members = {
+        "debian-binary": b"2.0\n",
+        "control.tar.xz": b"odd",
+        "data.tar.xz": packed.getvalue(),
+    }
     data = b"!<arch>\n"
     for name, content in members.items():
         data += (

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The motion library against people: they stand and walk with nearly straight legs, and stand upright.
+"""The motion library against people: they stand and walk with nearly straight legs, and stand
+upright.
 
-The fitted body is held to it, not the recordings, because its joints are what networks and priors learn.
+The fitted body is held to it, not the recordings, because its joints are what networks and priors
+learn.
 """
 
 from dataclasses import replace
@@ -28,12 +30,16 @@ STRAIGHTEST = 10  # per cent of the frames
 MOST_DEG = 8.0
 LEAN_DEG = 6.0
 STANDS_M_PER_S = 0.2
-JOINTS = tuple(f"{side}_{joint}" for side in ("left", "right") for joint in ("hip", "knee", "ankle"))
+JOINTS = tuple(
+    f"{side}_{joint}" for side in ("left", "right") for joint in ("hip", "knee", "ankle")
+)
 
 
 @pytest.fixture(scope="module")
 def takes(shared):
-    """A straightened walk of CMU's, and some of each set that has legs to go by, cut to 20 seconds."""
+    """A straightened walk of CMU's, and some of each set that has legs to go by, cut to 20
+    seconds.
+    """
     folder = shared / "data" / "mocap2"
     if not folder.is_dir():
         missing(f"the tests on real sets need {folder}", allowed_by="SCOPE_WITHOUT_SHARED")
@@ -43,7 +49,10 @@ def takes(shared):
     found = [straightened(walk.resampled(30)) for walk in walks]
     for name, wanted in STANDING_AND_WALKING.items():
         found += [take for take in load_set(folder / f"{name}.npz") if take.name in wanted]
-    return [replace(t, positions=t.positions[:MOST_FRAMES], orientations=t.orientations[:MOST_FRAMES]) for t in found]
+    return [
+        replace(t, positions=t.positions[:MOST_FRAMES], orientations=t.orientations[:MOST_FRAMES])
+        for t in found
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +75,11 @@ def flexions(fit, body):
 def test_the_straightest_legs_of_people_who_stand_and_walk_are_nearly_straight(fitted, body):
     for source in ("cmu_asf_amc", *STANDING_AND_WALKING):
         for kind in ("stand", "walk"):
-            own = [flexions(fit, body) for fit in fitted if fit.take.source == source and kind_of(fit.take) == kind]
+            own = [
+                flexions(fit, body)
+                for fit in fitted
+                if fit.take.source == source and kind_of(fit.take) == kind
+            ]
             if own:
                 straighter = np.concatenate(own, axis=1).min(axis=0)
                 assert 0.0 <= np.percentile(straighter, STRAIGHTEST) <= MOST_DEG, (source, kind)

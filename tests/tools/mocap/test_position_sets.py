@@ -25,9 +25,14 @@ MINUTES = {
 
 
 def write_set(path, spine_behind_m=0.07, gaps=(), fps=30.0, knee_deg=3.0, name="a"):
-    """Write a set of one take of somebody who stands facing +z, whose lower spine lies behind the hips."""
+    """Write a set of one take of somebody who stands facing +z, whose lower spine lies behind the
+    hips.
+    """
     at = {name: np.resize(place, (T, 3)) for name, place in standing(knee_deg=knee_deg).items()}
-    at["spine1"], at["spine2"] = at["pelvis"] + [0.0, 0.1, -spine_behind_m], at["chest"] - [0.0, 0.0, spine_behind_m]
+    at["spine1"], at["spine2"] = (
+        at["pelvis"] + [0.0, 0.1, -spine_behind_m],
+        at["chest"] - [0.0, 0.0, spine_behind_m],
+    )
     for side in ("left", "right"):
         at[f"{side}_foot"] = at[f"{side}_foot_end"]
     names = sorted(at)
@@ -35,9 +40,14 @@ def write_set(path, spine_behind_m=0.07, gaps=(), fps=30.0, knee_deg=3.0, name="
     for frame, joint in gaps:
         positions[frame, names.index(joint)] = np.nan
     np.savez(
-        path, take_name=np.array([name]), subject=np.array(["s"]), fps=np.array([fps]), start=np.array([0, T]),
-        joint_names=np.array(names), positions=positions.astype(np.float32),
-    )  # fmt: skip
+        path,
+        take_name=np.array([name]),
+        subject=np.array(["s"]),
+        fps=np.array([fps]),
+        start=np.array([0, T]),
+        joint_names=np.array(names),
+        positions=positions.astype(np.float32),
+    )
     return path
 
 
@@ -74,7 +84,9 @@ def test_sets_are_resampled_and_can_be_left_out(tmp_path):
 def test_bent_legs_of_rocketbox_are_straightened(tmp_path, name, turned):
     plain = load_set(write_set(tmp_path / "accad.npz", knee_deg=10.0))
     bent = load_set(write_set(tmp_path / "rocketbox.npz", knee_deg=10.0, name=name))
-    before, after = (knee_flexions({joint: take[0].joint(joint) for joint in LEGS}) for take in (plain, bent))
+    before, after = (
+        knee_flexions({joint: take[0].joint(joint) for joint in LEGS}) for take in (plain, bent)
+    )
     np.testing.assert_allclose(before - after, turned, atol=0.3)
 
 
@@ -99,7 +111,9 @@ def test_the_true_sets(shared, name):
     assert minutes == pytest.approx(MINUTES[name], abs=0.2)
     for take in takes[:: max(1, len(takes) // 8)]:
         R = take.orientations
-        np.testing.assert_allclose(R @ R.swapaxes(-1, -2), np.broadcast_to(np.eye(3), R.shape), atol=1e-6)
+        np.testing.assert_allclose(
+            R @ R.swapaxes(-1, -2), np.broadcast_to(np.eye(3), R.shape), atol=1e-6
+        )
         left = take.joint("left_hip") - take.joint("right_hip")
         assert np.einsum("ti,ti->t", R[:, take.index("pelvis"), :, 0], left).min() > 0.0
         assert np.median(knee_flexions({joint: take.joint(joint) for joint in LEGS})) > -10.0

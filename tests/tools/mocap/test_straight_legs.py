@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Straightening legs: of a made leg whose joints are wrong in a known way, and never what CMU's solver held at 0."""
+"""Straightening legs: of a made leg whose joints are wrong in a known way, and never what CMU's
+solver held at 0.
+"""
 
 import numpy as np
 import pytest
@@ -11,7 +13,8 @@ NAMES = ("pelvis", *(f"{s}_{j}" for s in ("left", "right") for j in ("hip", "kne
 
 
 def made_take(knee_deg, name="train_directing_traffic_1", source="cmu_expmap", lowered_m=0.025):
-    """Somebody who stands facing +z and bends the knees by these angles (T,), hips and ankles displaced as CMU's are.
+    """Somebody who stands facing +z and bends the knees by these angles (T,), hips and ankles
+    displaced as CMU's are.
 
     ``lowered_m``: how far the hips are below where they should be.
     """
@@ -36,8 +39,12 @@ def legs(take):
 def test_flexion_has_the_sign_of_the_side_to_which_a_knee_bends():
     left = np.array([[1.0, 0.0, 0.0]])
     hip, ankle = np.array([[0.0, 1.0, 0.0]]), np.array([[0.0, 0.0, 0.0]])
-    assert flexion(hip, np.array([[0.0, 0.5, 0.1]]), ankle, left) == pytest.approx(2 * np.degrees(np.arctan(0.2)))
-    assert flexion(hip, np.array([[0.0, 0.5, -0.1]]), ankle, left) == pytest.approx(-2 * np.degrees(np.arctan(0.2)))
+    assert flexion(hip, np.array([[0.0, 0.5, 0.1]]), ankle, left) == pytest.approx(
+        2 * np.degrees(np.arctan(0.2))
+    )
+    assert flexion(hip, np.array([[0.0, 0.5, -0.1]]), ankle, left) == pytest.approx(
+        -2 * np.degrees(np.arctan(0.2))
+    )
     assert flexion(hip, np.array([[0.0, 0.5, 0.0]]), ankle, left) == pytest.approx(0.0)
 
 
@@ -52,7 +59,9 @@ def test_standing_knees_get_the_flexion_of_people():
     moved = before.joint("left_knee") - after.joint("left_knee")
     x = np.linalg.norm(moved, axis=1) / np.cos(np.radians(knee_flexions(legs(after))[0]) / 2) ** 2
     assert 0.0 < x.min() < x.max() < MOST_M
-    np.testing.assert_allclose(after.joint("left_hip") - before.joint("left_hip"), [[0.0, 0.025, 0.0]] * 40, atol=1e-12)
+    np.testing.assert_allclose(
+        after.joint("left_hip") - before.joint("left_hip"), [[0.0, 0.025, 0.0]] * 40, atol=1e-12
+    )
     np.testing.assert_array_equal(after.joint("pelvis"), before.joint("pelvis"))
 
 
@@ -68,7 +77,9 @@ def test_bones_carry_their_segments_along():
             local.append(np.einsum("tji,tj->ti", take.orientations[:, k], bone))
         np.testing.assert_allclose(local[0], local[1], atol=1e-9)
         R = after.orientations[:, k]
-        np.testing.assert_allclose(R @ R.swapaxes(-1, -2), np.broadcast_to(np.eye(3), R.shape), atol=1e-9)
+        np.testing.assert_allclose(
+            R @ R.swapaxes(-1, -2), np.broadcast_to(np.eye(3), R.shape), atol=1e-9
+        )
 
 
 def test_knees_move_no_further_than_people_s_joints_are_wrong():

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Write flow_by_torch.npz: parameters of a random PyTorch flow, states, and what PyTorch makes of them.
+"""Write flow_by_torch.npz: parameters of a random PyTorch flow, states, and what PyTorch makes of
+them.
 
 Needs PyTorch, which the tests do not: ``python tests/tools/train_prior/make_flow_fixture.py``.
 """
@@ -24,7 +25,13 @@ def main():
         states = matrix_from_quaternion(rng.standard_normal((20, 4)))
         z, _ = flow(chart(torch.tensor(states[None]), flow.means[:, None])[0])
         log_likelihood = flow.log_likelihood(torch.tensor(states[None]))
-    np.savez_compressed(FIXTURE, states=states, z=z[0].numpy(), log_likelihood=log_likelihood[0].numpy(), **flow.row(0))
+    np.savez_compressed(
+        FIXTURE,
+        states=states,
+        z=z[0].numpy(),
+        log_likelihood=log_likelihood[0].numpy(),
+        **flow.row(0),
+    )
 
 
 if __name__ == "__main__":

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Training data, export and baselines of the joint-state prior, and the one in assets/. Nothing needs PyTorch."""
+"""Training data, export and baselines of the joint-state prior, and the one in assets/. Nothing
+needs PyTorch.
+"""
 
 from pathlib import Path
 
@@ -49,7 +51,9 @@ def test_export_evaluates_to_what_torch_computed():
     states, z, log_likelihood = row.pop("states"), row.pop("z"), row.pop("log_likelihood")
     parameters = flat(row, states)
     np.testing.assert_allclose(jf.transform(parameters, states)[0], z, rtol=1e-9, atol=1e-9)
-    np.testing.assert_allclose(jf.log_density(parameters, states), log_likelihood, rtol=1e-9, atol=1e-8)
+    np.testing.assert_allclose(
+        jf.log_density(parameters, states), log_likelihood, rtol=1e-9, atol=1e-8
+    )
 
 
 def test_mirrored_parameters_are_the_flow_of_the_mirror_image():
@@ -66,15 +70,23 @@ def test_mirrored_parameters_are_the_flow_of_the_mirror_image():
 
 
 def test_joints_without_data_have_a_gaussian_about_rest():
-    angles = rotations.log(jf.invert(fixed(HAND_DEVIATION), np.random.default_rng(0).standard_normal((50_000, 3))))
+    angles = rotations.log(
+        jf.invert(fixed(HAND_DEVIATION), np.random.default_rng(0).standard_normal((50_000, 3)))
+    )
     np.testing.assert_allclose(angles.std(0), HAND_DEVIATION, rtol=0.03)
     np.testing.assert_allclose(angles.mean(0), 0.0, atol=0.01)
 
 
 def test_performers_do_not_straddle_the_split():
     assert group_of("cmu_asf_amc", "cmu_02") in TEST
-    assert group_of("cmu_expmap", "expmap_train_soccer_3") == group_of("cmu_expmap", "expmap_test_soccer_1") in TEST
-    assert group_of("cmu_expmap", "expmap_train_running_2") == group_of("cmu_expmap", "expmap_test_walking_12")
+    assert (
+        group_of("cmu_expmap", "expmap_train_soccer_3")
+        == group_of("cmu_expmap", "expmap_test_soccer_1")
+        in TEST
+    )
+    assert group_of("cmu_expmap", "expmap_train_running_2") == group_of(
+        "cmu_expmap", "expmap_test_walking_12"
+    )
     assert group_of("cmu_expmap", "expmap_train_basketball_signal_1") == "expmap_basketball"
     assert group_of("cmu_more", "cmu_06") == "expmap_basketball"
     assert group_of("cmu_more", "cmu_13") == group_of("cmu_more", "cmu_14") == "expmap_jumping"
@@ -89,10 +101,14 @@ def test_performers_do_not_straddle_the_split():
 def test_balance_of_performers():
     group = np.array(["a"] * 8 + ["b"] * 2)
     np.testing.assert_allclose(balanced(group, 0.0), 0.1)
-    np.testing.assert_allclose([balanced(group, 1.0)[:8].sum(), balanced(group, 1.0)[8:].sum()], 0.5)
+    np.testing.assert_allclose(
+        [balanced(group, 1.0)[:8].sum(), balanced(group, 1.0)[8:].sum()], 0.5
+    )
 
 
-@pytest.mark.parametrize("s", [(0.0, 0.0, 0.0), (3.0, 1.0, -0.5), (8.0, 5.0, 2.0), (12.0, 3.0, -2.5)])
+@pytest.mark.parametrize(
+    "s", [(0.0, 0.0, 0.0), (3.0, 1.0, -0.5), (8.0, 5.0, 2.0), (12.0, 3.0, -2.5)]
+)
 def test_fisher_constant_is_the_integral_over_rotations(s):
     R = uniform_rotations(np.random.default_rng(1), 400_000)
     values = np.exp(R[:, 0, 0] * s[0] + R[:, 1, 1] * s[1] + R[:, 2, 2] * s[2])
@@ -100,11 +116,15 @@ def test_fisher_constant_is_the_integral_over_rotations(s):
     constant, gradient = baselines.log_fisher_constant(np.array(s))
     assert constant == pytest.approx(np.log(values.mean()), abs=max(tolerance, 1e-9))
     moments = (np.diagonal(R, axis1=1, axis2=2) * values[:, None]).mean(0) / values.mean()
-    np.testing.assert_allclose(gradient, moments, atol=5.0 * (tolerance + 1.0 / np.sqrt(len(values))))
+    np.testing.assert_allclose(
+        gradient, moments, atol=5.0 * (tolerance + 1.0 / np.sqrt(len(values)))
+    )
 
 
 def test_fisher_constant_in_the_concentrated_limit():
-    """c(s) -> exp(sum s) / sqrt(8 pi) / sqrt of the product of the pairs' sums, to first order in 1/s."""
+    """c(s) -> exp(sum s) / sqrt(8 pi) / sqrt of the product of the pairs' sums, to first order in
+    1/s.
+    """
     s = np.array([4000.0, 2500.0, 1000.0])
     pairs = np.array([s[0] + s[1], s[0] + s[2], s[1] + s[2]])
     limit = s.sum() - 0.5 * np.log(8.0 * np.pi) - 0.5 * np.log(pairs).sum()
@@ -123,7 +143,8 @@ def test_baselines_are_normalized_and_fit_their_own_samples(fit):
     values = np.exp(density(uniform_rotations(rng, 300_000)))
     assert values.mean() == pytest.approx(1.0, abs=4.0 * values.std() / np.sqrt(len(values)))
     fresh = concentrated(rng, 20_000)
-    exact = 1.5 * np.log(2 * np.pi * np.e) + np.log(0.1 * 0.3 * 0.8) - np.log(8 * np.pi**2)  # but for the volume factor
+    # but for the volume factor
+    exact = 1.5 * np.log(2 * np.pi * np.e) + np.log(0.1 * 0.3 * 0.8) - np.log(8 * np.pi**2)
     assert -density(fresh).mean() == pytest.approx(exact, abs=0.2)
 
 
@@ -163,7 +184,9 @@ def samples():
 
 
 def test_samples_of_the_prior_look_like_the_data(prior, samples):
-    """Mean rotation, and spread about it along its principal axes, of training performers and of samples."""
+    """Mean rotation, and spread about it along its principal axes, of training performers and of
+    samples.
+    """
     rng = np.random.default_rng(4)
     for model in MODELS:
         joint = model if model in TRUNK else f"left_{model}"
@@ -176,7 +199,9 @@ def test_samples_of_the_prior_look_like_the_data(prior, samples):
         spread, axes = np.linalg.eigh(C)
         found = np.diag(axes.T @ (y.T @ y / len(y)) @ axes)
         assert np.linalg.norm(y.mean(0)) < 0.35 * np.sqrt(spread[2]) + np.radians(1.0), model
-        ratio = np.sqrt(found[1:] + np.radians(1.0) ** 2) / np.sqrt(spread[1:] + np.radians(1.0) ** 2)
+        ratio = np.sqrt(found[1:] + np.radians(1.0) ** 2) / np.sqrt(
+            spread[1:] + np.radians(1.0) ** 2
+        )
         assert (0.6 < ratio).all(), (model, ratio)
         assert (ratio < 1.6).all(), (model, ratio)
 
@@ -186,6 +211,9 @@ def test_flow_is_better_than_both_baselines_on_performers_it_has_not_seen(prior,
 
     rows = held_out(prior, samples)
     count = np.array([1 if r.joint in TRUNK else 2 for r in rows])
-    mean = [np.average([getattr(r, key) for r in rows], weights=count) for key in ("flow", "gaussian", "fisher")]
+    mean = [
+        np.average([getattr(r, key) for r in rows], weights=count)
+        for key in ("flow", "gaussian", "fisher")
+    ]
     assert mean[0] < min(mean[1:]) - 0.1
     assert count[[r.best for r in rows]].sum() >= 18

@@ -34,7 +34,11 @@ def run_to_end(job):
 
 
 def job_files():
-    return [p for p in cache().root.rglob("*") if "captures" not in p.parts and p.name not in ("jobs", "kernels")]
+    return [
+        p
+        for p in cache().root.rglob("*")
+        if "captures" not in p.parts and p.name not in ("jobs", "kernels")
+    ]
 
 
 def captures():
@@ -59,10 +63,14 @@ def test_a_result_is_built_shown_and_cached(fake_worker, footage):
     assert len(captures()) == 2
 
 
-def test_the_next_capture_of_a_kind_knows_how_long_the_stages_took(fake_worker, footage, tmp_path, monkeypatch):
+def test_the_next_capture_of_a_kind_knows_how_long_the_stages_took(
+    fake_worker, footage, tmp_path, monkeypatch
+):
     now = [1000.0]
     monkeypatch.setattr(capture_job, "JobProgress", partial(JobProgress, lambda: now[0]))
-    steps = "".join(f"send('progress', stage='finding the person', done={k}, total=10)\n" for k in range(11))
+    steps = "".join(
+        f"send('progress', stage='finding the person', done={k}, total=10)\n" for k in range(11)
+    )
     solved = tmp_path / "solved"
     fake_worker(
         f"{steps}send('progress', stage='solving', done=1, total=10)\n"
@@ -88,9 +96,14 @@ def test_the_next_capture_of_a_kind_knows_how_long_the_stages_took(fake_worker, 
     assert job.progress._earlier["solving"] == pytest.approx(0.3)  # seconds for each of ten frames
 
 
-def test_blender_does_not_wait_for_a_worker_that_is_ending(fake_worker, footage, tmp_path, monkeypatch):
-    monkeypatch.setattr(capture_job, "_ENDING_S", 600.0)  # on a busy computer, three steps may take long
-    fake_worker(f"finish()\nwhile not os.path.exists({str(tmp_path / 'end')!r}):\n    time.sleep(0.01)")
+def test_blender_does_not_wait_for_a_worker_that_is_ending(
+    fake_worker, footage, tmp_path, monkeypatch
+):
+    # on a busy computer, three steps may take long
+    monkeypatch.setattr(capture_job, "_ENDING_S", 600.0)
+    fake_worker(
+        f"finish()\nwhile not os.path.exists({str(tmp_path / 'end')!r}):\n    time.sleep(0.01)"
+    )
     bpy.context.scene.scope.footage = str(footage)
     job = CaptureJob(bpy.context.scene)
     wait_for(lambda: job.step() and job.worker.finished)
@@ -115,14 +128,19 @@ def test_several_people_are_built_and_distinguished(fake_worker, footage):
 
 
 def test_the_height_of_a_child_requests_the_body_of_all_ages(fake_worker, footage):
-    fake_worker("assert request['body'] == 'scope_child', request\nsend('error', message='so it was')")
+    fake_worker(
+        "assert request['body'] == 'scope_child', request\nsend('error', message='so it was')"
+    )
     bpy.context.scene.scope.footage, bpy.context.scene.scope.height_cm = str(footage), 110
     with pytest.raises(RuntimeError, match="So it was"):
         bpy.ops.scope.capture()
 
 
 def test_hands_request_the_body_with_fingers(fake_worker, footage):
-    fake_worker("assert request['hands'] == 'on' and request['body'] == 'scope_h'\nsend('error', message='so it was')")
+    fake_worker(
+        "assert request['hands'] == 'on' and request['body'] == 'scope_h'\nsend('error', "
+        "message='so it was')"
+    )
     bpy.context.scene.scope.footage, bpy.context.scene.scope.hands = str(footage), "ON"
     with pytest.raises(RuntimeError, match="So it was"):
         bpy.ops.scope.capture()
@@ -134,7 +152,14 @@ def test_changed_options_need_another_capture(fake_worker, footage):
     scene.scope.footage = str(footage)
     bpy.ops.scope.capture()
     fake_worker("send('error', message='asked again')")
-    others = {"quality": "FAST", "lens": "FOV", "smoothing": False, "body": "SCOPE_H", "people": "ALL", "hands": "ON"}
+    others = {
+        "quality": "FAST",
+        "lens": "FOV",
+        "smoothing": False,
+        "body": "SCOPE_H",
+        "people": "ALL",
+        "hands": "ON",
+    }
     others |= {"height_cm": 180.0}
     for name, value in others.items():
         before = getattr(scene.scope, name)
@@ -155,7 +180,9 @@ def test_the_operator_builds_what_the_interface_builds(fake_worker, footage, sta
     options = BuildOptions(frame_rate="set", start_frame=1.0)
     interfaces = build_scene([standing], load_body("scope"), footage, options).people[0].armature
     ours, theirs = fcurves(operators), fcurves(interfaces)
-    assert [(c.data_path, c.array_index) for c in ours] == [(c.data_path, c.array_index) for c in theirs]
+    assert [(c.data_path, c.array_index) for c in ours] == [
+        (c.data_path, c.array_index) for c in theirs
+    ]
     for a, b in zip(ours, theirs, strict=True):
         assert np.array_equal(read_keys(a), read_keys(b))
 
@@ -168,7 +195,12 @@ def test_the_operator_builds_what_the_interface_builds(fake_worker, footage, sta
         ("sys.exit('no module named numba')", "no module named numba"),
         ("print('not json'); print('[1]'); sys.exit(3)", "status 3"),
         ("send('result', motions=['person1.npz'], report={})", "person1.npz"),
-        ("open(folder + '/person1.npz', 'w').write('x'); send('result', motions=['person1.npz'], report={})", "npz"),
+        (
+            "open(folder + '/person1.npz', 'w').write('x'); send('result', "
+            "motions=['person1.npz'], "
+            "report={})",
+            "npz",
+        ),
     ],
 )
 def test_a_failure_is_reported_and_changes_nothing(fake_worker, footage, contents, script, says):
@@ -183,9 +215,14 @@ def test_a_failure_is_reported_and_changes_nothing(fake_worker, footage, content
     assert job_files() == []
 
 
-@pytest.mark.parametrize("end", [lambda job: job.close(), lambda job: os.kill(job.worker.pid, signal.SIGKILL)])
+@pytest.mark.parametrize(
+    "end", [lambda job: job.close(), lambda job: os.kill(job.worker.pid, signal.SIGKILL)]
+)
 def test_a_cancelled_or_killed_capture_leaves_nothing_behind(fake_worker, footage, contents, end):
-    fake_worker("send('progress', stage='solving', done=3, total=10)\nopen(folder + '/half', 'w')\ntime.sleep(600)")
+    fake_worker(
+        "send('progress', stage='solving', done=3, total=10)\nopen(folder + '/half', "
+        "'w')\ntime.sleep(600)"
+    )
     bpy.context.scene.scope.footage = str(footage)
     before = contents()
     job = CaptureJob(bpy.context.scene)
@@ -313,7 +350,10 @@ def test_real_worker_uses_a_calibration_and_no_internet_connection(fake_worker, 
     import cv2
 
     height, width = cv2.imread(str(footage)).shape[:2]
-    K, dist = [[700.0, 0, width / 2 + 3], [0, 720.0, height / 2], [0, 0, 1]], [-0.05, 0.01, 0.002, 0.0, 0.0]
+    K, dist = (
+        [[700.0, 0, width / 2 + 3], [0, 720.0, height / 2], [0, 0, 1]],
+        [-0.05, 0.01, 0.002, 0.0, 0.0],
+    )
     lens, scene = tmp_path / "lens.json", bpy.context.scene
     scene.scope.footage, scene.scope.quality = str(footage), "FAST"
     scene.scope.lens, scene.scope.calibration_file = "FILE", str(lens)
@@ -321,7 +361,8 @@ def test_real_worker_uses_a_calibration_and_no_internet_connection(fake_worker, 
     guard.write_text(
         "import runpy, sys\n"
         "def hook(event, arguments):\n"
-        "    if event in ('socket.connect', 'socket.getaddrinfo', 'socket.bind', 'socket.sendto'):\n"
+        "    if event in ('socket.connect', 'socket.getaddrinfo', 'socket.bind', "
+        "'socket.sendto'):\n"
         "        raise RuntimeError('network')\n"
         "sys.addaudithook(hook)\n"
         "sys.argv = sys.argv[1:]\n"

@@ -21,8 +21,12 @@ from scope.scope_addon.ui.capture.job_operator import JobOperator
 
 
 def window_with_sidebar(category="Scope", width=200):
-    """Return what the operator reads of a window whose 3D viewport has its sidebar at x 800 to 1000."""
-    sidebar = SimpleNamespace(type="UI", x=800, y=100, width=width, height=500, active_panel_category=category)
+    """Return what the operator reads of a window whose 3D viewport has its sidebar at x 800 to
+    1000.
+    """
+    sidebar = SimpleNamespace(
+        type="UI", x=800, y=100, width=width, height=500, active_panel_category=category
+    )
     viewport = SimpleNamespace(type="VIEW_3D", regions=[SimpleNamespace(type="WINDOW"), sidebar])
     timeline = SimpleNamespace(type="DOPESHEET_EDITOR", regions=[])
     return SimpleNamespace(screen=SimpleNamespace(areas=[timeline, viewport]))
@@ -43,14 +47,18 @@ def test_the_cancel_operator_ends_the_worker_immediately(fake_worker, footage):
 
 def test_an_unexpected_error_ends_the_capture():
     closed = []
-    state.job = SimpleNamespace(close=lambda: closed.append(True), step=lambda: 1 / 0, cancelled=False)
+    state.job = SimpleNamespace(
+        close=lambda: closed.append(True), step=lambda: 1 / 0, cancelled=False
+    )
     operator = SimpleNamespace(job_state=state, stop_job=capture_operators.stop_job)
     operator.step, operator._advance = (
         partial(getattr(SCOPE_OT_capture, name), operator) for name in ("step", "_advance")
     )
     operator.end = partial(JobOperator.end, operator)
     with pytest.raises(ZeroDivisionError):
-        capture_operators.SCOPE_OT_capture.modal(operator, bpy.context, SimpleNamespace(type="TIMER", value="NOTHING"))
+        capture_operators.SCOPE_OT_capture.modal(
+            operator, bpy.context, SimpleNamespace(type="TIMER", value="NOTHING")
+        )
     assert closed
     assert state.job is None  # otherwise no other capture could be started
 
@@ -62,7 +70,9 @@ def test_the_panel_is_drawn_again_only_for_news_and_rarely(monkeypatch):
     lines = ["Finding the person"]
     progress = SimpleNamespace(lines=lambda _: lines, stage="finding the person")
     state.job = SimpleNamespace(progress=progress, messages=0, step=lambda: True, cancelled=False)
-    operator = SimpleNamespace(_shown=("", "", 0), _drawn_s=0.0, _pause_s=0.3, timer_s=0.1, job_state=state)
+    operator = SimpleNamespace(
+        _shown=("", "", 0), _drawn_s=0.0, _pause_s=0.3, timer_s=0.1, job_state=state
+    )
     operator.step, operator._advance = (
         partial(getattr(SCOPE_OT_capture, name), operator) for name in ("step", "_advance")
     )
@@ -125,7 +135,9 @@ def test_escape_cancels_only_over_the_panel(fake_worker, footage, x, y, window, 
     fake_worker("time.sleep(600)")
     bpy.context.scene.scope.footage = str(footage)
     state.job, state.started = CaptureJob(bpy.context.scene), time.monotonic()
-    operator = SimpleNamespace(job_state=state, ask_to_cancel=partial(SCOPE_OT_capture.ask_to_cancel, None))
+    operator = SimpleNamespace(
+        job_state=state, ask_to_cancel=partial(SCOPE_OT_capture.ask_to_cancel, None)
+    )
     context = SimpleNamespace(window=window)
     escape = SimpleNamespace(type="ESC", value="PRESS", mouse_x=x, mouse_y=y)
     outcome = SCOPE_OT_capture.modal(operator, context, escape)
@@ -155,11 +167,15 @@ class Drawn:
 @pytest.mark.parametrize(("seconds", "asks"), [(3.0, False), (30.0, True)])
 def test_cancelling_asks_when_more_than_ten_seconds_are_done(monkeypatch, seconds, asks):
     state.job, state.started = SimpleNamespace(cancelled=False, close=lambda: None), 100.0
-    monkeypatch.setattr(capture_operators, "time", SimpleNamespace(monotonic=lambda: 100.0 + seconds))
+    monkeypatch.setattr(
+        capture_operators, "time", SimpleNamespace(monotonic=lambda: 100.0 + seconds)
+    )
     questions, drawn = [], Drawn()
     monkeypatch.setattr(capture_operators, "ask_to_stop", lambda: questions.append(True))
     monkeypatch.setattr(capture_operators.bpy, "app", SimpleNamespace(background=False))
-    operator = SimpleNamespace(execute=lambda _: setattr(state.job, "cancelled", True) or {"FINISHED"})
+    operator = SimpleNamespace(
+        execute=lambda _: setattr(state.job, "cancelled", True) or {"FINISHED"}
+    )
     try:
         SCOPE_OT_cancel.invoke(operator, None, None)
         assert bool(questions) is asks

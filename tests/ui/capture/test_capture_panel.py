@@ -27,9 +27,27 @@ def captured(fake_worker, footage):
 def test_settings_and_result_are_saved_in_the_blend_file(fake_worker, footage, tmp_path):
     captured(fake_worker, footage)
     settings = bpy.context.scene.scope
-    wanted = {"quality": "FAST", "body": "FILE", "body_file": "//smpl.npz", "lens": "FOCAL", "focal_mm": 35.0}
-    wanted |= {"smoothing": False, "frame_rate": "KEEP", "start_frame": 101, "shape": "BAKED", "with_camera": False}
-    wanted |= {"people": "ALL", "people_count": 5, "use_range": True, "range_start": 2.5, "with_markers": False}
+    wanted = {
+        "quality": "FAST",
+        "body": "FILE",
+        "body_file": "//smpl.npz",
+        "lens": "FOCAL",
+        "focal_mm": 35.0,
+    }
+    wanted |= {
+        "smoothing": False,
+        "frame_rate": "KEEP",
+        "start_frame": 101,
+        "shape": "BAKED",
+        "with_camera": False,
+    }
+    wanted |= {
+        "people": "ALL",
+        "people_count": 5,
+        "use_range": True,
+        "range_start": 2.5,
+        "with_markers": False,
+    }
     wanted |= {"height_cm": 175.0}
     for name, value in wanted.items():
         setattr(settings, name, value)
@@ -80,8 +98,12 @@ def test_buttons_are_disabled_until_their_input_exists(fake_worker, footage):
     assert bpy.ops.scope.look_through.poll()
 
 
-@pytest.mark.parametrize(("kind", "suffix"), [(k, f".{k.lower()}") for k in ("FBX", "GLB", "BVH", "USDC", "NPZ")])
-def test_export_buttons_write_files_and_do_not_change_the_scene(fake_worker, footage, tmp_path, contents, kind, suffix):
+@pytest.mark.parametrize(
+    ("kind", "suffix"), [(k, f".{k.lower()}") for k in ("FBX", "GLB", "BVH", "USDC", "NPZ")]
+)
+def test_export_buttons_write_files_and_do_not_change_the_scene(
+    fake_worker, footage, tmp_path, contents, kind, suffix
+):
     if kind == "USDC" and "usd_export" not in dir(bpy.ops.wm):
         pytest.skip("this Blender was built without USD")
     captured(fake_worker, footage)
@@ -91,9 +113,14 @@ def test_export_buttons_write_files_and_do_not_change_the_scene(fake_worker, foo
     assert contents() == before
 
 
-def test_a_motion_file_contains_the_captured_motion_and_the_edits_that_it_keeps(fake_worker, footage, tmp_path):
+def test_a_motion_file_contains_the_captured_motion_and_the_edits_that_it_keeps(
+    fake_worker, footage, tmp_path
+):
     captured(fake_worker, footage)
-    armature, cached = bpy.data.objects["person"], next((cache().root / "captures").rglob("person1.npz"))
+    armature, cached = (
+        bpy.data.objects["person"],
+        next((cache().root / "captures").rglob("person1.npz")),
+    )
     kept = Motion.load(cached)
     bpy.context.view_layer.objects.active = armature
     bpy.ops.scope.refloor()
@@ -157,11 +184,15 @@ def test_only_the_active_capture_is_exported(fake_worker, footage, tmp_path):
         bpy.ops.scope.export(filepath=str(tmp_path / "none.bvh"), format="BVH", which="ACTIVE")
 
 
-def test_an_export_does_not_remember_that_the_last_one_wrote_another_capture_or_rig(fake_worker, footage, tmp_path):
+def test_an_export_does_not_remember_that_the_last_one_wrote_another_capture_or_rig(
+    fake_worker, footage, tmp_path
+):
     captured(fake_worker, footage)
     bpy.ops.scope.capture()
     assert bpy.ops.scope.export.get_rna_type().properties["which"].is_skip_save
-    bpy.ops.scope.export("INVOKE_DEFAULT", filepath=str(tmp_path / "both.bvh"), format="BVH", which="ALL")
+    bpy.ops.scope.export(
+        "INVOKE_DEFAULT", filepath=str(tmp_path / "both.bvh"), format="BVH", which="ALL"
+    )
     bpy.ops.scope.export("INVOKE_DEFAULT", filepath=str(tmp_path / "one.bvh"), format="BVH")
     assert len(list(tmp_path.glob("one*.bvh"))) == 1
 
@@ -208,7 +239,9 @@ def test_comparing_with_footage_sets_camera_and_resolution(fake_worker, footage)
 
 def test_a_hidden_camera_is_shown_because_it_shows_the_footage(fake_worker, footage):
     captured(fake_worker, footage)
-    camera = next(obj for obj in bpy.context.scene.scope.result.collection.objects if obj.type == "CAMERA")
+    camera = next(
+        obj for obj in bpy.context.scene.scope.result.collection.objects if obj.type == "CAMERA"
+    )
     camera.hide_viewport = True
     camera.hide_set(True)
     bpy.ops.scope.look_through()
@@ -219,7 +252,9 @@ def test_a_hidden_camera_is_shown_because_it_shows_the_footage(fake_worker, foot
 def test_comparing_a_hidden_capture_is_an_error(fake_worker, footage, way):
     captured(fake_worker, footage)
     shown = bpy.context.scene.scope.result.collection
-    layer = next(c for c in bpy.context.view_layer.layer_collection.children if c.collection == shown)
+    layer = next(
+        c for c in bpy.context.view_layer.layer_collection.children if c.collection == shown
+    )
     setattr(layer, way, True)
     bpy.context.view_layer.update()
     with pytest.raises(RuntimeError, match=f"'{shown.name}' is hidden; show it in the Outliner"):
@@ -239,7 +274,8 @@ def test_warnings_name_their_frames(fake_worker, footage):
     bpy.ops.scope.go_to_frame(frame=8)
     assert scene.frame_current == 8
     assert [first_frame(span) for span in ("-12--4", "-3-4", "7")] == [-12, -3, 7]
-    assert [m.frame for m in scene.timeline_markers] == [4]  # one marker for both spans, which are close together
+    # one marker for both spans, which are close together
+    assert [m.frame for m in scene.timeline_markers] == [4]
 
 
 def test_the_first_frame_is_not_negative():
@@ -275,11 +311,21 @@ def test_the_part_of_the_video_is_sent_to_the_worker(fake_worker, footage):
 
 def test_the_preferences_are_sent_to_the_worker(fake_worker, footage, monkeypatch):
     chosen = SimpleNamespace(
-        threads=3, provider="DIRECTML", detector_file="/a/d.onnx", keypoints_file="/a/k.onnx", body_file="",
-        cache_folder="", cache_limit_gb=2,
-    )  # fmt: skip
+        threads=3,
+        provider="DIRECTML",
+        detector_file="/a/d.onnx",
+        keypoints_file="/a/k.onnx",
+        body_file="",
+        cache_folder="",
+        cache_limit_gb=2,
+    )
     monkeypatch.setattr(capture_job, "preferences", lambda: chosen)
-    wanted = {"threads": 3, "provider": "directml", "detector": "/a/d.onnx", "keypoints": "/a/k.onnx"}
+    wanted = {
+        "threads": 3,
+        "provider": "directml",
+        "detector": "/a/d.onnx",
+        "keypoints": "/a/k.onnx",
+    }
     fake_worker(f"wanted = {wanted}\nassert {{k: request[k] for k in wanted}} == wanted\nfinish()")
     bpy.context.scene.scope.footage = str(footage)
     assert bpy.ops.scope.capture() == {"FINISHED"}
@@ -351,7 +397,9 @@ def test_compiling_has_its_own_progress_and_no_remaining_time():
     for second in range(50, 150):
         now[0] = float(second)
         progress.update("compiling the solver", second - 50, 100)
-        assert progress.lines() == [f"Compiling the solver (first capture only), {second - 50} of 100"]
+        assert progress.lines() == [
+            f"Compiling the solver (first capture only), {second - 50} of 100"
+        ]
     progress.update("finding the shape", 1, 100)
     assert progress.fraction == pytest.approx(before, abs=0.01)
     assert "finding the shape" not in progress.seconds
@@ -359,7 +407,8 @@ def test_compiling_has_its_own_progress_and_no_remaining_time():
 
 
 @pytest.mark.parametrize(
-    ("seconds", "text"), [(0.2, "0 s"), (59.6, "1 min 00 s"), (125, "2 min 05 s"), (3720, "1 h 02 min")]
+    ("seconds", "text"),
+    [(0.2, "0 s"), (59.6, "1 min 00 s"), (125, "2 min 05 s"), (3720, "1 h 02 min")],
 )
 def test_durations(seconds, text):
     assert duration(seconds) == text

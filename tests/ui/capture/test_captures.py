@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The list of captures: one result each, which survives whatever is done to the collection and its armatures."""
+"""The list of captures: one result each, which survives whatever is done to the collection and its
+armatures.
+"""
 
 import bpy
 import pytest
@@ -107,7 +109,8 @@ def test_undoing_a_capture_shows_the_previous_result(fake_worker, footage):
 def test_renaming_breaks_nothing(two):
     select("person")
     collection = bpy.data.collections["person"]
-    collection.name, bpy.data.objects["person"].name = "zzz", "hero"  # the collections are sorted by name
+    # the collections are sorted by name
+    collection.name, bpy.data.objects["person"].name = "zzz", "hero"
     bpy.data.collections["other"].name = "person"
     assert shown() == ("zzz", 1, "First")
     assert [obj.name for obj in people_of(collection)] == ["hero"]
@@ -204,7 +207,9 @@ def drawn(name: str, width: int) -> dict[str, list]:
             found["label"].append(text)
 
     preferences = type("P", (), {"system": type("S", (), {"ui_scale": 1.0})()})()
-    context = type("C", (), {"preferences": preferences, "region": type("R", (), {"width": width})()})()
+    context = type(
+        "C", (), {"preferences": preferences, "region": type("R", (), {"width": width})()}
+    )()
     item = bpy.data.collections[name]
     bpy.types.SCOPE_UL_captures.draw_item(None, context, Layout(), bpy.data, item, 0, None, "")
     return found

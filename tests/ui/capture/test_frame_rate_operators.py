@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Giving the scene the footage's frame rate: captures are at the same place at the same time, other keys stay."""
+"""Giving the scene the footage's frame rate: captures are at the same place at the same time, other
+keys stay.
+"""
 
 import bpy
 import numpy as np
@@ -27,7 +29,12 @@ def built(start=START, **changes):
     result = build_scene([motion], BODY, None, BuildOptions(start_frame=start, name="walk"))
     person = result.people[0].armature
     pack_motion(person, motion.to_bytes())
-    show_result(result.collection.scope_result, "", {"warnings": ["the scene keeps its 20 frames/s"]}, result)
+    show_result(
+        result.collection.scope_result,
+        "",
+        {"warnings": ["the scene keeps its 20 frames/s"]},
+        result,
+    )
     bpy.context.scene.scope.capture = result.collection
     return person
 
@@ -186,10 +193,18 @@ def test_review_frames_and_corrections_name_the_moved_frames(scene):
     valid = np.ones(61, bool)
     valid[30:45] = False
     person = built(valid=valid)
-    bpy.ops.scope.add_pin(joint="left_wrist", frame=31, location=at_times(person, ["left_wrist"])[2, 0])
-    assert (scene.timeline_markers[0].name, scene.timeline_markers[0].frame) == ("not seen 31-40", 31)
+    bpy.ops.scope.add_pin(
+        joint="left_wrist", frame=31, location=at_times(person, ["left_wrist"])[2, 0]
+    )
+    assert (scene.timeline_markers[0].name, scene.timeline_markers[0].frame) == (
+        "not seen 31-40",
+        31,
+    )
     bpy.ops.scope.match_frame_rate()
-    assert (scene.timeline_markers[0].name, scene.timeline_markers[0].frame) == ("not seen 41-54", 41)
+    assert (scene.timeline_markers[0].name, scene.timeline_markers[0].frame) == (
+        "not seen 41-54",
+        41,
+    )
     assert [w.spans for w in scene.scope.result.warnings if w.spans] == ["41-54"]
     assert [e["first"] for e in listed_corrections(person)] == [41]
 
@@ -238,7 +253,12 @@ def test_a_picture_has_no_frame_rate(scene, standing):
 
 @pytest.mark.parametrize(
     ("scene_rate", "rate", "said"),
-    [(30, 5, "are 6 frames apart"), (30, 29.98, "lie between"), (60, 29.99, "lie between"), (24, 1000, "lie between")],
+    [
+        (30, 5, "are 6 frames apart"),
+        (30, 29.98, "lie between"),
+        (60, 29.99, "lie between"),
+        (24, 1000, "lie between"),
+    ],
 )
 def test_keys_are_whole_frames_apart_only_if_they_stay_so(scene_rate, rate, said):
     (text,) = rate_warnings(scene_rate, rate)

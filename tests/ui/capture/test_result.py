@@ -17,7 +17,10 @@ def test_spans_are_listed_by_reason_in_scene_frames(body):
     motion.valid[[0, 20]] = False
     under = np.zeros(30, bool)
     under[3:6] = True
-    assert frame_warnings(motion, np.arange(30) + 10.0, under) == {"unseen": "10,30", "floor": "13-15"}
+    assert frame_warnings(motion, np.arange(30) + 10.0, under) == {
+        "unseen": "10,30",
+        "floor": "13-15",
+    }
 
 
 def test_heights_and_joints_with_their_deviations(body):
@@ -25,8 +28,13 @@ def test_heights_and_joints_with_their_deviations(body):
     motion.joint_sigma_m[1:4] = 0.052
     result = build_scene([motion], body)
     shown = result.collection.scope_result
-    heights = ({"height_m": 1.741, "height_sigma_m": 0.0913}, {"height_m": 1.5, "height_sigma_m": 0.005})
-    show_result(shown, "", {"per_person": [*heights, {"height_m": 1.62, "height_sigma_m": None}]}, result)
+    heights = (
+        {"height_m": 1.741, "height_sigma_m": 0.0913},
+        {"height_m": 1.5, "height_sigma_m": 0.005},
+    )
+    show_result(
+        shown, "", {"per_person": [*heights, {"height_m": 1.62, "height_sigma_m": None}]}, result
+    )
     assert shown.heights == "1.74 m ± 0.09, 1.50 m ± 0.005, 1.62 m"
     assert np.isclose(shown.sigma_cm, 5.2, atol=1e-5)
     show_result(shown, "", {}, result)
@@ -38,8 +46,16 @@ def test_a_warning_keeps_the_name_of_the_footage(body):
     motion.source = "my walk.mp4"
     result = build_scene([motion], body)
     shown = result.collection.scope_result
-    show_result(shown, "", {"warnings": ["my walk.mp4: the person was not seen", "the lens is a guess"]}, result)
-    assert [w.text for w in shown.warnings][:2] == ["my walk.mp4: the person was not seen", "The lens is a guess"]
+    show_result(
+        shown,
+        "",
+        {"warnings": ["my walk.mp4: the person was not seen", "the lens is a guess"]},
+        result,
+    )
+    assert [w.text for w in shown.warnings][:2] == [
+        "my walk.mp4: the person was not seen",
+        "The lens is a guess",
+    ]
 
 
 def test_a_sentence_begins_with_a_capital_but_not_a_file_name():
@@ -57,7 +73,12 @@ def test_figures_are_wrapped_to_the_width_of_the_sidebar(body):
     show_result(shown, "", {"camera": "estimated, 52 degrees", "per_person": heights}, result)
     layout = SimpleNamespace(label=lambda text="", icon="NONE": drawn.append(text))
     layout.column = lambda align=False: layout
-    region, preferences = SimpleNamespace(width=260), SimpleNamespace(system=SimpleNamespace(ui_scale=1.0))
-    capture_panel._draw_figures(SimpleNamespace(region=region, preferences=preferences), layout, shown)
+    region, preferences = (
+        SimpleNamespace(width=260),
+        SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)),
+    )
+    capture_panel._draw_figures(
+        SimpleNamespace(region=region, preferences=preferences), layout, shown
+    )
     assert "standard deviation, median" in " ".join(drawn)
     assert max(map(len, drawn)) <= 28  # as wide as the panel's other sentences

@@ -25,6 +25,9 @@ def test_where_nothing_can_be_captured_that_is_said_without_a_traceback(footage,
     with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (there, here):
         here.scenes = there.scenes
     linked = next(scene for scene in bpy.data.scenes if scene.library)
-    with bpy.context.temp_override(scene=linked), pytest.raises(RuntimeError, match="linked from") as caught:
+    with (
+        bpy.context.temp_override(scene=linked),
+        pytest.raises(RuntimeError, match="linked from") as caught,
+    ):
         bpy.ops.scope.import_video(filepath=str(footage))
     assert "Traceback" not in str(caught.value)

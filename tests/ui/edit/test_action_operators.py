@@ -41,7 +41,9 @@ def test_a_strip_has_the_time_of_the_body_the_root_motion_and_the_face():
     (face,) = (child.data.shape_keys for child in rig.children if child.type == "MESH")
     before = made_rigs.seen(rig, NAMES, [1, 9, 20])
     bpy.ops.scope.push_to_nla()
-    moved = [block for block in (rig, root_object(rig), face) if block.animation_data.action is None]
+    moved = [
+        block for block in (rig, root_object(rig), face) if block.animation_data.action is None
+    ]
     for block in moved:
         (strip,) = (strip for track in block.animation_data.nla_tracks for strip in track.strips)
         strip.frame_end += 50
@@ -52,7 +54,9 @@ def test_a_strip_has_the_time_of_the_body_the_root_motion_and_the_face():
         with pytest.raises((RuntimeError, UsageError), match="is animated by the NLA strip"):
             edit()
     rig.animation_data.action = rig.animation_data.nla_tracks[0].strips[0].action
-    with pytest.raises(RuntimeError, match=f"'{root_object(rig).name}' is animated by the NLA strip"):
+    with pytest.raises(
+        RuntimeError, match=f"'{root_object(rig).name}' is animated by the NLA strip"
+    ):
         bpy.ops.scope.root_motion(mode="BONES")
 
 

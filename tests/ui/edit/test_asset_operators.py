@@ -81,14 +81,17 @@ def test_the_picture_of_a_retargeted_rig_is_of_its_own_bones(rig):
 def test_a_catalog_of_the_file_is_assigned_and_an_unknown_one_changes_nothing(rig, tmp_path):
     uid = "d1f81597-d27c-42fd-8386-3a3def6c9200"
     (tmp_path / "blender_assets.cats.txt").write_text(
-        f"# comment\nVERSION 1\n\n{uid}:Motions/Walks:Motions-Walks\n{uid[:-1]}x:Motions/Runs:Motions-Runs\n"
+        "# comment\nVERSION "
+        f"1\n\n{uid}:Motions/Walks:Motions-Walks\n{uid[:-1]}x:Motions/Runs:Motions-Runs\n"
     )
     with pytest.raises(RuntimeError, match="no asset catalog 'Motions/Walks'"):
         bpy.ops.scope.mark_asset(catalog="Motions/Walks")  # the file has no folder yet
     assert rig.animation_data.action.asset_data is None
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "walks.blend"))
     for unknown in ("Runs", "Motions/Runs"):  # of which the latter's id is damaged
-        with pytest.raises(RuntimeError, match=f"no asset catalog '{unknown}'; there are Motions/Walks$"):
+        with pytest.raises(
+            RuntimeError, match=f"no asset catalog '{unknown}'; there are Motions/Walks$"
+        ):
             bpy.ops.scope.mark_asset(catalog=unknown)
     bpy.ops.scope.mark_asset(catalog="Motions/Walks")
     assert rig.animation_data.action.asset_data.catalog_id == uid

@@ -87,7 +87,11 @@ def test_smoothing_a_resampled_motion_keeps_its_keys_on_whole_frames(tmp_path):
     scene = bpy.context.scene
     scene.render.fps, scene.render.fps_base = 24, 1.0
     motion = motion_of(walk(SECONDS), noise=0.05)
-    rig = build_scene([motion], BODY, None, BuildOptions(frame_rate="resample", start_frame=1.0)).people[0].armature
+    rig = (
+        build_scene([motion], BODY, None, BuildOptions(frame_rate="resample", start_frame=1.0))
+        .people[0]
+        .armature
+    )
     motion.save(tmp_path / "person1.npz")
     rig["scope_motion"], rig["scope_body_file"] = str(tmp_path / "person1.npz"), "scope"
     before = read_clip(rig, BODY, 24.0)[1]
@@ -109,8 +113,12 @@ def test_interpolating_and_swapping_a_span(rig):
     bpy.ops.scope.swap_sides(start=20, end=30, limbs="legs")
     swapped = keys(rig)[0]
     assert turned(swapped.rotations[19:30], before.rotations[19:30]) > 10
-    around = range(15, 34)  # smoothing has mixed the sides at the ends of the span, so it is smoothed again there
-    assert turned(np.delete(swapped.rotations, around, 0), np.delete(before.rotations, around, 0)) < 0.01
+    # smoothing has mixed the sides at the ends of the span, so it is smoothed again there
+    around = range(15, 34)
+    assert (
+        turned(np.delete(swapped.rotations, around, 0), np.delete(before.rotations, around, 0))
+        < 0.01
+    )
     bpy.ops.scope.swap_sides(start=20, end=30, limbs="legs")
     assert turned(keys(rig)[0].rotations, before.rotations) < 0.05
     bpy.ops.scope.interpolate_span(start=40, end=44)
@@ -180,7 +188,11 @@ def test_root_motion_looks_the_same_and_comes_back(rig, heading):
 
 @pytest.mark.parametrize("tilt", [0.0, 0.5])
 def test_root_motion_of_an_armature_that_was_moved_looks_the_same(rig, tilt):
-    rig.location, rig.rotation_euler, rig.scale = (1.0, 2.0, 0.5), (tilt, -0.4 * tilt, 0.8), (1.2,) * 3
+    rig.location, rig.rotation_euler, rig.scale = (
+        (1.0, 2.0, 0.5),
+        (tilt, -0.4 * tilt, 0.8),
+        (1.2,) * 3,
+    )
     rig.rotation_mode = "XYZ"
     before = seen(rig)
     for mode in ("OBJECT", "OBJECT", "IN_PLACE", "OBJECT", "BONES"):
@@ -193,7 +205,12 @@ def test_root_motion_of_an_armature_that_was_moved_looks_the_same(rig, tilt):
 
 @pytest.mark.parametrize("mode", ["OBJECT", "IN_PLACE"])
 def test_a_moved_armature_is_in_place_again_when_root_motion_returns_to_the_bones(rig, mode):
-    rig.rotation_mode, rig.location, rig.rotation_euler, rig.scale = "XYZ", (1.0, 2.0, 0.5), (0.3, 0, 0.8), (1.2,) * 3
+    rig.rotation_mode, rig.location, rig.rotation_euler, rig.scale = (
+        "XYZ",
+        (1.0, 2.0, 0.5),
+        (0.3, 0, 0.8),
+        (1.2,) * 3,
+    )
     bpy.ops.scope.smooth()
     before, place, clip = seen(rig), np.array(rig.matrix_world), keys(rig)[0]
     operators = bpy.ops.scope.smooth, lambda: bpy.ops.scope.root_motion(mode="BONES")
@@ -219,7 +236,12 @@ def stage():
 
 
 def test_root_motion_keeps_the_armatures_parent(rig, stage):
-    rig.parent, rig.location, rig.rotation_euler, rig.rotation_mode = stage, (0.4, 0, 0), (0, 0, 0.5), "XYZ"
+    rig.parent, rig.location, rig.rotation_euler, rig.rotation_mode = (
+        stage,
+        (0.4, 0, 0),
+        (0, 0, 0.5),
+        "XYZ",
+    )
     rig.matrix_parent_inverse = Matrix.Translation((0, 0.2, 0)) @ Matrix.Scale(0.8, 4)
     before = seen(rig)
     for mode in ("OBJECT", "OBJECT", "IN_PLACE", "BONES", "OBJECT", "BONES"):
@@ -278,7 +300,10 @@ def test_each_cycle_of_a_loop_continues_from_the_previous_one(rig):
     length = scene.frame_end + 1 - scene.frame_start
     assert length in (30, 60)  # a period is one second
     first = scene.frame_start
-    once, next_time = seen(rig, [first, first + 10]), seen(rig, [first + length, first + length + 10])
+    once, next_time = (
+        seen(rig, [first, first + 10]),
+        seen(rig, [first + length, first + length + 10]),
+    )
     gone = next_time[:, 0] - once[:, 0]
     np.testing.assert_allclose(gone[:, 1], -1.2 * length / RATE, atol=0.02)
     np.testing.assert_allclose(next_time - next_time[:, :1], once - once[:, :1], atol=2e-3)
@@ -298,7 +323,8 @@ def test_smoothing_a_loop_restores_the_frame_range(rig):
     scene.frame_start, scene.frame_end = 2, 120
     bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
     cycle = scene.frame_start, scene.frame_end
-    bpy.ops.scope.loop(start=cycle[0], end=cycle[1] + 1, shortest=0.5)  # again, within the first one
+    # again, within the first one
+    bpy.ops.scope.loop(start=cycle[0], end=cycle[1] + 1, shortest=0.5)
     bpy.ops.scope.smooth()
     assert (scene.frame_start, scene.frame_end) == (2, 120)
     bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
@@ -316,7 +342,11 @@ def test_only_the_loop_is_exported(rig, tmp_path, suffix):
     bpy.ops.scope.export(filepath=path, format=suffix.upper())
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.context.scene.render.fps = int(RATE)
-    operators = {"glb": bpy.ops.import_scene.gltf, "fbx": bpy.ops.import_scene.fbx, "bvh": bpy.ops.import_anim.bvh}
+    operators = {
+        "glb": bpy.ops.import_scene.gltf,
+        "fbx": bpy.ops.import_scene.fbx,
+        "bvh": bpy.ops.import_anim.bvh,
+    }
     operators[suffix](filepath=path)
     assert len(bpy.data.actions) > 0
     for action in bpy.data.actions:
@@ -415,7 +445,10 @@ def test_a_renamed_or_converted_bone_is_named_and_the_keys_stay(rig, edit, chang
         wanted = "'walk' has no bone 'left_elbow'; if you have renamed it"
     else:
         rig.pose.bones["left_elbow"].rotation_mode = "XYZ"
-        wanted = "'left_elbow' of 'walk' has the rotation mode XYZ, in which its captured keys have no effect"
+        wanted = (
+            "'left_elbow' of 'walk' has the rotation mode XYZ, in which its captured keys have no "
+            "effect"
+        )
     before = [(c.data_path, c.array_index, read_keys(c).tobytes()) for c in fcurves(rig)]
     with pytest.raises(RuntimeError, match=wanted):
         edit()
@@ -430,7 +463,9 @@ def test_a_motion_in_the_nla_is_an_error_of_its_own(rig):
     strip = track.strips.new("walk", 1, action)
     if slot is not None:
         strip.action_slot = slot
-    with pytest.raises(RuntimeError, match="NLA strip 'walk', not by an action of its own alone: enter Tweak Mode"):
+    with pytest.raises(
+        RuntimeError, match="NLA strip 'walk', not by an action of its own alone: enter Tweak Mode"
+    ):
         bpy.ops.scope.refloor()
     animation.nla_tracks.active, strip.select = track, True
     animation.use_tweak_mode = True
@@ -440,11 +475,17 @@ def test_a_motion_in_the_nla_is_an_error_of_its_own(rig):
 def test_keys_over_those_in_the_nla_do_not_count_as_lost(rig):
     before = seen(rig)
     bpy.ops.scope.push_to_nla()
-    rig.animation_data.action, rig.animation_data.action_blend_type = bpy.data.actions.new("fix"), "ADD"
+    rig.animation_data.action, rig.animation_data.action_blend_type = (
+        bpy.data.actions.new("fix"),
+        "ADD",
+    )
     elbow = rig.pose.bones["left_elbow"]
     elbow.rotation_quaternion = (0.9, 0.4, 0.0, 0.0)
     elbow.keyframe_insert("rotation_quaternion", frame=1)
-    with pytest.raises(RuntimeError, match="NLA strip 'walk', .*: enter Tweak Mode .* bake all strips into one action"):
+    with pytest.raises(
+        RuntimeError,
+        match="NLA strip 'walk', .*: enter Tweak Mode .* bake all strips into one action",
+    ):
         bpy.ops.scope.refloor()
     fixed = seen(rig)
     assert np.abs(fixed - before).max() > 0.05
@@ -452,7 +493,11 @@ def test_keys_over_those_in_the_nla_do_not_count_as_lost(rig):
     bpy.ops.pose.select_all(action="SELECT")
     first, last = map(int, rig.animation_data.nla_tracks[0].strips[0].action.frame_range)
     bpy.ops.nla.bake(
-        frame_start=first, frame_end=last, only_selected=False, bake_types={"POSE"}, clear_constraints=False
+        frame_start=first,
+        frame_end=last,
+        only_selected=False,
+        bake_types={"POSE"},
+        clear_constraints=False,
     )
     bpy.ops.object.mode_set(mode="OBJECT")
     for track in rig.animation_data.nla_tracks:

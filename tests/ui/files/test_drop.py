@@ -22,6 +22,12 @@ def test_dropped_files_become_the_footage(footage):
 
 def test_dropped_motions_are_imported(tmp_path):
     motion, path = motion_of(walk(1.0)), tmp_path / "walk_poses.npz"
-    np.savez(path, poses=motion.poses, trans=motion.trans, betas=np.ones(16), mocap_framerate=np.array(120.0))
+    np.savez(
+        path,
+        poses=motion.poses,
+        trans=motion.trans,
+        betas=np.ones(16),
+        mocap_framerate=np.array(120.0),
+    )
     assert drop.SCOPE_FH_motion.bl_file_extensions == ".npz"
     assert bpy.ops.scope.import_motion("INVOKE_DEFAULT", filepath=str(path)) == {"FINISHED"}

@@ -57,7 +57,8 @@ def test_the_text_of_a_path_shows_and_sets_it(owner, setting):
 
 
 @pytest.mark.parametrize(
-    ("typed", "path"), [('"C:\\clips\\a b.mp4"', "C:\\clips\\a b.mp4"), ('"', '"'), ('""', ""), ('/a/"b', '/a/"b')]
+    ("typed", "path"),
+    [('"C:\\clips\\a b.mp4"', "C:\\clips\\a b.mp4"), ('"', '"'), ('""', ""), ('/a/"b', '/a/"b')],
 )
 def test_the_quotes_of_a_copied_path_are_not_part_of_it(typed, path):
     settings = bpy.context.scene.scope
@@ -84,7 +85,9 @@ def test_a_chosen_file_is_the_settings(owner, setting):
 def test_only_the_browser_of_a_video_shows_every_movie_that_blender_knows(owner, setting):
     opened = []
     context = SimpleNamespace(window_manager=SimpleNamespace(fileselect_add=opened.append))
-    operator = SimpleNamespace(setting=setting, _settings=lambda _: getattr(bpy.context.scene, owner))
+    operator = SimpleNamespace(
+        setting=setting, _settings=lambda _: getattr(bpy.context.scene, owner)
+    )
     assert SCOPE_OT_choose_file.invoke(operator, context, None) == {"RUNNING_MODAL"}
     assert opened == [operator]
     assert operator.filter_movie is (setting == "file")
@@ -95,19 +98,27 @@ def test_only_the_browser_of_a_video_shows_every_movie_that_blender_knows(owner,
 def test_a_chosen_file_is_that_of_the_preferences(saved, preferences, setting):
     bpy.context.preferences.is_dirty = False
     chosen = str(saved / "any.suffix")
-    assert bpy.ops.scope.choose_file(filepath=chosen, owner="preferences", setting=setting) == {"FINISHED"}
+    assert bpy.ops.scope.choose_file(filepath=chosen, owner="preferences", setting=setting) == {
+        "FINISHED"
+    }
     assert getattr(preferences, setting) == chosen  # no matter which .blend file is open
     assert getattr(preferences, f"{setting}_text") == chosen
     assert bpy.context.preferences.is_dirty  # or Blender would not save them
 
 
 def test_without_preferences_no_file_is_chosen_for_them():
-    assert bpy.ops.scope.choose_file(filepath="/a", owner="preferences", setting="body_file") == {"CANCELLED"}
+    assert bpy.ops.scope.choose_file(filepath="/a", owner="preferences", setting="body_file") == {
+        "CANCELLED"
+    }
 
 
 def test_the_button_beside_a_field_chooses_the_file_of_that_field(preferences):
     scene, row = bpy.context.scene, Row()
-    for settings, path in ((scene.scope, "body_file"), (scene.scope_live, "file"), (preferences, "body_file")):
+    for settings, path in (
+        (scene.scope, "body_file"),
+        (scene.scope_live, "file"),
+        (preferences, "body_file"),
+    ):
         draw_file(row, settings, path)
     assert row.fields == ["body_file_text", "file_text", "body_file_text"]
     assert {button.name for button in row.buttons} == {"scope.choose_file"}
@@ -115,7 +126,9 @@ def test_the_button_beside_a_field_chooses_the_file_of_that_field(preferences):
     assert drawn == [("scope", "body_file"), ("scope_live", "file"), ("preferences", "body_file")]
 
 
-@pytest.mark.parametrize(("is_relative", "stored"), [(True, "//clips/a.mp4"), (False, "{folder}/clips/a.mp4")])
+@pytest.mark.parametrize(
+    ("is_relative", "stored"), [(True, "//clips/a.mp4"), (False, "{folder}/clips/a.mp4")]
+)
 def test_a_chosen_file_is_stored_as_the_user_prefers(saved, fake_worker, is_relative, stored):
     fake_worker("finish()")
     bpy.context.preferences.filepaths.use_relative_paths = is_relative
@@ -140,7 +153,9 @@ def test_a_chosen_file_of_another_drive_is_stored_as_it_is(saved, monkeypatch):
     assert bpy.context.scene.scope.body_file == "D:\\a.npz"
 
 
-@pytest.mark.parametrize(("owner", "setting"), [("", ""), ("scope", "quality"), ("render", "filepath"), ("no", "file")])
+@pytest.mark.parametrize(
+    ("owner", "setting"), [("", ""), ("scope", "quality"), ("render", "filepath"), ("no", "file")]
+)
 def test_only_files_of_scope_are_set(owner, setting):
     before = bpy.context.scene.render.filepath
     assert bpy.ops.scope.choose_file(filepath="/a", owner=owner, setting=setting) == {"CANCELLED"}

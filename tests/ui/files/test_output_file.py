@@ -14,14 +14,20 @@ from ...scene.made_rigs import build_rig, captured
 
 
 def test_the_suffix_is_added_and_a_name_is_required(tmp_path):
-    assert output_file(str(tmp_path / "walk"), ".fbx") == output_file(str(tmp_path / "walk.fbx"), ".fbx")
+    assert output_file(str(tmp_path / "walk"), ".fbx") == output_file(
+        str(tmp_path / "walk.fbx"), ".fbx"
+    )
     for nameless in ("", "//", ".fbx", str(tmp_path / ".fbx")):
         with pytest.raises(UsageError, match="the file has no name"):
             output_file(nameless, ".fbx")
 
 
 def test_a_path_beside_the_blend_file_needs_one(tmp_path):
-    with pytest.raises(UsageError, match=r"'//walk\.fbx' is relative to this \.blend file, which was never saved"):
+    with pytest.raises(
+        UsageError,
+        match=r"'//walk\.fbx' is relative to this \.blend file, which "
+        r"was never saved",
+    ):
         output_file("//walk.fbx", ".fbx")
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
     assert output_file("//walk.fbx", ".fbx") == Path(tmp_path / "walk.fbx")

@@ -29,7 +29,10 @@ def answering(tmp_path, monkeypatch):
 
     def answer(code):
         script = tmp_path / "fake.py"
-        script.write_text("import json, sys, time\nasked = json.loads(sys.stdin.readline())\n" + textwrap.dedent(code))
+        script.write_text(
+            "import json, sys, time\nasked = json.loads(sys.stdin.readline())\n"
+            + textwrap.dedent(code)
+        )
         real = formats.FormatsProcess
         monkeypatch.setattr(formats, "FormatsProcess", lambda *arguments: real(*arguments, script))
 
@@ -51,7 +54,9 @@ def drawn():
     """Return the texts that the panel shows of the chosen camera."""
     texts = []
     column = SimpleNamespace(label=lambda text, icon: texts.append(text))
-    context = SimpleNamespace(preferences=bpy.context.preferences, region=None, scene=bpy.context.scene)
+    context = SimpleNamespace(
+        preferences=bpy.context.preferences, region=None, scene=bpy.context.scene
+    )
     camera_formats.draw(context, SimpleNamespace(column=lambda align: column))
     return " ".join(texts)
 

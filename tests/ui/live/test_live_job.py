@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A live capture in a scene, with a scripted process: the body follows, until Stop, Cancel or a failure ends it."""
+"""A live capture in a scene, with a scripted process: the body follows, until Stop, Cancel or a
+failure ends it.
+"""
 
 import sys
 import textwrap
@@ -26,18 +28,22 @@ from ..conftest import inventory
 def live(tmp_path, monkeypatch, standing):
     """Return a function that starts a live capture with a scripted process.
 
-    The script may use ``pose(index)``, ``send(event, **values)``, ``receive()``, which waits for a command,
-    ``wait_for(path)``, which waits for a file, and ``finish()``, which sends the motion ``standing``.
+    The script may use ``pose(index)``, ``send(event, **values)``, ``receive()``, which waits for a
+    command, ``wait_for(path)``, which waits for a file, and ``finish()``, which sends the motion
+    ``standing``.
     """
     standing.save(tmp_path / "standing.npz")
     jobs = []
-    monkeypatch.setattr(live_job, "LiveProcess", lambda r, folder, _, *rest: LiveProcess(r, folder, None, *rest))
+    monkeypatch.setattr(
+        live_job, "LiveProcess", lambda r, folder, _, *rest: LiveProcess(r, folder, None, *rest)
+    )
     (tmp_path / "walk.mp4").touch()
     settings = bpy.context.scene.scope_live
     settings.source, settings.file = "FILE", str(tmp_path / "walk.mp4")
 
     def start(body):
-        script = tmp_path / f"fake_live_{len(jobs)}.py"  # one each: a process may not have read its own yet
+        # one each: a process may not have read its own yet
+        script = tmp_path / f"fake_live_{len(jobs)}.py"
         monkeypatch.setattr(live_job, "START_SCRIPT", script)
         script.write_text(
             textwrap.dedent(f"""
@@ -52,7 +58,8 @@ def live(tmp_path, monkeypatch, standing):
                         time.sleep(0.01)
                 def pose(index, betas=(0.0,) * 10, person=0):
                     turned = [math.cos(0.1 * index), math.sin(0.1 * index), 0, 0]
-                    send("pose", person=person, frame=index, presence="seen", rotations=[turned] + [[1, 0, 0, 0]] * 23,
+                    send("pose", person=person, frame=index, presence="seen",
+                         rotations=[turned] + [[1, 0, 0, 0]] * 23,
                          positions=[[0.0, 0.0, 1.0]], betas=betas)
                 def finish(people=1):
                     names = [f"person{{k + 1}}.npz" for k in range(people)]
@@ -101,7 +108,9 @@ def test_the_newest_pose_is_shown_and_stays_after_stop(live):
 
 def test_a_recording_becomes_a_capture_and_the_body_goes(live):
     bpy.context.scene.scope.take = "Jump"
-    job = live('pose(1); assert receive() == "record"; pose(2); assert receive() == "stop"; finish()')
+    job = live(
+        'pose(1); assert receive() == "record"; pose(2); assert receive() == "stop"; finish()'
+    )
     until(job, lambda: job.has_body)
     job.record()
     until(job, lambda: job.poses == 2)
@@ -120,18 +129,27 @@ def test_a_recording_becomes_a_capture_and_the_body_goes(live):
 
 
 def test_a_recorded_take_is_kept_by_the_blend_file(live, tmp_path):
-    """It is smoothed, saved, opened again, and smoothed again from the motion that the file contains."""
-    job = live('pose(1); assert receive() == "record"; pose(2); assert receive() == "stop"; finish()')
+    """It is smoothed, saved, opened again, and smoothed again from the motion that the file
+    contains.
+    """
+    job = live(
+        'pose(1); assert receive() == "record"; pose(2); assert receive() == "stop"; finish()'
+    )
     until(job, lambda: job.has_body)
     job.record()
     job.stop()
     to_end(job)
 
     def take():
-        person = next(obj for obj in bpy.context.scene.scope.capture.all_objects if obj.type == "ARMATURE")
+        person = next(
+            obj for obj in bpy.context.scene.scope.capture.all_objects if obj.type == "ARMATURE"
+        )
         bpy.context.view_layer.objects.active = person
         curves = fcurves(person)
-        keys = {(c.data_path, c.array_index): [tuple(point.co) for point in c.keyframe_points] for c in curves}
+        keys = {
+            (c.data_path, c.array_index): [tuple(point.co) for point in c.keyframe_points]
+            for c in curves
+        }
         return keys, person["scope_motion"]["motion"]
 
     take()
@@ -154,7 +172,11 @@ def test_a_body_follows_each_of_the_people_and_all_are_recorded(live):
     job = live("""
         assert request["live_people"] == 2
         pose(1); pose(1, person=1); pose(1, person=2)
-        assert receive() == "record"; pose(3); pose(5, person=1); assert receive() == "stop"; finish(2)
+        assert receive() == "record"
+        pose(3)
+        pose(5, person=1)
+        assert receive() == "stop"
+        finish(2)
     """)
     until(job, lambda: len(job._worker._newest) == 0 and all(body.armature for body in job._bodies))
     assert [body.armature.name for body in job._bodies] == ["Live", "Live 2"]
@@ -165,7 +187,9 @@ def test_a_body_follows_each_of_the_people_and_all_are_recorded(live):
         return abs(body.armature.pose.bones["pelvis"].rotation_quaternion.w)
 
     before = [turned(body) for body in job._bodies]
-    until(job, lambda: all(turned(body) != was for body, was in zip(job._bodies, before, strict=True)))
+    until(
+        job, lambda: all(turned(body) != was for body, was in zip(job._bodies, before, strict=True))
+    )
     assert turned(job._bodies[0]) != turned(job._bodies[1])
     job.stop()
     to_end(job)
@@ -298,7 +322,10 @@ def test_a_stream_ends_when_online_access_does(live, monkeypatch):
     settings, system = bpy.context.scene.scope_live, bpy.context.preferences.system
     settings.source, settings.stream = "STREAM", "rtsp://camera/stream"
     system.use_online_access = True
-    jobs = [live("pose(1); receive()"), live('pose(1); receive(); assert receive() == "stop"; finish()')]
+    jobs = [
+        live("pose(1); receive()"),
+        live('pose(1); receive(); assert receive() == "stop"; finish()'),
+    ]
     for job in jobs:
         until(job, lambda job=job: job.poses)
     jobs[1].record()
@@ -348,8 +375,14 @@ def test_a_recording_is_retargeted_to_the_rig_that_followed(live):
 @pytest.mark.parametrize(
     ("script", "says"),
     [
-        ('send("error", message="camera 0 cannot be opened; check that it is plugged in")', "plugged in"),
-        ('send("pose", person=0, rotations=[], positions=[], betas=[]); receive()', "cannot be used"),
+        (
+            'send("error", message="camera 0 cannot be opened; check that it is plugged in")',
+            "plugged in",
+        ),
+        (
+            'send("pose", person=0, rotations=[], positions=[], betas=[]); receive()',
+            "cannot be used",
+        ),
         ("os._exit(3)", "ended with status 3"),
     ],
 )

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""When the operators of live captures can be used; the window's part is tested in a real Blender."""
+"""When the operators of live captures can be used; the window's part is tested in a real
+Blender.
+"""
 
 from types import SimpleNamespace
 
@@ -81,4 +83,8 @@ def test_disabling_the_extension_ends_the_process(job):
 
 
 def test_one_pose_per_second_is_singular():
-    assert [_speed(rate, 20.0).split(",")[0] for rate in (0.3, 1.4, 2.0)] == ["0 poses/s", "1 pose/s", "2 poses/s"]
+    assert [_speed(rate, 20.0).split(",")[0] for rate in (0.3, 1.4, 2.0)] == [
+        "0 poses/s",
+        "1 pose/s",
+        "2 poses/s",
+    ]

@@ -20,7 +20,9 @@ def test_a_login_is_taken_out_and_put_in_again(typed, kept):
     assert with_login(kept) == kept
 
 
-@pytest.mark.parametrize("address", ["", "rtsp://camera/a@b", "http://camera?x=a@b", "udp://@", "not an address"])
+@pytest.mark.parametrize(
+    "address", ["", "rtsp://camera/a@b", "http://camera?x=a@b", "udp://@", "not an address"]
+)
 def test_an_address_without_a_login_is_kept(address):
     taken = take_login(address)
     assert taken in (address, "udp://")

@@ -74,8 +74,14 @@ def test_a_pin_in_the_image_is_met_whatever_the_smoothing(rig):
 def test_removing_pins_restores_the_motion_in_any_order(rig):
     frames = range(20, 75, 3)
     before = seen(rig, frames)
-    bpy.ops.scope.add_pin(joint="left_wrist", frame=FRAME, location=before[9, WRIST] + [0.1, 0.05, 0.15])
-    bpy.ops.scope.add_pin(joint="right_ankle", frame=FRAME + 6, location=seen(rig, [FRAME + 6])[0, ANKLE] + [0, 0.1, 0])
+    bpy.ops.scope.add_pin(
+        joint="left_wrist", frame=FRAME, location=before[9, WRIST] + [0.1, 0.05, 0.15]
+    )
+    bpy.ops.scope.add_pin(
+        joint="right_ankle",
+        frame=FRAME + 6,
+        location=seen(rig, [FRAME + 6])[0, ANKLE] + [0, 0.1, 0],
+    )
     assert [(e["text"], e["first"]) for e in listed_corrections(rig)] == [
         ("Left Wrist", FRAME),
         ("Right Ankle", FRAME + 6),
@@ -90,7 +96,9 @@ def test_removing_pins_restores_the_motion_in_any_order(rig):
 
 def test_a_pin_out_of_reach_is_said_with_its_distance_and_listed(rig, capfd):
     before = seen(rig)[0]
-    bpy.ops.scope.add_pin(joint="left_wrist", location=before[NAMES.index("left_shoulder")] + [1.1, 0, 0])
+    bpy.ops.scope.add_pin(
+        joint="left_wrist", location=before[NAMES.index("left_shoulder")] + [1.1, 0, 0]
+    )
     after = seen(rig)[0]
     said = capfd.readouterr().out
     (entry,) = listed_corrections(rig)
@@ -117,11 +125,16 @@ def test_a_pin_under_the_floor_is_said_with_its_depth(rig, tmp_path, capfd):
     assert "under the floor" not in capfd.readouterr().out
     bpy.ops.scope.add_pin(joint="right_ankle", frame=49, location=[*ankle[:2], -0.03])
     heights = foot_heights(stored_motion_of(rig), BODY)[48, 2:]
-    assert f"up to {-100 * heights.min():.0f} cm under the floor in 1 of 91 frames" in capfd.readouterr().out
+    assert (
+        f"up to {-100 * heights.min():.0f} cm under the floor in 1 of 91 frames"
+        in capfd.readouterr().out
+    )
 
 
 CORRECTIONS = {
-    "pin": lambda wrist: bpy.ops.scope.add_pin(joint="left_wrist", frame=FRAME, location=wrist + [0.1, 0.05, 0.15]),
+    "pin": lambda wrist: bpy.ops.scope.add_pin(
+        joint="left_wrist", frame=FRAME, location=wrist + [0.1, 0.05, 0.15]
+    ),
     "foot": lambda _: bpy.ops.scope.foot_stands(start=FRAME - 4, end=FRAME + 4, foot="right"),
     "sides": lambda _: bpy.ops.scope.exchange_sides(start=FRAME - 8, end=FRAME + 2),
 }
@@ -155,7 +168,9 @@ def test_without_corrections_keys_and_motion_are_again_the_same_to_the_bit(rig, 
     for name in order:
         CORRECTIONS[name](wrist)
     assert any(not np.array_equal(now, before[curve]) for curve, now in keys(rig).items())
-    while added := [k for k, e in enumerate(listed_corrections(rig)) if e["kind"] != "INTERPOLATION"]:
+    while added := [
+        k for k, e in enumerate(listed_corrections(rig)) if e["kind"] != "INTERPOLATION"
+    ]:
         bpy.ops.scope.remove_correction(index=added[len(added) // 2])
     assert_same_keys(keys(rig), before)
     again = stored_motion_of(rig)
@@ -193,7 +208,9 @@ def test_keys_that_were_edited_after_a_correction_keep_the_edit_when_it_is_remov
     now = keys(rig)
     for name, values in before.items():
         assert now[name].shape == values.shape
-        shift = np.where(now[name][:, 0] == FRAME, 0.5, 0.0) * (name == (curve.data_path, curve.array_index))
+        shift = np.where(now[name][:, 0] == FRAME, 0.5, 0.0) * (
+            name == (curve.data_path, curve.array_index)
+        )
         np.testing.assert_allclose(now[name][:, 1], values[:, 1] + shift, atol=1e-5)
 
 
@@ -251,7 +268,9 @@ def test_an_exchange_swaps_the_sides_and_once_more_swaps_them_back(rig):
     bpy.ops.scope.exchange_sides(start=40, end=52)
     after = seen(rig, [40, 46, 70])
     np.testing.assert_allclose(after[2], before[2], atol=1e-6)
-    assert abs((after[1, left] - after[1, right])[1] + (before[1, left] - before[1, right])[1]) < 0.02
+    assert (
+        abs((after[1, left] - after[1, right])[1] + (before[1, left] - before[1, right])[1]) < 0.02
+    )
     bpy.ops.scope.exchange_sides(start=40, end=52)
     np.testing.assert_allclose(seen(rig, [40, 46, 70]), before, atol=1e-5)
     assert listed_corrections(rig) == []
@@ -265,14 +284,18 @@ def test_a_foot_that_stands_is_at_rest(rig):
 
 
 def outside(frame):
-    return f"Frame {frame} is outside of the captured motion of 'walk', which has frames 1 to 91; go to one of these"
+    return (
+        f"Frame {frame} is outside of the captured motion of 'walk', which has frames 1 to 91; go "
+        f"to one of these"
+    )
 
 
 def test_the_last_frame_can_be_pinned_and_the_frame_after_it_moves_nothing(rig):
     last = seen(rig, [91])[0]
     bpy.ops.scope.add_pin(joint="left_wrist", frame=91, location=last[WRIST] + [0.1, 0.0, 0.1])
     assert np.linalg.norm(seen(rig, [91])[0, WRIST] - last[WRIST] - [0.1, 0.0, 0.1]) < 0.01
-    bpy.context.scene.render.fps = 60  # frames of the scene between those of the motion, and half a frame after it
+    # frames of the scene between those of the motion, and half a frame after it
+    bpy.context.scene.render.fps = 60
     bpy.context.scene.frame_set(182)
     with pytest.raises(RuntimeError, match="Frame 182 is outside .* frames 1 to 181"):
         bpy.ops.scope.add_pin(joint="left_wrist", location=(0, 0, 1))
@@ -285,9 +308,13 @@ def test_a_span_is_corrected_as_far_as_there_is_a_motion(rig, start, end):
     assert (entry["first"], entry["last"]) == (start, 91)
 
 
-@pytest.mark.parametrize("operator", ["foot_stands", "exchange_sides", "interpolate_span", "swap_sides", "loop"])
+@pytest.mark.parametrize(
+    "operator", ["foot_stands", "exchange_sides", "interpolate_span", "swap_sides", "loop"]
+)
 def test_a_span_the_wrong_way_round_is_said_with_the_frames_of_the_scene(rig, operator):
-    with pytest.raises(RuntimeError, match="The span ends in frame 30, before it begins in frame 40; swap them"):
+    with pytest.raises(
+        RuntimeError, match="The span ends in frame 30, before it begins in frame 40; swap them"
+    ):
         getattr(bpy.ops.scope, operator)(start=40, end=30)
 
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What was corrected is on the rig that the motion is retargeted to, and in the files that are exported."""
+"""What was corrected is on the rig that the motion is retargeted to, and in the files that are
+exported.
+"""
 
 import bpy
 import numpy as np
@@ -35,7 +37,9 @@ def directions(places, side):
 
 
 def correct(armature):
-    """Exchange the sides, let a foot stand, put it on the floor and pin a wrist; return what is then true."""
+    """Exchange the sides, let a foot stand, put it on the floor and pin a wrist; return what is
+    then true.
+    """
     scene = bpy.context.scene
     before = made_rigs.seen(armature, NAMES, FRAMES)
     bpy.ops.scope.exchange_sides(start=EXCHANGED[0], end=EXCHANGED[1])
@@ -48,7 +52,9 @@ def correct(armature):
 
 
 def check(places, before, target):
-    """Check joints (T, K+1, 3) of `FRAMES` against what was corrected, and that it was wrong before."""
+    """Check joints (T, K+1, 3) of `FRAMES` against what was corrected, and that it was wrong
+    before.
+    """
     at, span = FRAMES.index(FRAME), slice(len(FRAMES) - (STANDS[1] - STANDS[0] + 1), None)
     assert np.linalg.norm(places[at, WRIST] - target) < 0.01
     assert np.linalg.norm(before[at, WRIST] - target) > 0.1
@@ -56,7 +62,8 @@ def check(places, before, target):
     assert np.ptp(before[span, ANKLE], axis=0).max() > 0.05
     middle = slice(2, EXCHANGED[1] - EXCHANGED[0] - 1)
     ours, theirs = directions(places, "left")[middle], directions(before, "right")[middle]
-    # A left thigh turned like a right one: the body's knees lie 5 mm outside the line from hip to ankle.
+    # A left thigh turned like a right one: the body's knees lie 5 mm outside the line from hip to
+    # ankle.
     assert np.abs(ours - theirs).max() < 0.03
     assert np.abs(ours - directions(before, "left")[middle]).max() > 0.1
 
@@ -66,7 +73,8 @@ def test_the_rig_that_the_motion_is_retargeted_to_is_corrected(rig):
     names = [f"mixamorig:{name}" for name in NAMES]
     own = made_rigs.renamed(rig, dict(zip(NAMES, names, strict=True)))
     settings = bpy.context.scene.scope_retarget
-    settings.rig, settings.feet = own, False  # the bones, without what keeps feet of other rigs on the floor
+    # the bones, without what keeps feet of other rigs on the floor
+    settings.rig, settings.feet = own, False
     bpy.ops.scope.guess_bones()
     bpy.context.view_layer.objects.active = rig
     bpy.ops.scope.retarget()
@@ -85,12 +93,19 @@ def test_exported_files_are_corrected(rig, tmp_path, kind):
     bpy.ops.scope.export(filepath=str(path), format=kind, which="ALL")
     first = read_back(path)
     (imported,) = (o for o in bpy.data.objects if o.type == "ARMATURE")
-    check(made_rigs.seen(imported, NAMES, [round(first) + frame - 1 for frame in FRAMES]), before, target)
+    check(
+        made_rigs.seen(imported, NAMES, [round(first) + frame - 1 for frame in FRAMES]),
+        before,
+        target,
+    )
 
 
 def test_the_exported_motion_file_is_corrected(rig, tmp_path):
     correct(rig)
     bpy.ops.scope.export(filepath=str(tmp_path / "walk.npz"), format="NPZ", which="ALL")
     with np.load(tmp_path / "walk.npz") as file:
-        kinds = {key: len(file[key]) for key in ("pin_frames", "contact_spans", "exchange_spans", "floor_heights")}
+        kinds = {
+            key: len(file[key])
+            for key in ("pin_frames", "contact_spans", "exchange_spans", "floor_heights")
+        }
     assert kinds == dict.fromkeys(kinds, 1)

@@ -18,7 +18,9 @@ FRAMES = range(1, 92)  # of the scene
 
 
 def pinned(motion, frame):
-    """Pin the left wrist of a capture in a scene frame; return the armature, the target, and all joints before."""
+    """Pin the left wrist of a capture in a scene frame; return the armature, the target, and all
+    joints before.
+    """
     armature = captured(motion)
     pack_motion(armature, motion.to_bytes())
     armature["scope_body_file"] = "scope"
@@ -31,7 +33,11 @@ def pinned(motion, frame):
 def test_a_pin_in_frames_in_which_the_person_was_not_seen_is_met():
     motion = motion_of(walk(3.0))
     hidden = np.arange(len(motion.valid))[30:60]
-    motion.valid[hidden], motion.joint_confidence[hidden], motion.residual_px[hidden] = False, 0.0, np.nan
+    motion.valid[hidden], motion.joint_confidence[hidden], motion.residual_px[hidden] = (
+        False,
+        0.0,
+        np.nan,
+    )
     armature, target, before = pinned(motion, 46)
     after = made_rigs.seen(armature, NAMES, FRAMES)
     assert np.linalg.norm(after[45, NAMES.index("left_wrist")] - target) < 0.01
@@ -45,7 +51,10 @@ def test_a_pin_in_a_gap_of_the_footage_is_refused_and_one_at_its_edge_is_met():
     rows = np.r_[0:31, 60:91]  # as numbered images of which some are missing
     clip = Clip(whole.times[rows], whole.rotations[rows], whole.root[rows])
     motion = replace(motion_of(clip), frames=rows)
-    with pytest.raises(RuntimeError, match="Frame 46 is in a gap of the captured motion of 'walk', where the footage"):
+    with pytest.raises(
+        RuntimeError,
+        match="Frame 46 is in a gap of the captured motion of 'walk', where the footage",
+    ):
         pinned(motion, 46)
     (armature,) = (obj for obj in bpy.context.scene.objects if "scope_source" in obj)
     assert listed_corrections(armature) == []

@@ -57,7 +57,10 @@ def everything(armature):
     camera = next(o for o in bpy.context.scene.objects if o.type == "CAMERA")
     curves = {(c.data_path, c.array_index): read_keys(c) for c in fcurves(armature)}
     motion = stored_motion_of(armature)
-    arrays = {n: getattr(motion, n) for n in ("poses", "trans", "poses_raw", "trans_raw", "world_from_camera")}
+    arrays = {
+        n: getattr(motion, n)
+        for n in ("poses", "trans", "poses_raw", "trans_raw", "world_from_camera")
+    }
     return curves | arrays | {"camera": np.array(camera.matrix_basis)}
 
 
@@ -77,7 +80,9 @@ def test_person_and_camera_move_until_the_foot_is_on_the_floor(rig):
     bpy.ops.scope.floor_here()
     assert abs(lowest(rig)) < 0.002
     np.testing.assert_allclose(from_camera(rig), before, atol=1e-5)
-    assert [(e["kind"], e["first"], e["last"]) for e in listed_corrections(rig)] == [("FLOOR", FRAME, FRAME)]
+    assert [(e["kind"], e["first"], e["last"]) for e in listed_corrections(rig)] == [
+        ("FLOOR", FRAME, FRAME)
+    ]
     for strength in (0.0, 2.5, 1.0):
         bpy.ops.scope.smooth(strength=strength)
         assert abs(lowest(rig)) < 0.03  # each smoothing has the foot a little elsewhere

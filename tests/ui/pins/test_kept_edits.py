@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Interpolated frames, swapped sides and feet on the floor outlive smoothing, and can be taken back."""
+"""Interpolated frames, swapped sides and feet on the floor outlive smoothing, and can be taken
+back.
+"""
 
 import bpy
 import numpy as np
@@ -67,7 +69,9 @@ def is_interpolated(rig):
 
 
 def is_swapped(rig):
-    """Whether the knees are where the walk has the other one, as far as they still swing after smoothing."""
+    """Whether the knees are where the walk has the other one, as far as they still swing after
+    smoothing.
+    """
     left, right = seen(rig, SWAPPED)[1:-1, KNEES].transpose(1, 0, 2)
     truth = walk(3.0).joints(BODY, BETAS)[SWAPPED[1] - 1 : SWAPPED[-1] - 1, KNEES]
     ours, theirs = (left - right)[:, 1], (truth[:, 0] - truth[:, 1])[:, 1]  # along the walk
@@ -80,8 +84,16 @@ def is_on_floor(rig):
 
 
 EDITS = {
-    "interpolated": (lambda: bpy.ops.scope.interpolate_span(start=39, end=47), is_interpolated, "INTERPOLATION"),
-    "swapped": (lambda: bpy.ops.scope.swap_sides(start=62, end=70, limbs="legs"), is_swapped, "EXCHANGE"),
+    "interpolated": (
+        lambda: bpy.ops.scope.interpolate_span(start=39, end=47),
+        is_interpolated,
+        "INTERPOLATION",
+    ),
+    "swapped": (
+        lambda: bpy.ops.scope.swap_sides(start=62, end=70, limbs="legs"),
+        is_swapped,
+        "EXCHANGE",
+    ),
     "on the floor": (lambda: bpy.ops.scope.refloor(), is_on_floor, "FEET"),
 }
 every_edit = pytest.mark.parametrize("name", EDITS)
@@ -270,7 +282,9 @@ def test_feet_of_poses_that_were_moved_by_hand_are_put_on_the_floor_and_stay_the
 
 
 def test_keys_edited_by_hand_since_a_pin_are_put_on_the_floor(rig):
-    bpy.ops.scope.add_pin(joint="left_wrist", frame=20, location=seen(rig, [20])[0, WRIST] + [0, 0.1, 0.1])
+    bpy.ops.scope.add_pin(
+        joint="left_wrist", frame=20, location=seen(rig, [20])[0, WRIST] + [0, 0.1, 0.1]
+    )
     clip, frames = read_clip(rig, BODY, RATE)
     clip.root[:, 2] += 0.1
     write_clip(rig, BODY, clip, frames)

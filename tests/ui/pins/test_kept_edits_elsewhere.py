@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Edits are on the rig that the smoothed motion is retargeted to, and in the files that are exported.
+"""Edits are on the rig that the smoothed motion is retargeted to, and in the files that are
+exported.
 
-The capture is wrong where it is edited, so that with its edits it is the walk again from which it was made.
+The capture is wrong where it is edited, so that with its edits it is the walk again from which it
+was made.
 """
 
 import bpy
@@ -23,7 +25,9 @@ SUFFIXES = {"GLB": "glb", "FBX": "fbx", "BVH": "bvh"}
 
 def wrong_walk():
     clip = walk(3.0)
-    clip = swap_sides(clip, BODY, clip.times[EXCHANGED.start], clip.times[EXCHANGED.stop - 1], "legs")
+    clip = swap_sides(
+        clip, BODY, clip.times[EXCHANGED.start], clip.times[EXCHANGED.stop - 1], "legs"
+    )
     clip.rotations[BAD, 1:] = clip.rotations[BAD, 1:] @ exp(np.array([0.5, 0.3, -0.4]))
     clip.root = clip.root + [0.0, 0.0, 0.3]
     return clip
@@ -68,7 +72,9 @@ def test_exported_files_have_the_edits(rig, tmp_path, kind):
     bpy.ops.scope.export(filepath=str(path), format=kind, which="ALL")
     first = read_back(path)
     (imported,) = (o for o in bpy.data.objects if o.type == "ARMATURE")
-    assert off(made_rigs.seen(imported, NAMES, [round(first) + frame - 1 for frame in FRAMES])) < 0.1
+    assert (
+        off(made_rigs.seen(imported, NAMES, [round(first) + frame - 1 for frame in FRAMES])) < 0.1
+    )
 
 
 def test_the_exported_motion_file_has_the_edits(rig, tmp_path):

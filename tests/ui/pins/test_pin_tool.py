@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the tool with the handles says when a drag ends. ./scripts/blender --part pins moves the mouse."""
+"""What the tool with the handles says when a drag ends. ./scripts/blender --part pins moves the
+mouse.
+"""
 
 from types import SimpleNamespace
 
@@ -16,12 +18,19 @@ from ...scene.made_rigs import captured
 
 
 class Tool:
-    """The operator without a window: what it reports, and the texts of the status bar, the last one last."""
+    """The operator without a window: what it reports, and the texts of the status bar, the last one
+    last.
+    """
 
     def __init__(self, armature):
         self.reported, self.status = [], []
         self._session = SimpleNamespace(
-            armature=armature.name, dragged="", hovered="", start=(0.0, 0.0), mouse=(0.0, 0.0), area=0
+            armature=armature.name,
+            dragged="",
+            hovered="",
+            start=(0.0, 0.0),
+            mouse=(0.0, 0.0),
+            area=0,
         )
 
     def report(self, kind, text):
@@ -29,12 +38,17 @@ class Tool:
 
     def drop(self, monkeypatch, place):
         """End a drag of the left wrist at a place in the scene."""
-        monkeypatch.setattr(bpy_extras.view3d_utils, "location_3d_to_region_2d", lambda *_: Vector((0.0, 0.0)))
+        monkeypatch.setattr(
+            bpy_extras.view3d_utils, "location_3d_to_region_2d", lambda *_: Vector((0.0, 0.0))
+        )
         monkeypatch.setattr(bpy_extras.view3d_utils, "region_2d_to_location_3d", lambda *_: place)
         self._session.dragged, self._session.mouse = "left_wrist", (50.0, 0.0)
         workspace = SimpleNamespace(status_text_set=self.status.append)
         context = SimpleNamespace(
-            scene=bpy.context.scene, view_layer=bpy.context.view_layer, selected_objects=[], workspace=workspace
+            scene=bpy.context.scene,
+            view_layer=bpy.context.view_layer,
+            selected_objects=[],
+            workspace=workspace,
         )
         space = SimpleNamespace(region_3d=SimpleNamespace(view_perspective="ORTHO"))
         area = SimpleNamespace(spaces=SimpleNamespace(active=space))

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a drag began and ended, from events as a busy Blender 4.3 gives them in a window without the focus."""
+"""Where a drag began and ended, from events as a busy Blender 4.3 gives them in a window without
+the focus.
+"""
 
 from types import SimpleNamespace
 

@@ -26,7 +26,9 @@ FRAMES = (5, 25, 50)
 
 @pytest.fixture(params=["static", "panning"])
 def rig(tmp_path, request):
-    """A walk captured by a camera whose world is tilted by 8 degrees, and the pixels of an upright post."""
+    """A walk captured by a camera whose world is tilted by 8 degrees, and the pixels of an upright
+    post.
+    """
     motion = motion_of(walk(2.0))
     if request.param == "panning":
         turn = exp(np.linspace(0, 0.1, len(motion))[:, None] * np.array([0.0, 1.0, 0.0]))
@@ -50,7 +52,9 @@ def in_image(rig):
     scene, found = bpy.context.scene, []
     for frame in FRAMES:
         places = made_rigs.seen(rig, NAMES, [frame])[0]
-        found.append([world_to_camera_view(scene, scene.camera, Vector(place))[:2] for place in places])
+        found.append(
+            [world_to_camera_view(scene, scene.camera, Vector(place))[:2] for place in places]
+        )
     return np.array(found)
 
 
@@ -75,11 +79,21 @@ def test_person_and_camera_turn_together_until_the_line_is_upright(rig):
 def everything(armature):
     """Keys of the armature and the camera, the camera's place, and the motion's arrays."""
     camera = next(o for o in bpy.context.scene.objects if o.type == "CAMERA")
-    curves = {(o.name, c.data_path, c.array_index): read_keys(c) for o in (armature, camera) for c in fcurves(o)}
+    curves = {
+        (o.name, c.data_path, c.array_index): read_keys(c)
+        for o in (armature, camera)
+        for c in fcurves(o)
+    }
     motion = stored_motion_of(armature)
-    arrays = {n: getattr(motion, n) for n in ("poses", "trans", "poses_raw", "trans_raw", "world_from_camera")}
+    arrays = {
+        n: getattr(motion, n)
+        for n in ("poses", "trans", "poses_raw", "trans_raw", "world_from_camera")
+    }
     if not fcurves(camera):
-        arrays |= {"location": np.array(camera.location), "rotation": np.array(camera.rotation_quaternion)}
+        arrays |= {
+            "location": np.array(camera.location),
+            "rotation": np.array(camera.rotation_quaternion),
+        }
     return curves | arrays
 
 
@@ -95,7 +109,9 @@ def pin(armature):
     return target
 
 
-@pytest.mark.parametrize("removed", [[0], [0, 0], [1, 0], [-1]], ids=["alone", "pin first", "line first", "all"])
+@pytest.mark.parametrize(
+    "removed", [[0], [0, 0], [1, 0], [-1]], ids=["alone", "pin first", "line first", "all"]
+)
 def test_without_the_line_everything_is_the_same_to_the_bit(rig, removed):
     armature, line = rig
     before = everything(armature)
@@ -172,12 +188,16 @@ def test_the_line_of_one_person_is_that_of_everybody_of_the_capture():
 
 @pytest.fixture
 def leaning(tmp_path):
-    """A walk captured by a camera whose world leans by 8 degrees towards it; the armature is turned and moved."""
+    """A walk captured by a camera whose world leans by 8 degrees towards it; the armature is turned
+    and moved.
+    """
     tilt = np.eye(4)
     tilt[:3, :3] = exp(np.radians([8.0, 0.0, 0.0]))
     armature = captured(moved_motion(motion_of(walk(2.0)), BODY, tilt))
     pack_motion(armature, moved_motion(motion_of(walk(2.0)), BODY, tilt).to_bytes())
-    place = Matrix.LocRotScale(Vector((3.0, 1.0, 0.0)), Matrix.Rotation(0.7, 3, "Z").to_quaternion(), None)
+    place = Matrix.LocRotScale(
+        Vector((3.0, 1.0, 0.0)), Matrix.Rotation(0.7, 3, "Z").to_quaternion(), None
+    )
     scene = bpy.context.scene
     scene.camera = next(o for o in scene.objects if o.type == "CAMERA")
     for obj in (armature, scene.camera):

@@ -41,7 +41,9 @@ def turns(rig, bone):
 
 
 def keyed(rig):
-    return {curve.data_path.split('"')[1]: len(curve.keyframe_points) for curve in actions.fcurves(rig)}
+    return {
+        curve.data_path.split('"')[1]: len(curve.keyframe_points) for curve in actions.fcurves(rig)
+    }
 
 
 def test_one_button_moves_body_and_face(settings):
@@ -62,7 +64,11 @@ def test_one_button_moves_body_and_face(settings):
 def test_the_list_is_edited_saved_loaded_and_used_for_the_face_alone(settings, tmp_path):
     bpy.ops.scope.retarget()
     body = keyed(settings.rig)["upperarm01.L"]
-    jaw = next(p for p in settings.face_pairs if (p.key, p.channel, p.expression) == ("jaw", "pitch", "jawOpen"))
+    jaw = next(
+        p
+        for p in settings.face_pairs
+        if (p.key, p.channel, p.expression) == ("jaw", "pitch", "jawOpen")
+    )
     jaw.factor = 10.0
     bpy.ops.scope.save_expression_map(filepath=str(tmp_path / "face"))
     count = len(settings.face_pairs)
@@ -74,7 +80,11 @@ def test_the_list_is_edited_saved_loaded_and_used_for_the_face_alone(settings, t
     assert turns(settings.rig, "jaw") == pytest.approx([0, 10], abs=0.1)
     assert keyed(settings.rig)["upperarm01.L"] == body
     bpy.ops.scope.guess_expressions()
-    jaw = next(p for p in settings.face_pairs if (p.key, p.channel, p.expression) == ("jaw", "pitch", "jawOpen"))
+    jaw = next(
+        p
+        for p in settings.face_pairs
+        if (p.key, p.channel, p.expression) == ("jaw", "pitch", "jawOpen")
+    )
     assert jaw.factor > 20
 
 

@@ -30,7 +30,11 @@ def settings():
 def test_guess_edit_keep_and_retarget(settings, tmp_path):
     bpy.ops.scope.guess_expressions()
     pairs = {(pair.key, pair.expression) for pair in settings.face_pairs}
-    assert {("viseme_aa", "jawOpen"), ("viseme_PP", "mouthPressLeft"), ("blinkLeft", "eyeBlinkLeft")} <= pairs
+    assert {
+        ("viseme_aa", "jawOpen"),
+        ("viseme_PP", "mouthPressLeft"),
+        ("blinkLeft", "eyeBlinkLeft"),
+    } <= pairs
     next(pair for pair in settings.face_pairs if pair.expression == "jawOpen").factor = 1.2
     bpy.ops.scope.save_expression_map(filepath=str(tmp_path / "face"))  # the suffix is added
     count = len(settings.face_pairs)
@@ -88,13 +92,18 @@ def test_a_mesh_that_was_deleted_from_the_scene_is_not_animated(settings):
 
 def test_choosing_another_mesh_replaces_the_list(settings):
     bpy.ops.scope.guess_expressions()
-    first, other = settings.face, face_mesh(["jawOpen", "mouthPucker", "mouthFunnel", "cheekPuff", "noseSneerLeft"])
+    first, other = (
+        settings.face,
+        face_mesh(["jawOpen", "mouthPucker", "mouthFunnel", "cheekPuff", "noseSneerLeft"]),
+    )
     settings.face_pairs[0].factor = 0.25  # edited by hand
     for chosen in (None, first):
         settings.face = chosen
         assert settings.face_pairs[0].factor == 0.25
     settings.face = other
-    assert {pair.key for pair in settings.face_pairs} == {block.name for block in other.data.shape_keys.key_blocks[1:]}
+    assert {pair.key for pair in settings.face_pairs} == {
+        block.name for block in other.data.shape_keys.key_blocks[1:]
+    }
 
 
 def test_guessing_without_known_names_leaves_the_list_as_it_is(settings):

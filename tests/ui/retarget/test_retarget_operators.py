@@ -60,20 +60,26 @@ def test_travel_scale_multiplies_the_path(rig):
         settings.travel = scale
         bpy.ops.scope.retarget()
         paths[scale] = seen(rig, ["pelvis"])[:, 0, :2]
-    np.testing.assert_allclose(np.ptp(paths[1.0], axis=0), 2.0 * np.ptp(paths[0.5], axis=0), atol=0.01)
+    np.testing.assert_allclose(
+        np.ptp(paths[1.0], axis=0), 2.0 * np.ptp(paths[0.5], axis=0), atol=0.01
+    )
     legs = np.ptp(paths[0.0][:, 1]) / np.ptp(paths[1.0][:, 1])
     assert legs == pytest.approx(1.3 * LEG_RATIO, abs=0.01)  # this rig has the size 1.3
 
 
 def two_people_who_meet():
-    """Return the armatures of two people who come towards each other, and their rigs of different sizes and kinds."""
+    """Return the armatures of two people who come towards each other, and their rigs of different
+    sizes and kinds.
+    """
     apart, clips = ([1.4, 0.3, 0.0], [0.0, 0.0, 0.0]), (walk(2.0), walk(2.0, speed=0.8))
     for clip, place in zip(clips, apart, strict=True):
         clip.root += place
     clips[0].root[:, 0] -= np.linspace(0.0, 1.0, len(clips[0]))
     motions = [motion_of(clip) for clip in clips]
     bpy.context.scene.render.fps = int(RATE)
-    people = [p.armature for p in build_scene(motions, BODY, None, BuildOptions(start_frame=1.0)).people]
+    people = [
+        p.armature for p in build_scene(motions, BODY, None, BuildOptions(start_frame=1.0)).people
+    ]
     rigs = [build_rig(scheme, size)[0] for scheme, size in (("unreal", 1.5), ("mixamo", 0.8))]
     for person in people:
         person["scope_body_file"] = "scope"
@@ -92,7 +98,10 @@ def test_rigs_of_two_people_meet_where_these_met_with_one_travel_scale(travel, r
         settings.pairs.clear()
         bpy.ops.scope.retarget()
     true = [seen(person, ["pelvis"])[:, 0, :2] for person in people]
-    found = [seen(rig, [hips])[:, 0, :2] for rig, hips in zip(rigs, ("pelvis", "mixamorig:Hips"), strict=True)]
+    found = [
+        seen(rig, [hips])[:, 0, :2]
+        for rig, hips in zip(rigs, ("pelvis", "mixamorig:Hips"), strict=True)
+    ]
     between = found[0] - found[1]
     np.testing.assert_allclose(between, travel * (true[0] - true[1]), atol=0.02)
     assert [captured_armature_of(rig) for rig in rigs] == people
@@ -128,7 +137,8 @@ def test_the_scale_of_the_path_is_reported_where_there_is_a_path(rig, capfd, roo
     bpy.ops.scope.retarget()
     said = capfd.readouterr().out
     assert f"'{rig.name}' is now animated by the action '{rig.animation_data.action.name}'" in said
-    assert ("positions on the floor scaled by 1.3" in said) is (root != "in-place")  # the size of this rig
+    # the size of this rig
+    assert ("positions on the floor scaled by 1.3" in said) is (root != "in-place")
 
 
 def test_saving_a_bone_map_overwrites_bone_maps_only(rig, tmp_path):
@@ -138,7 +148,11 @@ def test_saving_a_bone_map_overwrites_bone_maps_only(rig, tmp_path):
     text = saved.read_text("utf-8")
     other.write_text(before := '{"name": "a game", "bones": {}}')
     empty.touch()
-    with pytest.raises(RuntimeError, match=r"package\.json is not a bone map, so it is not overwritten"):
+    with pytest.raises(
+        RuntimeError,
+        match=r"package\.json is not a bone map, so it is not "
+        r"overwritten",
+    ):
         bpy.ops.scope.save_bone_map(filepath=str(other))
     (tmp_path / "notes.json").write_bytes(b"\xff\xfe not JSON")
     with pytest.raises(RuntimeError, match="not a bone map"):
@@ -201,7 +215,9 @@ def test_the_captured_body_is_hidden_side_by_side_or_overlapping(rig):
     settings.captured = "beside"
     bpy.ops.scope.retarget()
     assert not any(obj.hide_get() or obj.hide_render for obj in (source, body))
-    np.testing.assert_allclose(seen(rig, ["pelvis"]) - there, np.broadcast_to([1.5, 0, 0], there.shape), atol=1e-4)
+    np.testing.assert_allclose(
+        seen(rig, ["pelvis"]) - there, np.broadcast_to([1.5, 0, 0], there.shape), atol=1e-4
+    )
     body.hide_render = True  # a manual setting
     settings.captured = "keep"
     bpy.ops.scope.retarget()
@@ -238,7 +254,11 @@ def test_retargeting_again_after_an_edit_updates_the_rig(rig, tmp_path):
     motion_of(walk(2.0), noise=0.1).save(tmp_path / "person1.npz")
     source["scope_motion"] = str(tmp_path / "person1.npz")
     bpy.ops.scope.retarget()
-    before, count, name = seen(rig, ["upperarm_l", "hand_l"]), len(bpy.data.actions), rig.animation_data.action.name
+    before, count, name = (
+        seen(rig, ["upperarm_l", "hand_l"]),
+        len(bpy.data.actions),
+        rig.animation_data.action.name,
+    )
     bpy.ops.scope.smooth(strength=0.0)
     bpy.ops.scope.retarget()
     assert np.abs(seen(rig, ["upperarm_l", "hand_l"]) - before).max() > 0.02
@@ -284,11 +304,15 @@ def test_siblings_of_the_rig_are_not_exported_with_it(rig, tmp_path, suffix):
         bpy.ops.import_scene.fbx(filepath=path, anim_offset=0.0)
     assert not {obj.name for obj in bpy.data.objects} & {"Cube", "Plane"}
     rig = next(obj for obj in bpy.context.scene.objects if obj.type == "ARMATURE")
-    np.testing.assert_allclose(seen(rig, ["pelvis", "hand_l"], [9]), wanted, atol=1e-3)  # the file starts at 0 s
+    # the file starts at 0 s
+    np.testing.assert_allclose(seen(rig, ["pelvis", "hand_l"], [9]), wanted, atol=1e-3)
 
 
 def test_with_several_people_the_panels_ask_for_a_selection(rig):
-    people = [next(obj for obj in bpy.context.scene.objects if "scope_source" in obj), captured(motion_of(walk(2.0)))]
+    people = [
+        next(obj for obj in bpy.context.scene.objects if "scope_source" in obj),
+        captured(motion_of(walk(2.0))),
+    ]
     people[1]["scope_body_file"] = "scope"
     panels, layer = (bpy.types.SCOPE_PT_retarget, bpy.types.SCOPE_PT_edit), bpy.context.view_layer
     layer.objects.active = rig
@@ -356,7 +380,9 @@ def test_the_rig_is_exported_with_its_animation_and_only_its_mesh(rig, tmp_path,
     bpy.ops.scope.retarget()
     there, before = seen(rig, ["pelvis"])[:, 0], sorted(c.name for c in bpy.data.collections)
     path = tmp_path / f"hero.{kind}"
-    assert bpy.ops.scope.export(filepath=str(path), format=kind.upper(), which="RIG") == {"FINISHED"}
+    assert bpy.ops.scope.export(filepath=str(path), format=kind.upper(), which="RIG") == {
+        "FINISHED"
+    }
     assert sorted(c.name for c in bpy.data.collections) == before
     read_back(path, RATE)
     moved = [obj for obj in bpy.data.objects if obj.type == "ARMATURE"]
@@ -382,7 +408,9 @@ def test_the_shape_keys_of_the_rigs_own_face_move_in_usd(rig, tmp_path, shape):
         mesh.shape_keys.key_blocks["Fcl_MTH_A"].value = value
         mesh.shape_keys.keyframe_insert('key_blocks["Fcl_MTH_A"].value', frame=frame)
     path = tmp_path / "hero.usdc"
-    assert bpy.ops.scope.export(filepath=str(path), format="USDC", which="RIG", shape=shape) == {"FINISHED"}
+    assert bpy.ops.scope.export(filepath=str(path), format="USDC", which="RIG", shape=shape) == {
+        "FINISHED"
+    }
     read_back(path, RATE)
     (read,) = (obj for obj in bpy.data.objects if obj.type == "MESH")
     for frame, value in ((1, 0.0), (41, 0.8)):
@@ -400,7 +428,11 @@ def test_the_rig_is_exported_also_when_the_person_was_deleted(rig, tmp_path):
 
 def test_an_unwritable_bone_map_is_an_error_that_names_the_file(rig, tmp_path):
     bpy.ops.scope.guess_bones()
-    with pytest.raises(RuntimeError, match=r"Cannot write .*nowhere/bones\.json: its folder does not exist"):
+    with pytest.raises(
+        RuntimeError,
+        match=r"Cannot write .*nowhere/bones\.json: its folder does "
+        r"not exist",
+    ):
         bpy.ops.scope.save_bone_map(filepath=str(tmp_path / "nowhere" / "bones.json"))
 
 
@@ -443,7 +475,9 @@ def test_a_library_override_is_animated_and_saved(tmp_path, root):
     assert np.ptp(moving[:, 0, 1]) > 1.0
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
-    np.testing.assert_allclose(seen(bpy.context.scene.scope_retarget.rig, ["pelvis", "hand_l"]), moving, atol=1e-4)
+    np.testing.assert_allclose(
+        seen(bpy.context.scene.scope_retarget.rig, ["pelvis", "hand_l"]), moving, atol=1e-4
+    )
 
 
 def test_a_rig_outside_the_view_layer_is_an_error(rig):

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every text of the interface that Blender or Scope translates, found in the registered classes and in the source."""
+"""Every text of the interface that Blender or Scope translates, found in the registered classes and
+in the source.
+"""
 
 from __future__ import annotations
 
@@ -18,11 +20,33 @@ from scope.scope_addon.ui.translations import CONTEXT
 ROOT = Path(scope.__file__).resolve().parent / "scope_addon"
 OPERATOR, DEFAULT = "Operator", "*"  # Blender's contexts
 # The same in every language: names of products, formats and axes.
-UNTRANSLATED = {"Scope", "FBX", "glTF", "BVH", "USD", "NPZ", "CPU", "CUDA", "TensorRT", "DirectML", "Core ML", "Y", "Z"}
-# Texts that are composed, in .blend files as well: joints under the mouse, corrections, stages of the progress.
+UNTRANSLATED = {
+    "Scope",
+    "FBX",
+    "glTF",
+    "BVH",
+    "USD",
+    "NPZ",
+    "CPU",
+    "CUDA",
+    "TensorRT",
+    "DirectML",
+    "Core ML",
+    "Y",
+    "Z",
+}
+# Texts that are composed, in .blend files as well: joints under the mouse, corrections, stages of
+# the progress.
 _JOINTS = {name.replace("_", " ").title() for name in HANDLES}
 CORRECTIONS = {
-    *("Left Foot Stands", "Right Foot Stands", "Upright Line", "Floor", "Feet on the Floor", "Interpolated"),
+    *(
+        "Left Foot Stands",
+        "Right Foot Stands",
+        "Upright Line",
+        "Floor",
+        "Feet on the Floor",
+        "Interpolated",
+    ),
     *(f"{what} Exchanged" for what in ("Sides", "Arms", "Legs")),
 }
 _STAGES = {stage.capitalize() for stage in (*STAGES, *FIRST_ONLY, BUILDING)}
@@ -35,7 +59,9 @@ Message = tuple[str, str]  # context and text
 def stage_texts() -> set[str]:
     """Return what the progress of a capture says."""
     source = (ROOT / "job" / "progress" / "job_progress.py").read_text(encoding="utf-8")
-    return _STAGES | {text for _, text in _of_source(ast.parse(source)) if any(map(str.isalpha, text))}
+    return _STAGES | {
+        text for _, text in _of_source(ast.parse(source)) if any(map(str.isalpha, text))
+    }
 
 
 def interface_texts() -> set[Message]:
@@ -46,28 +72,48 @@ def interface_texts() -> set[Message]:
             found |= set(_of_class(cls))
     for path in (ROOT / "ui").rglob("*.py"):
         found |= set(_of_source(ast.parse(path.read_text(encoding="utf-8"))))
-    return {(context, text) for context, text in found if any(map(str.isalpha, text)) and text not in UNTRANSLATED}
+    return {
+        (context, text)
+        for context, text in found
+        if any(map(str.isalpha, text)) and text not in UNTRANSLATED
+    }
 
 
 def texts_without_lookup(path: Path) -> list[str]:
-    """Return the composed texts and messages of a file that are shown to the user without having been looked up."""
+    """Return the composed texts and messages of a file that are shown to the user without having
+    been looked up.
+    """
     shown: list[ast.expr] = []
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Call) and getattr(node.func, "attr", "") in ("poll_message_set", "status_text_set"):
+        if isinstance(node, ast.Call) and getattr(node.func, "attr", "") in (
+            "poll_message_set",
+            "status_text_set",
+        ):
             shown += node.args
         elif isinstance(node, ast.Call):
             reported = node.args[1:] if getattr(node.func, "attr", "") == "report" else []
             texts = [keyword.value for keyword in node.keywords if keyword.arg in _LAYOUT_TEXTS]
             shown += [text for text in (*reported, *texts) if isinstance(text, ast.JoinedStr)]
         elif isinstance(node, ast.FunctionDef) and node.name in ("work", "edit"):
-            shown += [each.value for each in ast.walk(node) if isinstance(each, ast.Return) and each.value]
-    parts = [part for text in shown if isinstance(text, ast.Constant | ast.JoinedStr) for part in _literals(text)]
+            shown += [
+                each.value for each in ast.walk(node) if isinstance(each, ast.Return) and each.value
+            ]
+    parts = [
+        part
+        for text in shown
+        if isinstance(text, ast.Constant | ast.JoinedStr)
+        for part in _literals(text)
+    ]
     return [part for part in parts if any(map(str.isalpha, part))]
 
 
 def _literals(text: ast.Constant | ast.JoinedStr) -> list[str]:
     values = text.values if isinstance(text, ast.JoinedStr) else [text]
-    return [value.value for value in values if isinstance(value, ast.Constant) and isinstance(value.value, str)]
+    return [
+        value.value
+        for value in values
+        if isinstance(value, ast.Constant) and isinstance(value.value, str)
+    ]
 
 
 def _of_class(cls: Any) -> Iterator[Message]:
@@ -106,7 +152,11 @@ def _of_source(tree: ast.Module) -> Iterator[Message]:
         if not isinstance(scope_node, ast.FunctionDef):
             continue
         for call in (node for node in ast.walk(scope_node) if isinstance(node, ast.Call)):
-            name = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
+            name = (
+                call.func.attr
+                if isinstance(call.func, ast.Attribute)
+                else getattr(call.func, "id", "")
+            )
             if name in _LOOKUPS and call.args:
                 yield from ((CONTEXT, text) for text in _constants(call.args[0], tree))
             elif name == "report" and len(call.args) == 2:

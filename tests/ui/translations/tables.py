@@ -24,5 +24,7 @@ def assert_end_as_the_english_texts(table: Mapping[str, str]) -> None:
 
 def _placeholders(text: str) -> list[str]:
     """Names and formats in braces, and printf's, each as often as it occurs."""
-    fields = [f"{name}:{spec}" for _, name, spec, _ in string.Formatter().parse(text) if name is not None]
+    fields = [
+        f"{name}:{spec}" for _, name, spec, _ in string.Formatter().parse(text) if name is not None
+    ]
     return sorted(fields + re.findall(r"%(?:\d+\$)?[sdif]", text))

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every text of the interface has a translation in each language, with the same placeholders; none is left over.
+"""Every text of the interface has a translation in each language, with the same placeholders; none
+is left over.
 
-The bpy of the Python package index has no languages to switch to: ./scripts/blender --part panel does that.
+The bpy of the Python package index has no languages to switch to: ./scripts/blender --part panel
+does that.
 """
 
 from __future__ import annotations
@@ -21,12 +23,17 @@ every_language = pytest.mark.parametrize("language", MODULES.values(), ids=MODUL
 
 @every_language
 def test_every_text_is_translated(language):
-    assert {text for context, text in interface_texts() if context != OPERATOR} - set(language.TEXTS) == set()
+    assert {text for context, text in interface_texts() if context != OPERATOR} - set(
+        language.TEXTS
+    ) == set()
 
 
 @every_language
 def test_no_translation_is_left_over(language):
-    assert set(language.TEXTS) - {text for context, text in interface_texts() if context != OPERATOR} == set()
+    assert (
+        set(language.TEXTS) - {text for context, text in interface_texts() if context != OPERATOR}
+        == set()
+    )
 
 
 @every_language
@@ -49,10 +56,18 @@ def test_the_texts_found_come_from_classes_layouts_reports_and_lists():
     assert ("*", "Capture finished") in texts  # report
 
 
-@pytest.mark.parametrize("language", [MODULES[code] for code in ("de", "es", "fr")], ids=("de", "es", "fr"))
+@pytest.mark.parametrize(
+    "language", [MODULES[code] for code in ("de", "es", "fr")], ids=("de", "es", "fr")
+)
 def test_labels_fit_into_a_sidebar_of_the_usual_width(language):
-    """Characters that fit, counted on screen: a checkbox of the options has room for 20, a listed correction for 18."""
-    options = {each.blender.label or each.name for each in options_at(Place.PANEL) if each.value_type is bool}
+    """Characters that fit, counted on screen: a checkbox of the options has room for 20, a listed
+    correction for 18.
+    """
+    options = {
+        each.blender.label or each.name
+        for each in options_at(Place.PANEL)
+        if each.value_type is bool
+    }
     for text in options & set(language.TEXTS):
         assert len(language.TEXTS[text]) <= 20, text
     for text in CORRECTIONS - {"Interpolated"}:
@@ -81,7 +96,8 @@ def test_messages_and_composed_texts_are_looked_up():
 def test_a_composed_text_that_is_not_looked_up_is_found(tmp_path):
     path = tmp_path / "panel.py"
     path.write_text(
-        'cls.poll_message_set("Choose one")\nlayout.label(text=f"{n} frames")\nself.report({"INFO"}, f"Freed {n}")\n'
+        'cls.poll_message_set("Choose one")\nlayout.label(text=f"{n} '
+        'frames")\nself.report({"INFO"}, f"Freed {n}")\n'
         'layout.label(text=iface_("{n} frames", n=n))\nlayout.label(text=f"{n} %")\n'
     )
     assert texts_without_lookup(path) == ["Choose one", " frames", "Freed "]

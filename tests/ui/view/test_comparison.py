@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The view over the footage and the one from the side, as far as a Blender without a window has them."""
+"""The view over the footage and the one from the side, as far as a Blender without a window has
+them.
+"""
 
 import bpy
 import numpy as np
@@ -20,7 +22,8 @@ def test_the_side_view_is_level_and_looks_across_the_cameras_view(heading, tilt)
     np.testing.assert_allclose(up, [0, 0, 1], atol=1e-6)
     forward = -np.array(camera.col[2])[:3]
     assert abs(looks @ forward) < 1e-6
-    np.testing.assert_allclose(looks, np.array(camera.col[0])[:3], atol=1e-6)  # to the right of the camera's view
+    # to the right of the camera's view
+    np.testing.assert_allclose(looks, np.array(camera.col[0])[:3], atol=1e-6)
 
 
 def test_a_camera_that_looks_along_its_side_still_gives_a_view():
@@ -51,7 +54,10 @@ def test_bones_are_hidden_in_the_view_and_shown_again_after_it():
 
 def capture_with_camera(name):
     """Return a capture's collection with a camera, linked to the scene, and the camera."""
-    collection, camera = bpy.data.collections.new(name), bpy.data.objects.new(name, bpy.data.cameras.new(name))
+    collection, camera = (
+        bpy.data.collections.new(name),
+        bpy.data.objects.new(name, bpy.data.cameras.new(name)),
+    )
     collection["scope_capture"] = 1
     collection.objects.link(camera)
     bpy.context.scene.collection.children.link(collection)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The camera's frame fills what sidebars and toolbars leave of a viewport; a real Blender checks it on the screen."""
+"""The camera's frame fills what sidebars and toolbars leave of a viewport; a real Blender checks it
+on the screen.
+"""
 
 import math
 from types import SimpleNamespace
@@ -8,7 +10,8 @@ import bpy
 import pytest
 from scope.scope_addon.ui.view.frame_fit import fit_frame, unfit_frame
 
-# As measured in a Blender 4.3: at zoom 0 and without an offset, a square frame in a viewport of 1322 x 876 is 661 wide.
+# As measured in a Blender 4.3: at zoom 0 and without an offset, a square frame in a viewport of
+# 1322 x 876 is 661 wide.
 HALF_AT_ZOOM_0 = (1322, 661)
 
 
@@ -28,7 +31,9 @@ def viewport(width, height, **given):
     view = SimpleNamespace(view_camera_zoom=12.0, view_camera_offset=(0.1, 0.2))
     space = SimpleNamespace(region_3d=view)
     space.as_pointer = lambda: id(space)
-    return SimpleNamespace(regions=regions(width, height, **given), spaces=SimpleNamespace(active=space))
+    return SimpleNamespace(
+        regions=regions(width, height, **given), spaces=SimpleNamespace(active=space)
+    )
 
 
 def scene(size, fit="AUTO"):
@@ -41,7 +46,9 @@ def scene(size, fit="AUTO"):
 
 
 def frame_of(area, size):
-    """Return left, right, bottom and top of the frame in the region, for a sensor that is fitted automatically."""
+    """Return left, right, bottom and top of the frame in the region, for a sensor that is fitted
+    automatically.
+    """
     view, region = area.spaces.active.region_3d, area.regions[0]
     scale = ((math.sqrt(2) + view.view_camera_zoom / 50) / math.sqrt(2)) ** 2
     longer = scale * HALF_AT_ZOOM_0[1] / HALF_AT_ZOOM_0[0] * max(region.width, region.height)
@@ -60,7 +67,9 @@ def test_the_whole_frame_is_visible_and_as_large_as_fits(size, viewport_size):
     free = 58, viewport_size[0] - 291, 0, viewport_size[1] - 54
     assert free[0] < left < right < free[1]
     assert free[2] < bottom < top < free[3]
-    assert max((right - left) / (free[1] - free[0]), (top - bottom) / (free[3] - free[2])) == pytest.approx(0.94)
+    assert max(
+        (right - left) / (free[1] - free[0]), (top - bottom) / (free[3] - free[2])
+    ) == pytest.approx(0.94)
 
 
 def test_the_former_view_returns():

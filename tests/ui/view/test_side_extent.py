@@ -11,7 +11,8 @@ from scope.scope_addon.ui.view.side_extent import side_extent
 
 from ...edit.walking import BODY, motion_of, walk
 
-ALONG_X = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]], float)  # a level view along -x, in which the walk goes along -y
+# a level view along -x, in which the walk goes along -y
+ALONG_X = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]], float)
 
 
 def people(*clips):

@@ -28,7 +28,9 @@ class Region:
 def area(kind="VIEW_3D", size=(800, 600), drawn=True):
     spaces = SimpleNamespace(active=SimpleNamespace(show_region_ui=False))
     regions = [SimpleNamespace(type="WINDOW"), Region(drawn)]
-    found = SimpleNamespace(type=kind, width=size[0], height=size[1], spaces=spaces, regions=regions)
+    found = SimpleNamespace(
+        type=kind, width=size[0], height=size[1], spaces=spaces, regions=regions
+    )
     found.as_pointer, found.tag_redraw = lambda: id(found), lambda: None
     return found
 
@@ -41,7 +43,11 @@ def context(areas, active=None):
 def test_the_tab_opens_in_the_largest_viewport_of_a_menu():
     menu, small, large = area("TOPBAR", (2000, 2000)), area(size=(100, 100)), area()
     sidebar.show_tab(context([menu, small, large], menu))
-    assert [each.spaces.active.show_region_ui for each in (menu, small, large)] == [False, False, True]
+    assert [each.spaces.active.show_region_ui for each in (menu, small, large)] == [
+        False,
+        False,
+        True,
+    ]
     assert large.regions[1].tab == "Scope"
 
 

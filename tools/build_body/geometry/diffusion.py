@@ -13,7 +13,9 @@ def perineum(mirror: NDArray[np.intp], vertices: NDArray[np.float64]) -> NDArray
     return vertices[midline[vertices[midline, 1].argmin()]]
 
 
-def bump(vertices: NDArray[np.float64], centre: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
+def bump(
+    vertices: NDArray[np.float64], centre: NDArray[np.float64], radius: float
+) -> NDArray[np.float64]:
     """Return (V,) factors: one at the centre, falling smoothly to zero at ``radius``."""
     distance = np.linalg.norm(vertices - centre, axis=1) / radius
     return np.clip(1.0 - distance**2, 0.0, None) ** 2
@@ -22,7 +24,9 @@ def bump(vertices: NDArray[np.float64], centre: NDArray[np.float64], radius: flo
 def diffuse(
     links: NDArray[np.intp], values: NDArray[np.float64], strength: NDArray[np.float64], rounds: int
 ) -> NDArray[np.float64]:
-    """Move each vertex's row towards the mean of its neighbours by ``strength`` (V,) in [0, 1], ``rounds`` times."""
+    """Move each vertex's row towards the mean of its neighbours by ``strength`` (V,) in [0, 1],
+    ``rounds`` times.
+    """
     active = np.flatnonzero(strength > 0.0)
     near = links[np.isin(links, active).any(axis=1)]
     degree = np.bincount(near.ravel(), minlength=len(values))[active, None]

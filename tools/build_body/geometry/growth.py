@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How a body changes from child to adult: one more shape coefficient, for the bodies of children.
 
-Its column is the mean adult of `shape_space` minus the mean six-year-old of growth tables (`anthropometry.CHILDREN`),
-made to measure by `population`: at −1, the adult's shape becomes the child's. Positive is taller, as for the others.
+Its column is the mean adult of `shape_space` minus the mean six-year-old of growth tables
+(`anthropometry.CHILDREN`), made to measure by `population`: at −1, the adult's shape becomes the
+child's. Positive is taller, as for the others.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ KEYS = ("shapedirs", "J_shapedirs", "keypoint_shapedirs")
 
 
 def build_growth(shaped: ShapedMesh, targets: SurveyTargets) -> dict[str, NDArray[Any]]:
-    """Return the additional columns of both bodies, (n, 3) metres each, by ``BODY/KEY`` with the body's name and key.
+    """Return the additional columns of both bodies, (n, 3) metres each, by ``BODY/KEY`` with the
+    body's name and key.
 
     :param targets: of all ages.
     """
@@ -40,4 +42,6 @@ def with_growth(shaped: ShapedMesh, targets: SurveyTargets) -> ShapedMesh:
     """Return the mesh with one more component, by which the child follows from the adult."""
     child = smooth_nipples(shaped.source, mean_child(shaped.source, targets, YEARS)[None])
     child = smooth_perineum(shaped.mesh, np.concatenate([shaped.basis[:1], child]))[1:]
-    return ShapedMesh(shaped.source, shaped.mesh, np.concatenate([shaped.basis, shaped.basis[:1] - child]))
+    return ShapedMesh(
+        shaped.source, shaped.mesh, np.concatenate([shaped.basis, shaped.basis[:1] - child])
+    )

@@ -34,7 +34,9 @@ class QuadLoops:
         return sorted(found)
 
     def walk(self, start: int, second: int) -> list[int] | None:
-        """Return the edge loop through an edge as a list of vertices, or None if it meets a pole or a border."""
+        """Return the edge loop through an edge as a list of vertices, or None if it meets a pole or
+        a border.
+        """
         loop = [start, second]
         while len(loop) <= MAX_LENGTH:
             previous, here = loop[-2:]
@@ -48,7 +50,9 @@ class QuadLoops:
         return None
 
     def _ahead(self, previous: int, here: int) -> list[int]:
-        """Return the end of the edge opposite to the one from ``previous`` to ``here``, if there is just one."""
+        """Return the end of the edge opposite to the one from ``previous`` to ``here``, if there is
+        just one.
+        """
         around = self.faces_at[here]
         if len(around) != 4:
             return []
@@ -56,16 +60,23 @@ class QuadLoops:
         return [v for v in self.neighbours(here) if v not in beside]
 
     def nearest(
-        self, vertices: NDArray[np.float64], point: NDArray[np.float64], normal: NDArray[np.float64], radius: float
+        self,
+        vertices: NDArray[np.float64],
+        point: NDArray[np.float64],
+        normal: NDArray[np.float64],
+        radius: float,
     ) -> list[int]:
         """Return the closed loop around a limb that stays nearest to a plane.
 
-        :param vertices: (V, 3) metres; ``point``, ``normal``: the plane, across the limb at its axis.
+        :param vertices: (V, 3) metres; ``point``, ``normal``: the plane, across the limb at its
+            axis.
         :param radius: metres; only loops within this distance of ``point`` count.
         """
         offset = vertices - point
         height = offset @ normal
-        candidates = np.flatnonzero((np.abs(height) < 0.03) & (np.linalg.norm(offset, axis=1) < radius))
+        candidates = np.flatnonzero(
+            (np.abs(height) < 0.03) & (np.linalg.norm(offset, axis=1) < radius)
+        )
         best, best_cost, done = None, np.inf, set()
         for v in candidates.tolist():
             for other in self.neighbours(v):
@@ -75,13 +86,19 @@ class QuadLoops:
                 if loop is None:
                     continue
                 round_trip = loop[1:] + loop[:1]
-                done |= set(zip(loop, round_trip, strict=True)) | set(zip(round_trip, loop, strict=True))
+                done |= set(zip(loop, round_trip, strict=True)) | set(
+                    zip(round_trip, loop, strict=True)
+                )
                 ring = offset[loop]
                 across = ring - np.outer(ring @ normal, normal)
                 angles = np.unwrap(np.arctan2(*(across @ _plane_axes(normal)).T))
                 turns_around = abs(angles[-1] - angles[0]) > np.pi
                 cost = np.abs(height[loop]).mean()
-                if turns_around and np.linalg.norm(ring, axis=1).max() < radius and cost < best_cost - 1e-9:
+                if (
+                    turns_around
+                    and np.linalg.norm(ring, axis=1).max() < radius
+                    and cost < best_cost - 1e-9
+                ):
                     best, best_cost = loop, cost
         if best is None:
             raise ValueError(f"no closed edge loop within {radius} m of {np.round(point, 3)}")

@@ -19,8 +19,10 @@ MATERIALS = {  # linear RGBA
     "eye_iris": (0.10, 0.055, 0.025, 1.0),
     "eye_pupil": (0.005, 0.005, 0.005, 1.0),
 }
-RING = 8  # vertices in each ring of an eyeball; the first ring bounds the pupil, the second the iris
-HAIRLINE = (  # metres relative to the eyes: z from the back of the head to the forehead, y of the line there
+# vertices in each ring of an eyeball; the first ring bounds the pupil, the second the iris
+RING = 8
+# metres relative to the eyes: z from the back of the head to the forehead, y of the line there
+HAIRLINE = (
     (-0.22, -0.17, -0.13, -0.10, -0.08, -0.055, -0.03, -0.01),
     (-0.06, -0.06, -0.03, 0.02, 0.03, 0.04, 0.062, 0.066),
 )
@@ -30,7 +32,8 @@ X, Y = np.eye(3)[:2]
 def face_materials(
     mesh: Mesh, skeleton: Skeleton, vertices: NDArray[np.float64], J: NDArray[np.float64]
 ) -> NDArray[np.uint8]:
-    """Return (F,) indices into ``MATERIALS``, symmetric, with closed edge loops around limbs and trunk as borders.
+    """Return (F,) indices into ``MATERIALS``, symmetric, with closed edge loops around limbs and
+    trunk as borders.
 
     :param vertices: (V, 3) the mean shape in T-pose; ``J`` (K+1, 3) its joints.
     """
@@ -43,8 +46,12 @@ def face_materials(
         a, b = J[skeleton.index(start)], J[skeleton.index(end)]
         return a + fraction * (b - a)
 
-    def beyond(point: NDArray[np.float64], normal: NDArray[np.float64], radius: float) -> NDArray[np.bool_]:
-        """Return the faces beyond the loop nearest to the plane, on the side to which the normal points."""
+    def beyond(
+        point: NDArray[np.float64], normal: NDArray[np.float64], radius: float
+    ) -> NDArray[np.bool_]:
+        """Return the faces beyond the loop nearest to the plane, on the side to which the normal
+        points.
+        """
         distance = np.linalg.norm(centre - point - 0.5 * radius * normal, axis=1)
         seed = int(np.where(mesh.is_eye, np.inf, distance).argmin())
         return loops.beyond(loops.nearest(vertices, point, normal, radius), seed)
@@ -80,7 +87,9 @@ def mirror_faces(mesh: Mesh) -> NDArray[np.intp]:
 
 
 def _front_of_eyes(mesh: Mesh, vertices: NDArray[np.float64], rings: int) -> NDArray[np.bool_]:
-    """Return (F,) bool: the eyeball faces inside the first ``rings`` rings around the line of sight."""
+    """Return (F,) bool: the eyeball faces inside the first ``rings`` rings around the line of
+    sight.
+    """
     inside = np.zeros(len(vertices), bool)
     eyeballs = np.unique(mesh.faces[mesh.is_eye])
     for side in (1.0, -1.0):

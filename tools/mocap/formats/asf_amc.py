@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Acclaim motion capture: .asf skeletons and .amc motions, as CMU publishes them.
 
-A bone b with rest direction d, length l, axis rotation C (Euler angles of ``axis``) and joint rotation M (Euler angles
-of its ``dof`` values, missing ones zero) under its parent p, all in the skeleton's axes:
+A bone b with rest direction d, length l, axis rotation C (Euler angles of ``axis``) and joint
+rotation M (Euler angles of its ``dof`` values, missing ones zero) under its parent p, all in the
+skeleton's axes:
 
     R_b = R_p C M Cᵀ        end_b = end_p + l R_b d        root: R = C M Cᵀ, end = position + T
 
-Euler angles "XYZ" turn about fixed axes, x first: R = Rz Ry Rx. Lengths are stored in inches times the file's
-``length`` unit, so metres = value / unit · 0.0254; CMU's 0.45 makes 1 unit 5.64 cm.
-Source: the Acclaim file format as described by J. Lander, "Working with motion capture file formats" (1998).
+Euler angles "XYZ" turn about fixed axes, x first: R = Rz Ry Rx. Lengths are stored in inches times
+the file's ``length`` unit, so metres = value / unit · 0.0254; CMU's 0.45 makes 1 unit 5.64 cm.
+Source: the Acclaim file format as described by J. Lander, "Working with motion capture file
+formats" (1998).
 """
 
 from __future__ import annotations
@@ -25,16 +27,27 @@ from ....solver.rotations import exp
 INCH = 0.0254
 AXES = {"x": 0, "y": 1, "z": 2}
 
-# CMU's bones by the joint about which they rotate. A bone that cannot rotate (hip joint) only moves its children.
+# CMU's bones by the joint about which they rotate. A bone that cannot rotate (hip joint) only moves
+# its children.
 _SIDE = {
-    "hip": "femur", "knee": "tibia", "ankle": "foot", "foot": "toes", "collar": "clavicle", "shoulder": "humerus",
+    "hip": "femur", "knee": "tibia", "ankle": "foot", "foot": "toes", "collar": "clavicle",
+    "shoulder": "humerus",
     "elbow": "radius", "forearm": "wrist", "wrist": "hand", "knuckle": "fingers", "thumb": "thumb",
 }  # fmt: skip
 SEGMENT_OF_JOINT = {
-    "pelvis": "root", "spine1": "lowerback", "spine2": "upperback", "spine3": "thorax", "neck": "lowerneck",
-    "neck2": "upperneck", "head": "head",
-    **{f"{side}_{joint}": side[0] + bone for side in ("left", "right") for joint, bone in _SIDE.items()},
-}  # fmt: skip
+    "pelvis": "root",
+    "spine1": "lowerback",
+    "spine2": "upperback",
+    "spine3": "thorax",
+    "neck": "lowerneck",
+    "neck2": "upperneck",
+    "head": "head",
+    **{
+        f"{side}_{joint}": side[0] + bone
+        for side in ("left", "right")
+        for joint, bone in _SIDE.items()
+    },
+}
 TIPS = {
     "head_end": "head",
     **{f"{side}_foot_end": side[0] + "toes" for side in ("left", "right")},
@@ -50,9 +63,11 @@ class Skeleton:
 
     bones: tuple[str, ...]
     parents: NDArray[np.intp]  # (B,) −1 for the root
-    offsets: NDArray[np.float64]  # (B, 3) start to end of the bone at zero pose; the root's is its rest position
+    # (B, 3) start to end of the bone at zero pose; the root's is its rest position
+    offsets: NDArray[np.float64]
     axes: NDArray[np.float64]  # (B, 3, 3) C_b
-    dofs: tuple[tuple[str, ...], ...]  # per bone, order of its values: rx, ry, rz and for the root tx, ty, tz
+    # per bone, order of its values: rx, ry, rz and for the root tx, ty, tz
+    dofs: tuple[tuple[str, ...], ...]
     metres_per_unit: float
     degrees: bool
 
@@ -61,7 +76,8 @@ class Skeleton:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Compute the global pose of every bone.
 
-        :param M: (T, B, 3, 3) rotations of the bones in skeleton axes relative to their parents, that is C M Cᵀ above.
+        :param M: (T, B, 3, 3) rotations of the bones in skeleton axes relative to their parents,
+            that is C M Cᵀ above.
         :param root: (T, 3) metres, position of the root.
         :return: R (T, B, 3, 3) bone to world and ends (T, B, 3) metres; ends[:, 0] is the root.
         """
@@ -81,23 +97,29 @@ class Skeleton:
     def named_joints(
         self, R: NDArray[np.float64], ends: NDArray[np.float64]
     ) -> tuple[tuple[str, ...], NDArray[np.float64], NDArray[np.float64]]:
-        """Return bone poses in the form of ``Take``: names, positions (T, J, 3), orientations (T, J, 3, 3).
+        """Return bone poses in the form of ``Take``: names, positions (T, J, 3), orientations (T,
+        J, 3, 3).
 
         :raises MotionFileError: when a bone of CMU's skeleton is missing.
         """
         names = (*SEGMENT_OF_JOINT.values(), *TIPS.values())
         missing = [n for n in names if n not in self.bones]
         if missing:
-            raise MotionFileError(f"the skeleton lacks {', '.join(missing)}: it is not CMU's 31-bone skeleton")
+            raise MotionFileError(
+                f"the skeleton lacks {', '.join(missing)}: it is not CMU's 31-bone skeleton"
+            )
         bone = np.array([self.bones.index(n) for n in names])
         at = bone.copy()
         n_joints = len(SEGMENT_OF_JOINT)
-        at[1:n_joints] = self.parents[bone[1:n_joints]]  # a joint is where its bone begins, that is its parent's end
+        # a joint is where its bone begins, that is its parent's end
+        at[1:n_joints] = self.parents[bone[1:n_joints]]
         return JOINT_NAMES, ends[:, at], R[:, bone]
 
 
 def _euler(angles: NDArray[np.float64], order: str) -> NDArray[np.float64]:
-    """Return rotations (..., 3, 3) of Euler angles (..., n) radians about fixed axes, ``order`` first to last."""
+    """Return rotations (..., 3, 3) of Euler angles (..., n) radians about fixed axes, ``order``
+    first to last.
+    """
     R = np.broadcast_to(np.eye(3), (*angles.shape[:-1], 3, 3))
     for k, axis in enumerate(order):
         R = exp(angles[..., k, None] * np.eye(3)[AXES[axis]]) @ R
@@ -121,7 +143,9 @@ def parse_asf(text: str, name: str = "skeleton") -> Skeleton:
             current.append(words)
     missing = [s for s in ("units", "root", "bonedata", "hierarchy") if s not in sections]
     if missing:
-        raise MotionFileError(f"{name}: no section :{missing[0]}; it is not a complete .asf skeleton")
+        raise MotionFileError(
+            f"{name}: no section :{missing[0]}; it is not a complete .asf skeleton"
+        )
     try:
         return _skeleton(sections)
     except (KeyError, ValueError, IndexError) as error:
@@ -177,12 +201,15 @@ def _blocks(lines: list[list[str]]) -> list[list[list[str]]]:
     return blocks
 
 
-def parse_amc(text: str, skeleton: Skeleton, name: str = "motion") -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def parse_amc(
+    text: str, skeleton: Skeleton, name: str = "motion"
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Read an .amc file.
 
-    :return: M (T, B, 3, 3), rotations relative to the parents in skeleton axes, and root (T, 3) metres, as
-        ``Skeleton.forward_kinematics`` takes them.
-    :raises MotionFileError: when bones or values do not match the skeleton, or frames are missing or incomplete.
+    :return: M (T, B, 3, 3), rotations relative to the parents in skeleton axes, and root (T, 3)
+        metres, as ``Skeleton.forward_kinematics`` takes them.
+    :raises MotionFileError: when bones or values do not match the skeleton, or frames are missing
+        or incomplete.
     """
     words = [w for line in text.splitlines() if line and line[0] not in "#:" for w in line.split()]
     if not words:
@@ -191,8 +218,12 @@ def parse_amc(text: str, skeleton: Skeleton, name: str = "motion") -> tuple[NDAr
     width = 1
     while width < len(words) and words[width] in skeleton.bones:
         width += 1 + len(skeleton.dofs[skeleton.bones.index(words[width])])
-    if len(words) % width or words[::width] != [str(int(words[0]) + t) for t in range(len(words) // width)]:
-        raise MotionFileError(f"{name}: the frames of the .amc file are not all complete and numbered in order")
+    if len(words) % width or words[::width] != [
+        str(int(words[0]) + t) for t in range(len(words) // width)
+    ]:
+        raise MotionFileError(
+            f"{name}: the frames of the .amc file are not all complete and numbered in order"
+        )
     table = np.array(words, dtype=object).reshape(-1, width)
     T = len(table)
     M = np.broadcast_to(np.eye(3), (T, len(skeleton.bones), 3, 3)).copy()
@@ -207,7 +238,9 @@ def parse_amc(text: str, skeleton: Skeleton, name: str = "motion") -> tuple[NDAr
         try:
             values = table[:, column + 1 : column + 1 + len(dof)].astype(float)
         except ValueError as error:
-            raise MotionFileError(f"{name}: the values of bone '{bone}' do not match its dof {dof}") from error
+            raise MotionFileError(
+                f"{name}: the values of bone '{bone}' do not match its dof {dof}"
+            ) from error
         turn = [k for k, d in enumerate(dof) if d[0] == "r"]
         angles = values[:, turn] * (np.pi / 180 if skeleton.degrees else 1.0)
         C = skeleton.axes[b]

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Biovision hierarchies (.bvh): joint positions.
 
-Channels of a joint apply in the order in which they are listed, each about the axes that the ones before it have
-turned: R = R_1 R_2 R_3. A position of the root replaces its offset.
+Channels of a joint apply in the order in which they are listed, each about the axes that the ones
+before it have turned: R = R_1 R_2 R_3. A position of the root replaces its offset.
 """
 
 from __future__ import annotations
@@ -27,8 +27,11 @@ class _Joint:
     channels: tuple[str, ...]
 
 
-def joint_positions(text: str, name: str = "motion") -> tuple[dict[str, NDArray[np.float64]], float]:
-    """Return the positions (T, 3) of all joints by their names, in the file's unit, and frames per second.
+def joint_positions(
+    text: str, name: str = "motion"
+) -> tuple[dict[str, NDArray[np.float64]], float]:
+    """Return the positions (T, 3) of all joints by their names, in the file's unit, and frames per
+    second.
 
     The end of the last bone below a joint is named after that joint, with ``_end``.
 
@@ -38,7 +41,9 @@ def joint_positions(text: str, name: str = "motion") -> tuple[dict[str, NDArray[
         head, motion = text.split("MOTION", 1)
         joints, words = _hierarchy(head), motion.split()
         count, seconds = int(words[1]), float(words[4])
-        values = np.array(words[5:], float).reshape(-1, sum(len(joint.channels) for joint in joints))
+        values = np.array(words[5:], float).reshape(
+            -1, sum(len(joint.channels) for joint in joints)
+        )
         if not 0 < count <= len(values):  # some programs write a frame more than they say
             raise ValueError(f"{len(values)} of {count} frames")
         if not 1e-4 <= seconds <= 1.0:
@@ -52,7 +57,10 @@ def _hierarchy(head: str) -> list[_Joint]:
     """Return the joints, each after its parent."""
     joints: list[_Joint] = []
     above: list[int] = []
-    pattern = r"(ROOT|JOINT|End)\s+(\S+)\s*\{\s*OFFSET((?:\s+\S+){3})(?:\s+CHANNELS\s+\d+((?:\s+[XYZ]\w+)+))?|(\})"
+    pattern = (
+        r"(ROOT|JOINT|End)\s+(\S+)\s*\{\s*OFFSET((?:\s+\S+){3})"
+        r"(?:\s+CHANNELS\s+\d+((?:\s+[XYZ]\w+)+))?|(\})"
+    )
     for kind, name, offset, channels, closed in re.findall(pattern, head):
         if closed:
             above.pop()
@@ -60,7 +68,9 @@ def _hierarchy(head: str) -> list[_Joint]:
         parent = above[-1] if above else -1
         name = f"{joints[parent].name}_end" if kind == "End" else name
         above.append(len(joints))
-        joints.append(_Joint(name, parent, np.array(offset.split(), float), tuple(channels.split())))
+        joints.append(
+            _Joint(name, parent, np.array(offset.split(), float), tuple(channels.split()))
+        )
     if above or head.count("{") != len(joints):
         raise ValueError("the hierarchy has an unexpected word, or brackets that do not match")
     return joints
@@ -68,9 +78,13 @@ def _hierarchy(head: str) -> list[_Joint]:
 
 def _positions(joints: list[_Joint], values: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
     column = 0
-    poses: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []  # R (T, 3, 3), position (T, 3)
+    # R (T, 3, 3), position (T, 3)
+    poses: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
     for joint in joints:
-        offset, turned = np.tile(joint.offset, (len(values), 1)), np.broadcast_to(np.eye(3), (len(values), 3, 3))
+        offset, turned = (
+            np.tile(joint.offset, (len(values), 1)),
+            np.broadcast_to(np.eye(3), (len(values), 3, 3)),
+        )
         for channel in joint.channels:
             axis, value = AXES[channel[0]], values[:, column]
             column += 1

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""DeepMimic's humanoid: a character file with joints and bodies, and motions of 44 numbers per frame.
+"""DeepMimic's humanoid: a character file with joints and bodies, and motions of 44 numbers per
+frame.
 
-A frame is its duration (s), the root's position (m) and quaternion (w, x, y, z), followed, in the order of the
-character's joints, by a quaternion for a spherical joint, an angle about z for a revolute joint and nothing for a fixed
-one. R_j = R_parent · R_state, t_j = t_parent + R_parent · attach. Axes: x forward, y up, z right; zero pose standing
-with hanging arms. Feet and head have no joint beyond them; their tips come from the bodies' shapes.
+A frame is its duration (s), the root's position (m) and quaternion (w, x, y, z), followed, in the
+order of the character's joints, by a quaternion for a spherical joint, an angle about z for a
+revolute joint and nothing for a fixed one. R_j = R_parent · R_state, t_j = t_parent + R_parent ·
+attach. Axes: x forward, y up, z right; zero pose standing with hanging arms. Feet and head have no
+joint beyond them; their tips come from the bodies' shapes.
 """
 
 from __future__ import annotations
@@ -34,7 +36,8 @@ class Character:
     types: tuple[str, ...]
     parents: tuple[int, ...]
     attach: NDArray[np.float64]  # (J, 3) in the parent's frame
-    tips: dict[str, tuple[int, NDArray[np.float64]]]  # tip -> joint that carries it, position in the joint's frame
+    # tip -> joint that carries it, position in the joint's frame
+    tips: dict[str, tuple[int, NDArray[np.float64]]]
 
     @property
     def width(self) -> int:
@@ -52,8 +55,11 @@ def parse_character(text: str, name: str = "character") -> Character:
         joints, bodies = data["Skeleton"]["Joints"], {b["Name"]: b for b in data["BodyDefs"]}
         names = tuple(j["Name"] for j in joints)
         tips = {}
-        for tip, joint, half in (("head_end", "neck", (0, 0.5, 0)), ("left_foot_end", "left_ankle", (0.5, 0, 0)),
-                                 ("right_foot_end", "right_ankle", (0.5, 0, 0))):  # fmt: skip
+        for tip, joint, half in (
+            ("head_end", "neck", (0, 0.5, 0)),
+            ("left_foot_end", "left_ankle", (0.5, 0, 0)),
+            ("right_foot_end", "right_ankle", (0.5, 0, 0)),
+        ):
             b = bodies[joint]
             size = np.array([b[f"Param{k}"] for k in range(3)])
             tips[tip] = (names.index(joint), _attach(b) + size * half)
@@ -82,14 +88,18 @@ def parse_motion(text: str, character: Character, name: str = "motion") -> NDArr
     except (KeyError, ValueError, TypeError) as error:
         raise MotionFileError(f"{name}: not a DeepMimic motion ({error!r})") from error
     if frames.ndim != 2 or frames.shape[1] != character.width or len(frames) < 2:
-        raise MotionFileError(f"{name}: frames must be (T >= 2, {character.width}), but got {frames.shape}")
+        raise MotionFileError(
+            f"{name}: frames must be (T >= 2, {character.width}), but got {frames.shape}"
+        )
     return frames
 
 
 def forward_kinematics(
     frames: NDArray[np.float64], character: Character
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return R (T, J, 3, 3) and t (T, J, 3), joint to world, DeepMimic's axes, of frames (T, 44)."""
+    """Return R (T, J, 3, 3) and t (T, J, 3), joint to world, DeepMimic's axes, of frames (T,
+    44).
+    """
     T, J = len(frames), len(character.names)
     R = np.empty((T, J, 3, 3))
     t = np.empty((T, J, 3))
@@ -102,12 +112,16 @@ def forward_kinematics(
         else:
             state = matrix_from_quaternion(value) if kind != "fixed" else np.eye(3)
         R[:, j] = state if parent < 0 else R[:, parent] @ state
-        t[:, j] = frames[:, 1:4] if parent < 0 else t[:, parent] + R[:, parent] @ character.attach[j]
+        t[:, j] = (
+            frames[:, 1:4] if parent < 0 else t[:, parent] + R[:, parent] @ character.attach[j]
+        )
     return R, t
 
 
 def read_take(text: str, character: Character, name: str) -> Take:
-    """Read a motion file as a take. Frames are assumed to be evenly spaced, as in every file of the archive."""
+    """Read a motion file as a take. Frames are assumed to be evenly spaced, as in every file of the
+    archive.
+    """
     frames = parse_motion(text, character, name)
     R, t = forward_kinematics(frames, character)
     tips = [t[:, j] + R[:, j] @ at for j, at in character.tips.values()]

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Deinterlacing: a frame of two fields, filmed one after the other, becomes an image of one moment.
 
-FFmpeg's bwdif keeps the lines of the first field, and interpolates the others from their neighbours and, where nothing
-moves, from the frames before and after. One frame goes in and one comes out, at the same time. Frames that are not
-marked as interlaced are left alone.
+FFmpeg's bwdif keeps the lines of the first field, and interpolates the others from their neighbours
+and, where nothing moves, from the frames before and after. One frame goes in and one comes out, at
+the same time. Frames that are not marked as interlaced are left alone.
 """
 
 from __future__ import annotations
@@ -20,8 +20,11 @@ if TYPE_CHECKING:
 FIELD_CODECS = ("hevc", "vvc")
 
 
-def deinterlaced(frames: Iterable[av.VideoFrame], before: av.VideoFrame | None = None) -> Iterator[av.VideoFrame]:
-    """Iterate over frames, those marked as interlaced deinterlaced; no frame is added, left out or moved in time.
+def deinterlaced(
+    frames: Iterable[av.VideoFrame], before: av.VideoFrame | None = None
+) -> Iterator[av.VideoFrame]:
+    """Iterate over frames, those marked as interlaced deinterlaced; no frame is added, left out or
+    moved in time.
 
     :param frames: in order of presentation.
     :param before: the frame before the first of them, which is not returned; None if there is none.
@@ -54,13 +57,16 @@ class _Bwdif:
 
         self._failures = (FFmpegError, OSError, ValueError)
         self._kind = _kind(first)
-        self._waiting: deque[av.VideoFrame] = deque()  # given to the filter, which has not returned them yet
+        # given to the filter, which has not returned them yet
+        self._waiting: deque[av.VideoFrame] = deque()
         self._not_shown = 0  # frames that come first and are not part of the result
         self._graph: Graph | None = Graph()
         try:
             width, height, _ = self._kind
             base = first.time_base or Fraction(1, 1000)
-            source = self._graph.add_buffer(width=width, height=height, format=first.format, time_base=base)
+            source = self._graph.add_buffer(
+                width=width, height=height, format=first.format, time_base=base
+            )
             bwdif = self._graph.add("bwdif", "mode=send_frame:parity=auto:deint=interlaced")
             self._graph.link_nodes(source, bwdif, self._graph.add("buffersink")).configure()
         except self._failures:
@@ -105,7 +111,9 @@ class _Bwdif:
                 yield frame
 
     def _pull(self) -> av.VideoFrame | None:
-        """Return what becomes of the frame that has waited longest: itself without a filter; None if not ready."""
+        """Return what becomes of the frame that has waited longest: itself without a filter; None
+        if not ready.
+        """
         try:
             if self._graph is not None:
                 return self._graph.vpull()

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Metadata of a picture file: orientation, focal length, and whether it is an animation.
 
-EXIF is a TIFF directory: the whole of a .tif, the APP1 segment of a JPEG, the eXIf chunk of a PNG, the EXIF chunk of a
-WebP. Damaged EXIF counts as absent: the picture can still be used.
+EXIF is a TIFF directory: the whole of a .tif, the APP1 segment of a JPEG, the eXIf chunk of a PNG,
+the EXIF chunk of a WebP. Damaged EXIF counts as absent: the picture can still be used.
 """
 
 from __future__ import annotations
@@ -15,13 +15,16 @@ PNG = b"\x89PNG\r\n\x1a\n"  # begins the file
 TIFF = (b"II*\0", b"MM\0*")  # one of these does; a TIFF of more than 4 GB would begin otherwise
 _WIDTH, _HEIGHT, _BITS = 0x0100, 0x0101, 0x0102  # tag numbers of TIFF 6.0
 _DEEPEST = 64  # bits of one channel
-_ORIENTATION, _EXIF_DIRECTORY, _FOCAL_35MM = 0x0112, 0x8769, 0xA405  # tag numbers of the EXIF 2.3 standard
+# tag numbers of the EXIF 2.3 standard
+_ORIENTATION, _EXIF_DIRECTORY, _FOCAL_35MM = 0x0112, 0x8769, 0xA405
 _INTEGER = {3: "H", 4: "I"}  # TIFF field types SHORT and LONG
 
 
 @dataclass(frozen=True)
 class Exif:
-    """``orientation`` 1..8 as EXIF numbers them (1: upright); ``focal_35mm`` in mm on a 36 × 24 mm frame, or None."""
+    """``orientation`` 1..8 as EXIF numbers them (1: upright); ``focal_35mm`` in mm on a 36 × 24 mm
+    frame, or None.
+    """
 
     orientation: int = 1
     focal_35mm: float | None = None
@@ -47,9 +50,11 @@ def animation_length(data: bytes) -> int:
 
 
 def tiff_size(data: bytes) -> tuple[int, int, int]:
-    """Read the size of a TIFF's first image: width and height in pixels, 0 if not stated, and bits of a channel.
+    """Read the size of a TIFF's first image: width and height in pixels, 0 if not stated, and bits
+    of a channel.
 
-    A tag that is repeated counts with its largest value, and a depth that cannot be read as 64 bits, the largest.
+    A tag that is repeated counts with its largest value, and a depth that cannot be read as 64
+    bits, the largest.
     """
     endian = "<" if data[:1] == b"I" else ">"
     found = {_WIDTH: 0, _HEIGHT: 0, _BITS: 1}
@@ -63,7 +68,11 @@ def tiff_size(data: bytes) -> tuple[int, int, int]:
             value = _DEEPEST if tag == _BITS else 0
             if kind in _INTEGER and count > 0:
                 size = struct.calcsize(_INTEGER[kind])
-                place = entry + 8 if count * size <= 4 else struct.unpack_from(endian + "I", data, entry + 8)[0]
+                place = (
+                    entry + 8
+                    if count * size <= 4
+                    else struct.unpack_from(endian + "I", data, entry + 8)[0]
+                )
                 value = struct.unpack_from(endian + _INTEGER[kind], data, place)[0]
             found[tag] = max(found[tag], value)
     except struct.error:
@@ -84,7 +93,8 @@ def _find_tiff(data: bytes) -> bytes:
 
 def _jpeg_app1(data: bytes) -> bytes:
     at = 2
-    while at + 4 <= len(data) and data[at] == 0xFF and data[at + 1] != 0xDA:  # 0xDA: start of the image data
+    # 0xDA: start of the image data
+    while at + 4 <= len(data) and data[at] == 0xFF and data[at + 1] != 0xDA:
         length = struct.unpack_from(">H", data, at + 2)[0]
         if data[at + 1] == 0xE1 and data[at + 4 : at + 10] == b"Exif\0\0":
             return data[at + 10 : at + 2 + length]
@@ -105,7 +115,9 @@ def png_chunks(data: bytes) -> Iterator[tuple[bytes, bytes, int]]:
 
 
 def _riff_chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """Iterate over the chunks of a WebP, stored as (name, size, data, padding to an even size); yield name and data."""
+    """Iterate over the chunks of a WebP, stored as (name, size, data, padding to an even size);
+    yield name and data.
+    """
     at = 12
     while at + 8 <= len(data):
         size = int.from_bytes(data[at + 4 : at + 8], "little")
@@ -125,7 +137,9 @@ def _parse(tiff: bytes) -> Exif:
 
 
 def _directory(tiff: bytes, at: int, endian: str) -> dict[int, int]:
-    """Read the integer tags of one TIFF directory, whose entries are 12 bytes: tag, type, count, value."""
+    """Read the integer tags of one TIFF directory, whose entries are 12 bytes: tag, type, count,
+    value.
+    """
     tags = {}
     for i in range(struct.unpack_from(endian + "H", tiff, at)[0]):
         tag, kind, count = struct.unpack_from(endian + "HHI", tiff, at + 2 + 12 * i)

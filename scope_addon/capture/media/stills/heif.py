@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The primary picture of a HEIF file (.heic, .avif): its items, its rotation and its EXIF.
 
-A file has items: coded pictures, grids of coded pictures (phones code pictures in tiles), thumbnails, depth, EXIF. The
-boxes within its ``meta`` box identify the primary picture and its relations to the other items. A decoder decodes the
-coded items; this module assembles a grid from them. Crops (``clap``) and overlays (``iovl``) are not supported. PyAV
-does not report how tiles belong together, and libheif's Python packages can crash if a file's boxes are damaged.
+A file has items: coded pictures, grids of coded pictures (phones code pictures in tiles),
+thumbnails, depth, EXIF. The boxes within its ``meta`` box identify the primary picture and its
+relations to the other items. A decoder decodes the coded items; this module assembles a grid from
+them. Crops (``clap``) and overlays (``iovl``) are not supported. PyAV does not report how tiles
+belong together, and libheif's Python packages can crash if a file's boxes are damaged.
 
 Sources: ISO/IEC 23008-12 (items, grids, irot, imir), ISO/IEC 14496-12 (boxes, iloc, iinf, iref).
 """
@@ -31,9 +32,10 @@ _MAX_TRANSFORMS = 16
 class Layout:
     """How the primary picture is assembled from items.
 
-    ``tiles`` (rows, columns) item numbers; ``size`` (width, height) of the assembled picture, None if it is not a grid;
-    ``transforms`` to apply to the whole in order: ("irot", number of 90° rotations anticlockwise) or ("imir", axis to
-    flip: 0 vertical, 1 horizontal); ``exif``: a TIFF directory, or empty.
+    ``tiles`` (rows, columns) item numbers; ``size`` (width, height) of the assembled picture, None
+    if it is not a grid; ``transforms`` to apply to the whole in order: ("irot", number of 90°
+    rotations anticlockwise) or ("imir", axis to flip: 0 vertical, 1 horizontal); ``exif``: a TIFF
+    directory, or empty.
     """
 
     tiles: NDArray[np.int64]
@@ -43,7 +45,9 @@ class Layout:
 
 
 def read_layout(data: bytes) -> Layout | None:
-    """Read the layout of the primary picture from the bytes of a file; None if it is damaged or not supported."""
+    """Read the layout of the primary picture from the bytes of a file; None if it is damaged or not
+    supported.
+    """
     try:
         return _MetaBox(data).layout()
     except (struct.error, IndexError, KeyError, ValueError, StopIteration):
@@ -62,7 +66,9 @@ def assemble(layout: Layout, pictures: Mapping[int, NDArray[np.uint8]]) -> NDArr
     tall, wide = shape[:2]
     rows, columns = layout.tiles.shape
     width, height = (wide, tall) if layout.size is None else layout.size
-    if not ((rows - 1) * tall < height <= rows * tall and (columns - 1) * wide < width <= columns * wide):
+    if not (
+        (rows - 1) * tall < height <= rows * tall and (columns - 1) * wide < width <= columns * wide
+    ):
         return None
     whole = np.empty((height, width, 3), np.uint8)
     for (row, column), item in np.ndenumerate(layout.tiles):
@@ -110,11 +116,16 @@ class _MetaBox:
     def layout(self) -> Layout:
         """Read the layout of the primary item.
 
-        :raises ValueError: it is damaged, too large or not supported; also struct.error, IndexError and KeyError.
+        :raises ValueError: it is damaged, too large or not supported; also struct.error, IndexError
+            and KeyError.
         """
         item = self._items[self._primary]
         exif = b""
-        metadata = [self._items.get(number, _Item()) for number, of in self._descriptions if of == self._primary]
+        metadata = [
+            self._items.get(number, _Item())
+            for number, of in self._descriptions
+            if of == self._primary
+        ]
         exif_item = next((item for item in metadata if item.kind == b"Exif"), None)
         if exif_item is not None:
             content = self._content(exif_item)
@@ -189,7 +200,10 @@ class _MetaBox:
         boxes = list(self._boxes(start, end))
         a, b = next((a, b) for name, a, b in boxes if name == b"ipco")
         supported = (b"irot", b"imir")
-        properties = [(name, self._data[at]) if name in supported else None for name, at, _ in self._boxes(a, b)]
+        properties = [
+            (name, self._data[at]) if name in supported else None
+            for name, at, _ in self._boxes(a, b)
+        ]
         for a, b in ((a, b) for name, a, b in boxes if name == b"ipma"):
             read = _Reader(self._data, a, b)
             for _ in range(read.integer(4)):
@@ -197,19 +211,29 @@ class _MetaBox:
                 for _ in range(read.integer(1)):
                     which = read.integer(2) & 0x7FFF if read.flags & 1 else read.integer(1) & 0x7F
                     transform = properties[which - 1] if which else None
-                    if transform is not None and number == self._primary and len(self._transforms) < _MAX_TRANSFORMS:
+                    if (
+                        transform is not None
+                        and number == self._primary
+                        and len(self._transforms) < _MAX_TRANSFORMS
+                    ):
                         name, value = transform
-                        self._transforms.append((name.decode(), value & (3 if name == b"irot" else 1)))
+                        self._transforms.append(
+                            (name.decode(), value & (3 if name == b"irot" else 1))
+                        )
 
     def _content(self, item: _Item) -> bytes:
         if sum(length for _, length in item.extents) > len(self._data):
             raise ValueError("an item is larger than the file")
         start, end = self._idat if item.is_in_idat else (0, len(self._data))
-        return b"".join(self._data[start + at : min(start + at + length, end)] for at, length in item.extents)
+        return b"".join(
+            self._data[start + at : min(start + at + length, end)] for at, length in item.extents
+        )
 
 
 class _Reader:
-    """Reads the big-endian integers of a box in order; ``is_full``: the box begins with version and flags."""
+    """Reads the big-endian integers of a box in order; ``is_full``: the box begins with version and
+    flags.
+    """
 
     def __init__(self, data: bytes, start: int, end: int, is_full: bool = True) -> None:
         self._data, self.at, self._end = data, start, end

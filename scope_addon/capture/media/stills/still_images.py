@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads a picture file as upright 8-bit RGB: a still, or one frame of an image sequence.
 
-OpenCV reads JPEG, PNG, WebP, TIFF and BMP. It could read others, in which a few hundred bytes can take gigabytes, and
-which nobody films in: these are refused. Its packages do not read AVIF and HEIC, which PyAV decodes.
+OpenCV reads JPEG, PNG, WebP, TIFF and BMP. It could read others, in which a few hundred bytes can
+take gigabytes, and which nobody films in: these are refused. Its packages do not read AVIF and
+HEIC, which PyAV decodes.
 """
 
 from __future__ import annotations
@@ -28,13 +29,16 @@ _JPEG_STREAMS = (".mjpeg", ".mjpg")  # begin like a JPEG, but are videos
 _HEIF_BRANDS = {b"mif1", b"heic", b"heix", b"heim", b"heis", b"avif"}  # of ISO 23008-12 and of AVIF
 _OPENEXR, _GIF = b"v/1\x01", b"GIF8"
 _READ = (PNG, *TIFF, b"\xff\xd8\xff", b"BM")  # how files begin that OpenCV is given; and WebP
-_MAX_BYTES = 8 * MAX_PIXELS  # of a file: as many as its image may take, with four channels of 16 bits
+# of a file: as many as its image may take, with four channels of 16 bits
+_MAX_BYTES = 8 * MAX_PIXELS
 _ROWS = 256  # that are converted at a time
 
 
 @dataclass(frozen=True)
 class Picture:
-    """``rgb`` (H, W, 3) uint8; ``focal_35mm`` in mm on a 36 × 24 mm frame; ``length`` more than 1 for an animation."""
+    """``rgb`` (H, W, 3) uint8; ``focal_35mm`` in mm on a 36 × 24 mm frame; ``length`` more than 1
+    for an animation.
+    """
 
     rgb: NDArray[np.uint8]
     focal_35mm: float | None = None
@@ -42,7 +46,8 @@ class Picture:
 
 
 def is_picture(path: Path) -> bool:
-    """Check by its content whether a file is a picture that can be read, rather than a video or anything else.
+    """Check by its content whether a file is a picture that can be read, rather than a video or
+    anything else.
 
     :raises VideoError: it is a picture in a format that is not read.
     """
@@ -56,14 +61,19 @@ def is_picture(path: Path) -> bool:
         return True
     with utf8_name(path) as name:
         if head.startswith(_OPENEXR) or cv2.haveImageReader(name):
-            raise VideoError(f"{path} is an image in a format that is not supported; export it as PNG, TIFF or JPEG")
+            raise VideoError(
+                f"{path} is an image in a format that is not supported; export it as "
+                "PNG, TIFF or JPEG"
+            )
     return False
 
 
 def read_picture(path: Path) -> Picture | None:
-    """Decode a picture; None if that fails. Transparent parts become white, except in AVIF and HEIC.
+    """Decode a picture; None if that fails. Transparent parts become white, except in AVIF and
+    HEIC.
 
-    :raises VideoError: it is too large, deep or long (see `image_size`), or AVIF or HEIC, and PyAV is not installed.
+    :raises VideoError: it is too large, deep or long (see `image_size`), or AVIF or HEIC, and PyAV
+        is not installed.
     """
     check_regular(path, VideoError, "picture", _MAX_BYTES)
     data = path.read_bytes()
@@ -106,7 +116,9 @@ def _holds_its_chunks(data: bytes) -> bool:
 
 
 def _brands(head: bytes) -> set[bytes]:
-    """Read the compatible brands of an ISO base media file (MP4, HEIC, AVIF, ...); empty for other files."""
+    """Read the compatible brands of an ISO base media file (MP4, HEIC, AVIF, ...); empty for other
+    files.
+    """
     if head[4:8] != b"ftyp":
         return set()
     size = min(int.from_bytes(head[:4], "big"), len(head))

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A user's box detector, used instead of BlazePose's: how each kind of graph is read, and non-maximum suppression.
+"""A user's box detector, used instead of BlazePose's: how each kind of graph is read, and
+non-maximum suppression.
 
-Positions in the network's input are measured from its left and top edges, as detectors do; positions in the image
-from the centre of the top left pixel, as OpenCV does.
+Positions in the network's input are measured from its left and top edges, as detectors do;
+positions in the image from the centre of the top left pixel, as OpenCV does.
 """
 
 from __future__ import annotations
@@ -32,20 +33,25 @@ _LARGEST_LOGARITHM = 10.0
 
 @dataclass(frozen=True)
 class Boxes:
-    """Boxes: ``corners`` (N, 4) left, top, right, bottom in pixels of the network's input; ``scores`` (N,) 0..1."""
+    """Boxes: ``corners`` (N, 4) left, top, right, bottom in pixels of the network's input;
+    ``scores`` (N,) 0..1.
+    """
 
     corners: NDArray[np.float64]
     scores: NDArray[np.float64]
 
 
 class BoxFormat(NamedTuple):
-    """A kind of graph: ``matches`` recognizes it by its outputs, ``decode`` reads the boxes of people from these."""
+    """A kind of graph: ``matches`` recognizes it by its outputs, ``decode`` reads the boxes of
+    people from these.
+    """
 
     type: str
     normalization: Normalization
     matches: Callable[[Graph], bool]
     decode: Callable[[Outputs, Graph, Description], Boxes]
-    centered: bool = False  # the image lies in the middle of the input rather than in its top left corner
+    # the image lies in the middle of the input rather than in its top left corner
+    centered: bool = False
     stretched: bool = False  # to the input, regardless of the image's aspect ratio
 
 
@@ -63,13 +69,16 @@ def suppress(boxes: Boxes, threshold: float) -> Boxes:
     size = boxes.corners[:, 2:] - boxes.corners[:, :2]
     chosen = np.flatnonzero((boxes.scores >= threshold) & (size > 0).all(axis=1))
     order = chosen[np.argsort(-boxes.scores[chosen], kind="stable")][:MAX_BOXES]
-    kept = order[[cluster[0] for cluster in overlap_clusters(boxes.corners[order], OVERLAP_THRESHOLD)]]
+    kept = order[
+        [cluster[0] for cluster in overlap_clusters(boxes.corners[order], OVERLAP_THRESHOLD)]
+    ]
     return Boxes(boxes.corners[kept], boxes.scores[kept])
 
 
-# YOLOX: one output (1, cells, 5 + classes), a row per cell of the grids of 8, 16 and 32 pixels. A row is x, y, width,
-# height, the probability of an object and one for each class; a score is the product of the two. If undecoded, x and y
-# are relative to the cell in units of its side, and width and height are logarithms:
+# YOLOX: one output (1, cells, 5 + classes), a row per cell of the grids of 8, 16 and 32 pixels. A
+# row is x, y, width, height, the probability of an object and one for each class; a score is the
+# product of the two. If undecoded, x and y are relative to the cell in units of its side, and width
+# and height are logarithms:
 #
 #     x = (x_raw + column) · side,  width = exp(width_raw) · side
 
@@ -89,29 +98,38 @@ def _yolox(outputs: Outputs, graph: Graph, description: Description) -> Boxes:
     if not decoded:
         grid = cells(graph.width, graph.height)
         center = (box[:, :2] + grid[:, :2]) * grid[:, 2:]
-        box = np.concatenate([center, np.exp(np.minimum(box[:, 2:], _LARGEST_LOGARITHM)) * grid[:, 2:]], axis=1)
+        box = np.concatenate(
+            [center, np.exp(np.minimum(box[:, 2:], _LARGEST_LOGARITHM)) * grid[:, 2:]], axis=1
+        )
     return Boxes(_corners_of(box), rows[:, 4] * rows[:, 5 + description.person_class])
 
 
 def cells(width: int, height: int) -> NDArray[np.float64]:
-    """List column, row and side in pixels (N, 3) of every cell of YOLOX, in the order of the output's rows."""
+    """List column, row and side in pixels (N, 3) of every cell of YOLOX, in the order of the
+    output's rows.
+    """
     grids = []
     for side in _CELL_SIDES:
-        row, column = np.meshgrid(np.arange(height // side), np.arange(width // side), indexing="ij")
+        row, column = np.meshgrid(
+            np.arange(height // side), np.arange(width // side), indexing="ij"
+        )
         grids.append(np.stack([column, row, np.full(column.shape, side)], axis=-1).reshape(-1, 3))
     table: NDArray[np.float64] = np.concatenate(grids).astype(np.float64)
     return table
 
 
-# YOLOv8, YOLO11 and similar: one output (1, 4 + classes, cells), a column per box: its centre x, y, width and height,
-# and a score for each class. Rows after the classes (the keypoints of a pose network) are ignored.
+# YOLOv8, YOLO11 and similar: one output (1, 4 + classes, cells), a column per box: its centre x, y,
+# width and height, and a score for each class. Rows after the classes (the keypoints of a pose
+# network) are ignored.
 
 
 def _is_yolov8(graph: Graph) -> bool:
     if len(graph.shapes) != 1 or len(graph.shapes[0]) != 3:
         return False
     _, numbers, boxes = graph.shapes[0]
-    return numbers >= 5 and boxes == sum((graph.width // s) * (graph.height // s) for s in _CELL_SIDES)
+    return numbers >= 5 and boxes == sum(
+        (graph.width // s) * (graph.height // s) for s in _CELL_SIDES
+    )
 
 
 def _yolov8(outputs: Outputs, graph: Graph, description: Description) -> Boxes:
@@ -119,8 +137,8 @@ def _yolov8(outputs: Outputs, graph: Graph, description: Description) -> Boxes:
     return Boxes(_corners_of(columns[:4].T), columns[4 + description.person_class])
 
 
-# YOLOv4 and similar: ``boxes`` (1, N, 1, 4) and ``confs`` (1, N, classes), in either order. A box is left, top, right,
-# bottom as fractions of the input; a score is that of the class.
+# YOLOv4 and similar: ``boxes`` (1, N, 1, 4) and ``confs`` (1, N, classes), in either order. A box
+# is left, top, right, bottom as fractions of the input; a score is that of the class.
 
 
 def _is_yolov4(graph: Graph) -> bool:
@@ -133,7 +151,9 @@ def _is_yolov4(graph: Graph) -> bool:
 def _yolov4(outputs: Outputs, graph: Graph, description: Description) -> Boxes:
     boxes, scores = outputs if _boxes_first([o.shape for o in outputs]) else outputs[::-1]
     size = np.array([graph.width, graph.height] * 2, float)
-    return Boxes(finite(boxes).reshape(-1, 4) * size, finite(scores)[0, :, description.person_class])
+    return Boxes(
+        finite(boxes).reshape(-1, 4) * size, finite(scores)[0, :, description.person_class]
+    )
 
 
 def _boxes_first(shapes: list[tuple[int, ...]]) -> bool:
@@ -144,8 +164,8 @@ def _is_boxes(shape: tuple[int, ...]) -> bool:
     return len(shape) == 4 and shape[2:] == (1, 4)
 
 
-# Detectors with non-maximum suppression inside the graph (YOLOv10, YOLO26, ``nms=True``): one output (1, N, 6), N
-# mostly 300. A row is left, top, right, bottom, score and index of the class.
+# Detectors with non-maximum suppression inside the graph (YOLOv10, YOLO26, ``nms=True``): one
+# output (1, N, 6), N mostly 300. A row is left, top, right, bottom, score and index of the class.
 
 
 def _is_end_to_end(graph: Graph) -> bool:
@@ -158,9 +178,9 @@ def _end_to_end(outputs: Outputs, graph: Graph, description: Description) -> Box
     return Boxes(rows[:, :4], rows[:, 4])
 
 
-# MMDeploy's detectors, also with non-maximum suppression inside: ``dets`` (1, N, 5) and ``labels`` (1, N). A row is
-# left, top, right, bottom and score. Several families of networks are exported with these outputs, each with its own
-# normalization, which their JSON has to specify.
+# MMDeploy's detectors, also with non-maximum suppression inside: ``dets`` (1, N, 5) and ``labels``
+# (1, N). A row is left, top, right, bottom and score. Several families of networks are exported
+# with these outputs, each with its own normalization, which their JSON has to specify.
 
 
 def _is_detections(graph: Graph) -> bool:
@@ -191,7 +211,8 @@ DETECTOR_TYPES = tuple(each.type for each in BOX_FORMATS)
 class BoxDetector:
     """Detects people in a whole image with the user's network; see `Description` for its JSON.
 
-    :raises ModelFileError: the file or its JSON cannot be used, or the type of the network is unknown.
+    :raises ModelFileError: the file or its JSON cannot be used, or the type of the network is
+        unknown.
     """
 
     def __init__(self, path: Path, threads: int, execution: Execution | None = None) -> None:
@@ -225,7 +246,9 @@ class BoxDetector:
         return [box_detection(float(s), box) for s, box in zip(kept.scores, corners, strict=True)]
 
     def detect_small(self, image_rgb: NDArray[np.uint8]) -> list[Detection]:
-        """Return nothing for any (H, W, 3) image: how small people may be is a property of the user's network."""
+        """Return nothing for any (H, W, 3) image: how small people may be is a property of the
+        user's network.
+        """
         return []
 
     def detect_in_parts(self, image_rgb: NDArray[np.uint8]) -> list[Detection]:
@@ -247,7 +270,9 @@ class BoxDetector:
 
 
 def box_detection(score: float, box_px: NDArray[np.float64]) -> Detection:
-    """Convert a box (4,) in pixels to a `Detection`: its centre as hips, a body circle as wide as its longer side."""
+    """Convert a box (4,) in pixels to a `Detection`: its centre as hips, a body circle as wide as
+    its longer side.
+    """
     center = (box_px[:2] + box_px[2:]) / 2
     top = center - [0.0, float((box_px[2:] - box_px[:2]).max()) / 2]
     return Detection(score, box_px, np.stack([center, top, center, top]))
@@ -262,7 +287,8 @@ def _format_of(graph: Graph, description: Description) -> BoxFormat:
         raise ModelFileError(
             f"{graph.path} is an MMDeploy model, but its colour normalization is unknown; create "
             f"{description_path(graph.path)} "
-            'with {"type": "detections", "mean": 0, "std": 1, "channel_order": "bgr"} for YOLOX, with '
+            'with {"type": "detections", "mean": 0, "std": 1, "channel_order": "bgr"} for YOLOX, '
+            "with "
             '"mean": [103.53, 116.28, 123.675], "std": [57.375, 57.12, 58.395] for RTMDet'
         )
     return found

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The JSON file next to a model (``NAME.json`` for ``NAME.onnx``), with what its graph does not specify."""
+"""The JSON file next to a model (``NAME.json`` for ``NAME.onnx``), with what its graph does not
+specify.
+"""
 
 from __future__ import annotations
 
@@ -17,14 +19,15 @@ _LARGEST = 1e30  # of a number: networks get single precision
 
 @dataclass(frozen=True)
 class Description:
-    """The contents of the JSON; None: not specified, so that the graph or the usual value of its type applies.
+    """The contents of the JSON; None: not specified, so that the graph or the usual value of its
+    type applies.
 
-    ``type``: see `DETECTOR_TYPES` and `KEYPOINT_TYPES`.  ``input_size``: [width, height].  ``mean``, ``std``: one or
-    three numbers on the scale 0..255, in the order of the channels; input = (pixel − mean) / std.
-    ``channel_order``: rgb or bgr.  ``score_threshold``: least score of a person or of a visible keypoint.
-    Detectors: ``decoded`` (yolox: boxes are in pixels already), ``person_class`` (index of the class).
-    Keypoints: ``keypoints`` (a set's name), ``decode`` (dark or quarter), ``udp`` (the corner cells of a heatmap
-    are centred on the corner pixels).
+    ``type``: see `DETECTOR_TYPES` and `KEYPOINT_TYPES`.  ``input_size``: [width, height].
+    ``mean``, ``std``: one or three numbers on the scale 0..255, in the order of the channels; input
+    = (pixel − mean) / std. ``channel_order``: rgb or bgr.  ``score_threshold``: least score of a
+    person or of a visible keypoint. Detectors: ``decoded`` (yolox: boxes are in pixels already),
+    ``person_class`` (index of the class). Keypoints: ``keypoints`` (a set's name), ``decode`` (dark
+    or quarter), ``udp`` (the corner cells of a heatmap are centred on the corner pixels).
     """
 
     type: str | None = None
@@ -58,9 +61,13 @@ def read_description(model: Path, types: tuple[str, ...]) -> Description:
     known = {field.name for field in fields(Description)}
     for key, value in values.items():
         if key not in known:
-            raise ModelFileError(f"{path}: unknown entry {key!r}; use any of {', '.join(sorted(known))}")
+            raise ModelFileError(
+                f"{path}: unknown entry {key!r}; use any of {', '.join(sorted(known))}"
+            )
         if expected := _violated(key, value, types):
-            raise ModelFileError(f"{path}: {key} must be {expected}, but is {json.dumps(value)[:80]}")
+            raise ModelFileError(
+                f"{path}: {key} must be {expected}, but is {json.dumps(value)[:80]}"
+            )
     for key in ("mean", "std", "input_size"):
         if key in values:
             values[key] = tuple(values[key] if isinstance(values[key], list) else [values[key]])
@@ -84,7 +91,11 @@ def _violated(key: str, value: Any, types: tuple[str, ...]) -> str | None:
     if key == "person_class":
         return None if type(value) is int and value >= 0 else "a whole number of at least 0"
     if key == "input_size":
-        valid = isinstance(value, list) and len(value) == 2 and all(type(v) is int and 16 <= v <= 4096 for v in value)
+        valid = (
+            isinstance(value, list)
+            and len(value) == 2
+            and all(type(v) is int and 16 <= v <= 4096 for v in value)
+        )
         return None if valid else "[width, height] in pixels, 16 to 4096"
     numbers = value if isinstance(value, list) else [value]
     valid = len(numbers) in (1, 3) and all(_is_number(v) for v in numbers)
@@ -94,4 +105,5 @@ def _violated(key: str, value: Any, types: tuple[str, ...]) -> str | None:
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < _LARGEST  # no NaN
+    # no NaN
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < _LARGEST

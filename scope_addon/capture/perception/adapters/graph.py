@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A user's ONNX graph, from one image to arrays. It is run once when it is opened, so that errors are reported then."""
+"""A user's ONNX graph, from one image to arrays. It is run once when it is opened, so that errors
+are reported then.
+"""
 
 from __future__ import annotations
 
@@ -46,10 +48,14 @@ class Normalization:
     channel_order: str = "rgb"
 
     def with_description(self, description: Description) -> Normalization:
-        """Override with the JSON's values; default means and deviations are reordered to the JSON's channel order."""
+        """Override with the JSON's values; default means and deviations are reordered to the JSON's
+        channel order.
+        """
         order = description.channel_order or self.channel_order
         step = 1 if order == self.channel_order else -1
-        return Normalization(description.mean or self.mean[::step], description.std or self.std[::step], order)
+        return Normalization(
+            description.mean or self.mean[::step], description.std or self.std[::step], order
+        )
 
 
 UNIT = Normalization(std=(255.0,))
@@ -66,7 +72,9 @@ class Graph:
     :raises ModelFileError: its input is not one image, or it cannot be run.
     """
 
-    def __init__(self, path: Path, description: Description, threads: int, execution: Execution | None = None) -> None:
+    def __init__(
+        self, path: Path, description: Description, threads: int, execution: Execution | None = None
+    ) -> None:
         check_onnx_file(path)
         self.path = path
         self._session = open_session(path, threads, execution, NetworkProcess)
@@ -75,11 +83,14 @@ class Graph:
         self.names = [output.name for output in self._session.get_outputs()]
         if len(inputs) != 1:
             raise ModelFileError(
-                f"{path} takes {len(inputs)} inputs ({', '.join(names)}); only graphs with one image input can be used"
+                f"{path} takes {len(inputs)} inputs ({', '.join(names)}); only graphs with one "
+                "image input can be used"
             )
         self._name = names[0]
         if inputs[0].type not in _TYPES:
-            raise ModelFileError(f"{path} takes {inputs[0].type}; only images of {', '.join(_TYPES)} can be given")
+            raise ModelFileError(
+                f"{path} takes {inputs[0].type}; only images of {', '.join(_TYPES)} can be given"
+            )
         self._type = _TYPES[inputs[0].type]
         self._channels_last, self.width, self.height = self._input_layout(shapes[0], description)
         self.trial_outputs = self.run(np.full((self.height, self.width, 3), 114, np.uint8), UNIT)
@@ -96,7 +107,9 @@ class Graph:
         :return: the outputs, float16 and float64 converted to float32.
         :raises ModelFileError: the graph fails.
         """
-        picture: NDArray[Any] = picture_rgb if normalization.channel_order == "rgb" else picture_rgb[..., ::-1]
+        picture: NDArray[Any] = (
+            picture_rgb if normalization.channel_order == "rgb" else picture_rgb[..., ::-1]
+        )
         if self._type is not np.uint8:
             mean, std = (np.asarray(v, np.float32) for v in (normalization.mean, normalization.std))
             picture = (picture.astype(np.float32) - mean) / std
@@ -106,17 +119,23 @@ class Graph:
         except RuntimeError as error:
             raise ModelFileError(
                 f"{self.path} cannot be run on an image of {self.width} x {self.height} "
-                f"({' '.join(str(error).split())}); export it again, or correct {description_path(self.path).name}"
+                f"({' '.join(str(error).split())}); export it again, or correct "
+                f"{description_path(self.path).name}"
             ) from error
         return [o.astype(np.float32) if o.dtype.kind == "f" else o for o in outputs]
 
     def _input_layout(self, shape: list[Any], description: Description) -> tuple[bool, int, int]:
         """Derive whether the channels come last, and the width and height."""
-        required = f"{self.path} must take one colour image, shape (1, 3, height, width), but takes {shape}"
+        required = (
+            f"{self.path} must take one colour image, shape (1, 3, height, width), but takes "
+            f"{shape}"
+        )
         if len(shape) != 4 or (isinstance(shape[0], int) and shape[0] != 1):
             raise ModelFileError(f"{required}; export it with batch size 1")
         channels_last = shape[1] != 3 and shape[3] == 3
-        if shape[3 if channels_last else 1] != 3 and isinstance(shape[3 if channels_last else 1], int):
+        if shape[3 if channels_last else 1] != 3 and isinstance(
+            shape[3 if channels_last else 1], int
+        ):
             raise ModelFileError(f"{required}; choose a network for colour images")
         height, width = shape[1:3] if channels_last else shape[2:]
         if description.input_size is not None:
@@ -124,7 +143,8 @@ class Graph:
             for fixed, new in ((width, new_width), (height, new_height)):
                 if isinstance(fixed, int) and fixed != new:
                     raise ModelFileError(
-                        f"{description_path(self.path)} specifies input_size {list(description.input_size)}, but "
+                        f"{description_path(self.path)} specifies input_size "
+                        f"{list(description.input_size)}, but "
                         f"{self.path.name} takes images of {width} x {height}; correct it"
                     )
             width, height = new_width, new_height
@@ -141,24 +161,32 @@ class Graph:
         self, what: str, types: tuple[str, ...], why: str = "its outputs match no known type"
     ) -> ModelFileError:
         """Create the error for a graph of unknown type, with its outputs and the JSON to write."""
-        outputs = ", ".join(f"{name} {list(shape)}" for name, shape in zip(self.names, self.shapes, strict=True))
+        outputs = ", ".join(
+            f"{name} {list(shape)}" for name, shape in zip(self.names, self.shapes, strict=True)
+        )
         return ModelFileError(
-            f"{self.path} cannot be used as {what}: {why}. Its outputs are {outputs}. If it is one of "
+            f"{self.path} cannot be used as {what}: {why}. Its outputs are {outputs}. If it is one "
+            "of "
             f"{', '.join(types)}, "
-            f'create {description_path(self.path)} with {{"type": "{types[0]}"}}, or the correct type'
+            f'create {description_path(self.path)} with {{"type": "{types[0]}"}}, or the correct '
+            "type"
         )
 
 
 def finite(values: NDArray[Any]) -> NDArray[np.float64]:
-    """Convert an array (...) to float64, with 0 in place of NaN and infinity: as a score, 0 means nothing was found."""
+    """Convert an array (...) to float64, with 0 in place of NaN and infinity: as a score, 0 means
+    nothing was found.
+    """
     return np.nan_to_num(values.astype(np.float64), nan=0.0, posinf=0.0, neginf=0.0)
 
 
 def check_onnx_file(path: Path) -> None:
-    """Check, before onnxruntime opens it, that a file is an ONNX model and has no weights outside its folder.
+    """Check, before onnxruntime opens it, that a file is an ONNX model and has no weights outside
+    its folder.
 
-    An ONNX file is a protocol buffer; only the few fields that lead to tensors are followed (onnx.proto3 of the ONNX
-    project). https://protobuf.dev/programming-guides/encoding/ describes the wire format.
+    An ONNX file is a protocol buffer; only the few fields that lead to tensors are followed
+    (onnx.proto3 of the ONNX project). https://protobuf.dev/programming-guides/encoding/ describes
+    the wire format.
 
     :raises ModelFileError: it is not, it has, or the file cannot be read.
     """
@@ -166,13 +194,17 @@ def check_onnx_file(path: Path) -> None:
     try:
         data = memoryview(path.read_bytes())
     except OSError as error:
-        raise ModelFileError(f"{path} cannot be read ({error.strerror}); choose an ONNX file") from error
+        raise ModelFileError(
+            f"{path} cannot be read ({error.strerror}); choose an ONNX file"
+        ) from error
     try:
         if not any(number == _GRAPH for number, _ in _fields(data)):
             raise ValueError("it has no graph")
         locations = list(_locations(data, "model", 0))
     except (ValueError, UnicodeDecodeError) as error:
-        raise ModelFileError(f"{path} is not an ONNX model ({error}); export the network to ONNX") from error
+        raise ModelFileError(
+            f"{path} is not an ONNX model ({error}); export the network to ONNX"
+        ) from error
     folder = path.resolve().parent
     for location in locations:
         target = (folder / location).resolve()
@@ -182,7 +214,9 @@ def check_onnx_file(path: Path) -> None:
                 "export it as one file, or with its data in the same folder"
             )
         if not target.is_file():
-            raise ModelFileError(f"{path} needs its weights in {target}, which is missing; put that file there")
+            raise ModelFileError(
+                f"{path} needs its weights in {target}, which is missing; put that file there"
+            )
 
 
 def _locations(data: memoryview, kind: str, depth: int) -> Iterator[str]:
@@ -204,7 +238,9 @@ def _locations(data: memoryview, kind: str, depth: int) -> Iterator[str]:
 
 
 def _fields(data: memoryview) -> Iterator[tuple[int, memoryview | int]]:
-    """Iterate over the fields of a message; yield number and value. Fixed-size numbers, which are unused, become 0."""
+    """Iterate over the fields of a message; yield number and value. Fixed-size numbers, which are
+    unused, become 0.
+    """
     at = 0
     while at < len(data):
         tag, at = _varint(data, at)
@@ -230,7 +266,9 @@ def _fields(data: memoryview) -> Iterator[tuple[int, memoryview | int]]:
 
 
 def _varint(data: memoryview, at: int) -> tuple[int, int]:
-    """Decode the varint at ``at`` (seven bits per byte, least significant first); return it and the offset after it."""
+    """Decode the varint at ``at`` (seven bits per byte, least significant first); return it and the
+    offset after it.
+    """
     value = 0
     for shift in range(0, 70, 7):
         if at >= len(data):

@@ -1,21 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A user's top-down keypoint network, with the interface of BlazePose's landmark network for the tracker.
+"""A user's top-down keypoint network, with the interface of BlazePose's landmark network for the
+tracker.
 
-Its input is a box around the person, rotated so that the trunk is upright. It does not estimate depth. Its outputs are
-heatmaps or SimCC.
+Its input is a box around the person, rotated so that the trunk is upright. It does not estimate
+depth. Its outputs are heatmaps or SimCC.
 
-Heatmaps (HRNet, ViTPose, AlphaPose): (1, J, rows, columns), coarser than the input, with a maximum at each keypoint.
-The maximum is refined by a quarter of a cell towards its greater neighbours, or by DARK: with h the logarithm of the
-heatmap after a Gaussian blur, the maximum of its second-order Taylor expansion about the greatest cell is at
+Heatmaps (HRNet, ViTPose, AlphaPose): (1, J, rows, columns), coarser than the input, with a maximum
+at each keypoint. The maximum is refined by a quarter of a cell towards its greater neighbours, or
+by DARK: with h the logarithm of the heatmap after a Gaussian blur, the maximum of its second-order
+Taylor expansion about the greatest cell is at
 
     cell − (∇²h)⁻¹ ∇h
 
-(Zhang et al., Distribution-Aware Coordinate Representation for Human Pose Estimation, CVPR 2020). A cell c is the pixel
-c · width / columns, or with ``udp`` c · (width − 1) / (columns − 1).
+(Zhang et al., Distribution-Aware Coordinate Representation for Human Pose Estimation, CVPR 2020). A
+cell c is the pixel c · width / columns, or with ``udp`` c · (width − 1) / (columns − 1).
 
-SimCC (RTMPose, RTMW): two rows of scores per keypoint, along x and along y, in bins of a fraction of a pixel:
-``simcc_x`` (1, J, ratio · width), ``simcc_y`` (1, J, ratio · height); pixel = argmax / ratio, the score is the smaller
-of the two maxima. The ratio, mostly 2, follows from the sizes.
+SimCC (RTMPose, RTMW): two rows of scores per keypoint, along x and along y, in bins of a fraction
+of a pixel: ``simcc_x`` (1, J, ratio · width), ``simcc_y`` (1, J, ratio · height); pixel = argmax /
+ratio, the score is the smaller of the two maxima. The ratio, mostly 2, follows from the sizes.
 """
 
 from __future__ import annotations
@@ -39,14 +41,18 @@ from .keypoint_sets import COCO_17, KEYPOINT_SETS, KeypointSet
 
 SCORE_THRESHOLD = 0.3  # from which a keypoint counts as seen
 UNSURE = 0.25  # share of this threshold from which a keypoint widens the next region
-MARGIN = 1.4  # the keypoints' box lacks crown, feet and the border that these networks are trained with
+# the keypoints' box lacks crown, feet and the border that these networks are trained with
+MARGIN = 1.4
 MIN_STATURE = 1.6  # least side in lengths of trunk and leg: a person who crouches will stand up
 MAX_SHRINK = 0.97  # from one frame to the next: legs that are briefly occluded must stay inside
 MIN_KEYPOINTS = 4  # to predict the next region
 _BODY = np.array([KEYPOINT_NAMES.index(name) for name in COCO_17])
 _SHOULDERS = np.array([KEYPOINT_NAMES.index(f"{side}_shoulder") for side in ("left", "right")])
 _HIPS = np.array([KEYPOINT_NAMES.index(f"{side}_hip") for side in ("left", "right")])
-_LEGS = [[KEYPOINT_NAMES.index(f"{side}_{joint}") for joint in ("hip", "knee", "ankle")] for side in ("left", "right")]
+_LEGS = [
+    [KEYPOINT_NAMES.index(f"{side}_{joint}") for joint in ("hip", "knee", "ankle")]
+    for side in ("left", "right")
+]
 _BLUR = 11  # cells; suits the Gaussians of 2 to 3 cells that these networks are trained with
 _MIN_HEAT = 1e-10
 
@@ -55,7 +61,9 @@ Keypoints = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 class KeypointFormat(NamedTuple):
-    """A kind of graph: ``matches`` recognizes it by its outputs, ``decode`` locates the keypoints in these."""
+    """A kind of graph: ``matches`` recognizes it by its outputs, ``decode`` locates the keypoints
+    in these.
+    """
 
     type: str
     matches: Callable[[Graph], bool]
@@ -81,7 +89,9 @@ def _heatmap(outputs: Outputs, graph: Graph, description: Description) -> Keypoi
         [refine(h, x, y) for h, (x, y) in zip(heatmaps, cells.tolist(), strict=True)]
     )
     size, grid = np.array([graph.width, graph.height]), np.array([columns, rows])
-    pixels_per_cell: NDArray[np.float64] = (size - 1) / (grid - 1) if description.udp else size / grid
+    pixels_per_cell: NDArray[np.float64] = (
+        (size - 1) / (grid - 1) if description.udp else size / grid
+    )
     return refined * pixels_per_cell, scores
 
 
@@ -151,7 +161,8 @@ KEYPOINT_TYPES = tuple(each.type for each in KEYPOINT_FORMATS)
 class KeypointNetwork:
     """The user's network; see `Description` for its JSON.
 
-    :raises ModelFileError: the file or its JSON cannot be used, or the type of the network is unknown.
+    :raises ModelFileError: the file or its JSON cannot be used, or the type of the network is
+        unknown.
     """
 
     def __init__(self, path: Path, threads: int, execution: Execution | None = None) -> None:
@@ -163,10 +174,15 @@ class KeypointNetwork:
         self._normalization = IMAGENET.with_description(description)
         self._threshold = description.score_threshold or SCORE_THRESHOLD
         self._side = max(self._graph.width, self._graph.height)
-        self._corner = np.array([(self._side - self._graph.width) // 2, (self._side - self._graph.height) // 2])
+        self._corner = np.array(
+            [(self._side - self._graph.width) // 2, (self._side - self._graph.height) // 2]
+        )
 
-    def estimate(self, image_rgb: NDArray[np.uint8], regions: Sequence[Region]) -> list[PoseEstimate]:
-        """Estimate one pose per region of an (H, W, 3) uint8 RGB image; world landmarks are all 0, that is, unknown.
+    def estimate(
+        self, image_rgb: NDArray[np.uint8], regions: Sequence[Region]
+    ) -> list[PoseEstimate]:
+        """Estimate one pose per region of an (H, W, 3) uint8 RGB image; world landmarks are all 0,
+        that is, unknown.
 
         :raises ModelFileError: the network fails.
         """
@@ -191,8 +207,12 @@ class KeypointNetwork:
             next_region=self._next_region(ours, confidence, region),
         )
 
-    def _next_region(self, points: NDArray[np.float64], confidence: NDArray[np.float64], region: Region) -> Region:
-        """Calculate the box around the seen keypoints, upright along the trunk, in the network's aspect ratio."""
+    def _next_region(
+        self, points: NDArray[np.float64], confidence: NDArray[np.float64], region: Region
+    ) -> Region:
+        """Calculate the box around the seen keypoints, upright along the trunk, in the network's
+        aspect ratio.
+        """
         seen = confidence >= UNSURE * self._threshold
         if seen.sum() < MIN_KEYPOINTS:
             return region
@@ -207,20 +227,31 @@ class KeypointNetwork:
 
 
 def _stature(points: NDArray[np.float64], seen: NDArray[np.bool_]) -> float:
-    """Add the lengths in pixels of trunk, thigh and lower leg, regardless of the pose; 0 for those not seen."""
+    """Add the lengths in pixels of trunk, thigh and lower leg, regardless of the pose; 0 for those
+    not seen.
+    """
     ends = [points[pair].mean(axis=0) for pair in (_SHOULDERS, _HIPS)]
     trunk = math.dist(*ends) if seen[[*_SHOULDERS, *_HIPS]].all() else 0.0
     legs = [
-        sum(math.dist(points[a], points[b]) for a, b in zip(leg, leg[1:], strict=False)) if seen[leg].all() else 0.0
+        sum(math.dist(points[a], points[b]) for a, b in zip(leg, leg[1:], strict=False))
+        if seen[leg].all()
+        else 0.0
         for leg in _LEGS
     ]
     return trunk + max(legs)
 
 
 def _format_of(graph: Graph, description: Description) -> KeypointFormat:
-    found = next((f for f in KEYPOINT_FORMATS if f.matches(graph) and description.type in (None, f.type)), None)
+    found = next(
+        (f for f in KEYPOINT_FORMATS if f.matches(graph) and description.type in (None, f.type)),
+        None,
+    )
     if found is None:
-        why = f"it is not {description.type}" if description.type else "its outputs match no known type"
+        why = (
+            f"it is not {description.type}"
+            if description.type
+            else "its outputs match no known type"
+        )
         raise graph.unrecognized("a keypoint network", KEYPOINT_TYPES, why)
     return found
 
@@ -232,7 +263,8 @@ def _set_for(graph: Graph, description: Description) -> KeypointSet:
     if found is None or found.count > count:
         sets = ", ".join(f"{s.name} ({s.count})" for s in KEYPOINT_SETS.values())
         raise ModelFileError(
-            f"{graph.path} outputs {count} keypoints, which matches none of {sets}; if it begins with those of "
+            f"{graph.path} outputs {count} keypoints, which matches none of {sets}; if it begins "
+            "with those of "
             f'one of these, name it in {description_path(graph.path)}: {{"keypoints": "coco17"}}'
         )
     return found

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keypoint sets of other networks, and their conversion to the 33 keypoints of the lifter and the solver.
+"""Keypoint sets of other networks, and their conversion to the 33 keypoints of the lifter and the
+solver.
 
-A keypoint that a set lacks gets a rough position and confidence 0: the solver ignores it, and the lifter gets the
-position together with the confidence.
+A keypoint that a set lacks gets a rough position and confidence 0: the solver ignores it, and the
+lifter gets the position together with the confidence.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ COCO_17 = (
     ),
 )
 _SIDES = ("left", "right")
-_TOES = {"big_toe": 0.85, "small_toe": 0.15}  # weights of BlazePose's foot tip; see solver/loaders/keypoints.py
+# weights of BlazePose's foot tip; see solver/loaders/keypoints.py
+_TOES = {"big_toe": 0.85, "small_toe": 0.15}
 
 # Our name: {index in the set: weight}.
 Mixture = dict[str, dict[int, float]]
@@ -33,24 +35,47 @@ _COCO: Mixture = {name: {k: 1.0} for k, name in enumerate(COCO_17)}
 def _feet(indices: dict[str, int]) -> Mixture:
     feet: Mixture = {f"{side}_heel": {indices[f"{side}_heel"]: 1.0} for side in _SIDES}
     for side in _SIDES:
-        feet[f"{side}_foot_index"] = {indices[f"{side}_{toe}"]: weight for toe, weight in _TOES.items()}
+        feet[f"{side}_foot_index"] = {
+            indices[f"{side}_{toe}"]: weight for toe, weight in _TOES.items()
+        }
     return feet
 
 
 def _halpe() -> Mixture:
     # 17 top of the head, 18 neck, 19 hip
-    points = ("left_big_toe", "right_big_toe", "left_small_toe", "right_small_toe", "left_heel", "right_heel")
+    points = (
+        "left_big_toe",
+        "right_big_toe",
+        "left_small_toe",
+        "right_small_toe",
+        "left_heel",
+        "right_heel",
+    )
     return _COCO | _feet({name: 20 + k for k, name in enumerate(points)})
 
 
 def _wholebody() -> Mixture:
-    feet = _feet({f"{s}_{p}": 17 + 3 * i + k for i, s in enumerate(_SIDES) for k, p in enumerate((*_TOES, "heel"))})
-    # 23 + the 68 points of the face, which begin at the person's right ear; eyes from 36, mouth from 48
-    face = {"right_eye_outer": 36, "right_eye_inner": 39, "left_eye_inner": 42, "left_eye_outer": 45}
+    feet = _feet(
+        {
+            f"{s}_{p}": 17 + 3 * i + k
+            for i, s in enumerate(_SIDES)
+            for k, p in enumerate((*_TOES, "heel"))
+        }
+    )
+    # 23 + the 68 points of the face, which begin at the person's right ear; eyes from 36, mouth
+    # from 48
+    face = {
+        "right_eye_outer": 36,
+        "right_eye_inner": 39,
+        "left_eye_inner": 42,
+        "left_eye_outer": 45,
+    }
     face |= {"mouth_right": 48, "mouth_left": 54}
     # hands of 21: wrist, then thumb, index, middle, ring, pinky, each from the base to the tip
     hand = {"thumb": 3, "index": 5, "pinky": 17}
-    fingers = {f"{s}_{f}": {91 + 21 * i + n: 1.0} for i, s in enumerate(_SIDES) for f, n in hand.items()}
+    fingers = {
+        f"{s}_{f}": {91 + 21 * i + n: 1.0} for i, s in enumerate(_SIDES) for f, n in hand.items()
+    }
     return _COCO | feet | {name: {23 + n: 1.0} for name, n in face.items()} | fingers
 
 
@@ -74,7 +99,10 @@ class KeypointSet:
         ours, confidence = np.zeros((len(KEYPOINT_NAMES), 2)), np.zeros(len(KEYPOINT_NAMES))
         for k, name in enumerate(KEYPOINT_NAMES):
             if name in self.mixture:
-                indices, weights = list(self.mixture[name]), np.array(list(self.mixture[name].values()))
+                indices, weights = (
+                    list(self.mixture[name]),
+                    np.array(list(self.mixture[name].values())),
+                )
                 ours[k], confidence[k] = weights @ points[indices], scores[indices].min()
         at = {name: ours[k] for k, name in enumerate(KEYPOINT_NAMES)}
         for k, name in enumerate(KEYPOINT_NAMES):

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A session on a user's network in a process of its own, which ends where the network takes too much time or memory.
+"""A session on a user's network in a process of its own, which ends where the network takes too
+much time or memory.
 
-A file from somewhere may loop without end, ask for any memory, or crash onnxruntime; and it may do so for one image
-alone, so that a trial before the capture would prove nothing. Therefore every run is made in that process. It costs a
-third of a second at the start, and a few milliseconds an image to pass arrays through a pipe. The built-in networks
-are opened in the capture's own process and pay nothing.
+A file from somewhere may loop without end, ask for any memory, or crash onnxruntime; and it may do
+so for one image alone, so that a trial before the capture would prove nothing. Therefore every run
+is made in that process. It costs a third of a second at the start, and a few milliseconds an image
+to pass arrays through a pipe. The built-in networks are opened in the capture's own process and pay
+nothing.
 """
 
 from __future__ import annotations
@@ -28,12 +30,15 @@ SERVER = Path(__file__).with_name("network_server.py")
 OPENING_S = {"tensorrt": 1800.0}  # TensorRT compiles the network
 DEFAULT_OPENING_S = 120.0
 RUN_S = 60.0
-BASE_BYTES, WEIGHT_COPIES = 4 << 30, 4  # of memory; onnxruntime copies weights while it rearranges them
+# of memory; onnxruntime copies weights while it rearranges them
+BASE_BYTES, WEIGHT_COPIES = 4 << 30, 4
 _FLAGS = getattr(subprocess, "CREATE_NO_WINDOW", 0)
 
 
 class NetworkProcess:
-    """A session of onnxruntime, with what `Graph` needs of its interface, in another process; thread-safe."""
+    """A session of onnxruntime, with what `Graph` needs of its interface, in another process;
+    thread-safe.
+    """
 
     def __init__(self, provider: str, path: Path, threads: int) -> None:
         """Start the process and open the network.
@@ -117,12 +122,14 @@ class NetworkProcess:
         self._end()
         if status == OUT_OF_MEMORY:
             return ModelFileError(
-                f"{self._path} was stopped because it took more than {self._limit_bytes / 1e9:.1f} GB of memory; "
+                f"{self._path} was stopped because it took more than {self._limit_bytes / 1e9:.1f} "
+                "GB of memory; "
                 "choose a smaller network"
             )
         if elapsed_s >= self._limit_s:
             return ModelFileError(
-                f"{self._path} was stopped because it gave no result within {self._limit_s:g} s; choose a faster "
+                f"{self._path} was stopped because it gave no result within {self._limit_s:g} s; "
+                "choose a faster "
                 "network, or export this one again"
             )
         return RuntimeError(f"onnxruntime crashed in its process, which ended with status {status}")
@@ -140,7 +147,9 @@ def _start() -> subprocess.Popen[bytes]:
             creationflags=_FLAGS,
         )
     except OSError as error:
-        raise SetupError(f"the process for your network cannot be started ({error}); free some memory") from error
+        raise SetupError(
+            f"the process for your network cannot be started ({error}); free some memory"
+        ) from error
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
@@ -154,10 +163,15 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 
 
 def _bytes_of_weights(path: Path) -> int:
-    """Return the size of an ONNX file and of what may be its external data: the files whose names begin with its own.
+    """Return the size of an ONNX file and of what may be its external data: the files whose names
+    begin with its own.
 
     The check of the file has confined external data to its folder.
     """
     with suppress(OSError):
-        return sum(p.stat().st_size for p in path.parent.iterdir() if p.name.startswith(path.stem) and p.is_file())
+        return sum(
+            p.stat().st_size
+            for p in path.parent.iterdir()
+            if p.name.startswith(path.stem) and p.is_file()
+        )
     return 0

@@ -3,13 +3,13 @@
 
     python -I -S network_server.py SEARCH_PATH...
 
-A script: it imports nothing of Scope, so that it starts fast and a network finds little in its process. Requests come
-on standard input, answers leave on standard output: the length of a JSON text as four bytes, the text, and the contents
-of the arrays that it describes.
+A script: it imports nothing of Scope, so that it starts fast and a network finds little in its
+process. Requests come on standard input, answers leave on standard output: the length of a JSON
+text as four bytes, the text, and the contents of the arrays that it describes.
 
-The limits hold on every system, whatever the network does: the time is kept by a thread of the interpreter's own, which
-needs no lock. Memory is limited by the system itself on Linux, and watched by a thread elsewhere and on a GPU, whose
-drivers reserve addresses without end.
+The limits hold on every system, whatever the network does: the time is kept by a thread of the
+interpreter's own, which needs no lock. Memory is limited by the system itself on Linux, and watched
+by a thread elsewhere and on a GPU, whose drivers reserve addresses without end.
 """
 
 import contextlib
@@ -37,9 +37,9 @@ Arrays = Sequence[Any]
 def load_runtime() -> ModuleType:
     """Import onnxruntime without its telemetry.
 
-    From version 1.29 on, which a user may install for a graphics card, the library in its wheels reports its start and
-    every session to a server of Microsoft's, and keeps an identifier of the computer, unless this variable is set when
-    the library is loaded.
+    From version 1.29 on, which a user may install for a graphics card, the library in its wheels
+    reports its start and every session to a server of Microsoft's, and keeps an identifier of the
+    computer, unless this variable is set when the library is loaded.
 
     :raises ImportError: it is not installed, or cannot be loaded.
     """
@@ -49,7 +49,9 @@ def load_runtime() -> ModuleType:
     return onnxruntime  # type: ignore[no-any-return]
 
 
-def make_session(runtime: ModuleType, path: str, threads: int, providers: list[str], mem_pattern: bool) -> Any:
+def make_session(
+    runtime: ModuleType, path: str, threads: int, providers: list[str], mem_pattern: bool
+) -> Any:
     """Open an onnxruntime session, with the options of all our sessions.
 
     :param providers: onnxruntime's names.
@@ -90,7 +92,8 @@ def receive(stream: IO[bytes], largest_arrays: int) -> dict[str, Any]:
     text = _read(stream, size)
     try:
         return _with_arrays(text, stream, largest_arrays)
-    except (KeyError, TypeError, OverflowError, RecursionError, SyntaxError) as error:  # the last one of np.dtype
+    # the last one of np.dtype
+    except (KeyError, TypeError, OverflowError, RecursionError, SyntaxError) as error:
         raise ValueError(str(error)) from error
 
 
@@ -145,7 +148,11 @@ class Server:
     def _open(self, request: dict[str, Any]) -> dict[str, Any]:
         self._limit_memory(request["limit_bytes"], on_cpu=request["providers"] == [_CPU_PROVIDER])
         self._session = session = make_session(
-            load_runtime(), request["path"], request["threads"], request["providers"], request["mem_pattern"]
+            load_runtime(),
+            request["path"],
+            request["threads"],
+            request["providers"],
+            request["mem_pattern"],
         )
         return {
             "providers": session.get_providers(),
@@ -157,8 +164,12 @@ class Server:
         import numpy as np
 
         outputs = self._session.run(None, {name: array})
-        if not all(isinstance(output, np.ndarray) and output.dtype.kind in "fiub" for output in outputs):
-            raise ValueError("it has outputs that are not arrays of numbers; export it without these")
+        if not all(
+            isinstance(output, np.ndarray) and output.dtype.kind in "fiub" for output in outputs
+        ):
+            raise ValueError(
+                "it has outputs that are not arrays of numbers; export it without these"
+            )
         if sum(output.nbytes for output in outputs) > LARGEST_ARRAYS:
             raise ValueError(f"its outputs are larger than {LARGEST_ARRAYS >> 20} MB")
         return [np.ascontiguousarray(output).reshape(output.shape) for output in outputs]
@@ -223,7 +234,9 @@ def _peak_on_windows() -> int:
     counters = Counters(cb=ctypes.sizeof(Counters))
     library.GetCurrentProcess.restype = ctypes.c_void_p
     library.K32GetProcessMemoryInfo.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint32]
-    found = library.K32GetProcessMemoryInfo(library.GetCurrentProcess(), ctypes.byref(counters), counters.cb)
+    found = library.K32GetProcessMemoryInfo(
+        library.GetCurrentProcess(), ctypes.byref(counters), counters.cb
+    )
     return int(counters.peak) if found else 0
 
 

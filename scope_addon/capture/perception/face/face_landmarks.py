@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Faces in the image: the landmark network and its regions, the expression network, and the light around the eyes.
+"""Faces in the image: the landmark network and its regions, the expression network, and the light
+around the eyes.
 
-A region is predicted from the body's head keypoints, or from the face's own landmarks; its forehead points up. The box
-of the landmarks fills two thirds of it.
+A region is predicted from the body's head keypoints, or from the face's own landmarks; its forehead
+points up. The box of the landmarks fills two thirds of it.
 """
 
 from __future__ import annotations
@@ -24,28 +25,38 @@ from ..sessions import network_path, open_session
 
 INPUT_SIZE = 256
 FACE_POINTS = 478  # the mesh of 468 points, then the right and the left iris, five points each
-HEAD = tuple(range(KEYPOINT_NAMES.index("mouth_right") + 1))  # keypoints of the body: nose, eyes, ears, mouth
+# keypoints of the body: nose, eyes, ears, mouth
+HEAD = tuple(range(KEYPOINT_NAMES.index("mouth_right") + 1))
 _EYES = [KEYPOINT_NAMES.index(f"{side}_eye") for side in ("left", "right")]
 _EARS = [KEYPOINT_NAMES.index(f"{side}_ear") for side in ("left", "right")]
 _MOUTH = [KEYPOINT_NAMES.index(f"mouth_{side}") for side in ("left", "right")]
 # Distances on an adult's face: each gives a scale, the largest of which is the least foreshortened.
 _EYES_M, _EYES_TO_MOUTH_M, _EARS_M = 0.063, 0.068, 0.150
-FACE_M = 0.185  # longer side of the box of the landmarks, which reaches from the hairline to the chin
+# longer side of the box of the landmarks, which reaches from the hairline to the chin
+FACE_M = 0.185
 _MIDDLE = 0.3  # of the face, from the eyes towards the mouth, in their distance
 _SCALE = 1.5  # side of a region in longer sides of the box
 _OUTER_EYES = (33, 263)  # landmarks: the outer corners of the right and the left eye
 # The landmarks that the expression network was trained on, in its order.
 EXPRESSION_POINTS = (
-    0, 1, 4, 5, 6, 7, 8, 10, 13, 14, 17, 21, 33, 37, 39, 40, 46, 52, 53, 54, 55, 58, 61, 63, 65, 66, 67, 70, 78, 80, 81,
-    82, 84, 87, 88, 91, 93, 95, 103, 105, 107, 109, 127, 132, 133, 136, 144, 145, 146, 148, 149, 150, 152, 153, 154,
-    155, 157, 158, 159, 160, 161, 162, 163, 168, 172, 173, 176, 178, 181, 185, 191, 195, 197, 234, 246, 249, 251, 263,
-    267, 269, 270, 276, 282, 283, 284, 285, 288, 291, 293, 295, 296, 297, 300, 308, 310, 311, 312, 314, 317, 318, 321,
-    323, 324, 332, 334, 336, 338, 356, 361, 362, 365, 373, 374, 375, 377, 378, 379, 380, 381, 382, 384, 385, 386, 387,
-    388, 389, 390, 397, 398, 400, 402, 405, 409, 415, 454, 466, 468, 469, 470, 471, 472, 473, 474, 475, 476, 477,
+    0, 1, 4, 5, 6, 7, 8, 10, 13, 14, 17, 21, 33, 37, 39, 40, 46, 52, 53, 54, 55, 58, 61, 63, 65, 66,
+    67, 70, 78, 80, 81,
+    82, 84, 87, 88, 91, 93, 95, 103, 105, 107, 109, 127, 132, 133, 136, 144, 145, 146, 148, 149,
+    150, 152, 153, 154,
+    155, 157, 158, 159, 160, 161, 162, 163, 168, 172, 173, 176, 178, 181, 185, 191, 195, 197, 234,
+    246, 249, 251, 263,
+    267, 269, 270, 276, 282, 283, 284, 285, 288, 291, 293, 295, 296, 297, 300, 308, 310, 311, 312,
+    314, 317, 318, 321,
+    323, 324, 332, 334, 336, 338, 356, 361, 362, 365, 373, 374, 375, 377, 378, 379, 380, 381, 382,
+    384, 385, 386, 387,
+    388, 389, 390, 397, 398, 400, 402, 405, 409, 415, 454, 466, 468, 469, 470, 471, 472, 473, 474,
+    475, 476, 477,
 )  # fmt: skip
-# The expression network's outputs: a weight of the neutral face, then these. It knows nothing of the tongue.
+# The expression network's outputs: a weight of the neutral face, then these. It knows nothing of
+# the tongue.
 _OF_NETWORK = [k for k, name in enumerate(EXPRESSIONS) if name != "tongueOut"]
-# Corners of the right and the left eye, and places on the cheek under each and on the forehead above; landmarks.
+# Corners of the right and the left eye, and places on the cheek under each and on the forehead
+# above; landmarks.
 _EYE_CORNERS = ((33, 133), (362, 263))
 _CHEEKS = ((50, 101, 205, 36), (280, 330, 425, 266))
 _FOREHEAD = ((151, 108, 69), (151, 337, 299))
@@ -59,8 +70,9 @@ _MIN_PX = 6.0  # distance of an eye's corners below which the square is mostly s
 class FaceEstimate:
     """The network's estimate for one region.
 
-    ``landmarks`` (478, 3): image pixels, and depth in pixels in the region's axes, away from the camera; ``presence``:
-    probability that there is a face; ``region``: the input region; ``eye_light``: see `eye_light`; of faces only.
+    ``landmarks`` (478, 3): image pixels, and depth in pixels in the region's axes, away from the
+    camera; ``presence``: probability that there is a face; ``region``: the input region;
+    ``eye_light``: see `eye_light`; of faces only.
     """
 
     landmarks: NDArray[np.float64]
@@ -111,25 +123,33 @@ def pixels_per_metre(keypoints_px: NDArray[np.float64]) -> float:
 def region_from_body(keypoints_px: NDArray[np.float64]) -> Region:
     """Predict the region of the face from the body's keypoints (33, 2), in pixels.
 
-    Up is from the mouth to the eyes, and across the line of the eyes, each as far as it is not foreshortened.
+    Up is from the mouth to the eyes, and across the line of the eyes, each as far as it is not
+    foreshortened.
     """
     eyes, mouth = keypoints_px[_EYES], keypoints_px[_MOUTH].mean(axis=0)
     middle = eyes.mean(axis=0)
-    dx, dy = eyes[0] - eyes[1]  # from the right eye to the left one, to the right in an image of a front view
+    # from the right eye to the left one, to the right in an image of a front view
+    dx, dy = eyes[0] - eyes[1]
     up = (middle - mouth) + np.array([dy, -dx])
     center = middle + _MIDDLE * (mouth - middle)
     side = _SCALE * FACE_M * pixels_per_metre(keypoints_px)
-    return Region((float(center[0]), float(center[1])), side, math.atan2(float(up[0]), -float(up[1])))
+    return Region(
+        (float(center[0]), float(center[1])), side, math.atan2(float(up[0]), -float(up[1]))
+    )
 
 
 def facing(world_landmarks: NDArray[np.float64]) -> float:
-    """Return the cosine of the angle between where the body's head looks and the direction to the camera.
+    """Return the cosine of the angle between where the body's head looks and the direction to the
+    camera.
 
-    It looks along (left ear − right ear) × (eyes − mouth): -1 is the back of a head, 1 a face from the front.
+    It looks along (left ear − right ear) × (eyes − mouth): -1 is the back of a head, 1 a face from
+    the front.
 
-    Where the body's network exchanges left and right, a face from the front counts as the back of a head.
+    Where the body's network exchanges left and right, a face from the front counts as the back of a
+    head.
 
-    :param world_landmarks: (33, 3) of the body, metres, camera axes; all 0 where depth is unknown, for which this is 1.
+    :param world_landmarks: (33, 3) of the body, metres, camera axes; all 0 where depth is unknown,
+        for which this is 1.
     """
     across = world_landmarks[_EARS[0]] - world_landmarks[_EARS[1]]
     up = world_landmarks[_EYES].mean(axis=0) - world_landmarks[_MOUTH].mean(axis=0)
@@ -139,7 +159,8 @@ def facing(world_landmarks: NDArray[np.float64]) -> float:
 
 
 def region_from_landmarks(landmarks_px: NDArray[np.float64]) -> Region:
-    """Calculate the region for the next frame from this one's landmarks (478, 2): their box along the line of the eyes.
+    """Calculate the region for the next frame from this one's landmarks (478, 2): their box along
+    the line of the eyes.
 
     :param landmarks_px: pixels.
     """
@@ -161,7 +182,8 @@ class ExpressionNetwork:
         self._session = open_session(network_path("face_expression"), 1)
 
     def estimate(self, landmarks_px: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
-        """Estimate the weights (52,) 0..1 of the expressions in the order of `EXPRESSIONS`; 0 of the tongue.
+        """Estimate the weights (52,) 0..1 of the expressions in the order of `EXPRESSIONS`; 0 of
+        the tongue.
 
         :param landmarks_px: (146, 2) those of `EXPRESSION_POINTS`, pixels.
         """
@@ -172,11 +194,12 @@ class ExpressionNetwork:
 
 
 def eye_light(image_rgb: NDArray[np.uint8], landmarks: NDArray[np.float64]) -> float:
-    """Return the median brightness of the square around an eye over that of the skin, for the brighter eye.
+    """Return the median brightness of the square around an eye over that of the skin, for the
+    brighter eye.
 
-    The skin is the darker one of cheek and forehead: a mask is brighter than skin. 0.6 to 1.5 with bare eyes and clear
-    glasses, at most 0.4 with dark ones; 1 where the skin is too dark or the eye too small to tell, and where a landmark
-    is not finite.
+    The skin is the darker one of cheek and forehead: a mask is brighter than skin. 0.6 to 1.5 with
+    bare eyes and clear glasses, at most 0.4 with dark ones; 1 where the skin is too dark or the eye
+    too small to tell, and where a landmark is not finite.
 
     :param image_rgb: (H, W, 3) uint8.
     :param landmarks: (478, 2) or (478, 3) pixels; a third column is not used.
@@ -191,7 +214,10 @@ def eye_light(image_rgb: NDArray[np.uint8], landmarks: NDArray[np.float64]) -> f
             continue
         eye = _brightness(image_rgb, (ax + bx) / 2, (ay + by) / 2, _HALF * width)
         half = _SPOT * width
-        spots = [[_brightness(image_rgb, x, y, half) for x, y in landmarks[list(k), :2].tolist()] for k in places]
+        spots = [
+            [_brightness(image_rgb, x, y, half) for x, y in landmarks[list(k), :2].tolist()]
+            for k in places
+        ]
         skin = min(_middle(place) for place in spots)
         if not math.isnan(eye) and skin > _DARK:
             found.append(eye / skin)

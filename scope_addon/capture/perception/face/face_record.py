@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is kept of a face in one frame, as one row of numbers: an hour of 30 frames a second takes 260 MB."""
+"""What is kept of a face in one frame, as one row of numbers: an hour of 30 frames a second takes
+260 MB.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,8 @@ from .face_landmarks import EXPRESSION_POINTS, FACE_POINTS, FaceEstimate
 
 # Landmarks that are kept: the outline of the face, brows, eyes, irises, nose and lips.
 CONTOURS = (
-    10, 338, 297, 332, 284, 251, 389, 356, 454, 323, 361, 288, 397, 365, 379, 378, 400, 377, 152, 148, 176, 149, 150,
+    10, 338, 297, 332, 284, 251, 389, 356, 454, 323, 361, 288, 397, 365, 379, 378, 400, 377, 152,
+    148, 176, 149, 150,
     136, 172, 58, 132, 93, 234, 127, 162, 21, 54, 103, 67, 109,
     70, 63, 105, 66, 107, 336, 296, 334, 293, 300,
     33, 160, 159, 158, 133, 153, 145, 144, 362, 385, 386, 387, 263, 373, 374, 380, 468, 473,
@@ -28,7 +31,8 @@ _AT_CONTOURS = np.searchsorted(_KEPT, CONTOURS)
 _POINTS = slice(_GAZE.stop, _GAZE.stop + 3 * len(_KEPT))
 _LIGHT = _POINTS.stop
 RECORD = _LIGHT + 1  # numbers in a row
-# A face of 16 pixels shows nothing, one of 64 everything; one that is seen from the side shows only half.
+# A face of 16 pixels shows nothing, one of 64 everything; one that is seen from the side shows only
+# half.
 _FACE_PX = (16.0, 64.0)
 _FACING = (0.2, 0.6)  # cosine of the angle between the face's direction and the one to the camera
 _SCALE = 1.5  # side of a region over the face's
@@ -39,12 +43,16 @@ _RADIUS = 0.4  # of the eyeball, 12 mm, over the distance of the eye's corners, 
 _LARGEST_SINE = 0.9
 
 
-def record(estimate: FaceEstimate | None, weights: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+def record(
+    estimate: FaceEstimate | None, weights: NDArray[np.float64] | None = None
+) -> NDArray[np.float64]:
     """Return the row (RECORD,) of a face; zeros if there is none.
 
-    Its numbers: confidence, size in pixels, weights, gaze, landmarks, and the light around the eyes.
+    Its numbers: confidence, size in pixels, weights, gaze, landmarks, and the light around the
+    eyes.
 
-    :param weights: (52,) of the expressions; None: they and the gaze stay 0, for `with_expressions` to find.
+    :param weights: (52,) of the expressions; None: they and the gaze stay 0, for `with_expressions`
+        to find.
     """
     row = np.zeros(RECORD)
     if estimate is None:
@@ -60,7 +68,9 @@ def record(estimate: FaceEstimate | None, weights: NDArray[np.float64] | None = 
 
 
 def parts(rows: NDArray[np.floating[Any]]) -> tuple[NDArray[np.floating[Any]], ...]:
-    """Split rows (T, RECORD) into confidence (T,), size (T,), weights (T, 52), gaze (T, 2, 3), contours (T, n, 2)."""
+    """Split rows (T, RECORD) into confidence (T,), size (T,), weights (T, 52), gaze (T, 2, 3),
+    contours (T, n, 2).
+    """
     T = len(rows)
     return (
         rows[:, 0],
@@ -71,7 +81,9 @@ def parts(rows: NDArray[np.floating[Any]]) -> tuple[NDArray[np.floating[Any]], .
     )
 
 
-def landmarks_of(rows: NDArray[np.floating[Any]], numbers: NDArray[np.int64]) -> NDArray[np.floating[Any]]:
+def landmarks_of(
+    rows: NDArray[np.floating[Any]], numbers: NDArray[np.int64]
+) -> NDArray[np.floating[Any]]:
     """Return landmarks (T, n, 3) of rows, in pixels, and depth in pixels.
 
     :param numbers: (n,) of the contours, or of those that the expression network takes.
@@ -80,7 +92,9 @@ def landmarks_of(rows: NDArray[np.floating[Any]], numbers: NDArray[np.int64]) ->
 
 
 def kept_landmarks(row: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
-    """Return the landmarks (478, 3) of a row (RECORD,), in pixels, and depth in pixels; 0 those that are not kept."""
+    """Return the landmarks (478, 3) of a row (RECORD,), in pixels, and depth in pixels; 0 those
+    that are not kept.
+    """
     landmarks = np.zeros((FACE_POINTS, 3))
     landmarks[_KEPT] = row[_POINTS].reshape(len(_KEPT), 3)
     return landmarks
@@ -92,7 +106,9 @@ def eye_light_of(rows: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
 
 
 def presence_of(rows: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
-    """Return (T,) the presence of the faces of rows, less where they are seen from the side, but not where small."""
+    """Return (T,) the presence of the faces of rows, less where they are seen from the side, but
+    not where small.
+    """
     of_size = np.maximum(_ramp(rows[:, 1], *_FACE_PX), 1e-3)
     found: NDArray[np.floating[Any]] = np.minimum(rows[:, 0] / of_size, 1.0)
     return found
@@ -112,7 +128,8 @@ def _ramp(value: Any, low: float, high: float) -> Any:
 
 
 def head_axes(landmarks: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Calculate R_camera_head (3, 3), up to the camera's perspective, from landmarks (478, 3) in pixels.
+    """Calculate R_camera_head (3, 3), up to the camera's perspective, from landmarks (478, 3) in
+    pixels.
 
     The head's frame: x to the person's left, y up, z out of the face.
     """
@@ -125,10 +142,11 @@ def head_axes(landmarks: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def gaze(landmarks: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Estimate the unit directions (2, 3) in which the left and the right eye look, in the head's frame.
+    """Estimate the unit directions (2, 3) in which the left and the right eye look, in the head's
+    frame.
 
-    With the iris at offset (u, v) from the middle of the eye's corners, along the head's x and y axes, and the
-    eyeball's radius r: sin(azimuth) = u / r, sin(elevation) = v / r.
+    With the iris at offset (u, v) from the middle of the eye's corners, along the head's x and y
+    axes, and the eyeball's radius r: sin(azimuth) = u / r, sin(elevation) = v / r.
 
     :param landmarks: (478, 3) pixels, and depth in pixels.
     """

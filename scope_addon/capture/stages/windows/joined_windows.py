@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The windows of a clip joined: one list of frames, and tracklets that go on across the seams.
 
-Two windows have followed the people in the frames that they share. Two tracklets are the same person if both last until
-the end of these frames, with keypoints in the same places over the last of them.
+Two windows have followed the people in the frames that they share. Two tracklets are the same
+person if both last until the end of these frames, with keypoints in the same places over the last
+of them.
 """
 
 from __future__ import annotations
@@ -22,9 +23,11 @@ from ...tracking.track import Track, Tracklet, trunk_px
 from .window_record import WindowRecord
 
 _NOWHERE = Region((0.0, 0.0), 1.0, 0.0)
-SAME_PERSON = 0.15  # mean distance of the keypoints in sides of the region, below which two tracklets are one person
+# mean distance of the keypoints in sides of the region, below which two tracklets are one person
+SAME_PERSON = 0.15
 COMPARED_FRAMES = 10
-SAME_POSE = 0.04  # the same, below which the tracklets are faded into each other; else left and right may be swapped
+# the same, below which the tracklets are faded into each other; else left and right may be swapped
+SAME_POSE = 0.04
 
 
 class JoinedWindows:
@@ -46,14 +49,17 @@ class JoinedWindows:
         return len(self.timestamps)
 
     def accepts(self, record: WindowRecord) -> bool:
-        """Return whether a record surely follows the last one frame by frame, however its frames were decoded.
+        """Return whether a record surely follows the last one frame by frame, however its frames
+        were decoded.
 
         Without common frames that is not known.
         """
         return self._last is None or (record.first > 0 and record.continues(self._last))
 
     def missed(self, record: WindowRecord) -> list[Region]:
-        """Return the regions in which the next window has to begin, where it has lost somebody; else none."""
+        """Return the regions in which the next window has to begin, where it has lost somebody;
+        else none.
+        """
         if self._last is None or not record.first or not missed_people(self._last, record):
             return []
         return list(self._last.anchor_regions.values())
@@ -100,7 +106,8 @@ class JoinedWindows:
         return [self.timestamps[row] for row in self._cut_rows]
 
     def largest_people(self, first_row: int) -> Iterator[tuple[float, Observation]]:
-        """Yield the time and the largest person of each frame from a row on in which somebody was seen.
+        """Yield the time and the largest person of each frame from a row on in which somebody was
+        seen.
 
         The observations contain what a fit of their frames needs.
         """
@@ -112,10 +119,17 @@ class JoinedWindows:
         for row in sorted(largest):
             _, tracklet, k = largest[row]
             px, confidence, world = np.split(tracklet.values[k].astype(float), (2, 3), axis=1)
-            yield self.timestamps[row], Observation(px, confidence[:, 0], world, 1.0, _NOWHERE, acquired=True)
+            yield (
+                self.timestamps[row],
+                Observation(px, confidence[:, 0], world, 1.0, _NOWHERE, acquired=True),
+            )
 
-    def _continue(self, place: int, number: int, tracklet: Tracklet, own: Tracklet, overlap: int) -> None:
-        """Append a tracklet's own frames to the one that it continues, and fade it in over the frames before."""
+    def _continue(
+        self, place: int, number: int, tracklet: Tracklet, own: Tracklet, overlap: int
+    ) -> None:
+        """Append a tracklet's own frames to the one that it continues, and fade it in over the
+        frames before.
+        """
         assert self._last is not None
         joined, last = self._people[place], self._last.tracklets[number]
         behind = len(joined.rows) - len([row for row in last.rows if row >= self._last.first])
@@ -127,7 +141,9 @@ class JoinedWindows:
 
 
 def same_people(before: WindowRecord, after: WindowRecord) -> dict[int, int]:
-    """Return for each tracklet of the later window that continues one of the earlier window, the number of that one."""
+    """Return for each tracklet of the later window that continues one of the earlier window, the
+    number of that one.
+    """
     overlap = after.first
     if not overlap or len(before) - before.anchor != overlap:
         return {}
@@ -144,7 +160,9 @@ def same_people(before: WindowRecord, after: WindowRecord) -> dict[int, int]:
 
 
 def missed_people(before: WindowRecord, after: WindowRecord) -> bool:
-    """Return whether somebody who was followed throughout the shared frames was not found there again."""
+    """Return whether somebody who was followed throughout the shared frames was not found there
+    again.
+    """
     overlap = len(before) - before.anchor
     if not overlap:
         return False
@@ -152,13 +170,15 @@ def missed_people(before: WindowRecord, after: WindowRecord) -> bool:
     followed = [
         number
         for number in _lasting(before, len(before) - 1)
-        if len(before.tracklets[number].rows) >= overlap and before.tracklets[number].rows[-overlap] == before.anchor
+        if len(before.tracklets[number].rows) >= overlap
+        and before.tracklets[number].rows[-overlap] == before.anchor
     ]
     return not found.issuperset(followed)
 
 
 def distance(earlier: Tracklet, later: Tracklet, offset: int, rows: tuple[int, int]) -> float:
-    """Return the mean distance of the keypoints in the frames that two tracklets share, in sides of the region.
+    """Return the mean distance of the keypoints in the frames that two tracklets share, in sides of
+    the region.
 
     :param offset: the row of the earlier window that is row 0 of the later one.
     :param rows: the first and the end of the rows of the later window that are compared.
@@ -169,16 +189,22 @@ def distance(earlier: Tracklet, later: Tracklet, offset: int, rows: tuple[int, i
     for k, row in enumerate(later.rows):
         if rows[0] <= row < rows[1] and row in places:
             other = places[row]
-            apart = np.linalg.norm(later.values[k][:, :2] - earlier.values[other][:, :2], axis=1).mean()
+            apart = np.linalg.norm(
+                later.values[k][:, :2] - earlier.values[other][:, :2], axis=1
+            ).mean()
             found.append(float(apart) / min(later.sides_px[k], earlier.sides_px[other]))
     return float(np.mean(found)) if found else np.inf
 
 
-def faded(earlier: Tracklet, later: Tracklet, offset: int, overlap: int) -> dict[int, NDArray[np.float32]]:
-    """Return the values of the shared frames, which go over from the earlier tracklet to the later one.
+def faded(
+    earlier: Tracklet, later: Tracklet, offset: int, overlap: int
+) -> dict[int, NDArray[np.float32]]:
+    """Return the values of the shared frames, which go over from the earlier tracklet to the later
+    one.
 
-    value(i) = (1 − a) earlier(i) + a later(i), with a rising evenly over the overlap. Else the body would jump by some
-    pixels at the seam: two trackers that began at different frames look at slightly different regions.
+    value(i) = (1 − a) earlier(i) + a later(i), with a rising evenly over the overlap. Else the body
+    would jump by some pixels at the seam: two trackers that began at different frames look at
+    slightly different regions.
 
     :param offset: the row of the earlier window that is row 0 of the later one.
     :return: by the place in the earlier tracklet; empty where the poses are not the same.

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where the windows of a clip begin and end.
 
-All tracking starts afresh in each window, so what is observed in it depends on its frames alone. It does so a little
-before the window, for the frames in which people are found and the regions settle; these frames belong to the window
-before.
+All tracking starts afresh in each window, so what is observed in it depends on its frames alone. It
+does so a little before the window, for the frames in which people are found and the regions settle;
+these frames belong to the window before.
 """
 
 from __future__ import annotations
@@ -28,7 +28,9 @@ class Window:
     end_s: float
 
     def has_begun(self, time_s: float) -> bool:
-        """Return whether a frame at this time is not before the window's first one, as none of the first window is."""
+        """Return whether a frame at this time is not before the window's first one, as none of the
+        first window is.
+        """
         return not self.number or time_s >= self.begin_s - _TOLERANCE_S
 
     def warms_up(self, time_s: float) -> bool:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What was observed in a window as a file, for the process that joins the windows: plain arrays, no Python objects.
+"""What was observed in a window as a file, for the process that joins the windows: plain arrays, no
+Python objects.
 
-A file may come from another machine, so whatever is read from it is checked. One that is missing, damaged or of another
-window counts for nothing: the window is observed again.
+A file may come from another machine, so whatever is read from it is checked. One that is missing,
+damaged or of another window counts for nothing: the window is observed again.
 """
 
 from __future__ import annotations
@@ -36,10 +37,12 @@ from .window_record import WindowRecord, known_reference
 
 MASK_SIDE = 256
 MAX_TEXT = 100_000
-# Name: type and shape. The first length of several arrays is the same where the letter is: frames (N), tracklets (M),
-# their rows (R), references (Q), masks (K), regions (S), edge frames (E), edges (L).
+# Name: type and shape. The first length of several arrays is the same where the letter is: frames
+# (N), tracklets (M), their rows (R), references (Q), masks (K), regions (S), edge frames (E), edges
+# (L).
 _ARRAYS: dict[str, tuple[type[Any], str, tuple[int, ...]]] = {
-    "geometry": (np.float64, "6", ()),  # number, anchor, begin and end of the window, width and height of the image
+    # number, anchor, begin and end of the window, width and height of the image
+    "geometry": (np.float64, "6", ()),
     "rows": (np.int64, "2", ()),  # first, anchor
     "indices": (np.int64, "N", ()),
     "timestamps": (np.float64, "N", ()),
@@ -102,7 +105,9 @@ def save_window(folder: Path, record: WindowRecord, size: tuple[int, int]) -> Pa
         "edge_rows": [(edge.row, len(edge.segments.lengths)) for edge in background.edge_frames],
         "edge_ends": _joined([each.ends_px for each in segments]),
         "edge_lengths": _joined([each.lengths for each in segments]),
-        "anchor_regions": [(number, *_region_row(r)) for number, r in record.anchor_regions.items()],
+        "anchor_regions": [
+            (number, *_region_row(r)) for number, r in record.anchor_regions.items()
+        ],
         "text": np.frombuffer(text, np.uint8),
         **_people_arrays(record.tracklets),
     }
@@ -129,7 +134,9 @@ def load_window(folder: Path, window: Window, size: tuple[int, int]) -> WindowRe
 
 def _people_arrays(tracklets: dict[int, Tracklet]) -> dict[str, Any]:
     people = list(tracklets.values())
-    references = [(n, row, call.result()) for n, t in tracklets.items() for row, call in t.references]
+    references = [
+        (n, row, call.result()) for n, t in tracklets.items() for row, call in t.references
+    ]
     nothing = np.zeros((KEYPOINT_COUNT, 3))
     masks = [(n, row, mask) for n, t in tracklets.items() for row, mask in t.masks]
     return {
@@ -173,23 +180,41 @@ def _check(arrays: Arrays) -> None:
     lengths: dict[str, int] = {}
     for name, (dtype, letter, shape) in _ARRAYS.items():
         array = arrays.get(name)
-        if array is None or array.dtype != dtype or array.ndim != 1 + len(shape) or array.shape[1:] != shape:
+        if (
+            array is None
+            or array.dtype != dtype
+            or array.ndim != 1 + len(shape)
+            or array.shape[1:] != shape
+        ):
             raise InputError(f"{name} is missing or has another form")
         expected = int(letter) if letter.isdigit() else lengths.setdefault(letter, len(array))
         may_be_infinite = name == "geometry"
-        if len(array) != expected or (array.dtype.kind == "f" and not may_be_infinite and not np.isfinite(array).all()):
+        if len(array) != expected or (
+            array.dtype.kind == "f" and not may_be_infinite and not np.isfinite(array).all()
+        ):
             raise InputError(f"{name} has another length, or numbers that are not finite")
-    _require(lengths["H"] in (0, lengths["R"]) and lengths["F"] in (0, lengths["R"]), "hands and faces")
+    _require(
+        lengths["H"] in (0, lengths["R"]) and lengths["F"] in (0, lengths["R"]), "hands and faces"
+    )
     frames, (first, anchor) = lengths["N"], arrays["rows"].tolist()
     _require(0 <= first <= frames and first <= anchor <= frames, "rows")
-    for name, column in (("cut_rows", ...), ("edge_rows", 0), ("tracklet_rows", ...), ("references", 1), ("masks", 1)):
+    for name, column in (
+        ("cut_rows", ...),
+        ("edge_rows", 0),
+        ("tracklet_rows", ...),
+        ("references", 1),
+        ("masks", 1),
+    ):
         rows = arrays[name][..., column] if isinstance(column, int) else arrays[name]
         _require(bool(((rows >= 0) & (rows < frames)).all()), name)
     _require(bool((np.diff(arrays["timestamps"]) > 0).all()), "timestamps")
     _require(bool((arrays["cut_rows"] >= first).all()), "cut_rows")
     numbers, counts = arrays["tracklets"].T
     _require(bool((counts >= 0).all()) and len(set(numbers.tolist())) == len(numbers), "tracklets")
-    _require(_sums_to(counts, lengths["R"]) and _sums_to(arrays["edge_rows"][:, 1], lengths["L"]), "counts")
+    _require(
+        _sums_to(counts, lengths["R"]) and _sums_to(arrays["edge_rows"][:, 1], lengths["L"]),
+        "counts",
+    )
     for rows in np.split(arrays["tracklet_rows"], np.cumsum(counts)[:-1]):
         _require(bool((np.diff(rows) > 0).all()), "tracklet_rows")
     _require(bool(np.isin(arrays["references"][:, 0], numbers).all()), "references")
@@ -212,13 +237,18 @@ def _record(arrays: Arrays, window: Window, size: tuple[int, int]) -> WindowReco
     first, anchor = arrays["rows"].tolist()
     execution, warnings = _text(arrays["text"])
     counts = np.cumsum(arrays["edge_rows"][:, 1])[:-1]
-    edges = zip(np.split(arrays["edge_ends"], counts), np.split(arrays["edge_lengths"], counts), strict=True)
+    edges = zip(
+        np.split(arrays["edge_ends"], counts), np.split(arrays["edge_lengths"], counts), strict=True
+    )
     background = BackgroundRecord(
         arrays["timestamps"],
         arrays["R_first_camera"],
         arrays["known"],
         arrays["inlier_shares"].tolist(),
-        [FrameEdges(int(row), Segments(*each)) for (row, _), each in zip(arrays["edge_rows"], edges, strict=False)],
+        [
+            FrameEdges(int(row), Segments(*each))
+            for (row, _), each in zip(arrays["edge_rows"], edges, strict=False)
+        ],
         list(arrays["bars"]),
     )
     return WindowRecord(
@@ -240,7 +270,9 @@ def _record(arrays: Arrays, window: Window, size: tuple[int, int]) -> WindowReco
 def _tracklets(arrays: Arrays, size: tuple[int, int]) -> dict[int, Tracklet]:
     tracklets: dict[int, Tracklet] = {}
     begin = 0
-    for (number, count), appearance in zip(arrays["tracklets"].tolist(), arrays["appearance"], strict=True):
+    for (number, count), appearance in zip(
+        arrays["tracklets"].tolist(), arrays["appearance"], strict=True
+    ):
         rows = slice(begin, begin + count)
         tracklets[number] = Tracklet(
             arrays["tracklet_rows"][rows].tolist(),
@@ -257,7 +289,10 @@ def _tracklets(arrays: Arrays, size: tuple[int, int]) -> dict[int, Tracklet]:
     ):
         tracklets[number].references.append((row, known_reference(landmarks if found else None)))
     for (number, row), region, mask in zip(
-        arrays["masks"].tolist(), arrays["mask_regions"].tolist(), arrays["mask_probability"], strict=True
+        arrays["masks"].tolist(),
+        arrays["mask_regions"].tolist(),
+        arrays["mask_probability"],
+        strict=True,
     ):
         tracklets[number].masks.append((row, PersonMask(_region(region), mask, size)))
     return tracklets
@@ -283,13 +318,16 @@ def _text(encoded: NDArray[np.uint8]) -> tuple[str, tuple[str, ...]]:
 class KeptWindows:
     """The files of finished windows, after which a capture that was killed goes on.
 
-    They depend on the footage, the program and the options: within the caller's folder, which is one of this footage
-    and this program, each set of options has a folder of its own. What cannot be read or written is not kept.
+    They depend on the footage, the program and the options: within the caller's folder, which is
+    one of this footage and this program, each set of options has a folder of its own. What cannot
+    be read or written is not kept.
 
     :param unfinished: folder of the capture, need not exist; None: nothing is kept.
     """
 
-    def __init__(self, unfinished: Path | None, options: CaptureOptions, size: tuple[int, int]) -> None:
+    def __init__(
+        self, unfinished: Path | None, options: CaptureOptions, size: tuple[int, int]
+    ) -> None:
         self._folder = None if unfinished is None else unfinished / f"windows-{_digest(options)}"
         self._size, self._bytes = size, 0
 
@@ -315,7 +353,9 @@ class KeptWindows:
 
 
 def _digest(options: CaptureOptions) -> str:
-    """Return a name that differs where options, or the files that they name, may lead to another result."""
+    """Return a name that differs where options, or the files that they name, may lead to another
+    result.
+    """
     described = []
     for field in fields(options):
         if field.name in _UNIMPORTANT:

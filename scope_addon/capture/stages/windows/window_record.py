@@ -20,12 +20,14 @@ from .plan import Window
 
 @dataclass
 class WindowRecord:
-    """N frames from the one in which the trackers began; the first ``first`` of them belong to the window before.
+    """N frames from the one in which the trackers began; the first ``first`` of them belong to the
+    window before.
 
-    ``checksums`` are those of the images in the frames that two windows share, and 0 elsewhere. ``anchor`` is the row
-    in which the trackers of the next window begin, N if there is none, and ``anchor_regions`` holds the regions of the
-    people in it, by tracklet. The rows of ``tracklets``, whose references are not pending, count from 0. ``cut_rows``
-    are those of the window's own frames that begin another scene. ``execution``: what the networks ran on.
+    ``checksums`` are those of the images in the frames that two windows share, and 0 elsewhere.
+    ``anchor`` is the row in which the trackers of the next window begin, N if there is none, and
+    ``anchor_regions`` holds the regions of the people in it, by tracklet. The rows of
+    ``tracklets``, whose references are not pending, count from 0. ``cut_rows`` are those of the
+    window's own frames that begin another scene. ``execution``: what the networks ran on.
     """
 
     window: Window
@@ -45,9 +47,15 @@ class WindowRecord:
         return len(self.timestamps)
 
     def continues(self, before: WindowRecord) -> bool:
-        """Return whether the frames that this window shares with the one before are the same images there."""
-        same_times = np.array_equal(before.timestamps[before.anchor :], self.timestamps[: self.first])
-        return same_times and np.array_equal(before.checksums[before.anchor :], self.checksums[: self.first])
+        """Return whether the frames that this window shares with the one before are the same images
+        there.
+        """
+        same_times = np.array_equal(
+            before.timestamps[before.anchor :], self.timestamps[: self.first]
+        )
+        return same_times and np.array_equal(
+            before.checksums[before.anchor :], self.checksums[: self.first]
+        )
 
 
 def known_reference(landmarks: NDArray[Any] | None) -> PendingReference:

@@ -45,7 +45,8 @@ class WindowRun:
         self._trackers, self._masks, self._cuts = trackers, masks, SceneCuts()
         self.background, self._pool, self._clock = background, pool, clock
         self._exposure = AutoExposure()
-        self._upcoming_lit: NDArray[np.uint8] | None = None  # in the brightness that the networks are given
+        # in the brightness that the networks are given
+        self._upcoming_lit: NDArray[np.uint8] | None = None
         self._pending: Future[None] | None = None
         self._indices: list[int] = []
         self._times: list[float] = []
@@ -58,25 +59,40 @@ class WindowRun:
     def add(self, frame: Frame, upcoming: Frame | None) -> Observation | None:
         """Observe the next frame, and return its largest person.
 
-        :param upcoming: the frame after it, also if that is in the next window; None at the end of the clip.
+        :param upcoming: the frame after it, also if that is in the next window; None at the end of
+            the clip.
         """
         with self._clock.stage("decode"):
-            lit = self._exposure.brighten(frame.image_rgb) if self._upcoming_lit is None else self._upcoming_lit
-            self._upcoming_lit = None if upcoming is None else self._exposure.brighten(upcoming.image_rgb)
+            lit = (
+                self._exposure.brighten(frame.image_rgb)
+                if self._upcoming_lit is None
+                else self._upcoming_lit
+            )
+            self._upcoming_lit = (
+                None if upcoming is None else self._exposure.brighten(upcoming.image_rgb)
+            )
         time_s, row = frame.timestamp_s, len(self._times)
         is_own = self.window.has_begun(time_s)
         with self._clock.stage("networks"):
-            is_cut = self._cuts.is_cut(frame.image_rgb, None if upcoming is None else upcoming.image_rgb)
+            is_cut = self._cuts.is_cut(
+                frame.image_rgb, None if upcoming is None else upcoming.image_rgb
+            )
         observations = self._observe(lit, time_s, is_cut, is_own)
         if is_cut and is_own:
             self._cut_rows.append(row)
         self._first += not is_own
-        is_anchor = self._anchor < 0 and self._following is not None and self._following.warms_up(time_s)
+        is_anchor = (
+            self._anchor < 0 and self._following is not None and self._following.warms_up(time_s)
+        )
         if is_anchor:
             self._anchor = row
-            self._anchor_regions = {number: observation.region for number, observation in observations}
+            self._anchor_regions = {
+                number: observation.region for number, observation in observations
+            }
         is_shared = not is_own or self._anchor >= 0
-        self._checksums.append(zlib.crc32(np.ascontiguousarray(frame.image_rgb).data) if is_shared else 0)
+        self._checksums.append(
+            zlib.crc32(np.ascontiguousarray(frame.image_rgb).data) if is_shared else 0
+        )
         self._indices.append(frame.index)
         self._times.append(time_s)
         for number, observation in observations:
@@ -85,7 +101,9 @@ class WindowRun:
         with self._clock.stage("background"):
             self._wait()
             points = [observation.keypoints_px for observation in people]
-            self._pending = self._pool.submit(self.background.add, frame.image_rgb, time_s, points, is_cut, is_anchor)
+            self._pending = self._pool.submit(
+                self.background.add, frame.image_rgb, time_s, points, is_cut, is_anchor
+            )
         return max(people, key=lambda observation: observation.region.side_px, default=None)
 
     def record(self, execution: str = "", warnings: Sequence[str] = ()) -> WindowRecord:

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Observation of a clip, window by window; a short one is a single window.
 
-In one piece, all windows are observed in one pass; a capture that was killed goes on after its last finished window.
-Some or all of them may also have been observed before, by other processes, which each began to decode at their own
-window. The result is the same, because
+In one piece, all windows are observed in one pass; a capture that was killed goes on after its last
+finished window. Some or all of them may also have been observed before, by other processes, which
+each began to decode at their own window. The result is the same, because
 
 - what is observed in a window depends on its frames alone;
-- a window whose first frames are not those of the window before, image by image, is observed again with the clip
-  decoded from its beginning;
-- a window whose trackers have lost somebody at the seam is observed again with trackers that are given the regions of
-  the window before. Whether that is so depends on the shared frames alone.
+- a window whose first frames are not those of the window before, image by image, is observed again
+  with the clip decoded from its beginning;
+- a window whose trackers have lost somebody at the seam is observed again with trackers that are
+  given the regions of the window before. Whether that is so depends on the shared frames alone.
 """
 
 from __future__ import annotations
@@ -45,7 +45,8 @@ from .window_file import KeptWindows, load_window, save_window
 from .window_record import WindowRecord
 from .window_run import WindowRun
 
-# Called when a window has ended, with its run and that of the next window; returns the run to go on with.
+# Called when a window has ended, with its run and that of the next window; returns the run to go on
+# with.
 Seam = Callable[[WindowRun, WindowRun | None], WindowRun | None]
 _THREADS = 2  # in which backgrounds are followed by `observe_windows`
 
@@ -54,8 +55,8 @@ class WindowedClip:
     """A clip and its windows.
 
     :param pool: in which the background is followed.
-    :param unfinished: folder with what an earlier capture that was killed has found, and in which to keep what this one
-        finds; None: nothing is kept.
+    :param unfinished: folder with what an earlier capture that was killed has found, and in which
+        to keep what this one finds; None: nothing is kept.
     """
 
     def __init__(
@@ -93,8 +94,13 @@ class WindowedClip:
         else:
             self._gather(folder, listeners.progress)
         if not len(self._joined):
-            raise VideoError(f"{self._video.path} has no frames between the given start and end; change one of them")
-        background.wait_for_solver(lambda done: listeners.progress(COMPILING, min(done, KERNELS), KERNELS))
+            raise VideoError(
+                f"{self._video.path} has no frames between the given start and end; "
+                "change one of them"
+            )
+        background.wait_for_solver(
+            lambda done: listeners.progress(COMPILING, min(done, KERNELS), KERNELS)
+        )
         with self._clock.stage("solver"):
             return self._footage(background), self._joined.tracks(most_people(self._options.people))
 
@@ -124,8 +130,12 @@ class WindowedClip:
         )
         return files, frames
 
-    def _observe_all(self, background: BackgroundEstimators, live: LiveBody, listeners: Listeners) -> None:
-        """Observe all windows in one pass, from the first on that an earlier capture has not finished."""
+    def _observe_all(
+        self, background: BackgroundEstimators, live: LiveBody, listeners: Listeners
+    ) -> None:
+        """Observe all windows in one pass, from the first on that an earlier capture has not
+        finished.
+        """
         known, is_single = self._join_kept(), len(self._windows) == 1
         done, expected = len(self._joined), self._video.expected_frames
         listeners.progress(FINDING, done, max(expected, done))
@@ -133,9 +143,16 @@ class WindowedClip:
             return
 
         def seam(ended: WindowRun, following: WindowRun | None) -> WindowRun | None:
-            self._add(ended, is_whole=following is not None or ended.window.number + 1 == len(self._windows))
+            self._add(
+                ended,
+                is_whole=following is not None or ended.window.number + 1 == len(self._windows),
+            )
             regions = self._joined.missed(following.record()) if following is not None else []
-            return self._warmed_up(following, regions) if following is not None and regions else following
+            return (
+                self._warmed_up(following, regions)
+                if following is not None and regions
+                else following
+            )
 
         def watch(frame: Frame, largest: Observation | None) -> None:
             nonlocal done
@@ -156,7 +173,9 @@ class WindowedClip:
         )
 
     def _join_kept(self) -> int:
-        """Join the first windows as far as an earlier capture has finished them, and return their number."""
+        """Join the first windows as far as an earlier capture has finished them, and return their
+        number.
+        """
         for window in self._windows:
             record = self._kept_windows.load(window)
             if record is None or not self._joined.accepts(record):
@@ -167,7 +186,8 @@ class WindowedClip:
     def _add(self, ended: WindowRun, is_whole: bool) -> None:
         """Join a window, and keep it if others follow or came before.
 
-        :param is_whole: whether it did not end early with the footage, which may be whole when it is read again.
+        :param is_whole: whether it did not end early with the footage, which may be whole when it
+            is read again.
         """
         record = self._record(ended)
         self._joined.add(record)
@@ -175,9 +195,11 @@ class WindowedClip:
             self._kept_windows.save(record)
 
     def _first_run(self, window: Window) -> tuple[WindowRun, Iterator[tuple[Frame, Frame | None]]]:
-        """Return the run of the first window that is observed, and the frames from its own first one on.
+        """Return the run of the first window that is observed, and the frames from its own first
+        one on.
 
-        After windows that are known, it begins in the middle of the footage, unless its images are others then.
+        After windows that are known, it begins in the middle of the footage, unless its images are
+        others then.
         """
         for exact in (False, True):
             run, pairs = self._begin(window), frame_pairs(self._frames(window, exact), self._clock)
@@ -190,7 +212,9 @@ class WindowedClip:
         return (self._warmed_up(run, regions) if regions else run), pairs
 
     def _warmed_up(self, run: WindowRun, regions: list[Region]) -> WindowRun:
-        """Return another run of a window, with people in given regions, up to the frame that the first one reached."""
+        """Return another run of a window, with people in given regions, up to the frame that the
+        first one reached.
+        """
         for exact in (False, True):
             other = self._begin(run.window, regions)
             _up_to_begin(other, frame_pairs(self._frames(run.window, exact), self._clock))
@@ -199,7 +223,9 @@ class WindowedClip:
         return other
 
     def _gather(self, folder: Path, progress: Progress) -> None:
-        """Join windows from their files; those that are missing, or do not fit, are observed here."""
+        """Join windows from their files; those that are missing, or do not fit, are observed
+        here.
+        """
         size = self._video.width, self._video.height
         for window in self._windows:
             record = load_window(folder, window, size) or self._single(window)
@@ -210,7 +236,9 @@ class WindowedClip:
                 if not self._joined.accepts(record):
                     record = self._single(window, regions, exact=True)
             self._joined.add(record)
-            progress(FINDING, len(self._joined), max(self._video.expected_frames, len(self._joined)))
+            progress(
+                FINDING, len(self._joined), max(self._video.expected_frames, len(self._joined))
+            )
 
     def _single(
         self,
@@ -233,7 +261,8 @@ class WindowedClip:
     def _frames(self, window: Window, exact: bool = False) -> Iterator[Frame]:
         """Yield the frames from a window's anchor on.
 
-        :param exact: whether to decode from the beginning of the clip, as is always done where frames are left out.
+        :param exact: whether to decode from the beginning of the clip, as is always done where
+            frames are left out.
         """
         video = self._video
         if window.number == 0:
@@ -246,12 +275,18 @@ class WindowedClip:
     def _begin(self, window: Window, regions: Sequence[Region] = ()) -> WindowRun:
         """Return a run of a window with trackers that have seen nothing."""
         if self._trackers is None:
-            self._trackers = open_trackers(self._options, self._threads, self._execution, self._kept)
+            self._trackers = open_trackers(
+                self._options, self._threads, self._execution, self._kept
+            )
         people, hands, faces = self._trackers
-        own = Trackers(people.restarted(regions), hands and hands.restarted(), faces and faces.restarted())
+        own = Trackers(
+            people.restarted(regions), hands and hands.restarted(), faces and faces.restarted()
+        )
         network = people.mask_network if self._options.ablation.outline else None
         masks = MaskSchedule(network, self._video.expected_frames)
-        following = self._windows[window.number + 1] if window.number + 1 < len(self._windows) else None
+        following = (
+            self._windows[window.number + 1] if window.number + 1 < len(self._windows) else None
+        )
         return WindowRun(
             window,
             following,
@@ -273,14 +308,20 @@ class WindowedClip:
         warnings = self._execution.warnings + self._video.warnings
         warnings += [text for text in joined.warnings if text not in warnings]
         record = joined.background()
-        people = joined.largest_people(record.edge_frames[0].row) if record.edge_frames else iter(())
+        people = (
+            joined.largest_people(record.edge_frames[0].row) if record.edge_frames else iter(())
+        )
         found = background.camera(record, people)
         motion = record.motion(camera, found, size)
         lines = record.lines(motion, found)
-        return Footage(np.array(joined.timestamps), found, motion, lines, joined.cuts_s(), execution, warnings)
+        return Footage(
+            np.array(joined.timestamps), found, motion, lines, joined.cuts_s(), execution, warnings
+        )
 
 
-def _up_to_begin(run: WindowRun, pairs: Iterator[tuple[Frame, Frame | None]]) -> Iterator[tuple[Frame, Frame | None]]:
+def _up_to_begin(
+    run: WindowRun, pairs: Iterator[tuple[Frame, Frame | None]]
+) -> Iterator[tuple[Frame, Frame | None]]:
     """Observe the frames before a window's own first one, and return the pairs from that one on."""
     for pair in pairs:
         if run.window.has_begun(pair[0].timestamp_s):
@@ -290,7 +331,9 @@ def _up_to_begin(run: WindowRun, pairs: Iterator[tuple[Frame, Frame | None]]) ->
 
 
 def frame_pairs(frames: Iterator[Frame], clock: StageClock) -> Iterator[tuple[Frame, Frame | None]]:
-    """Yield every frame with the one after it; each is decoded while the networks run on the previous one."""
+    """Yield every frame with the one after it; each is decoded while the networks run on the
+    previous one.
+    """
     with clock.stage("decode"):
         upcoming = next(frames, None)
     while upcoming is not None:
@@ -334,7 +377,8 @@ def run_windows(
 
 
 def count_windows(path: Path, options: CaptureOptions) -> int:
-    """Return into how many windows a clip can be divided; 1 if it is short, or frames of it are to be left out.
+    """Return into how many windows a clip can be divided; 1 if it is short, or frames of it are to
+    be left out.
 
     :raises VideoError: the footage cannot be used.
     """
@@ -343,7 +387,11 @@ def count_windows(path: Path, options: CaptureOptions) -> int:
 
 
 def observe_windows(
-    path: Path, options: CaptureOptions, numbers: range, folder: Path, progress: Progress = lambda *_: None
+    path: Path,
+    options: CaptureOptions,
+    numbers: range,
+    folder: Path,
+    progress: Progress = lambda *_: None,
 ) -> tuple[list[Path], int]:
     """Observe some successive windows of a clip, and write each to a file of a folder.
 
@@ -353,8 +401,16 @@ def observe_windows(
     :raises OSError: a file cannot be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    with open_video(path, options.wanted) as video, opencv_in_one_thread(), ThreadPoolExecutor(_THREADS) as pool:
+    with (
+        open_video(path, options.wanted) as video,
+        opencv_in_one_thread(),
+        ThreadPoolExecutor(_THREADS) as pool,
+    ):
         windows = plan_windows(video, options.window_s)
         if not (numbers and 0 <= numbers.start < numbers.stop <= len(windows)):
-            raise UsageError(f"{path} has {len(windows)} windows, and none of the numbers {numbers}")
-        return WindowedClip(video, windows, options, StageClock(), pool).save(numbers, folder, progress)
+            raise UsageError(
+                f"{path} has {len(windows)} windows, and none of the numbers {numbers}"
+            )
+        return WindowedClip(video, windows, options, StageClock(), pool).save(
+            numbers, folder, progress
+        )

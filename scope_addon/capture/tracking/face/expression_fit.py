@@ -1,18 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Expression weights fitted to a clip's landmarks, by the response of the landmark network to the body's own face.
+"""Expression weights fitted to a clip's landmarks, by the response of the landmark network to the
+body's own face.
 
 Frame t's aligned landmarks x_t (D,) are modelled as
 
     x_t = m + V f(v_t) + c + G (v_t − v̄) + Eᵀ w_t + e_t        e_t ~ N(0, Σ)
 
-m: the mean face; f(v_t): terms of the view v_t; c and G: this person's face, and how it looks in other views than his
-mean one v̄, constant over the clip; E (U, D): the response to each unit of expression. The weights minimize
+m: the mean face; f(v_t): terms of the view v_t; c and G: this person's face, and how it looks in
+other views than his mean one v̄, constant over the clip; E (U, D): the response to each unit of
+expression. The weights minimize
 
     ½ (r_t − Eᵀ w)ᵀ Σ⁻¹ (r_t − Eᵀ w) + λ Σ_u w_u        0 ≤ w ≤ w_max
 
-by coordinate descent, in turns with c and G. λ grows with the errors in the clip: it is `SPARSITY` times q over that in
-the rendered faces, with q = median_t mean_u (E Σ⁻¹ e_t)_u² / (E Σ⁻¹ Eᵀ)_uu. `tools/calibrate_face` measures m, V, E, Σ
-on rendered faces, with the network's errors: a lid that the network closes only by half still counts as closed.
+by coordinate descent, in turns with c and G. λ grows with the errors in the clip: it is `SPARSITY`
+times q over that in the rendered faces, with q = median_t mean_u (E Σ⁻¹ e_t)_u² / (E Σ⁻¹ Eᵀ)_uu.
+`tools/calibrate_face` measures m, V, E, Σ on rendered faces, with the network's errors: a lid that
+the network closes only by half still counts as closed.
 """
 
 from __future__ import annotations
@@ -29,14 +32,22 @@ from .....solver.errors import ModelFileError
 from .....solver.loaders.npz import read_npz
 from .....solver.rotations import log
 from ...perception.face.face_landmarks import EXPRESSION_POINTS, ExpressionNetwork
-from ...perception.face.face_record import gaze, kept_landmarks, landmarks_of, parts, with_expression
+from ...perception.face.face_record import (
+    gaze,
+    kept_landmarks,
+    landmarks_of,
+    parts,
+    with_expression,
+)
 
 FILE = Path(__file__).resolve().parents[4] / "assets" / "face" / "response.npz"
 MIN_S, MIN_FRAMES = 2.0, 10  # of a face, from which a person's face at rest is known
 SURE = 0.3  # confidence of frames that tell the person's face
 SPARSITY = 3.0  # λ
-SURE_PX, MAX_NOISE = 64.0, 8.0  # size of a face below which errors grow, with the area's inverse; most growth of λ
-LARGEST_GAZE = 2.0  # w_max of the units that turn the eyes: eyes turn farther than the body's keys at 1
+# size of a face below which errors grow, with the area's inverse; most growth of λ
+SURE_PX, MAX_NOISE = 64.0, 8.0
+# w_max of the units that turn the eyes: eyes turn farther than the body's keys at 1
+LARGEST_GAZE = 2.0
 _TIME_TOLERANCE_S = 0.005  # of their sum
 _ROUNDS, _SWEEPS = 4, 30
 _STILL = 1e-6  # change of the weights in a sweep after which no other follows
@@ -77,13 +88,16 @@ def load_response() -> FaceResponse:
     data = read_npz(FILE, ModelFileError, "file of the face's response")
     try:
         return FaceResponse(
-            data["landmarks"], *(data[name].astype(float) for name in list(FaceResponse.__annotations__)[1:])
+            data["landmarks"],
+            *(data[name].astype(float) for name in list(FaceResponse.__annotations__)[1:]),
         )
     except (KeyError, TypeError, ValueError) as error:
         raise ModelFileError(f"{FILE} is damaged ({error}); install Scope again") from error
 
 
-def fitted(rows: NDArray[np.floating[Any]], times: NDArray[np.float64]) -> NDArray[np.floating[Any]]:
+def fitted(
+    rows: NDArray[np.floating[Any]], times: NDArray[np.float64]
+) -> NDArray[np.floating[Any]]:
     """Return rows whose weights and gaze are fitted to the landmarks.
 
     :param rows: (T, RECORD) see `face_record`, for which `is_known`.
@@ -93,12 +107,18 @@ def fitted(rows: NDArray[np.floating[Any]], times: NDArray[np.float64]) -> NDArr
     seen = np.flatnonzero(rows[:, 0] > 0)
     response = load_response()
     confidence, size, *_ = parts(rows[seen])
-    faces = aligned(landmarks_of(rows[seen], response.landmarks).astype(float), response.reference, response.shares)
+    faces = aligned(
+        landmarks_of(rows[seen], response.landmarks).astype(float),
+        response.reference,
+        response.shares,
+    )
     noise = np.clip((SURE_PX / np.maximum(size, 1.0)) ** 2, 1.0, MAX_NOISE)
     sure = confidence >= min(SURE, float(np.median(confidence)))
     units = fit_units(response, faces.points.reshape(len(seen), -1), faces.turns, noise, sure)
     out = rows.copy()
-    out[seen] = with_expression(rows[seen], np.minimum(units @ response.units, 1.0), _directions(units @ response.gaze))
+    out[seen] = with_expression(
+        rows[seen], np.minimum(units @ response.units, 1.0), _directions(units @ response.gaze)
+    )
     return out
 
 
@@ -106,7 +126,8 @@ def is_known(rows: NDArray[np.floating[Any]], times: NDArray[np.float64]) -> boo
     """Return whether a face was seen for long enough that the person's face at rest is known.
 
     :param rows: (T, RECORD) see `face_record`.
-    :param times: (T,) seconds; those since the frame before are added up over the frames in which it was seen.
+    :param times: (T,) seconds; those since the frame before are added up over the frames in which
+        it was seen.
     """
     seen = rows[:, 0] > 0
     seconds = float(np.diff(times, prepend=times[:1])[seen].sum())
@@ -141,14 +162,21 @@ def fit_units(
         target = own @ response.projection.T - SPARSITY * np.clip(noise, ratio, MAX_NOISE)[:, None]
         for a in range(0, len(x), _BLOCK):
             _descend(w[a : a + _BLOCK], normal, target[a : a + _BLOCK], response.largest)
-        ratio = min(max(error_size(response, own[sure] - w[sure] @ E) / float(response.noise), ratio), MAX_NOISE)
+        ratio = min(
+            max(error_size(response, own[sure] - w[sure] @ E) / float(response.noise), ratio),
+            MAX_NOISE,
+        )
     return w
 
 
 def error_size(response: FaceResponse, errors: NDArray[np.float64]) -> float:
     """Return q, see the module, of errors (T, D) of landmarks."""
     scores = errors @ response.projection.T
-    return float(np.median((scores**2 / np.einsum("ud,ud->u", response.response, response.projection)).mean(axis=1)))
+    return float(
+        np.median(
+            (scores**2 / np.einsum("ud,ud->u", response.response, response.projection)).mean(axis=1)
+        )
+    )
 
 
 def _descend(
@@ -163,7 +191,8 @@ def _descend(
     :param normal: (U, U) H.
     :param target: (T, U) g.
     """
-    weights, g = np.ascontiguousarray(w.T), np.ascontiguousarray(target.T)  # a unit's numbers lie together
+    # a unit's numbers lie together
+    weights, g = np.ascontiguousarray(w.T), np.ascontiguousarray(target.T)
     before, diagonal = np.empty_like(weights), np.diag(normal).tolist()
     for _ in range(_SWEEPS):
         before[:] = weights
@@ -179,17 +208,23 @@ def _descend(
 
 
 def _directions(tangents: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return unit vectors (T, 2, 3), the same of both eyes, from the tangents (T, 2) to the left and up."""
+    """Return unit vectors (T, 2, 3), the same of both eyes, from the tangents (T, 2) to the left
+    and up.
+    """
     ahead = np.concatenate([tangents, np.ones((len(tangents), 1))], axis=1)
     ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
     return np.repeat(ahead[:, None], 2, axis=1)
 
 
-def with_expressions(rows: NDArray[np.floating[Any]], times: NDArray[np.float64]) -> NDArray[np.floating[Any]]:
-    """Return rows of one person with weights and gaze: fitted, or by the expression network of a face seen briefly.
+def with_expressions(
+    rows: NDArray[np.floating[Any]], times: NDArray[np.float64]
+) -> NDArray[np.floating[Any]]:
+    """Return rows of one person with weights and gaze: fitted, or by the expression network of a
+    face seen briefly.
 
-    They are found when all frames have been observed: only then is it known whether a face was seen for long enough,
-    and the expression network, which few captures need, does not run for the others.
+    They are found when all frames have been observed: only then is it known whether a face was seen
+    for long enough, and the expression network, which few captures need, does not run for the
+    others.
 
     :param rows: (T, RECORD) see `face_record`.
     :param times: (T,) seconds.
@@ -201,7 +236,8 @@ def with_expressions(rows: NDArray[np.floating[Any]], times: NDArray[np.float64]
         return fitted(rows, times)
     if not len(seen):
         return rows
-    network = ExpressionNetwork()  # on the CPU, whatever the other networks run on: it takes a millisecond
+    # on the CPU, whatever the other networks run on: it takes a millisecond
+    network = ExpressionNetwork()
     landmarks = landmarks_of(rows[seen], np.array(EXPRESSION_POINTS))[..., :2]
     weights = np.array([network.estimate(face) for face in landmarks])
     directions = np.array([gaze(kept_landmarks(row)) for row in rows[seen]])
@@ -211,7 +247,9 @@ def with_expressions(rows: NDArray[np.floating[Any]], times: NDArray[np.float64]
 
 
 class AlignedFaces(NamedTuple):
-    """Landmarks (T, n, 3) in the reference's axes and size, and rotation vectors (T, 3) from the reference's axes."""
+    """Landmarks (T, n, 3) in the reference's axes and size, and rotation vectors (T, 3) from the
+    reference's axes.
+    """
 
     points: NDArray[np.float64]
     turns: NDArray[np.float64]
@@ -222,8 +260,9 @@ def aligned(
 ) -> AlignedFaces:
     """Align faces by the similarity transform with least squared distance from the reference.
 
-    With the weighted means removed, and the singular values of Σ_n a_n x_n y_nᵀ = U S Vᵀ: R = V diag(1, 1, ±1) Uᵀ and
-    s = tr(S diag(1, 1, ±1)) / Σ_n a_n |x_n|² (Umeyama: Least-squares estimation of transformation parameters, 1991).
+    With the weighted means removed, and the singular values of Σ_n a_n x_n y_nᵀ = U S Vᵀ: R = V
+    diag(1, 1, ±1) Uᵀ and s = tr(S diag(1, 1, ±1)) / Σ_n a_n |x_n|² (Umeyama: Least-squares
+    estimation of transformation parameters, 1991).
 
     :param landmarks: (T, n, 3) pixels, and depth in pixels.
     :param reference: (n, 3).
@@ -243,7 +282,9 @@ def aligned(
 
 
 def view_terms(turns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the terms (T, VIEW_TERMS) of views (T, 3) in which the mean error of landmarks is expressed."""
+    """Return the terms (T, VIEW_TERMS) of views (T, 3) in which the mean error of landmarks is
+    expressed.
+    """
     v = np.clip(turns, -_STEEPEST, _STEEPEST)
     x, y, z = v.T
     return np.column_stack([v, v**2, x * y, y * z, x * z, abs(y)])

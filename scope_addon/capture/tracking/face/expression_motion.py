@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Expression weights and gaze over time: calm at rest, sharp in a blink, and back to rest where no face is seen."""
+"""Expression weights and gaze over time: calm at rest, sharp in a blink, and back to rest where no
+face is seen.
+"""
 
 from __future__ import annotations
 
@@ -18,10 +20,14 @@ NOISE = 0.05  # deviation of a weight from the calm motion that counts as noise,
 MAX_NOISE = 8.0  # times as much for a small one, by the inverse of its area
 GAZE_NOISE = 0.06
 SURE_PX = 64.0  # size of a face from which it is large
-RELEASE_S = 0.5  # in which an expression goes to rest after the face was last seen, and comes back before it is again
+# in which an expression goes to rest after the face was last seen, and comes back before it is
+# again
+RELEASE_S = 0.5
 CLOSED = 0.5  # weight of a blink above which the iris is not seen
-DARK_GLASSES = 0.4  # light around the eyes below which they are not seen; small ones in thick frames have 0.45
-GLASSES_S = 1.0  # time over which the median of that is taken: a hand or a shadow that passes is none
+# light around the eyes below which they are not seen; small ones in thick frames have 0.45
+DARK_GLASSES = 0.4
+# time over which the median of that is taken: a hand or a shadow that passes is none
+GLASSES_S = 1.0
 SURE_OF_MOUTH = 0.5  # times the confidence of a face whose eyes are not seen
 MIN_S = 2.0  # of a face, from which it is known how the network sees its open eyes
 MAX_OPEN = 0.65  # weight of a blink that may be an open eye
@@ -71,7 +77,8 @@ def expression_motion(
 def behind_glasses(
     light: NDArray[np.floating[Any]], seen: NDArray[np.bool_], times: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Return (T,) where the eyes are behind dark glasses, by the median of the `eye_light` (T,) over `GLASSES_S`.
+    """Return (T,) where the eyes are behind dark glasses, by the median of the `eye_light` (T,)
+    over `GLASSES_S`.
 
     :param seen: (T,) where the face was seen.
     """
@@ -79,17 +86,21 @@ def behind_glasses(
     starts = np.searchsorted(times[rows], times[rows] - GLASSES_S / 2)
     ends = np.searchsorted(times[rows], times[rows] + GLASSES_S / 2, side="right")
     out = np.zeros(len(seen), bool)
-    out[rows] = [np.median(light[rows[a:b]]) < DARK_GLASSES for a, b in zip(starts, ends, strict=True)]
+    out[rows] = [
+        np.median(light[rows[a:b]]) < DARK_GLASSES for a, b in zip(starts, ends, strict=True)
+    ]
     return out
 
 
 def with_open_eyes(
     weights: NDArray[np.floating[Any]], seen: NDArray[np.bool_], times: NDArray[np.float64]
 ) -> NDArray[np.floating[Any]]:
-    """Take from the blinks what the network sees in this person's open eyes, as narrow ones, or those behind glasses.
+    """Take from the blinks what the network sees in this person's open eyes, as narrow ones, or
+    those behind glasses.
 
-    With the median m of a blink's weight over the clip, in most of which eyes are open: w' = max(0, (w − m) / (1 − m)).
-    Weights of faces that are seen for less than `MIN_S` stay, and those of eyes that are closed for half of the clip.
+    With the median m of a blink's weight over the clip, in most of which eyes are open: w' = max(0,
+    (w − m) / (1 − m)). Weights of faces that are seen for less than `MIN_S` stay, and those of eyes
+    that are closed for half of the clip.
 
     :param weights: (T, 52).
     :param seen: (T,) where the face was seen.
@@ -106,12 +117,16 @@ def with_open_eyes(
 
 
 def released(
-    values: NDArray[np.floating[Any]], seen: NDArray[np.bool_], times: NDArray[np.float64], rest: NDArray[np.float64]
+    values: NDArray[np.floating[Any]],
+    seen: NDArray[np.bool_],
+    times: NDArray[np.float64],
+    rest: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Fill the frames without measurement: from the last value to rest and from rest to the next one.
+    """Fill the frames without measurement: from the last value to rest and from rest to the next
+    one.
 
-    With the times since the last and until the next measurement, both values count by s(t) = (1 + cos(π t / τ)) / 2 for
-    t < τ = `RELEASE_S`; what remains of their sum to 1 is rest.
+    With the times since the last and until the next measurement, both values count by s(t) = (1 +
+    cos(π t / τ)) / 2 for t < τ = `RELEASE_S`; what remains of their sum to 1 is rest.
 
     :param values: (T, n).
     :param seen: (T,) which were measured.
@@ -139,8 +154,8 @@ def calmed(
 ) -> NDArray[np.float64]:
     """Remove noise from values (T, n) without phase, and without rounding what moves quickly.
 
-    With the calm motion c, a low-pass of x, and d = x − c: y = c + d · d² / (d² + noise²). What deviates by less than
-    the noise follows c; a blink deviates by much more and stays as it is.
+    With the calm motion c, a low-pass of x, and d = x − c: y = c + d · d² / (d² + noise²). What
+    deviates by less than the noise follows c; a blink deviates by much more and stays as it is.
 
     :param noise: (T, 1) or ().
     """

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tracking of faces: the body's head says where to look first, the face's own landmarks where in the next frame."""
+"""Tracking of faces: the body's head says where to look first, the face's own landmarks where in
+the next frame.
+"""
 
 from __future__ import annotations
 
@@ -27,18 +29,23 @@ from ...perception.region import Region
 from ..frame_clock import PATIENCE_S, is_search_due
 
 PRESENCE_THRESHOLD = 0.5
-MAX_DISTANCE = 0.35  # between the face and where the body's head predicts it, in sides of the predicted region
+# between the face and where the body's head predicts it, in sides of the predicted region
+MAX_DISTANCE = 0.35
 MIN_SIZE, MAX_SIZE = 0.5, 1.6  # side of the face's region over that of the predicted one
 SMALLEST_REGION_PX = 24.0
-# Least cosine of the angle to the camera, by the body, of a head on which a lost face is looked for. Of heads that look
-# farther away, the network imagines the half that nobody sees, or a face at the back.
+# Least cosine of the angle to the camera, by the body, of a head on which a lost face is looked
+# for. Of heads that look farther away, the network imagines the half that nobody sees, or a face at
+# the back.
 MIN_FACING = 0.1
-FIRST_PRESENCE = 0.001  # in the region by the body, below which it is not looked for by the landmarks there
+# in the region by the body, below which it is not looked for by the landmarks there
+FIRST_PRESENCE = 0.001
 
 
 @dataclass
 class _Face:
-    """The state of one person's face: its region in the frame before, and where the body's head was, if it was seen."""
+    """The state of one person's face: its region in the frame before, and where the body's head
+    was, if it was seen.
+    """
 
     region: Region | None
     head_px: NDArray[np.float64]
@@ -55,7 +62,8 @@ class FaceTracker:
 
     def __init__(self, threads: int, execution: Execution | None = None) -> None:
         with ThreadPoolExecutor(1) as pool:
-            # `with_expressions` may need it: if it is missing or damaged, say so now. Opening takes a core 20 ms.
+            # `with_expressions` may need it: if it is missing or damaged, say so now. Opening takes
+            # a core 20 ms.
             opened = pool.submit(ExpressionNetwork)
             self._network = FaceNetwork(threads, execution)
             opened.result()
@@ -68,9 +76,13 @@ class FaceTracker:
         return tracker
 
     def step(
-        self, image_rgb: NDArray[np.uint8], observations: Sequence[tuple[int, Observation]], time_s: float
+        self,
+        image_rgb: NDArray[np.uint8],
+        observations: Sequence[tuple[int, Observation]],
+        time_s: float,
     ) -> list[tuple[int, Observation]]:
-        """Add ``face`` to the observations of one frame: its landmarks, from which `with_expressions` finds the rest.
+        """Add ``face`` to the observations of one frame: its landmarks, from which
+        `with_expressions` finds the rest.
 
         :param image_rgb: (H, W, 3).
         :param observations: tracklet number and observation of each person.
@@ -97,7 +109,8 @@ class FaceTracker:
         head_px: NDArray[np.float64],
         time_s: float,
     ) -> FaceEstimate | None:
-        """Look for the face where it was a frame ago, moved with the head, otherwise where the body predicts it.
+        """Look for the face where it was a frame ago, moved with the head, otherwise where the body
+        predicts it.
 
         There it is estimated twice: the landmarks give a better region than the body.
         """
@@ -105,7 +118,9 @@ class FaceTracker:
         if predicted.side_px < SMALLEST_REGION_PX or not np.isfinite(predicted.side_px):
             return None
         if face.region is not None:
-            estimate = self._network.estimate(image_rgb, face.region.moved(head_px).moved(-face.head_px))
+            estimate = self._network.estimate(
+                image_rgb, face.region.moved(head_px).moved(-face.head_px)
+            )
             if belongs(estimate, predicted):
                 return estimate
         elif not is_search_due(time_s, face.seen_s, face.searched_s):
@@ -121,7 +136,9 @@ class FaceTracker:
 
 
 def belongs(estimate: FaceEstimate, predicted: Region) -> bool:
-    """Return whether this is a face, and the one of the person for whom the body's head predicts a region."""
+    """Return whether this is a face, and the one of the person for whom the body's head predicts a
+    region.
+    """
     if estimate.presence < PRESENCE_THRESHOLD or not np.isfinite(estimate.landmarks).all():
         return False
     region = estimate.next_region

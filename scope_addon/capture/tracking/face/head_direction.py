@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The direction across the head, from the face's landmarks: they show how it turns and leans to the side best.
+"""The direction across the head, from the face's landmarks: they show how it turns and leans to the
+side best.
 
-With the rotation vector v of the landmarks against the reference face (`aligned`), in the axes of a camera that
-looks at the face, and Y from y up to y down, the direction from the right to the left ear is
+With the rotation vector v of the landmarks against the reference face (`aligned`), in the axes of a
+camera that looks at the face, and Y from y up to y down, the direction from the right to the left
+ear is
 
     d = R_camera_virtual Y exp(v) exp(c) (1, 0, 0)
 
-c: from the reference's axes to the head's. How far the head nods stays with the body's keypoints: of somebody whom the
-network has not seen before, it is off by 4 degrees, and by more where the focal length is wrong.
+c: from the reference's axes to the head's. How far the head nods stays with the body's keypoints:
+of somebody whom the network has not seen before, it is off by 4 degrees, and by more where the
+focal length is wrong.
 """
 
 from __future__ import annotations
@@ -23,19 +26,22 @@ from ...perception.face.face_record import landmarks_of, parts, presence_of
 from ...perception.lifter import camera_towards
 from .expression_fit import aligned, load_response
 
-# Mean rotation vector from the reference's axes to the default body's head, over the hundred people of the set `poses`.
+# Mean rotation vector from the reference's axes to the default body's head, over the hundred people
+# of the set `poses`.
 _HEAD_FROM_REFERENCE = np.radians([5.3, -0.4, 0.7])
 _Y_DOWN = np.diag([1.0, -1.0, -1.0])
-# Cosine of the angle between face and ears from which a face counts for nothing, and to which it counts in full: at the
-# back of a head, the network may see a face that looks the other way.
+# Cosine of the angle between face and ears from which a face counts for nothing, and to which it
+# counts in full: at the back of a head, the network may see a face that looks the other way.
 _CONTRADICTED, _AGREED = np.cos(np.radians(60.0)), np.cos(np.radians(30.0))
 
 
 def across_head(face: NDArray[np.floating[Any]], camera: Camera) -> NDArray[np.float64]:
-    """Return the unit vectors d (T, 3) of the module's equation, in camera axes; zeros where no face was seen.
+    """Return the unit vectors d (T, 3) of the module's equation, in camera axes; zeros where no
+    face was seen.
 
     :param face: (T, RECORD) see `face_record`.
-    :raises ModelFileError: the response of the landmarks, which has the reference face, is missing or damaged.
+    :raises ModelFileError: the response of the landmarks, which has the reference face, is missing
+        or damaged.
     """
     directions, seen = np.zeros((len(face), 3)), face[:, 0] > 0
     if not seen.any():
@@ -52,11 +58,15 @@ def across_head(face: NDArray[np.floating[Any]], camera: Camera) -> NDArray[np.f
 
 
 def certainty(
-    face: NDArray[np.floating[Any]], directions: NDArray[np.float64], ears: NDArray[np.floating[Any]]
+    face: NDArray[np.floating[Any]],
+    directions: NDArray[np.float64],
+    ears: NDArray[np.floating[Any]],
 ) -> NDArray[np.float64]:
-    """Return how much each direction counts (T,), 1 of a large face that is surely there, 0 where there is none.
+    """Return how much each direction counts (T,), 1 of a large face that is surely there, 0 where
+    there is none.
 
-    A face counts by its size, and by the cube of its presence, since landmarks of blurred and hidden faces jump.
+    A face counts by its size, and by the cube of its presence, since landmarks of blurred and
+    hidden faces jump.
 
     :param face: (T, RECORD) see `face_record`.
     :param directions: (T, 3) of `across_head`.

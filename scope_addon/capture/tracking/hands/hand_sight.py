@@ -10,15 +10,25 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...perception.hand_landmarks import HAND_LENGTH_M, HAND_POINTS, WRISTS, HandEstimate, HandNetwork, region_from_body
+from ...perception.hand_landmarks import (
+    HAND_LENGTH_M,
+    HAND_POINTS,
+    WRISTS,
+    HandEstimate,
+    HandNetwork,
+    region_from_body,
+)
 from ...perception.observation import Observation
 from ...perception.region import Region
 from ..appearance import sample
 from .hand_assignment import CERTAIN_PRESENCE, SAME_WRIST, Least, assigned, is_same_hand, side_of
 
-FAR_MOTION = 0.35  # of the wrist in a frame, in hand lengths, from which the region that does not move is tried as well
+# of the wrist in a frame, in hand lengths, from which the region that does not move is tried as
+# well
+FAR_MOTION = 0.35
 KEPT_REACH = 2.0  # of the part of a frame that is kept around the wrist, in hand lengths
-_KNUCKLES, _MIDDLES = [5, 9, 13, 17], [6, 10, 14, 18]  # keypoints of a hand: bases and middle joints of the fingers
+# keypoints of a hand: bases and middle joints of the fingers
+_KNUCKLES, _MIDDLES = [5, 9, 13, 17], [6, 10, 14, 18]
 _ALONG = (1 / 3, 2 / 3)  # places on the palm, from the wrist to the knuckles
 _DARK = 8.0  # added to colours, which say little below it
 MAX_SHADE = 0.7  # change of a channel's logarithm that light can make from one frame to another
@@ -26,7 +36,9 @@ MAX_TINT = 0.08  # change of a channel's share of all three
 
 
 class Found(NamedTuple):
-    """An estimate that may be this hand, whether the network is sure of it, and the palm's colour."""
+    """An estimate that may be this hand, whether the network is sure of it, and the palm's
+    colour.
+    """
 
     estimate: HandEstimate
     is_sure: bool
@@ -34,7 +46,9 @@ class Found(NamedTuple):
 
     @property
     def row(self) -> NDArray[np.float32]:
-        """Pixels, confidence and world landmarks (21, 6), finite; the confidence of a tentative hand is negative."""
+        """Pixels, confidence and world landmarks (21, 6), finite; the confidence of a tentative
+        hand is negative.
+        """
         out = np.empty((HAND_POINTS, 6))
         out[:, :2], out[:, 3:] = self.estimate.keypoints_px, self.estimate.world_landmarks
         out[:, 2] = self.estimate.presence if self.is_sure else -self.estimate.presence
@@ -43,10 +57,12 @@ class Found(NamedTuple):
 
 @dataclass(frozen=True)
 class Sight:
-    """Where one hand is looked for: ``scale`` in pixels per metre, ``side`` 0 left, 1 right, ``color`` of the palm.
+    """Where one hand is looked for: ``scale`` in pixels per metre, ``side`` 0 left, 1 right,
+    ``color`` of the palm.
 
-    ``image_rgb`` is the frame, or a part of it with the pixel ``offset_px`` at its top left; ``others`` are the other
-    hands that are known in it; ``opposite`` collects those that were seen and surely are of the other side.
+    ``image_rgb`` is the frame, or a part of it with the pixel ``offset_px`` at its top left;
+    ``others`` are the other hands that are known in it; ``opposite`` collects those that were seen
+    and surely are of the other side.
     """
 
     image_rgb: NDArray[np.uint8]
@@ -64,7 +80,9 @@ class Sight:
         return replace(found, keypoints_px=found.keypoints_px + self.offset_px, region=region)
 
     def around_wrist(self) -> Sight:
-        """Return the same with a copy of the part of the frame in which a hand at the body's wrist can be."""
+        """Return the same with a copy of the part of the frame in which a hand at the body's wrist
+        can be.
+        """
         reach = KEPT_REACH * self.hand_px
         height, width = self.image_rgb.shape[:2]
         (x0, y0), (x1, y1) = np.floor(self.wrist_px - reach), np.ceil(self.wrist_px + reach)
@@ -96,7 +114,9 @@ class Sight:
     def judge(
         self, estimate: HandEstimate, sure: Least, tentative: Least, same_wrist: float = SAME_WRIST
     ) -> Found | None:
-        """Return an estimate if it may be this hand, see `assigned`; unless it is certain, in the hand's colour."""
+        """Return an estimate if it may be this hand, see `assigned`; unless it is certain, in the
+        hand's colour.
+        """
         if any(is_same_hand(estimate, other) for other in self.others):
             return None
         color = palm_color(self.image_rgb, estimate.keypoints_px - self.offset_px)
@@ -111,8 +131,11 @@ class Sight:
         return None
 
 
-def followed_regions(estimate: HandEstimate, motion_px: NDArray[np.float64], hand_px: float) -> list[Region]:
-    """Return where a hand that was seen a frame ago may be: moved with the body's wrist, and at its place of then.
+def followed_regions(
+    estimate: HandEstimate, motion_px: NDArray[np.float64], hand_px: float
+) -> list[Region]:
+    """Return where a hand that was seen a frame ago may be: moved with the body's wrist, and at its
+    place of then.
 
     :param motion_px: (2,) of the body's wrist.
     :param hand_px: length of the hand.
@@ -129,22 +152,31 @@ def better(a: Found | None, b: Found | None) -> Found | None:
     return max(both, key=lambda found: (found.is_sure, found.estimate.presence), default=None)
 
 
-def palm_color(image_rgb: NDArray[np.uint8], keypoints_px: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """Return the median colour (3,) at places on palm and fingers; None if none of them is in the image.
+def palm_color(
+    image_rgb: NDArray[np.uint8], keypoints_px: NDArray[np.float64]
+) -> NDArray[np.float64] | None:
+    """Return the median colour (3,) at places on palm and fingers; None if none of them is in the
+    image.
 
     :param image_rgb: (H, W, 3) uint8.
     :param keypoints_px: (21, 2) of the hand.
     """
     wrist, knuckles = keypoints_px[0], keypoints_px[_KNUCKLES]
-    places = [knuckles, keypoints_px[_MIDDLES], *(wrist + share * (knuckles - wrist) for share in _ALONG)]
+    places = [
+        knuckles,
+        keypoints_px[_MIDDLES],
+        *(wrist + share * (knuckles - wrist) for share in _ALONG),
+    ]
     pixels = sample(image_rgb, np.concatenate(places))
     return np.asarray(np.median(pixels.astype(float), axis=0)) if len(pixels) else None
 
 
 def is_like(color: NDArray[np.float64] | None, before: NDArray[np.float64] | None) -> bool:
-    """Return whether a colour (3,) and an earlier one (3,) can be one hand's; also where one of them is not known.
+    """Return whether a colour (3,) and an earlier one (3,) can be one hand's; also where one of
+    them is not known.
 
-    Light and shadow change all channels by one factor, which may be large; something else differs in tint as well.
+    Light and shadow change all channels by one factor, which may be large; something else differs
+    in tint as well.
     """
     if color is None or before is None:
         return True

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tracking of hands: the body says where to look first, the hand's own keypoints where to look in the next frame."""
+"""Tracking of hands: the body says where to look first, the hand's own keypoints where to look in
+the next frame.
+"""
 
 from __future__ import annotations
 
@@ -44,15 +46,17 @@ from .tentative_hands import SUPPORT_S
 
 AGAIN_PRESENCE = 0.03  # the same where a hand is looked for that was found in the frame after
 FIRST_PRESENCE = 0.1  # in a rough region, from which the better one of the landmarks is looked at
-SEARCH_SCALE = 2.3  # side of the square in which a palm is searched, in sides of the predicted region
+# side of the square in which a palm is searched, in sides of the predicted region
+SEARCH_SCALE = 2.3
 CLOSER_SCALE, SMALLER_SCALE = 1.5, 0.7  # of the square and the region of a second look, likewise
 UNSURE_SCORE = 0.2  # of a palm in a second look
 MAX_PALMS = 2
-# Frames that are kept of a hand, a third of a second at 30 frames/s: each is a copy of its surroundings.
+# Frames that are kept of a hand, a third of a second at 30 frames/s: each is a copy of its
+# surroundings.
 MAX_MISSED = 11
 SMALLEST_HAND_PX = 12.0  # length of a hand that is looked for
-# Length from which the network reads the palm's direction to within about 20 degrees: 20 pixels from wrist to middle
-# knuckle.
+# Length from which the network reads the palm's direction to within about 20 degrees: 20 pixels
+# from wrist to middle knuckle.
 LARGE_HAND_PX = 52.0
 HIDDEN_WRIST = 0.1  # confidence of the body's wrist below which its hand is hardly ever found
 LARGER_SCALE = 1.3  # of a region by the body in which a hand is looked for that was found later
@@ -61,7 +65,9 @@ _MARGIN = 0.3  # of a region's side, by which its centre may be outside the imag
 
 @dataclass
 class _Hand:
-    """The state of one hand of one person: what was found in the frame before, if anything, and the body's wrist."""
+    """The state of one hand of one person: what was found in the frame before, if anything, and the
+    body's wrist.
+    """
 
     found: Found | None
     wrist_px: NDArray[np.float64]
@@ -72,7 +78,9 @@ class _Hand:
 
 @dataclass
 class _Missed:
-    """A frame in which a hand was not surely found, and its row in the array that the observation has."""
+    """A frame in which a hand was not surely found, and its row in the array that the observation
+    has.
+    """
 
     time_s: float
     sight: Sight
@@ -83,8 +91,8 @@ class _Missed:
 class HandTracker:
     """Tracks the hands of the people whom `PeopleTracker` tracks; frames are given in order.
 
-    Each network runs in one thread, and several hands in parallel: in two threads, which mostly wait for each other, a
-    run of these small networks takes twice the processor time.
+    Each network runs in one thread, and several hands in parallel: in two threads, which mostly
+    wait for each other, a run of these small networks takes twice the processor time.
 
     :param threads: number of hands that are looked for in parallel.
     :param least_px: length of the smallest hands that are looked for, by the body's scale; pixels.
@@ -112,12 +120,15 @@ class HandTracker:
         return tracker
 
     def step(
-        self, image_rgb: NDArray[np.uint8], observations: Sequence[tuple[int, Observation]], time_s: float | None = None
+        self,
+        image_rgb: NDArray[np.uint8],
+        observations: Sequence[tuple[int, Observation]],
+        time_s: float | None = None,
     ) -> list[tuple[int, Observation]]:
         """Add ``hands`` to the observations of one frame; tentative ones as in `tentative_hands`.
 
-        A hand that is surely found after frames in which it was not is followed back through the last third of a
-        second, and written into the arrays of these frames.
+        A hand that is surely found after frames in which it was not is followed back through the
+        last third of a second, and written into the arrays of these frames.
 
         :param image_rgb: (H, W, 3).
         :param observations: tracklet number and observation of each person.
@@ -125,18 +136,29 @@ class HandTracker:
         """
         self._time_s = now = self._time_s + FRAME_S if time_s is None else time_s
         sights = {
-            (n, side): self._sight(image_rgb, o, (n, side)) for n, o in observations for side in range(len(SIDES))
+            (n, side): self._sight(image_rgb, o, (n, side))
+            for n, o in observations
+            for side in range(len(SIDES))
         }
         self._hands = {
             key: self._hands.get(key) or _Hand(None, sight.wrist_px, now, now - PATIENCE_S)
             for key, sight in sights.items()
         }
-        # Each changes its own hand and sight alone, so that the results do not depend on the threads' timing.
-        found = dict(zip(sights, self._pool.map(self._find, sights.values(), self._hands.values()), strict=True))
+        # Each changes its own hand and sight alone, so that the results do not depend on the
+        # threads' timing.
+        found = dict(
+            zip(
+                sights,
+                self._pool.map(self._find, sights.values(), self._hands.values()),
+                strict=True,
+            )
+        )
         for (number, side), sight in sights.items():
             if found[number, side] is None:
                 found[number, side] = _of_other_side(sight, sights[number, 1 - side].opposite)
-        kept = without_duplicates({key: hand and hand.estimate for key, hand in found.items()}, dict(observations))
+        kept = without_duplicates(
+            {key: hand and hand.estimate for key, hand in found.items()}, dict(observations)
+        )
         for key, sight in sights.items():
             if found[key] is not None and kept[key] is None:
                 # Another one was found there: look beside all of them, which this one may touch.
@@ -150,7 +172,9 @@ class HandTracker:
                 state.seen_s, state.color = now, hand.color
         nothing = np.zeros((HAND_POINTS, 6), np.float32)
         rows = {
-            n: np.array([hand.row if (hand := found[n, side]) else nothing for side in range(len(SIDES))])
+            n: np.array(
+                [hand.row if (hand := found[n, side]) else nothing for side in range(len(SIDES))]
+            )
             for n, _ in observations
         }
         before, self._missed = self._missed, {}
@@ -158,16 +182,28 @@ class HandTracker:
             hand = found[key]
             missed = [m for m in before.get(key, []) if now - m.time_s <= SUPPORT_S + 0.005]
             if hand is not None and hand.is_sure:
-                elsewhere = [m for other, those in (before | self._missed).items() if other != key for m in those]
+                elsewhere = [
+                    m
+                    for other, those in (before | self._missed).items()
+                    if other != key
+                    for m in those
+                ]
                 self._look_back(missed, hand, sight, elsewhere)
             elif sight.hand_px >= self._least_px:
-                others = [h.estimate for other, h in found.items() if other != key and h is not None]
+                others = [
+                    h.estimate for other, h in found.items() if other != key and h is not None
+                ]
                 seen = replace(sight.around_wrist(), others=others, opposite=[])
-                self._missed[key] = [*missed, _Missed(now, seen, hand, rows[key[0]][key[1]])][-MAX_MISSED:]
+                self._missed[key] = [*missed, _Missed(now, seen, hand, rows[key[0]][key[1]])][
+                    -MAX_MISSED:
+                ]
         return [(n, replace(o, hands=rows[n])) for n, o in observations]
 
-    def _look_back(self, missed: Sequence[_Missed], hand: Found, sight: Sight, elsewhere: Sequence[_Missed]) -> None:
-        """Follow a hand that was surely found back through the frames before in which it was not; see `_Missed`.
+    def _look_back(
+        self, missed: Sequence[_Missed], hand: Found, sight: Sight, elsewhere: Sequence[_Missed]
+    ) -> None:
+        """Follow a hand that was surely found back through the frames before in which it was not;
+        see `_Missed`.
 
         :param elsewhere: frames in which other hands were missed, which are told of this one.
         """
@@ -182,20 +218,26 @@ class HandTracker:
             hand, sight = found, each.sight
 
     def _found_back(self, sight: Sight, later: Found, later_sight: Sight) -> Found | None:
-        """Look for a hand in the frame before one in which it was found, there and around the body's wrist."""
+        """Look for a hand in the frame before one in which it was found, there and around the
+        body's wrist.
+        """
         if not min(sight.image_rgb.shape[:2]):
             return None
         least = DETECTED if later.is_sure else PREDICTED
         both = min(sight.wrist_confidence, later_sight.wrist_confidence) >= SURE_WRIST
         motion = sight.wrist_px - later_sight.wrist_px if both else np.zeros(2)
-        followed = [(region, least) for region in followed_regions(later.estimate, motion, sight.hand_px)]
+        followed = [
+            (region, least) for region in followed_regions(later.estimate, motion, sight.hand_px)
+        ]
         found = self._first_sure(sight, followed, FOLLOWED_BACK, FOLLOWED_WRIST, AGAIN_PRESENCE)
         if found is not None and found.is_sure:
             return found
         predicted = sight.predicted
         larger = replace(predicted, side_px=LARGER_SCALE * predicted.side_px)
         rough = [(region, SECOND) for region in (predicted, larger)]
-        return better(found, self._first_sure(sight, rough, SECOND_TENTATIVE, least_first=AGAIN_PRESENCE))
+        return better(
+            found, self._first_sure(sight, rough, SECOND_TENTATIVE, least_first=AGAIN_PRESENCE)
+        )
 
     def _sight(self, image_rgb: NDArray[np.uint8], person: Observation, key: Key) -> Sight:
         scale = pixels_per_metre(person.keypoints_px, person.world_landmarks)
@@ -203,45 +245,67 @@ class HandTracker:
         return Sight(image_rgb, person, key[1], scale, known.color if known else None)
 
     def _find(self, sight: Sight, hand: _Hand) -> Found | None:
-        """Look for the hand where it was a frame ago, otherwise where the body's pose predicts it."""
+        """Look for the hand where it was a frame ago, otherwise where the body's pose predicts
+        it.
+        """
         followed = None
         if hand.found is not None:
             least = DETECTED if hand.found.is_sure else PREDICTED
-            motion = sight.wrist_px - hand.wrist_px if sight.wrist_confidence >= SURE_WRIST else np.zeros(2)
+            motion = (
+                sight.wrist_px - hand.wrist_px
+                if sight.wrist_confidence >= SURE_WRIST
+                else np.zeros(2)
+            )
             for region in followed_regions(hand.found.estimate, motion, sight.hand_px):
                 estimate = sight.estimate(self._network, region)
                 followed = better(followed, sight.judge(estimate, least, TENTATIVE, FOLLOWED_WRIST))
                 if followed is not None and followed.is_sure:
                     return followed
-        # A lost hand is looked for at most 30 times per second, a hidden one at `PATIENCE_S`: where it is found again,
-        # it is followed back through the frames in between.
+        # A lost hand is looked for at most 30 times per second, a hidden one at `PATIENCE_S`: where
+        # it is found again, it is followed back through the frames in between.
         seen_s = hand.seen_s if sight.wrist_confidence >= HIDDEN_WRIST else -math.inf
         if not is_search_due(self._time_s, seen_s, hand.searched_s, FRAME_S):
             return followed
         hand.searched_s = self._time_s
-        return better(self._search(sight, look_again=self._time_s - hand.seen_s <= EAGER_S), followed)
+        return better(
+            self._search(sight, look_again=self._time_s - hand.seen_s <= EAGER_S), followed
+        )
 
     def _search(self, sight: Sight, look_again: bool) -> Found | None:
-        """Find the hand whose palm is nearest to the predicted region, or without a palm, any hand in that region.
+        """Find the hand whose palm is nearest to the predicted region, or without a palm, any hand
+        in that region.
 
-        Where the network is sure of none although the body's wrist is seen, it may look again: for palms in a smaller
-        square, in which blurred and small ones score higher, and for a hand in a smaller region.
+        Where the network is sure of none although the body's wrist is seen, it may look again: for
+        palms in a smaller square, in which blurred and small ones score higher, and for a hand in a
+        smaller region.
         """
         predicted = sight.predicted
         if sight.hand_px < self._least_px or not _is_in_image(predicted, sight.image_rgb):
             return None
         around = replace(predicted, side_px=SEARCH_SCALE * predicted.side_px)
         palms = self._palms_near(sight, around, PALM_THRESHOLD)
-        found = self._first_sure(sight, [*((palm, DETECTED) for palm in palms), (predicted, PREDICTED)], TENTATIVE)
-        if not look_again or (found is not None and found.is_sure) or sight.wrist_confidence < SURE_WRIST:
+        found = self._first_sure(
+            sight, [*((palm, DETECTED) for palm in palms), (predicted, PREDICTED)], TENTATIVE
+        )
+        if (
+            not look_again
+            or (found is not None and found.is_sure)
+            or sight.wrist_confidence < SURE_WRIST
+        ):
             return found
-        closer, smaller = (replace(predicted, side_px=k * predicted.side_px) for k in (CLOSER_SCALE, SMALLER_SCALE))
+        closer, smaller = (
+            replace(predicted, side_px=k * predicted.side_px) for k in (CLOSER_SCALE, SMALLER_SCALE)
+        )
         palms = self._palms_near(sight, closer, UNSURE_SCORE)
-        again = self._first_sure(sight, [(region, SECOND) for region in (*palms, smaller)], SECOND_TENTATIVE)
+        again = self._first_sure(
+            sight, [(region, SECOND) for region in (*palms, smaller)], SECOND_TENTATIVE
+        )
         return better(found, again)
 
     def _palms_near(self, sight: Sight, square: Region, threshold: float) -> list[Region]:
-        """Return the hands' regions by the palms in a square that are nearest to the predicted region."""
+        """Return the hands' regions by the palms in a square that are nearest to the predicted
+        region.
+        """
         palms = self._palms.detect(sight.image_rgb, square, threshold)
         palms.sort(key=lambda palm: math.dist(palm.center_px, sight.predicted.center_px))
         return palms[:MAX_PALMS]
@@ -254,9 +318,11 @@ class HandTracker:
         same_wrist: float = SAME_WRIST,
         least_first: float = FIRST_PRESENCE,
     ) -> Found | None:
-        """Return the hand in the first region, each with what it requires, in which there surely is one.
+        """Return the hand in the first region, each with what it requires, in which there surely is
+        one.
 
-        Otherwise the best tentative one. Each is estimated twice: the landmarks give a better region.
+        Otherwise the best tentative one. Each is estimated twice: the landmarks give a better
+        region.
         """
         found = None
         for region, least in regions:
@@ -272,7 +338,9 @@ class HandTracker:
 
 
 def _of_other_side(sight: Sight, seen: Sequence[HandEstimate]) -> Found | None:
-    """Return this hand where it was seen while the other one was looked for: the body's wrists may be exchanged."""
+    """Return this hand where it was seen while the other one was looked for: the body's wrists may
+    be exchanged.
+    """
     found = None
     for estimate in seen:
         found = better(found, sight.judge(estimate, DETECTED, TENTATIVE))

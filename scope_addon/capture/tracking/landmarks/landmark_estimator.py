@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Landmarks of the people who are tracked, estimated one frame ahead in the background where that is possible."""
+"""Landmarks of the people who are tracked, estimated one frame ahead in the background where that
+is possible.
+"""
 
 from __future__ import annotations
 
@@ -64,24 +66,36 @@ class LandmarkEstimator:
         return out
 
     def estimate_live(
-        self, image_rgb: NDArray[np.uint8], upcoming_rgb: NDArray[np.uint8] | None, live: Sequence[TrackedTarget]
+        self,
+        image_rgb: NDArray[np.uint8],
+        upcoming_rgb: NDArray[np.uint8] | None,
+        live: Sequence[TrackedTarget],
     ) -> list[PoseEstimate | None]:
-        """Estimate everybody who is tracked in this frame, and start the estimates of the upcoming one.
+        """Estimate everybody who is tracked in this frame, and start the estimates of the upcoming
+        one.
 
         A pending estimate counts if the frame before confirms its region.
 
         :param image_rgb: (H, W, 3).
-        :param upcoming_rgb: (H, W, 3) or None; the largest network starts on it in predicted regions.
+        :param upcoming_rgb: (H, W, 3) or None; the largest network starts on it in predicted
+            regions.
         :param live: in the state of the frame before; their ``pending`` is replaced.
         :return: an estimate for each target; None where the landmarks are not those of a body.
         """
         calls = [f.pending for f in live]
         for f in live:
             f.pending = None
-            if upcoming_rgb is None or self._early is None or not self._prefetches or f.age < MIN_VELOCITY_FRAMES:
+            if (
+                upcoming_rgb is None
+                or self._early is None
+                or not self._prefetches
+                or f.age < MIN_VELOCITY_FRAMES
+            ):
                 continue
             if is_in_image(f.prefetch_region, upcoming_rgb):
-                f.pending = self._early.begin(upcoming_rgb, f.prefetch_region, self._upcoming_with_masks)
+                f.pending = self._early.begin(
+                    upcoming_rgb, f.prefetch_region, self._upcoming_with_masks
+                )
         found: dict[int, PoseEstimate | None] = {}
         for f, call in zip(live, calls, strict=True):
             estimate = call.result() if call is not None else None
@@ -92,8 +106,11 @@ class LandmarkEstimator:
         found |= {f.tracklet: estimate for f, estimate in zip(missing, estimates, strict=True)}
         return [found[f.tracklet] for f in live]
 
-    def begin_upcoming(self, upcoming_rgb: NDArray[np.uint8] | None, live: Sequence[TrackedTarget]) -> None:
-        """Start the estimates of the next frame that are not pending yet; they run in parallel with this one's rest.
+    def begin_upcoming(
+        self, upcoming_rgb: NDArray[np.uint8] | None, live: Sequence[TrackedTarget]
+    ) -> None:
+        """Start the estimates of the next frame that are not pending yet; they run in parallel with
+        this one's rest.
 
         :param upcoming_rgb: (H, W, 3) or None.
         :param live: in the state of this frame; their ``pending`` is set.
@@ -102,11 +119,15 @@ class LandmarkEstimator:
             return
         for f in live:
             if f.pending is None and is_in_image(f.estimate.next_region, upcoming_rgb):
-                f.pending = self._early.begin(upcoming_rgb, f.estimate.next_region, self._upcoming_with_masks)
+                f.pending = self._early.begin(
+                    upcoming_rgb, f.estimate.next_region, self._upcoming_with_masks
+                )
 
 
 class ReferenceEstimator:
-    """Estimates world landmarks in the background; tracking does not depend on them, so it does not wait."""
+    """Estimates world landmarks in the background; tracking does not depend on them, so it does not
+    wait.
+    """
 
     def __init__(self, network: LandmarkNetwork) -> None:
         self._network = network
@@ -135,11 +156,11 @@ class ReferenceEstimator:
 class TrackingNetworks:
     """Opened networks.
 
-    ``begins_early`` is the network for landmarks if it can work on the next frame in the background; ``prefetches``
-    says whether it may do so in regions that are only predicted. Only the largest network does: the others are less
-    stable there, and save less time. ``reference`` is the largest network, which checks left and right, or None if it
-    estimates the landmarks itself. ``fallback`` replaces a smaller network for a while; a user's own network is not
-    replaced.
+    ``begins_early`` is the network for landmarks if it can work on the next frame in the
+    background; ``prefetches`` says whether it may do so in regions that are only predicted. Only
+    the largest network does: the others are less stable there, and save less time. ``reference`` is
+    the largest network, which checks left and right, or None if it estimates the landmarks itself.
+    ``fallback`` replaces a smaller network for a while; a user's own network is not replaced.
     """
 
     detector: PersonDetector | BoxDetector
@@ -165,13 +186,16 @@ def open_networks(
     :raises ModelFileError: one of the user's networks cannot be used.
     """
     people: PersonDetector | BoxDetector = (
-        BoxDetector(detector, threads, execution) if detector else PersonDetector(threads, execution)
+        BoxDetector(detector, threads, execution)
+        if detector
+        else PersonDetector(threads, execution)
     )
     name, largest = landmark_network_name(quality), landmark_network_name("best")
     reference: LandmarkNetwork | None = None
     if keypoints:
         own = KeypointNetwork(keypoints, threads, execution)
-        with suppress(SetupError):  # without the reference, left and right follow from continuity alone
+        # without the reference, left and right follow from continuity alone
+        with suppress(SetupError):
             reference = LandmarkNetwork(largest, 1, execution, kept)
         return TrackingNetworks(people, own, None, False, reference, None)
     landmarks = LandmarkNetwork(name, threads, execution, kept)

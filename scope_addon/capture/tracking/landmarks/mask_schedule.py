@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Person masks of everybody in a few frames of the clip, from which the shape is estimated later."""
+"""Person masks of everybody in a few frames of the clip, from which the shape is estimated
+later.
+"""
 
 from __future__ import annotations
 
@@ -20,9 +22,10 @@ MIN_PRESENCE = 0.5  # in a region without a person, the network invents one
 class MaskSchedule:
     """Adds masks to the observations of every n-th frame.
 
-    When there are enough, n doubles: a clip of unknown length has hardly more masks than one of known length. The
-    tracker knows beforehand which frame is due (`upcoming_is_due`), since its own run of the network gives masks at
-    a quarter of the cost of another one; only people whom it was not following take that other run.
+    When there are enough, n doubles: a clip of unknown length has hardly more masks than one of
+    known length. The tracker knows beforehand which frame is due (`upcoming_is_due`), since its own
+    run of the network gives masks at a quarter of the cost of another one; only people whom it was
+    not following take that other run.
 
     :param network: None: no frame has masks.
     :param frames: how many frames are expected; 0 if that is unknown.
@@ -34,7 +37,9 @@ class MaskSchedule:
 
     @property
     def upcoming_is_due(self) -> bool:
-        """Whether the frame after the next one to be added will be due, if people are seen in the next one."""
+        """Whether the frame after the next one to be added will be due, if people are seen in the
+        next one.
+        """
         return self._network is not None and (self._frames + 1) % self._stride == 0
 
     def add(
@@ -51,7 +56,9 @@ class MaskSchedule:
         return [(number, self._with_mask(self._network, image_rgb, o)) for number, o in found]
 
     @staticmethod
-    def _with_mask(network: LandmarkNetwork, image_rgb: NDArray[np.uint8], observation: Observation) -> Observation:
+    def _with_mask(
+        network: LandmarkNetwork, image_rgb: NDArray[np.uint8], observation: Observation
+    ) -> Observation:
         if observation.presence < MIN_PRESENCE:
             return replace(observation, mask=None)
         if observation.mask is not None:

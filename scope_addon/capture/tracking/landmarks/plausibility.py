@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tests of a landmark network's estimates: whether they are of a body, of which one, and whether it is in the image."""
+"""Tests of a landmark network's estimates: whether they are of a body, of which one, and whether it
+is in the image.
+"""
 
 from __future__ import annotations
 
@@ -13,37 +15,45 @@ from ...perception.region import Region, bounds, inside
 from ..left_right import mean_distance
 
 PRESENCE_THRESHOLD = 0.5
-# See PoseEstimate.spread and .disagreement. Hands are detected as people with scores of up to 0.86, and the landmark
-# networks then report spreads of up to 0.36, rarely 0.46. A detection with a lower score has to pass stricter limits.
+# See PoseEstimate.spread and .disagreement. Hands are detected as people with scores of up to 0.86,
+# and the landmark networks then report spreads of up to 0.36, rarely 0.46. A detection with a lower
+# score has to pass stricter limits.
 SPREAD_THRESHOLD = 0.38
 DISAGREEMENT_THRESHOLD = 0.25
 UNSURE_SPREAD_THRESHOLD = 0.47
 UNSURE_DISAGREEMENT_THRESHOLD = 0.18
-MIN_CONFIDENT, CONFIDENT = 4, 0.3  # keypoints above this confidence; a person who has left shows fewer
+# keypoints above this confidence; a person who has left shows fewer
+MIN_CONFIDENT, CONFIDENT = 4, 0.3
 SMALLEST_SIDE_PX = 24.0
 LARGEST_SIDE = 6.0  # in longer sides of the image
-SAME_BODY = 0.1  # mean distance of the keypoints, in sides of the region, below which two bodies are one
-# How far a predicted region may be from the one that the frame before gives: centre and size in sides, rotation in
-# radians. The networks were trained on regions with larger errors.
+# mean distance of the keypoints, in sides of the region, below which two bodies are one
+SAME_BODY = 0.1
+# How far a predicted region may be from the one that the frame before gives: centre and size in
+# sides, rotation in radians. The networks were trained on regions with larger errors.
 SAME_CENTER, SAME_SIDE, SAME_ROTATION = 0.08, 0.12, 0.15
 
 
 def is_plausible(estimate: PoseEstimate, sure: bool = True) -> bool:
     """Return whether landmarks are those of a body.
 
-    :param sure: whether there is independent evidence of a body here; without it, stricter limits apply.
+    :param sure: whether there is independent evidence of a body here; without it, stricter limits
+        apply.
     """
     return bool(
         estimate.presence >= PRESENCE_THRESHOLD
         and (estimate.keypoints_confidence >= CONFIDENT).sum() >= MIN_CONFIDENT
         and estimate.spread >= (SPREAD_THRESHOLD if sure else UNSURE_SPREAD_THRESHOLD)
-        and estimate.disagreement <= (DISAGREEMENT_THRESHOLD if sure else UNSURE_DISAGREEMENT_THRESHOLD)
+        and estimate.disagreement
+        <= (DISAGREEMENT_THRESHOLD if sure else UNSURE_DISAGREEMENT_THRESHOLD)
     )
 
 
 def is_same_body(a: PoseEstimate, b: PoseEstimate) -> bool:
     """Return whether two estimates describe the same body in the image."""
-    return bool(mean_distance(a.keypoints_px, b.keypoints_px) < SAME_BODY * min(a.region.side_px, b.region.side_px))
+    return bool(
+        mean_distance(a.keypoints_px, b.keypoints_px)
+        < SAME_BODY * min(a.region.side_px, b.region.side_px)
+    )
 
 
 def share_within(a: PoseEstimate, b: PoseEstimate) -> float:
@@ -52,7 +62,9 @@ def share_within(a: PoseEstimate, b: PoseEstimate) -> float:
 
 
 def is_center_in_image(estimate: PoseEstimate, image_rgb: NDArray[np.uint8]) -> bool:
-    """Return whether the mean of the keypoints is inside the image (H, W, 3); a network may imagine a body outside."""
+    """Return whether the mean of the keypoints is inside the image (H, W, 3); a network may imagine
+    a body outside.
+    """
     height, width = image_rgb.shape[:2]
     x, y = estimate.keypoints_px.mean(axis=0)
     return bool(0 <= x < width and 0 <= y < height)
@@ -61,7 +73,11 @@ def is_center_in_image(estimate: PoseEstimate, image_rgb: NDArray[np.uint8]) -> 
 def share_in_image(estimate: PoseEstimate, image_rgb: NDArray[np.uint8]) -> float:
     """Return the share of the keypoints that are inside the image (H, W, 3)."""
     height, width = image_rgb.shape[:2]
-    return float(((estimate.keypoints_px >= 0) & (estimate.keypoints_px < [width, height])).all(axis=1).mean())
+    return float(
+        ((estimate.keypoints_px >= 0) & (estimate.keypoints_px < [width, height]))
+        .all(axis=1)
+        .mean()
+    )
 
 
 def is_same_region(a: Region, b: Region) -> bool:

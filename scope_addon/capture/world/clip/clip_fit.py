@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The finished motion of a track: all frames of a clip fitted at once, coupled by the acceleration of joints and root.
+"""The finished motion of a track: all frames of a clip fitted at once, coupled by the acceleration
+of joints and root.
 
     minimize  Σ_f E_f(x_f) + ½ ∫ w ρ(|a|²) dt + ½ ∫ w_c p |v|² dt   over the poses x_f of all frames
 
-with the terms E_f of single frames, their shape fixed, accelerations a, and velocities v of the soles and palms that
-rest with probability p (`solver.fit_motion`). A keypoint that jumps for one frame loses against its neighbours, a limb
-that is hidden for some frames moves on smoothly, feet that stand stay where they are (in a second fit, at the place
-that the first one found), and no filter follows.
-Long clips are fitted in windows of consecutive frames. Where two windows overlap, their motions are blended.
+with the terms E_f of single frames, their shape fixed, accelerations a, and velocities v of the
+soles and palms that rest with probability p (`solver.fit_motion`). A keypoint that jumps for one
+frame loses against its neighbours, a limb that is hidden for some frames moves on smoothly, feet
+that stand stay where they are (in a second fit, at the place that the first one found), and no
+filter follows. Long clips are fitted in windows of consecutive frames. Where two windows overlap,
+their motions are blended.
 """
 
 from __future__ import annotations
@@ -30,11 +32,14 @@ from ..camera_path import CameraPath
 from .clip_window import ClipWindow
 from .limb_search import search_limbs
 
-WINDOW_UNKNOWNS = 36_000  # unknowns of a window, whose equations take some 120 MB: 480 frames of a body of 24 parts
-OVERLAP = 4_800  # unknowns; two windows differ by 2 to 4 mm where one of them has 1 s more to its end
+# unknowns of a window, whose equations take some 120 MB: 480 frames of a body of 24 parts
+WINDOW_UNKNOWNS = 36_000
+# unknowns; two windows differ by 2 to 4 mm where one of them has 1 s more to its end
+OVERLAP = 4_800
 LONGEST_STEP = 2.5  # between two frames that are fitted together, in units of the median step
 _Progress = Callable[[str, int, int], None]
-ALONG, ACROSS, _RATE_HZ, _EXPONENT = 15.5, 11.5, 60.0, 0.3  # of the standard deviations, see `joint_sigma`
+# of the standard deviations, see `joint_sigma`
+ALONG, ACROSS, _RATE_HZ, _EXPONENT = 15.5, 11.5, 60.0, 0.3
 _MIN_HZ = 10.0  # acceleration hardly couples frames that are further apart
 
 
@@ -48,12 +53,15 @@ def fit_clip(
     """Fit all frames of a track together, between longer gaps.
 
     :param start: the states to start from, and the shape, in each frame's camera.
-    :param progress: called with the stage's name, the frames done and the total; it may raise to cancel.
+    :param progress: called with the stage's name, the frames done and the total; it may raise to
+        cancel.
     :return: the states in each frame's camera; those of invalid frames are as given.
     """
     clip = _Clip(prepared, start, path, progress, ablation)
     for run in runs(start.valid, prepared.track.times):
-        for window in windows(len(run), _frames_of(prepared, WINDOW_UNKNOWNS), _frames_of(prepared, OVERLAP)):
+        for window in windows(
+            len(run), _frames_of(prepared, WINDOW_UNKNOWNS), _frames_of(prepared, OVERLAP)
+        ):
             clip.fit(run[window])
     return clip.fitted()
 
@@ -62,19 +70,39 @@ class _Clip:
     """A track on its way to its motion, in the first frame's axes."""
 
     def __init__(
-        self, prepared: PreparedTrack, start: FittedTrack, path: CameraPath, progress: _Progress, ablation: Ablation
+        self,
+        prepared: PreparedTrack,
+        start: FittedTrack,
+        path: CameraPath,
+        progress: _Progress,
+        ablation: Ablation,
     ) -> None:
-        self._prepared, self._path, self._progress, self._limb_search = prepared, path, progress, ablation.limb_search
+        self._prepared, self._path, self._progress, self._limb_search = (
+            prepared,
+            path,
+            progress,
+            ablation.limb_search,
+        )
         self._start, first = start, path.to_first(start)
         self._rotations, self._root = first.rotations.copy(), first.t_camera_root.copy()
-        self._surface = BodySurface(prepared.body, np.asarray(start.betas, float)) if ablation.body_surface else None
+        self._surface = (
+            BodySurface(prepared.body, np.asarray(start.betas, float))
+            if ablation.body_surface
+            else None
+        )
         self._done = np.zeros(len(start.valid), bool)
         self._sigma = np.full((*first.rotations.shape[:2], 2), np.nan, np.float32)
 
     def fit(self, frames: NDArray[np.intp]) -> None:
-        """Fit one window; frames that an earlier one has fitted are blended from that one's motion to this one's."""
+        """Fit one window; frames that an earlier one has fitted are blended from that one's motion
+        to this one's.
+        """
         self._progress("solving the clip", int(self._done.sum()), len(self._done))
-        body, times, every = self._prepared.body, self._prepared.track.times[frames], slice(0, len(frames))
+        body, times, every = (
+            self._prepared.body,
+            self._prepared.track.times[frames],
+            slice(0, len(frames)),
+        )
         quadratic, robust = motion_priors(body, times)
         window = ClipWindow.of(self._prepared, self._path, frames, self._start.betas)
         found = window.fit(every, [self._state(k) for k in frames], quadratic)
@@ -96,7 +124,9 @@ class _Clip:
         return replace(self._path.to_frames(first), joint_sigma_m=self._sigma)
 
     def _state(self, k: int) -> State:
-        return State(self._rotations[k, 0], self._root[k], self._rotations[k, 1:], self._start.betas)
+        return State(
+            self._rotations[k, 0], self._root[k], self._rotations[k, 1:], self._start.betas
+        )
 
     def _keep(self, frames: NDArray[np.intp], found: MotionFit) -> None:
         rotations = np.array([[state.R_camera_root, *state.Omega] for state in found.states])
@@ -106,7 +136,9 @@ class _Clip:
         earlier = self._rotations[frames[:both]].astype(float)
         turn = log(np.swapaxes(earlier, -1, -2) @ rotations[:both])
         rotations[:both] = earlier @ exp(share[:, None, None] * turn)
-        root[:both] = self._root[frames[:both]] * (1 - share[:, None]) + root[:both] * share[:, None]
+        root[:both] = (
+            self._root[frames[:both]] * (1 - share[:, None]) + root[:both] * share[:, None]
+        )
         self._rotations[frames], self._root[frames] = rotations, root
         self._sigma[frames] = self._blended_sigma(frames, found, share)
         self._done[frames] = True
@@ -114,7 +146,9 @@ class _Clip:
     def _blended_sigma(
         self, frames: NDArray[np.intp], found: MotionFit, share: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Return the deviations of a window's frames, the first blended by `share` with those of an earlier window."""
+        """Return the deviations of a window's frames, the first blended by `share` with those of an
+        earlier window.
+        """
         assert found.joint_covariance is not None
         assert found.covariance_from_root is not None
         joints = found.t_world_part - self._path.center[frames, None]
@@ -139,7 +173,9 @@ def runs(valid: NDArray[np.bool_], times: NDArray[np.float64]) -> Iterator[NDArr
 
 
 def windows(count: int, most: int, overlap: int) -> list[slice]:
-    """Divide ``count`` frames into as few slices of at most ``most`` as overlap by ``overlap``, all of one length."""
+    """Divide ``count`` frames into as few slices of at most ``most`` as overlap by ``overlap``, all
+    of one length.
+    """
     if count <= most:
         return [slice(0, count)]
     number = int(np.ceil((count - overlap) / (most - overlap)))
@@ -158,16 +194,20 @@ def joint_sigma(
     joints: NDArray[np.floating[Any]],
     times: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return the (T, K+1, 2) standard deviations along the line of sight and across it, per axis, metres.
+    """Return the (T, K+1, 2) standard deviations along the line of sight and across it, per axis,
+    metres.
 
-    That of the pelvis is relative to the camera, those of the others relative to the pelvis. The covariance is that of
-    independent errors, but networks' errors in neighbouring frames and keypoints are alike, and their mean is not zero.
-    Positions are off by a multiple, which differs little from person to person and from joint to joint, and grows less
-    with the frame rate than smoothing lowers the covariance:
+    That of the pelvis is relative to the camera, those of the others relative to the pelvis. The
+    covariance is that of independent errors, but networks' errors in neighbouring frames and
+    keypoints are alike, and their mean is not zero. Positions are off by a multiple, which differs
+    little from person to person and from joint to joint, and grows less with the frame rate than
+    smoothing lowers the covariance:
 
-        σ = c s (rate / 60 Hz)^0.3,   s of the covariance,   c = 15.5 along the line of sight and 11.5 across it
+        σ = c s (rate / 60 Hz)^0.3,   s of the covariance,
+        c = 15.5 along the line of sight and 11.5 across it
 
-    Fitted to the twelve limb joints of real clips and renders with ground truth (benchmarks/notebook/clip.md).
+    Fitted to the twelve limb joints of real clips and renders with ground truth
+    (benchmarks/notebook/clip.md).
 
     :param pelvis: (T, 3, 3) covariance of its position for independent errors, metres².
     :param from_pelvis: (T, K+1, 3, 3) of the joints' positions relative to it; row 0 is not used.

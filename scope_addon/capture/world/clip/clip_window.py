@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Consecutive frames of a track and their measurements, in the first frame's axes: what is fitted together."""
+"""Consecutive frames of a track and their measurements, in the first frame's axes: what is fitted
+together.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +39,8 @@ from ..camera_path import CameraPath
 
 MIN_PROBABILITY, SPREAD_M = 0.5, 0.02  # of a rest; see `resting_places`
 ENTERS_M = 0.01  # depth from which on an arm counts as inside the body
-_INSIDE_WEIGHT = 1.0  # of a point inside the body, against one of a sole under the floor that is surely in contact
+# of a point inside the body, against one of a sole under the floor that is surely in contact
+_INSIDE_WEIGHT = 1.0
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,11 @@ class ClipWindow:
 
     @classmethod
     def of(
-        cls, prepared: PreparedTrack, path: CameraPath, frames: NDArray[np.intp], betas: NDArray[np.floating[Any]]
+        cls,
+        prepared: PreparedTrack,
+        path: CameraPath,
+        frames: NDArray[np.intp],
+        betas: NDArray[np.floating[Any]],
     ) -> ClipWindow:
         """Measure frames (n,) of a track for a shape (P,)."""
         measured = [prepared.measure_all(k) for k in frames]
@@ -123,7 +130,8 @@ class ClipWindow:
         return replace(self, measured=measured)
 
     def with_body_surface(self, found: MotionFit, surface: BodySurface) -> tuple[ClipWindow, bool]:
-        """Add to the measurements the body's own surface in a motion, which forearms and hands may not enter.
+        """Add to the measurements the body's own surface in a motion, which forearms and hands may
+        not enter.
 
         :return: and whether they enter it by more than `ENTERS_M` there.
         """
@@ -131,10 +139,16 @@ class ClipWindow:
         offset = planes.offset - np.einsum("tci,ti->tc", planes.normal, path.center[self.frames])
         normal_cam = planes.normal @ path.R_first_camera[self.frames]
         measured = [
-            replace(each, floor=with_planes(each.floor, surface.indices[near], normal[near], d[near]))
-            for each, near, normal, d in zip(self.measured, planes.near, normal_cam, offset, strict=True)
+            replace(
+                each, floor=with_planes(each.floor, surface.indices[near], normal[near], d[near])
+            )
+            for each, near, normal, d in zip(
+                self.measured, planes.near, normal_cam, offset, strict=True
+            )
         ]
-        return replace(self, measured=measured), bool((planes.height[planes.near] < -ENTERS_M).any())
+        return replace(self, measured=measured), bool(
+            (planes.height[planes.near] < -ENTERS_M).any()
+        )
 
     @cached_property
     def _tree(self) -> Tree:
@@ -159,10 +173,12 @@ class ClipWindow:
 def resting_places(
     points: NDArray[np.floating[Any]], resting: NDArray[np.floating[Any]]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the places (T, C, 3) of points while they rest, and the probability (T, C) that they are there.
+    """Return the places (T, C, 3) of points while they rest, and the probability (T, C) that they
+    are there.
 
-    Where little speed is allowed, a point can still drift by centimetres in some seconds. One that has stayed within
-    `SPREAD_M` of its mean throughout a rest is therefore drawn to that mean; one that has strayed farther may not rest.
+    Where little speed is allowed, a point can still drift by centimetres in some seconds. One that
+    has stayed within `SPREAD_M` of its mean throughout a rest is therefore drawn to that mean; one
+    that has strayed farther may not rest.
 
     :param points: (T, C, 3) in axes that do not move, metres.
     :param resting: (T, C) probability that each point rests.
@@ -178,12 +194,16 @@ def resting_places(
 
 
 def with_planes(
-    floor: Floor | None, indices: NDArray[np.intp], normal: NDArray[np.float64], offset: NDArray[np.float64]
+    floor: Floor | None,
+    indices: NDArray[np.intp],
+    normal: NDArray[np.float64],
+    offset: NDArray[np.float64],
 ) -> Floor | None:
     """Add points that may not be below a plane each, and are free to be above it.
 
     :param floor: with one plane for all of its points, or None.
-    :param indices: (n,) keypoints. :param normal, offset: (n, 3) unit, and (n,) metres, in the frame's camera.
+    :param indices: (n,) keypoints. :param normal, offset: (n, 3) unit, and (n,) metres, in the
+        frame's camera.
     """
     count = len(indices)
     if not count:
@@ -197,6 +217,9 @@ def with_planes(
         return np.concatenate([np.broadcast_to(first, (soles, *width)), second])
 
     return Floor(
-        joined(floor.indices, indices), joined(floor.normal, normal, (3,)), joined(floor.offset, offset),
-        joined(floor.contact, free), joined(1.0 if floor.below is None else floor.below, inside),
-    )  # fmt: skip
+        joined(floor.indices, indices),
+        joined(floor.normal, normal, (3,)),
+        joined(floor.offset, offset),
+        joined(floor.contact, free),
+        joined(1.0 if floor.below is None else floor.below, inside),
+    )

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which of the two poses of a limb that look alike in the image fits the clip better.
 
-The fit of a clip ends in the nearest minimum. Where a limb points far towards the camera or away from it, the mirrored
-limb (`kinematics.mirrored_limbs`) often has a minimum of its own, and the pose that the frames were started from, which
-the lifting network could not tell from the other, may be the worse one. For as long as a bone keeps to one side, it
-is therefore mirrored and fitted again, first in some frames alone. If it stays on the other side and costs no more
-there, the frames around are fitted together from both poses, and the cheaper one is kept.
+The fit of a clip ends in the nearest minimum. Where a limb points far towards the camera or away
+from it, the mirrored limb (`kinematics.mirrored_limbs`) often has a minimum of its own, and the
+pose that the frames were started from, which the lifting network could not tell from the other, may
+be the worse one. For as long as a bone keeps to one side, it is therefore mirrored and fitted
+again, first in some frames alone. If it stays on the other side and costs no more there, the frames
+around are fitted together from both poses, and the cheaper one is kept.
 """
 
 from __future__ import annotations
@@ -22,13 +23,15 @@ from .clip_window import ClipWindow
 
 SHALLOW_M, DEEP_M = 0.03, 0.1  # a bone is mirrored while it is deeper, if it gets so deep
 _MIN_CHANGE_M = 0.1  # by which a limb that has a minimum of its own differs
-_MAX_COST, _MAX_COST_OF_ONE = 5.0, 30.0  # that the mirrored limb may add to frames alone, in the mean and to one
+# that the mirrored limb may add to frames alone, in the mean and to one
+_MAX_COST, _MAX_COST_OF_ONE = 5.0, 30.0
 _MIN_GAIN = 10.0  # of cost, over the frames that are fitted together
 _LONGEST_S = 2.0  # of a bone on one side; longer trials cost much, and none has found a better pose
 _SAMPLES = 5  # further frames of a run that are tried alone
 _MARGIN = 8  # frames before and after
 _STEPS = 8  # of a trial, after which a better pose costs less already
-_BONES = (True, False), (False, True), (True, True)  # whether the upper and the lower bone of a limb are mirrored
+# whether the upper and the lower bone of a limb are mirrored
+_BONES = (True, False), (False, True), (True, True)
 
 
 @dataclass(frozen=True)
@@ -40,7 +43,9 @@ class _Motion:
     joints: NDArray[np.float64]
 
 
-def search_limbs(body: Body, window: ClipWindow, found: MotionFit, prior: MotionPrior) -> list[State] | None:
+def search_limbs(
+    body: Body, window: ClipWindow, found: MotionFit, prior: MotionPrior
+) -> list[State] | None:
     """Return the states of a better motion to start from, or None if none was found.
 
     :param found: the fit of all frames of the window.
@@ -73,7 +78,9 @@ def _mirrored(
     lower: bool,
 ) -> list[State]:
     """Return the states of all frames, with the limb mirrored in those of ``rows``."""
-    turned = mirrored_limb(body.parents, motion.R[rows], motion.joints[rows], center[rows], limb, upper, lower)
+    turned = mirrored_limb(
+        body.parents, motion.R[rows], motion.joints[rows], center[rows], limb, upper, lower
+    )
     states = list(motion.states)
     for row, pair in zip(range(rows.start, rows.stop), turned, strict=True):
         Omega = np.array(states[row].Omega)
@@ -90,22 +97,34 @@ def _some_deep(depths: NDArray[np.float64], rows: slice) -> list[int]:
 
 
 def _may_be_better(
-    window: ClipWindow, states: list[State], other: list[State], limb: tuple[int, int, int], rows: list[int]
+    window: ClipWindow,
+    states: list[State],
+    other: list[State],
+    limb: tuple[int, int, int],
+    rows: list[int],
 ) -> bool:
-    """Whether the first of some frames, alone, keeps to the mirrored limb, and all cost hardly more with it."""
+    """Whether the first of some frames, alone, keeps to the mirrored limb, and all cost hardly more
+    with it.
+    """
     added: list[float] = []
     ends = list(limb[1:])
     for row in rows:
         now, then = window.fit_alone(row, states[row]), window.fit_alone(row, other[row])
-        change: NDArray[Any] = np.linalg.norm(then.t_camera_part[ends] - now.t_camera_part[ends], axis=1)
+        change: NDArray[Any] = np.linalg.norm(
+            then.t_camera_part[ends] - now.t_camera_part[ends], axis=1
+        )
         added.append(float(then.cost - now.cost))
         if added[0] > _MAX_COST or not (len(added) > 1 or change.max() > _MIN_CHANGE_M):
             return False
     return float(np.mean(added)) < _MAX_COST and max(added) < _MAX_COST_OF_ONE
 
 
-def _better(window: ClipWindow, motion: _Motion, rows: slice, other: list[State], prior: MotionPrior) -> _Motion:
-    """Return the motion with the mirrored limb of ``other`` if the frames around cost less with it, or as it is."""
+def _better(
+    window: ClipWindow, motion: _Motion, rows: slice, other: list[State], prior: MotionPrior
+) -> _Motion:
+    """Return the motion with the mirrored limb of ``other`` if the frames around cost less with it,
+    or as it is.
+    """
     around = slice(max(rows.start - _MARGIN, 0), min(rows.stop + _MARGIN, len(other)))
     now = window.fit(around, motion.states[around], prior, steps=_STEPS)
     then = window.fit(around, other[around], prior, steps=_STEPS)

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Changing a captured armature's keys by what was corrected in its motion.
 
-The keys may have been edited since: smoothed, put on the floor, their root motion moved to an object. So it is the
-change of the motion that is applied to them, in each joint's own axes and the pelvis's: Ω' = Ω (Ω_beforeᵀ Ω_after),
-t' = t + R_0 R_0,beforeᵀ (t_after − t_before). Keys that the correction does not reach are not written.
+The keys may have been edited since: smoothed, put on the floor, their root motion moved to an
+object. So it is the change of the motion that is applied to them, in each joint's own axes and the
+pelvis's: Ω' = Ω (Ω_beforeᵀ Ω_after), t' = t + R_0 R_0,beforeᵀ (t_after − t_before). Keys that the
+correction does not reach are not written.
 """
 
 from __future__ import annotations
@@ -16,7 +17,13 @@ from numpy.typing import NDArray
 
 from .....solver.body import Body
 from ....edit.clip import Clip, sample
-from ....edit.pins.corrected_motion import corrections_of, floor_of, pin_in_world, shot_of, uncorrected
+from ....edit.pins.corrected_motion import (
+    corrections_of,
+    floor_of,
+    pin_in_world,
+    shot_of,
+    uncorrected,
+)
 from ....edit.pins.corrections import Correction, FeetOnFloor, Pin, feet_on_floor, world_of
 from ....edit.pins.floor_here import foot_height
 from ....edit.pins.moved import moved_clip
@@ -47,12 +54,14 @@ def rewrite_changed_keys(
 ) -> UncorrectedKeys:
     """Change the keys from one motion to another, which differs from it in its corrections.
 
-    Rows of keys that corrections have changed before, and nothing else since, begin again with the keys from before.
+    Rows of keys that corrections have changed before, and nothing else since, begin again with the
+    keys from before.
 
     :param rate: scene frames per second.
     :param motions: before and after.
     :param stored: bytes of the ``UncorrectedKeys`` of the last change.
-    :param added: a new correction; a pin or an edit holds even if edited keys differ from the motion.
+    :param added: a new correction; a pin or an edit holds even if edited keys differ from the
+        motion.
     :param rise: metres by which all keys are raised, which is an edit of its own.
     :return: the keys that are now different from those without corrections.
     :raises UsageError: when a bone or its keys are missing.
@@ -71,7 +80,9 @@ def rewrite_changed_keys(
     )
     was, now = (world_of(corrections_of(m)) for m in motions)
     _check_root_motion(armature, was, now)
-    old, new = (c if T is None else moved_clip(c, np.linalg.inv(T)) for c, T in ((old, was), (new, now)))
+    old, new = (
+        c if T is None else moved_clip(c, np.linalg.inv(T)) for c, T in ((old, was), (new, now))
+    )
     again = np.zeros(len(frames), bool)  # rows that begin with the keys from before all corrections
     for row in restored:
         again |= np.abs(frames - (start + known.times[row] * rate)) < _SAME_FRAME
@@ -79,9 +90,13 @@ def rewrite_changed_keys(
     old.rotations[exact], old.root[exact] = free.rotations[exact], free.root[exact]
     rows = frames.astype(np.float32)
     values, moves = keyed_values(armature, body, rows), _moves(again, was, now)
-    edits = KeyEdits(corrections_of(after), after.betas, shot_of(after, _start(armature, rate)), added, exact)
+    edits = KeyEdits(
+        corrections_of(after), after.betas, shot_of(after, _start(armature, rate)), added, exact
+    )
     if edits.any():
-        begun, old = begin_with_edits(armature, body, (_moved_rows(clip, moves)[0], old), frames, edits)
+        begun, old = begin_with_edits(
+            armature, body, (_moved_rows(clip, moves)[0], old), frames, edits
+        )
         write_keys(armature, body, begun, frames, differ(begun, clip))
         clip, moves = begun, np.tile(np.eye(4), (len(frames), 1, 1))
     _write_change(armature, body, clip, frames, (old, new), moves)
@@ -107,7 +122,8 @@ def _raise_keys(armature: bpy.types.Object, body: Body, rate: float, rise: float
 def pinned_places(
     armature: bpy.types.Object, body: Body, rate: float, motion: Motion
 ) -> dict[Pin, NDArray[np.float64]]:
-    """Return where the keys have each pinned joint in its frame, (3,) metres in the world of the capture.
+    """Return where the keys have each pinned joint in its frame, (3,) metres in the world of the
+    capture.
 
     :param rate: scene frames per second.
     """
@@ -116,12 +132,17 @@ def pinned_places(
         return {}
     clip, frames = read_clip(armature, body, rate)
     shot = shot_of(motion, _start(armature, rate))
-    at = sample(clip_with_root_motion(armature, clip, frames), np.array([shot.time(pin.frame) for pin in pins]))
+    at = sample(
+        clip_with_root_motion(armature, clip, frames),
+        np.array([shot.time(pin.frame) for pin in pins]),
+    )
     joints = at.joints(body, motion.betas)
     return {pin: joints[k, list(body.joint_names).index(pin.joint)] for k, pin in enumerate(pins)}
 
 
-def _meet_pin(armature: bpy.types.Object, body: Body, rate: float, motion: Motion, pin: Pin) -> None:
+def _meet_pin(
+    armature: bpy.types.Object, body: Body, rate: float, motion: Motion, pin: Pin
+) -> None:
     """Correct the keys by one more pin, if edited keys do not meet it although the motion does.
 
     :param rate: scene frames per second.
@@ -130,7 +151,9 @@ def _meet_pin(armature: bpy.types.Object, body: Body, rate: float, motion: Motio
     clip, frames = read_clip(armature, body, rate)
     whole = clip_with_root_motion(armature, clip, frames)
     shot = shot_of(motion, _start(armature, rate))
-    if missed(whole, body, motion.betas, pin, shot) > (_MISSED_M if pin.pixel is None else _MISSED_PX):
+    if missed(whole, body, motion.betas, pin, shot) > (
+        _MISSED_M if pin.pixel is None else _MISSED_PX
+    ):
         met = resolve(whole, body, motion.betas, [pin], shot, slack=0.0, floor=floor_of(motion))
         _write_change(armature, body, clip, frames, (whole, met))
 
@@ -138,7 +161,8 @@ def _meet_pin(armature: bpy.types.Object, body: Body, rate: float, motion: Motio
 def heights_of_foot(
     armature: bpy.types.Object, body: Body, rate: float, motion: Motion, place: tuple[int, str]
 ) -> tuple[float, float]:
-    """Return how high a foot is in a frame, metres: in the motion, as smooth as the keys are, and in the edited keys.
+    """Return how high a foot is in a frame, metres: in the motion, as smooth as the keys are, and
+    in the edited keys.
 
     :param rate: scene frames per second.
     :param place: frame of the footage, and the foot as in `foot_height`.
@@ -153,8 +177,12 @@ def heights_of_foot(
     )
 
 
-def captured_points(armature: bpy.types.Object, frame: float, points_world: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Convert points of the scene (N, 3) at the current frame to the world of the capture, (N, 3) metres."""
+def captured_points(
+    armature: bpy.types.Object, frame: float, points_world: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Convert points of the scene (N, 3) at the current frame to the world of the capture, (N, 3)
+    metres.
+    """
     inverse = np.array(armature.matrix_world.inverted_safe())
     points = points_world @ inverse[:3, :3].T + inverse[:3, 3]
     n = len(points)
@@ -170,7 +198,8 @@ def source_frame(armature: bpy.types.Object, motion: Motion, frame: float, rate:
     first, last = whole_span(armature, motion, rate)
     if not first <= frame <= last:
         raise UsageError(
-            f"frame {frame:g} is outside of the captured motion of '{armature.name}', which has frames {first} to "
+            f"frame {frame:g} is outside of the captured motion of '{armature.name}', which has "
+            f"frames {first} to "
             f"{last}; go to one of these"
         )
     time = frame / rate - _start(armature, rate)
@@ -178,7 +207,8 @@ def source_frame(armature: bpy.types.Object, motion: Motion, frame: float, rate:
     spacing = float(np.median(np.diff(motion.timestamps))) if len(motion) > 1 else 1.0 / rate
     if abs(motion.timestamps[row] - time) > max(spacing, 1.0 / rate):
         raise UsageError(
-            f"frame {frame:g} is in a gap of the captured motion of '{armature.name}', where the footage has no "
+            f"frame {frame:g} is in a gap of the captured motion of '{armature.name}', where the "
+            "footage has no "
             "frames; go to a frame beside it"
         )
     return int(motion.frames[row])
@@ -205,10 +235,15 @@ def _start(armature: bpy.types.Object, rate: float) -> float:
 
 
 def _at(clip: Clip, times: NDArray[np.float64], start: float) -> Clip:
-    """Sample a captured clip at the keys' times; keys at its own frames must not mix in a little of the next frame."""
+    """Sample a captured clip at the keys' times; keys at its own frames must not mix in a little of
+    the next frame.
+    """
     own = clip.times + start
     nearest = own[np.clip(np.searchsorted(own, times - _SAME_S), 0, len(own) - 1)]
-    return sample(Clip(own, clip.rotations, clip.root), np.where(np.abs(nearest - times) < _SAME_S, nearest, times))
+    return sample(
+        Clip(own, clip.rotations, clip.root),
+        np.where(np.abs(nearest - times) < _SAME_S, nearest, times),
+    )
 
 
 def _check_root_motion(
@@ -220,13 +255,16 @@ def _check_root_motion(
     """
     same = was is now if was is None or now is None else np.array_equal(was, now)
     if not same and root_object(armature) is not None:
-        raise UsageError(f"the root motion of '{armature.name}' is on an object; put it back with In Bones first")
+        raise UsageError(
+            f"the root motion of '{armature.name}' is on an object; put it back with In Bones first"
+        )
 
 
 def _moves(
     again: NDArray[np.bool_], was: NDArray[np.float64] | None, now: NDArray[np.float64] | None
 ) -> NDArray[np.float64]:
-    """Return the transform (T, 4, 4) of each row for an upright line: rows with all corrections have the former one.
+    """Return the transform (T, 4, 4) of each row for an upright line: rows with all corrections
+    have the former one.
 
     :param again: (T,) rows that begin without corrections.
     """
@@ -246,7 +284,8 @@ def _write_change(
     change: tuple[Clip, Clip],
     moves: NDArray[np.float64] | None = None,
 ) -> None:
-    """Apply the change between two clips to the keys at which they differ, then move these in the world.
+    """Apply the change between two clips to the keys at which they differ, then move these in the
+    world.
 
     :param moves: (T, 4, 4) rigid; rows that it moves are all written.
     """
@@ -263,8 +302,12 @@ def _write_change(
 
 
 def _moved_rows(clip: Clip, moves: NDArray[np.float64]) -> tuple[Clip, NDArray[np.bool_]]:
-    """Move each row in the world by its rigid transform (T, 4, 4); also return which rows (T,) that moves."""
+    """Move each row in the world by its rigid transform (T, 4, 4); also return which rows (T,) that
+    moves.
+    """
     out, moved = clip.copy(), (moves != np.eye(4)).any(axis=(1, 2))
     out.rotations[moved, 0] = moves[moved, :3, :3] @ out.rotations[moved, 0]
-    out.root[moved] = (moves[moved, :3, :3] @ out.root[moved, :, None])[..., 0] + moves[moved, :3, 3]
+    out.root[moved] = (moves[moved, :3, :3] @ out.root[moved, :, None])[..., 0] + moves[
+        moved, :3, 3
+    ]
     return out, moved

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The edits that a motion keeps, applied to keys, which may differ from the motion.
 
-Who interpolates frames or puts feet on the floor means what is displayed. So the keys are edited themselves, and so is
-the clip that they are compared with; then the change of the motion, as by pins, is applied to them.
+Who interpolates frames or puts feet on the floor means what is displayed. So the keys are edited
+themselves, and so is the clip that they are compared with; then the change of the motion, as by
+pins, is applied to them.
 """
 
 from __future__ import annotations
@@ -36,7 +37,8 @@ class KeyEdits:
     betas: NDArray[np.floating[Any]]  # (P,) shape coefficients
     shot: Shot  # on the clock of the keys
     new: Correction | None  # which is applied to all keys
-    rows: NDArray[np.bool_]  # (T,) keys that begin without corrections, to which all edits are applied
+    # (T,) keys that begin without corrections, to which all edits are applied
+    rows: NDArray[np.bool_]
 
     def any(self) -> bool:
         """Return whether there is an edit among the corrections."""
@@ -44,11 +46,16 @@ class KeyEdits:
 
 
 def begin_with_edits(
-    armature: bpy.types.Object, body: Body, clips: tuple[Clip, Clip], frames: NDArray[np.float64], edits: KeyEdits
+    armature: bpy.types.Object,
+    body: Body,
+    clips: tuple[Clip, Clip],
+    frames: NDArray[np.float64],
+    edits: KeyEdits,
 ) -> tuple[Clip, Clip]:
     """Edit keys, and the clip that they are compared with.
 
-    :param clips: the keys, in the world that the corrections have moved; and the other one, in the captured world.
+    :param clips: the keys, in the world that the corrections have moved; and the other one, in the
+        captured world.
     :param frames: (T,) scene frames of the keys.
     :return: both, edited in the rows that an edit is applied to.
     :raises UsageError: a new interpolation has no keys, or none on one side.
@@ -61,18 +68,27 @@ def begin_with_edits(
         old = _replaced(old, rows, interpolated(old, [each], edits.shot).rows(rows))
     feet = feet_on_floor(edits.corrections)
     # The floor of a few keys would not be that of all; others have the change of the motion.
-    enough = edits.rows.all() if isinstance(edits.new, FeetOnFloor) else 2 * edits.rows.sum() > len(frames)
+    enough = (
+        edits.rows.all()
+        if isinstance(edits.new, FeetOnFloor)
+        else 2 * edits.rows.sum() > len(frames)
+    )
     if feet is None or not enough:
         return keys, old
     height = floor_above(edits.corrections, feet)
-    placed = floored(armature, body, edits.betas, (keys.rows(edits.rows), frames[edits.rows]), feet, height)
+    placed = floored(
+        armature, body, edits.betas, (keys.rows(edits.rows), frames[edits.rows]), feet, height
+    )
     others = tuple(c for c in edits.corrections if not isinstance(c, Interpolation))
     compared = edited(old.rows(edits.rows), body, edits.betas, others, edits.shot)
     return _replaced(keys, edits.rows, placed), _replaced(old, edits.rows, compared)
 
 
-def meet_floor(armature: bpy.types.Object, body: Body, rate: float, motion: Motion, edits: KeyEdits) -> None:
-    """Put feet on the floor whose keys were edited, if they are not there although those of the motion are.
+def meet_floor(
+    armature: bpy.types.Object, body: Body, rate: float, motion: Motion, edits: KeyEdits
+) -> None:
+    """Put feet on the floor whose keys were edited, if they are not there although those of the
+    motion are.
 
     :param rate: scene frames per second.
     """

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The keys as they were before corrections changed them, so that removing corrections restores them to the bit.
+"""The keys as they were before corrections changed them, so that removing corrections restores them
+to the bit.
 
-They are stored with the motion's text, for the rows that corrections have changed: one row for each time at which any
-curve has a key, one column for each curve, NaN where that curve has no key. A row whose keys are still as the
-corrections wrote them is restored; a row that was edited since is not.
+They are stored with the motion's text, for the rows that corrections have changed: one row for each
+time at which any curve has a key, one column for each curve, NaN where that curve has no key. A row
+whose keys are still as the corrections wrote them is restored; a row that was edited since is not.
 """
 
 from __future__ import annotations
@@ -32,7 +33,8 @@ _NAMES = ("times", "before", "written")
 class UncorrectedKeys:
     """R rows of C curves."""
 
-    times: NDArray[np.float64]  # (R,) seconds since timestamp 0, so that they are valid at any frame rate
+    # (R,) seconds since timestamp 0, so that they are valid at any frame rate
+    times: NDArray[np.float64]
     before: NDArray[np.float32]  # (R, C)
     written: NDArray[np.float32]  # (R, C)
 
@@ -44,7 +46,9 @@ class UncorrectedKeys:
 
     @staticmethod
     def from_bytes(content: object, curves: int) -> UncorrectedKeys:
-        """Read what ``to_bytes`` returned; without rows if it is something else: a .blend file may be hostile."""
+        """Read what ``to_bytes`` returned; without rows if it is something else: a .blend file may
+        be hostile.
+        """
         none = UncorrectedKeys(np.zeros(0), *(np.zeros((0, curves), np.float32) for _ in range(2)))
         if not isinstance(content, bytes):
             return none
@@ -59,7 +63,9 @@ class UncorrectedKeys:
         return UncorrectedKeys(times, before.astype(np.float32), written.astype(np.float32))
 
 
-def keyed_values(armature: bpy.types.Object, body: Body, frames: NDArray[np.float32]) -> NDArray[np.float32]:
+def keyed_values(
+    armature: bpy.types.Object, body: Body, frames: NDArray[np.float32]
+) -> NDArray[np.float32]:
     """Return the keys' values (T, C) at scene frames (T,); NaN where a curve has no key."""
     curves = channel_curves(armature, body)
     out = np.full((len(frames), len(curves)), np.nan, np.float32)
@@ -71,8 +77,11 @@ def keyed_values(armature: bpy.types.Object, body: Body, frames: NDArray[np.floa
     return out
 
 
-def restore(armature: bpy.types.Object, body: Body, start: float, rate: float, known: UncorrectedKeys) -> set[int]:
-    """Give the rows that are as the corrections wrote them the keys from before; remove keys that were added.
+def restore(
+    armature: bpy.types.Object, body: Body, start: float, rate: float, known: UncorrectedKeys
+) -> set[int]:
+    """Give the rows that are as the corrections wrote them the keys from before; remove keys that
+    were added.
 
     :param start: scene frame of timestamp 0.
     :param rate: scene frames per second.
@@ -86,7 +95,9 @@ def restore(armature: bpy.types.Object, body: Body, start: float, rate: float, k
         values, keys = known.before[rows, column], curve.keyframe_points
         there = ~np.isnan(now[rows, column])
         coordinates = read_keys(curve)
-        at = np.clip(np.searchsorted(coordinates[:, 0], frames[rows] - _SAME), 0, len(coordinates) - 1)
+        at = np.clip(
+            np.searchsorted(coordinates[:, 0], frames[rows] - _SAME), 0, len(coordinates) - 1
+        )
         put = there & ~np.isnan(values)
         coordinates[at[put], 1] = values[put]
         keys.foreach_set("co", coordinates.ravel())
@@ -97,7 +108,11 @@ def restore(armature: bpy.types.Object, body: Body, start: float, rate: float, k
 
 
 def write_both(
-    armature: bpy.types.Object, body: Body, clips: tuple[Clip, Clip], frames: NDArray[np.float64], rate: float
+    armature: bpy.types.Object,
+    body: Body,
+    clips: tuple[Clip, Clip],
+    frames: NDArray[np.float64],
+    rate: float,
 ) -> UncorrectedKeys:
     """Replace all keys by those of a corrected clip, at scene frames (T,).
 
@@ -116,7 +131,9 @@ def write_both(
 
 def differ(a: Clip, b: Clip) -> NDArray[np.bool_]:
     """Return at which keys (T,) two clips differ."""
-    different: NDArray[np.bool_] = (a.rotations != b.rotations).any((1, 2, 3)) | (a.root != b.root).any(1)
+    different: NDArray[np.bool_] = (a.rotations != b.rotations).any((1, 2, 3)) | (
+        a.root != b.root
+    ).any(1)
     return different
 
 

@@ -38,7 +38,8 @@ OPERATORS = {
     "Make Loop": "Créer une boucle",
     "Mark as Asset": "Marquer comme ressource",
     "Match Frame Rate": "Ajuster la fréquence d’images",
-    "Motion from Video (Motion Capture, Mocap)": "Mouvement depuis une vidéo (Motion Capture, Mocap)",
+    "Motion from Video (Motion Capture, "
+    "Mocap)": "Mouvement depuis une vidéo (Motion Capture, Mocap)",
     "Motion from Video": "Mouvement depuis une vidéo",
     "Normal": "Normal",
     "On Object": "Sur l’objet",

@@ -23,22 +23,27 @@ OPTIONS = {
     "Height (cm)": "身高 (cm)",
     "How the person's body shape is stored": "人物体型的存储方式",
     "How the scene's frame rate is set": "场景帧率的设置方式",
-    "JSON file with OpenCV intrinsics (3x3), optionally dist (five values) and size (width, height)": "含 OpenCV 内参 (3x3) 的 JSON 文件，可选 dist（五个值）和 size（宽、高）",
+    "JSON file with OpenCV intrinsics (3x3), optionally dist (five values) and size (width, "
+    "height)": "含 OpenCV 内参 (3x3) 的 JSON 文件，可选 dist（五个值）和 size（宽、高）",
     "Keypoint Network": "关键点网络",
     "Markers": "标记",
     "Maximum number of people": "最多人数",
     "Maximum number of people to follow; each one takes time": "最多跟随的人数；每个人都需要时间",
-    "Name of the next capture, its actions and the exported animation; if empty, the footage's name": "下一次捕捉、其动作及导出动画的名称；为空则使用素材名称",
+    "Name of the next capture, its actions and the exported animation; if empty, the footage's "
+    "name": "下一次捕捉、其动作及导出动画的名称；为空则使用素材名称",
     "Part of the Video": "视频片段",
     "People": "人物",
     "People to capture": "要捕捉的人物",
-    "People walk on stairs, steps or slopes: feet rest at any height instead of on one horizontal floor": "人物在楼梯、台阶或斜坡上行走：脚可在任意高度着地，而不限于一个水平地面",
+    "People walk on stairs, steps or slopes: feet rest at any height instead of on one horizontal "
+    "floor": "人物在楼梯、台阶或斜坡上行走：脚可在任意高度着地，而不限于一个水平地面",
     "Person Detector": "人物检测器",
-    "Remove jitter and lock feet in contact with the floor; off keeps the per-frame solution": "去除抖动并锁定接触地面的脚；关闭则保留逐帧解算结果",
+    "Remove jitter and lock feet in contact with the floor; off keeps the per-frame "
+    "solution": "去除抖动并锁定接触地面的脚；关闭则保留逐帧解算结果",
     "Scene frame at which the footage starts": "素材开始处的场景帧",
     "Set the scene's frame range to the captured frames": "将场景帧范围设为捕捉的帧",
     "Smooth": "平滑",
-    "SMPL, SMPL+H, SMPL-X or STAR model (.npz or .pkl); if empty, the one in the preferences": "SMPL、SMPL+H、SMPL-X 或 STAR 模型（.npz 或 .pkl）；为空则使用偏好设置中的模型",
+    "SMPL, SMPL+H, SMPL-X or STAR model (.npz or .pkl); if empty, the one in the "
+    "preferences": "SMPL、SMPL+H、SMPL-X 或 STAR 模型（.npz 或 .pkl）；为空则使用偏好设置中的模型",
     "Speed versus accuracy": "速度与精度的权衡",
     "Start of the captured part, in seconds": "捕捉部分的开始时间（秒）",
     "The body that is fitted to the person": "拟合到人物的身体",

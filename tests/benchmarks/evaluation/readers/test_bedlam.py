@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""BEDLAM's layout: rows of several people and images in one .npz, whose pickled arrays stay unread."""
+"""BEDLAM's layout: rows of several people and images in one .npz, whose pickled arrays stay
+unread.
+"""
 
 import numpy as np
 import pytest
@@ -30,7 +32,9 @@ def test_rows_become_people_in_the_order_of_the_images(tmp_path, models):
     assert second.rows.tolist() == [2, 3]
     poses, trans, betas = motion(6, 55)
     rotations = exp(poses[5].reshape(55, 3))
-    _, joints = smpl_formula(make_tables("smplx"), betas, rotations, trans[5] + rigid(6, 7)[5, :3, 3])
+    _, joints = smpl_formula(
+        make_tables("smplx"), betas, rotations, trans[5] + rigid(6, 7)[5, :3, 3]
+    )
     assert np.allclose(second.camera.joints(SMPL22)[1], joints[:22], atol=1e-6)
 
 
@@ -47,7 +51,11 @@ def test_rows_become_people_in_the_order_of_the_images(tmp_path, models):
 )
 def test_damage_is_one_sentence(tmp_path, models, changes, said):
     path = write_bedlam(tmp_path)
-    arrays = {key: value for key, value in np.load(path, allow_pickle=True).items() if key != "motion_info"} | changes
+    arrays = {
+        key: value
+        for key, value in np.load(path, allow_pickle=True).items()
+        if key != "motion_info"
+    } | changes
     np.savez(path, **{key: value for key, value in arrays.items() if value is not None})
     with pytest.raises(DatasetError, match=said) as found:
         clips(tmp_path, models)[0].truth()

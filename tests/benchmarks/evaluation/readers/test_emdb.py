@@ -29,7 +29,9 @@ def test_joints_are_those_of_smpl_in_the_world_and_in_the_camera(tmp_path, model
     poses, trans, betas = motion(6, 24)
     extrinsics = rigid(6, 2)
     for row, frame in enumerate(person.rows):
-        _, joints = smpl_formula(make_tables("smpl"), betas, exp(poses[frame].reshape(24, 3)), trans[frame])
+        _, joints = smpl_formula(
+            make_tables("smpl"), betas, exp(poses[frame].reshape(24, 3)), trans[frame]
+        )
         assert np.allclose(person.world.joints(SMPL24)[row], joints, atol=1e-6)
         in_camera = joints @ extrinsics[frame, :3, :3].T + extrinsics[frame, :3, 3]
         assert np.allclose(person.camera.joints(SMPL24)[row], in_camera, atol=1e-6)
@@ -42,7 +44,11 @@ def test_both_parts_may_hold_a_sequence(tmp_path, models):
 
 def test_without_smpl_the_ground_truth_cannot_be_computed(tmp_path):
     write_emdb(tmp_path)
-    with pytest.raises(DatasetError, match=r"parameters of SMPL: give the folder .* SMPL_FEMALE\.npz .* --smpl FOLDER"):
+    with pytest.raises(
+        DatasetError,
+        match=r"parameters of SMPL: give the folder .* "
+        r"SMPL_FEMALE\.npz .* --smpl FOLDER",
+    ):
         clips(tmp_path, Models())[0].truth()
 
 

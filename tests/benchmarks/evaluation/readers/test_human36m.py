@@ -21,7 +21,11 @@ def write(root, **options):
 
 def test_every_fifth_frame_in_metres(tmp_path):
     write(tmp_path)
-    write_cdf(tmp_path / "S9/MyPoseFeatures/D3_Positions_mono/_ALL.60457274.cdf", "Pose", np.zeros((1, 2, 96)))
+    write_cdf(
+        tmp_path / "S9/MyPoseFeatures/D3_Positions_mono/_ALL.60457274.cdf",
+        "Pose",
+        np.zeros((1, 2, 96)),
+    )
     first, second = clips(tmp_path, Models())
     assert (first.name, first.protocols) == (f"S9 {FRONTAL}", ("h36m-p1", "h36m-p2"))
     assert (second.name, second.protocols) == ("S11 Directions.54138969", ("h36m-p1",))
@@ -29,10 +33,19 @@ def test_every_fifth_frame_in_metres(tmp_path):
     (person,) = truth.people
     assert person.rows.tolist() == [0, 5, 10]
     # Numbers of the data set's own skeleton: the right side first, as in its documentation.
-    by_number = {"right_hip": 1, "right_ankle": 3, "left_knee": 7, "left_wrist": 19, "right_elbow": 26, "head_top": 15}
+    by_number = {
+        "right_hip": 1,
+        "right_ankle": 3,
+        "left_knee": 7,
+        "left_wrist": 19,
+        "right_elbow": 26,
+        "head_top": 15,
+    }
     for name, number in by_number.items():
         assert name in LSP14
-        assert np.allclose(person.camera.joints([name])[2, 0], JOINTS[10, number] / 1000, atol=1e-6), name
+        assert np.allclose(
+            person.camera.joints([name])[2, 0], JOINTS[10, number] / 1000, atol=1e-6
+        ), name
     assert np.allclose(person.camera.joints(["neck"])[0, 0], JOINTS[0, 24] / 1000, atol=1e-6)
     assert np.allclose(truth.intrinsics, K, atol=0.01)
 
@@ -46,7 +59,9 @@ def test_the_folders_of_h36m_fetch_are_read_as_well(tmp_path):
     write(tmp_path)
     for subject in ("S9", "S11"):
         for kind in ("D2_Positions", "D3_Positions_mono"):
-            (tmp_path / subject / "MyPoseFeatures" / kind).rename(tmp_path / subject / f"Poses_{kind}")
+            (tmp_path / subject / "MyPoseFeatures" / kind).rename(
+                tmp_path / subject / f"Poses_{kind}"
+            )
     found = clips(tmp_path, Models())
     assert [clip.truth().intrinsics is not None for clip in found] == [True, True]
 
@@ -64,7 +79,11 @@ def test_a_video_that_is_missing_is_named(tmp_path):
         (lambda path: path.write_bytes(path.read_bytes()[:300]), "is not a readable CDF file"),
         (lambda path: path.write_bytes(b"no CDF"), "is not a readable CDF file"),
         (lambda path: write_cdf(path, "Other", np.zeros((1, 4, 96))), "is not a readable CDF file"),
-        (lambda path: write_cdf(path, "Pose", np.zeros((1, 4, 95))), r"Pose must have shape \(any, 96\)"),
+        (
+            lambda path: write_cdf(path, "Pose", np.zeros((1, 4, 95))),
+            r"Pose must have shape \(any, "
+            r"96\)",
+        ),
         (lambda path: write_cdf(path, "Pose", np.full((1, 4, 96), np.nan)), "Pose contains NaN"),
         (lambda path: write_cdf(path, "Pose", np.full((1, 4, 96), 1e9)), "m from the origin"),
     ],
@@ -78,5 +97,9 @@ def test_damage_is_one_sentence(tmp_path, damage, said):
 
 
 def test_another_folder_is_one_sentence(tmp_path):
-    with pytest.raises(DatasetError, match=r"S9.Videos does not exist, where the videos of Human3\.6M are expected"):
+    with pytest.raises(
+        DatasetError,
+        match=r"S9.Videos does not exist, where the videos of "
+        r"Human3\.6M are expected",
+    ):
         clips(tmp_path, Models())

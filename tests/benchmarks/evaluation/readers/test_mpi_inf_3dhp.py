@@ -23,7 +23,8 @@ def test_valid_frames_of_the_universal_joints_in_metres(tmp_path):
         truth = found[2].truth()
         (person,) = truth.people
         assert person.rows.tolist() == [0, 2, 3]
-        # The data set's order of joints: head top, neck, right arm, left arm, right leg, left leg, pelvis, …
+        # The data set's order of joints: head top, neck, right arm, left arm, right leg, left leg,
+        # pelvis, …
         for name, number in {
             "head_top": 0,
             "right_wrist": 4,
@@ -51,7 +52,11 @@ def replace(path, key, value):
         ("univ_annot3", np.full((4, 1, 17, 3), 1e9), "m from the origin"),
         ("valid_frame", np.ones((9, 1)), "univ_annot3 must have shape"),
         ("annot2", h5py.SoftLink("/annot3"), "annot2 is no array of the file itself"),
-        ("annot2", h5py.ExternalLink("other.mat", "annot2"), "annot2 is no array of the file itself"),
+        (
+            "annot2",
+            h5py.ExternalLink("other.mat", "annot2"),
+            "annot2 is no array of the file itself",
+        ),
     ],
 )
 def test_damage_is_one_sentence(tmp_path, key, value, said):
@@ -82,7 +87,9 @@ def test_values_in_other_files_are_not_read(tmp_path):
         clips(tmp_path, Models())[2].truth()
 
 
-@pytest.mark.parametrize("content", [b"", b"MATLAB 5.0 MAT-file", b"\x89HDF\r\n\x1a\n" + bytes(100)])
+@pytest.mark.parametrize(
+    "content", [b"", b"MATLAB 5.0 MAT-file", b"\x89HDF\r\n\x1a\n" + bytes(100)]
+)
 def test_what_is_no_hdf5_is_one_sentence(tmp_path, content):
     write_3dhp(tmp_path, JOINTS, VALID)
     (tmp_path / FILE).write_bytes(content)
@@ -91,5 +98,9 @@ def test_what_is_no_hdf5_is_one_sentence(tmp_path, content):
 
 
 def test_another_folder_is_one_sentence(tmp_path):
-    with pytest.raises(DatasetError, match=r"TS1 does not exist, where imageSequence and annot_data\.mat"):
+    with pytest.raises(
+        DatasetError,
+        match=r"TS1 does not exist, where imageSequence and "
+        r"annot_data\.mat",
+    ):
         clips(tmp_path, Models())

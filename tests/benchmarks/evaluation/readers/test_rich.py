@@ -34,7 +34,9 @@ def test_joints_are_those_of_smplx_in_the_world_and_in_the_camera(tmp_path, mode
     _, joints = smpl_formula(make_tables("smplx"), betas, rotations, trans[3])
     assert np.allclose(person.world.joints(SMPL22)[3], joints[:22], atol=1e-5)
     T = rigid(1, 3)[0]
-    assert np.allclose(person.camera.joints(SMPL22)[3], joints[:22] @ T[:3, :3].T + T[:3, 3], atol=1e-5)
+    assert np.allclose(
+        person.camera.joints(SMPL22)[3], joints[:22] @ T[:3, :3].T + T[:3, 3], atol=1e-5
+    )
 
 
 @pytest.mark.parametrize(

@@ -29,7 +29,12 @@ def table():
 def test_joints_are_in_the_camera_of_their_frames(tmp_path, table):
     write_3dpw(tmp_path, table)
     (clip,) = clips(tmp_path, Models())
-    assert (clip.name, clip.protocols, clip.rate, len(clip.pictures)) == ("downtown_arguing_00", ("3dpw",), 30, COUNT)
+    assert (clip.name, clip.protocols, clip.rate, len(clip.pictures)) == (
+        "downtown_arguing_00",
+        ("3dpw",),
+        30,
+        COUNT,
+    )
     assert not clip.alone
     truth = clip.truth()
     assert np.allclose(truth.intrinsics, K)
@@ -54,20 +59,31 @@ def test_with_smpl_and_a_regressor_joints_are_those_of_the_mesh(tmp_path, table)
     rotations = exp(table["poses"][1][frame].reshape(24, 3))
     vertices, _ = smpl_formula(tables, table["betas"][1], rotations, table["trans"][1][frame])
     T = table["cam_poses"][frame]
-    expected = (matrix @ (vertices @ T[:3, :3].T + T[:3, 3]))[[REGRESSED17.index(name) for name in LSP14]]
+    expected = (matrix @ (vertices @ T[:3, :3].T + T[:3, 3]))[
+        [REGRESSED17.index(name) for name in LSP14]
+    ]
     assert np.allclose(female.camera.joints(LSP14)[2], expected, atol=1e-6)
 
 
 @pytest.mark.parametrize(
     ("key", "value", "said"),
     [
-        ("jointPositions", [np.zeros((COUNT, 71))], r"jointPositions must have shape \(5, 72\), but has \(5, 71\)"),
+        (
+            "jointPositions",
+            [np.zeros((COUNT, 71))],
+            r"jointPositions must have shape \(5, 72\), "
+            r"but has \(5, 71\)",
+        ),
         ("jointPositions", [np.full((COUNT, 72), np.nan)], "jointPositions contains NaN"),
         ("jointPositions", [np.full((COUNT, 72), 1e6)], r"1e\+06 m from the origin"),
         ("jointPositions", [np.array([{}] * COUNT)], "an array of type .O8."),
         ("jointPositions", {}, "holds nobody"),
         ("campose_valid", [np.zeros(COUNT, bool)], "holds nobody|lacks campose_valid"),
-        ("cam_poses", np.zeros((9, 4, 4)), "is about 9 frames, but its folder in imageFiles holds 5"),
+        (
+            "cam_poses",
+            np.zeros((9, 4, 4)),
+            "is about 9 frames, but its folder in imageFiles holds 5",
+        ),
         ("cam_intrinsics", "a lens", "cam_intrinsics must hold numbers"),
     ],
 )

@@ -16,25 +16,42 @@ PQ, HLG, BT709 = 16, 18, 1  # transfer characteristics of ITU-T H.273
 BT2020 = 9  # primaries, and matrix of YUV
 
 
-def coded_frame(code: np.ndarray, transfer: int, bits: int = 10, matrix: int = BT2020, primaries: int = BT2020):
-    """Make a frame 4:4:4 from R'G'B' codes (H, W, 3) from 0 to 1, by the equations of ITU-R BT.2020, video range."""
+def coded_frame(
+    code: np.ndarray, transfer: int, bits: int = 10, matrix: int = BT2020, primaries: int = BT2020
+):
+    """Make a frame 4:4:4 from R'G'B' codes (H, W, 3) from 0 to 1, by the equations of ITU-R
+    BT.2020, video range.
+    """
     y = code @ np.array([0.2627, 0.6780, 0.0593])
-    planes = (219 * y + 16, 224 * (code[..., 2] - y) / 1.8814 + 128, 224 * (code[..., 0] - y) / 1.4746 + 128)
+    planes = (
+        219 * y + 16,
+        224 * (code[..., 2] - y) / 1.8814 + 128,
+        224 * (code[..., 0] - y) / 1.4746 + 128,
+    )
     frame = av.VideoFrame(code.shape[1], code.shape[0], "yuv444p10le" if bits == 10 else "yuv444p")
     for plane, values in zip(frame.planes, planes, strict=True):
         kind = np.uint16 if bits == 10 else np.uint8
         rows = np.zeros((plane.height, plane.line_size // kind().itemsize), kind)
         rows[:, : plane.width] = np.rint(values * 2 ** (bits - 8))
         plane.update(rows.tobytes())
-    frame.color_trc, frame.color_primaries, frame.colorspace, frame.color_range = transfer, primaries, matrix, 1
+    frame.color_trc, frame.color_primaries, frame.colorspace, frame.color_range = (
+        transfer,
+        primaries,
+        matrix,
+        1,
+    )
     return frame
 
 
-def write_frames(path: Path, frames: Iterable, codec: str, pixels: str, rate: int = 25, **options: str) -> Path:
+def write_frames(
+    path: Path, frames: Iterable, codec: str, pixels: str, rate: int = 25, **options: str
+) -> Path:
     """Encode frames with the tags of the first one; frame k is shown at k / rate."""
     frames = [frame.reformat(format=pixels) for frame in frames]
     with av.open(str(path), "w") as container:
-        stream = container.add_stream(codec, rate=rate, options={k.replace("_", "-"): v for k, v in options.items()})
+        stream = container.add_stream(
+            codec, rate=rate, options={k.replace("_", "-"): v for k, v in options.items()}
+        )
         stream.width, stream.height, stream.pix_fmt = frames[0].width, frames[0].height, pixels
         context, first = stream.codec_context, frames[0]
         context.thread_count = 1

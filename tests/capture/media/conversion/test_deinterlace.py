@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Deinterlacing: images of one moment, and exactly as many of them, at the same times, however they are reached."""
+"""Deinterlacing: images of one moment, and exactly as many of them, at the same times, however they
+are reached.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +45,9 @@ def test_images_are_those_of_the_first_field(order: str) -> None:
     shown = list(deinterlaced(woven))
     assert times(shown) == times(woven)
     for k, (frame, comb) in enumerate(zip(shown, woven, strict=True)):
-        whole = grey(av.VideoFrame.from_ndarray(pictures[2 * k], format="rgb24").reformat(format="yuv420p"))
+        whole = grey(
+            av.VideoFrame.from_ndarray(pictures[2 * k], format="rgb24").reformat(format="yuv420p")
+        )
         assert np.abs(grey(comb) - whole).max() > 100
         assert np.abs(grey(frame) - whole).max() < 12, k  # also of the first and the last frame
         first = slice(0 if order == "tff" else 1, None, 2)
@@ -65,13 +69,18 @@ def test_no_frame_is_added_or_lost(count: int) -> None:
 
 
 def test_progressive_frames_are_the_very_same() -> None:
-    frames = marked([av.VideoFrame.from_ndarray(moving_bar(k), format="rgb24") for k in range(5)], "prog")
+    frames = marked(
+        [av.VideoFrame.from_ndarray(moving_bar(k), format="rgb24") for k in range(5)], "prog"
+    )
     assert all(a is b for a, b in zip(deinterlaced(frames), frames, strict=True))
 
 
 def test_progressive_frames_among_interlaced_ones_are_left_alone() -> None:
     woven = with_fields([moving_bar(k) for k in range(24)])
-    mixed = [marked([frame], "prog")[0] if k in (0, 1, 4, 5, 6, 11) else frame for k, frame in enumerate(woven)]
+    mixed = [
+        marked([frame], "prog")[0] if k in (0, 1, 4, 5, 6, 11) else frame
+        for k, frame in enumerate(woven)
+    ]
     for k, frame in enumerate(mixed):
         frame.pts = 10 * k + k % 3
     shown = list(deinterlaced(mixed))
@@ -89,7 +98,10 @@ def test_the_frame_before_makes_a_late_begin_the_same() -> None:
 
 
 def test_a_change_of_size_or_format_loses_no_frame() -> None:
-    large, small = with_fields([moving_bar(k) for k in range(6)]), with_fields([moving_bar(k)[:32] for k in range(6)])
+    large, small = (
+        with_fields([moving_bar(k) for k in range(6)]),
+        with_fields([moving_bar(k)[:32] for k in range(6)]),
+    )
     other = with_fields([moving_bar(k) for k in range(6)], pixels="yuv422p")
     frames = [*large, *small, *other]
     shown = list(deinterlaced(frames))
@@ -133,19 +145,23 @@ def test_a_filter_that_fails_loses_no_frame(monkeypatch, broken: str, after: int
 def test_hdr_is_still_known_afterwards() -> None:
     frames = [coded_frame(moving_bar(k) / 255, HLG) for k in range(4)]
     shown = list(deinterlaced(marked(frames, "tff")))
-    assert {(f.color_trc, f.color_primaries, int(f.colorspace), int(f.color_range)) for f in shown} == {
-        (HLG, BT2020, BT2020, 1)
-    }
+    assert {
+        (f.color_trc, f.color_primaries, int(f.colorspace), int(f.color_range)) for f in shown
+    } == {(HLG, BT2020, BT2020, 1)}
     assert hdr_rgb(shown[0]) is not None
 
 
-def write(path: Path, count: int, rate: int, codec: str = "libx264", order: str = "tff", **options: str) -> Path:
+def write(
+    path: Path, count: int, rate: int, codec: str = "libx264", order: str = "tff", **options: str
+) -> Path:
     """Encode ``count`` interlaced frames of a moving bar."""
     pixels = "yuv422p10le" if codec == "prores_ks" else "yuv420p"
     frames = with_fields([moving_bar(k) for k in range(2 * count)], order, pixels)
     flags = "+ildct+ilme" if codec == "mpeg2video" else "+ildct"
     with av.open(str(path), "w") as container:
-        stream = container.add_stream(codec, rate=rate, options={"flags": flags, "threads": "1", **options})
+        stream = container.add_stream(
+            codec, rate=rate, options={"flags": flags, "threads": "1", **options}
+        )
         stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, pixels
         for k, frame in enumerate(frames):
             frame.pts, frame.time_base = k, 1 / stream.codec_context.framerate
@@ -179,7 +195,9 @@ def test_files_are_read_without_combs(tmp_path: Path, name: str) -> None:
         frames = list(video)
     assert len(frames) == len(decoded) == 12
     start = decoded[0].pts
-    assert [f.timestamp_s for f in frames] == pytest.approx([float((f.pts - start) * f.time_base) for f in decoded])
+    assert [f.timestamp_s for f in frames] == pytest.approx(
+        [float((f.pts - start) * f.time_base) for f in decoded]
+    )
     assert min(combs(frame.to_ndarray(format="rgb24")) for frame in decoded) > 100
     assert max(combs(frame.image_rgb) for frame in frames) < 40
 
@@ -192,7 +210,11 @@ def images(path: Path, wanted: VideoRange | None = None) -> dict[int, tuple[floa
 def test_ranges_show_the_frames_of_the_whole(tmp_path: Path) -> None:
     path = write(tmp_path / "a.mp4", 30, 10)
     whole = images(path)
-    for wanted, indices in ((VideoRange(0.5, 1.2), range(5, 13)), (VideoRange(2.9), [29]), (VideoRange(0, 0.05), [0])):
+    for wanted, indices in (
+        (VideoRange(0.5, 1.2), range(5, 13)),
+        (VideoRange(2.9), [29]),
+        (VideoRange(0, 0.05), [0]),
+    ):
         part = images(path, wanted)
         assert list(part) == list(indices)
         for index, (time, image) in part.items():
@@ -232,7 +254,9 @@ def test_fields_that_are_frames_of_their_own_stay_as_they_are(tmp_path: Path) ->
         stream = container.add_stream("libx265", rate=50, options=options)
         stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
         for k in range(6):
-            frame = av.VideoFrame.from_ndarray(moving_bar(k), format="rgb24").reformat(format="yuv420p")
+            frame = av.VideoFrame.from_ndarray(moving_bar(k), format="rgb24").reformat(
+                format="yuv420p"
+            )
             frame.pts = k
             container.mux(stream.encode(frame))
         container.mux(stream.encode(None))

@@ -8,7 +8,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from scope.scope_addon.capture.media.conversion.hdr import compress, hdr_rgb, hlg_light, pq_code, pq_light
+from scope.scope_addon.capture.media.conversion.hdr import (
+    compress,
+    hdr_rgb,
+    hlg_light,
+    pq_code,
+    pq_light,
+)
 from scope.scope_addon.capture.media.frame_readers import rgb
 from scope.scope_addon.capture.media.video import open_video
 
@@ -38,7 +44,9 @@ def test_the_curves_are_those_of_the_standards() -> None:
     np.testing.assert_allclose(pq_code(light), [7.3e-7, 0.508078, 0.751827, 1.0], atol=1e-6)
     np.testing.assert_allclose(pq_light(pq_code(light)), light, atol=1e-6)
     np.testing.assert_allclose(hlg_light(np.array([0.0, 0.5, 1.0])), [0.0, 1 / 12, 1.0], atol=1e-6)
-    np.testing.assert_allclose(compress(np.array([0.0, 50.0, 1000.0, 9000.0])), [0.0, 50.0, 203.0, 203.0], atol=1e-6)
+    np.testing.assert_allclose(
+        compress(np.array([0.0, 50.0, 1000.0, 9000.0])), [0.0, 50.0, 203.0, 203.0], atol=1e-6
+    )
     slope = np.diff(compress(np.linspace(0, 1000, 2001)))
     assert (slope > 0).all()  # highlights stay distinct
     assert np.abs(np.diff(slope)).max() < 0.02  # the knee is no edge
@@ -47,12 +55,16 @@ def test_the_curves_are_those_of_the_standards() -> None:
 @pytest.mark.parametrize("bits", [8, 10])
 @pytest.mark.parametrize("transfer", [PQ, HLG])
 def test_greys_have_the_light_that_they_stand_for(transfer: int, bits: int) -> None:
-    shown = {light: converted(grey(code, transfer, bits=bits)) for light, code in LEVELS[transfer].items()}
+    shown = {
+        light: converted(grey(code, transfer, bits=bits))
+        for light, code in LEVELS[transfer].items()
+    }
     for image in shown.values():
         assert image.dtype == np.uint8
         assert np.ptp(image) <= 1  # grey, and even
     assert shown[0.0].max() == 0
-    assert shown[26.0].mean() == pytest.approx(255 * (26 / 203) ** (1 / 2.4), abs=3)  # under the knee
+    # under the knee
+    assert shown[26.0].mean() == pytest.approx(255 * (26 / 203) ** (1 / 2.4), abs=3)
     assert 225 < shown[203.0].mean() < 240  # leaves room for highlights
     assert shown[1000.0].min() >= 254
 
@@ -62,12 +74,20 @@ def test_what_is_brighter_than_the_peak_is_white() -> None:
 
 
 # Codes of SDR: skins, grass, jeans, and BT.709's red, which BT.2020 holds well inside.
-COLOURS = np.array([[217, 158, 128], [140, 89, 64], [76, 46, 31], [96, 120, 70], [60, 80, 120], [200, 30, 30]]) / 255
-TO_2020 = np.array([[0.6274, 0.3293, 0.0433], [0.0691, 0.9195, 0.0114], [0.0164, 0.0880, 0.8956]])  # ITU-R BT.2087
+COLOURS = (
+    np.array(
+        [[217, 158, 128], [140, 89, 64], [76, 46, 31], [96, 120, 70], [60, 80, 120], [200, 30, 30]]
+    )
+    / 255
+)
+# ITU-R BT.2087
+TO_2020 = np.array([[0.6274, 0.3293, 0.0433], [0.0691, 0.9195, 0.0114], [0.0164, 0.0880, 0.8956]])
 
 
 def as_hdr(sdr: np.ndarray, transfer: int, from_709: np.ndarray = TO_2020) -> np.ndarray:
-    """Calculate the codes that show SDR colours with white at 203 cd/m²: inverses of what is tested, in full."""
+    """Calculate the codes that show SDR colours with white at 203 cd/m²: inverses of what is
+    tested, in full.
+    """
     light = 203 * sdr**2.4 @ from_709.T
     if transfer == PQ:
         power = (light / 1e4) ** 0.1593017578125
@@ -103,14 +123,21 @@ def to_xyz(primaries: tuple[tuple[float, float], ...], white: tuple[float, float
 
 
 def adaptation_from_d65(white: tuple[float, float]) -> np.ndarray:
-    cones = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])  # Bradford
+    # Bradford
+    cones = np.array(
+        [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]]
+    )
     return np.linalg.inv(cones) @ np.diag(cones @ xyz(white) / (cones @ xyz(D65))) @ cones
 
 
 @pytest.mark.parametrize("transfer", [PQ, HLG])
 @pytest.mark.parametrize(("primaries", "white"), [(11, DCI), (12, D65)])
 def test_colours_of_p3_come_back(transfer: int, primaries: int, white: tuple[float, float]) -> None:
-    to_p3 = np.linalg.inv(to_xyz(P3_PRIMARIES, white)) @ adaptation_from_d65(white) @ to_xyz(SDR_PRIMARIES, D65)
+    to_p3 = (
+        np.linalg.inv(to_xyz(P3_PRIMARIES, white))
+        @ adaptation_from_d65(white)
+        @ to_xyz(SDR_PRIMARIES, D65)
+    )
     patches = np.repeat(as_hdr(COLOURS, transfer, to_p3), 8, 0)[None].repeat(4, 0)
     error = converted(coded_frame(patches, transfer, primaries=primaries))[2, 4::8] - 255 * COLOURS
     assert np.abs(error[:-1]).max() < 8, error.round()
@@ -133,12 +160,16 @@ def test_damaged_tags_leave_greys_alone(matrix: int, primaries: int) -> None:
 
 def test_primaries_of_sdr_are_kept() -> None:
     red = np.tile([0.6, 0.2, 0.2], (4, 4, 1))
-    wide, narrow = (converted(coded_frame(red, PQ, primaries=p))[0, 0].astype(int) for p in (BT2020, BT709))
+    wide, narrow = (
+        converted(coded_frame(red, PQ, primaries=p))[0, 0].astype(int) for p in (BT2020, BT709)
+    )
     assert wide[0] - wide[1] > narrow[0] - narrow[1] + 10, (wide, narrow)
 
 
 def picture() -> np.ndarray:
-    """Codes of SDR: dark at the left, light at the right, and a light corner, so that every rotation differs."""
+    """Codes of SDR: dark at the left, light at the right, and a light corner, so that every
+    rotation differs.
+    """
     ramp = np.tile(np.linspace(0.1, 0.7, 64)[:, None], (48, 1, 3))
     ramp[:16, :24] = 0.8, 0.6, 0.5
     return ramp
@@ -168,7 +199,9 @@ def test_files_show_what_was_filmed(tmp_path: Path, name: str, transfer: int) ->
 
 
 def test_rotated_footage_of_uneven_rate_is_as_its_sdr_version(tmp_path: Path) -> None:
-    sdr = [av.VideoFrame.from_ndarray(np.rint(255 * picture()).astype(np.uint8), format="rgb24")] * 6
+    sdr = [
+        av.VideoFrame.from_ndarray(np.rint(255 * picture()).astype(np.uint8), format="rgb24")
+    ] * 6
     sdr[0].color_trc = BT709
     write_frames(tmp_path / "sdr.mp4", sdr, "libx264", "yuv420p", crf="5", bf="0")
     hdr = [coded_frame(as_hdr(picture(), HLG), HLG)] * 6
@@ -193,7 +226,9 @@ def test_rotated_footage_of_uneven_rate_is_as_its_sdr_version(tmp_path: Path) ->
 def test_pictures_in_hdr_are_converted_too(tmp_path: Path) -> None:
     frame = coded_frame(as_hdr(picture(), PQ), PQ)
     need_encoder("libsvtav1")
-    path = write_frames(tmp_path / "a.avif", [frame], "libsvtav1", "yuv420p10le", crf="10", preset="10")
+    path = write_frames(
+        tmp_path / "a.avif", [frame], "libsvtav1", "yuv420p10le", crf="10", preset="10"
+    )
     with open_video(path) as video:
         image = next(iter(video)).image_rgb
     assert np.median(np.abs(image - 255 * picture())) < 5

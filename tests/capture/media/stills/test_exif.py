@@ -31,7 +31,8 @@ def jpeg_with_exif(image: np.ndarray, tiff: bytes) -> bytes:
     return data[:2] + b"\xff\xe1" + struct.pack(">H", len(segment) + 2) + segment + data[2:]
 
 
-# Where each corner must come to lie, from the EXIF standard: orientation -> position of row 0 and column 0.
+# Where each corner must come to lie, from the EXIF standard: orientation -> position of row 0 and
+# column 0.
 UPRIGHT = {1: "rgbw", 2: "grwb", 3: "wbgr", 4: "bwrg", 5: "rbgw", 6: "brwg", 7: "wgbr", 8: "gwrb"}
 
 
@@ -43,7 +44,9 @@ def test_exif_orientation_and_focal_length(tmp_path, orientation, endian):
     video = open_video(path)
     image = next(iter(video)).image_rgb
     assert corners(image) == UPRIGHT[orientation]
-    assert (video.width, video.height) == image.shape[1::-1] == ((W, H) if orientation < 5 else (H, W))
+    assert (
+        (video.width, video.height) == image.shape[1::-1] == ((W, H) if orientation < 5 else (H, W))
+    )
     assert video.focal_35mm == 26
     theirs = cv2.cvtColor(cv2.imread(str(path)), cv2.COLOR_BGR2RGB)
     np.testing.assert_array_equal(image, theirs)
@@ -54,25 +57,39 @@ def test_orientation_of_png_webp_and_tiff(tmp_path):
     png = encode(".png", corner_image())
     cut = png.index(b"IDAT") - 4
     chunk = struct.pack(">I", len(block)) + b"eXIf" + block
-    (tmp_path / "a.png").write_bytes(png[:cut] + chunk + struct.pack(">I", zlib.crc32(chunk[4:])) + png[cut:])
+    (tmp_path / "a.png").write_bytes(
+        png[:cut] + chunk + struct.pack(">I", zlib.crc32(chunk[4:])) + png[cut:]
+    )
     webp = encode(".webp", corner_image())
     block += b"\0" * (len(block) % 2)
-    extended = b"VP8X" + struct.pack("<II", 10, 8) + struct.pack("<I", W - 1)[:3] + struct.pack("<I", H - 1)[:3]
+    extended = (
+        b"VP8X"
+        + struct.pack("<II", 10, 8)
+        + struct.pack("<I", W - 1)[:3]
+        + struct.pack("<I", H - 1)[:3]
+    )
     body = b"WEBP" + extended + webp[12:] + b"EXIF" + struct.pack("<I", len(block)) + block
     (tmp_path / "a.webp").write_bytes(b"RIFF" + struct.pack("<I", len(body)) + body)
     tiff = bytearray(encode(".tiff", corner_image()))
     start = struct.unpack_from("<I", tiff, 4)[0]
     count = struct.unpack_from("<H", tiff, start)[0]
     entries = [bytes(tiff[start + 2 + 12 * i : start + 14 + 12 * i]) for i in range(count)]
-    entries = sorted([*entries, struct.pack("<HHIHH", 0x0112, 3, 1, 6, 0)], key=lambda e: struct.unpack("<H", e[:2])[0])
+    entries = sorted(
+        [*entries, struct.pack("<HHIHH", 0x0112, 3, 1, 6, 0)],
+        key=lambda e: struct.unpack("<H", e[:2])[0],
+    )
     struct.pack_into("<I", tiff, 4, len(tiff))
-    (tmp_path / "a.tiff").write_bytes(tiff + struct.pack("<H", count + 1) + b"".join(entries) + b"\0\0\0\0")
+    (tmp_path / "a.tiff").write_bytes(
+        tiff + struct.pack("<H", count + 1) + b"".join(entries) + b"\0\0\0\0"
+    )
     for name in ("a.png", "a.webp", "a.tiff"):
         assert corners(next(iter(open_video(tmp_path / name))).image_rgb) == "brwg", name
 
 
 def test_damaged_exif_counts_as_absent(tmp_path):
-    for i, block in enumerate((b"II*\0", b"II*\0\xff\xff\xff\xff", b"", exif_block(6)[:12], exif_block(99), b"XX" * 9)):
+    for i, block in enumerate(
+        (b"II*\0", b"II*\0\xff\xff\xff\xff", b"", exif_block(6)[:12], exif_block(99), b"XX" * 9)
+    ):
         path = tmp_path / f"{i}.jpg"
         path.write_bytes(jpeg_with_exif(corner_image(), block))
         assert corners(next(iter(open_video(path))).image_rgb) == "rgbw"

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Phone pictures: in one piece or in tiles, rotated, with a focal length, damaged, and malicious."""
+"""Phone pictures: in one piece or in tiles, rotated, with a focal length, damaged, and
+malicious.
+"""
 
 from __future__ import annotations
 
@@ -48,7 +50,8 @@ def test_tiles_are_assembled(tmp_path: Path, tile: int | None, name: str) -> Non
 @pytest.mark.parametrize(
     ("turns", "expected"),
     [
-        ([("irot", 1)], lambda a: a.transpose(1, 0, 2)[::-1]),  # 90° anticlockwise: right becomes top
+        # 90° anticlockwise: right becomes top
+        ([("irot", 1)], lambda a: a.transpose(1, 0, 2)[::-1]),
         ([("irot", 2)], lambda a: a[::-1, ::-1]),
         ([("irot", 3)], lambda a: a[::-1].transpose(1, 0, 2)),
         ([("imir", 0)], lambda a: a[::-1]),
@@ -57,7 +60,9 @@ def test_tiles_are_assembled(tmp_path: Path, tile: int | None, name: str) -> Non
     ],
     ids=["left turn", "half turn", "right turn", "upside down", "mirrored", "mirrored, left turn"],
 )
-def test_rotations_and_mirroring_are_applied(tmp_path: Path, turns: list, expected, tile: int | None) -> None:
+def test_rotations_and_mirroring_are_applied(
+    tmp_path: Path, turns: list, expected, tile: int | None
+) -> None:
     found = read(tmp_path / "a.heic", heic(slopes(), tile, turns))
     wanted = expected(slopes().astype(int))
     assert found.shape == wanted.shape
@@ -151,7 +156,13 @@ def test_decoding_stops_at_the_maximum_number_of_pixels(tmp_path: Path) -> None:
 def test_surplus_tiles_are_refused() -> None:
     layout = read_layout(heic(slopes(), 64))
     assert layout is not None
-    assert assemble(replace(layout, size=(64, 64)), {n: np.zeros((64, 64, 3), np.uint8) for n in range(2, 8)}) is None
+    assert (
+        assemble(
+            replace(layout, size=(64, 64)),
+            {n: np.zeros((64, 64, 3), np.uint8) for n in range(2, 8)},
+        )
+        is None
+    )
 
 
 def test_a_grid_in_the_idat_box_is_found(tmp_path: Path) -> None:

@@ -34,8 +34,15 @@ def avif(path: Path, image_rgb: np.ndarray) -> Path:
     need_encoder("libsvtav1")
     with av.open(str(path), "w", format="avif") as container:
         stream = container.add_stream("libsvtav1", rate=1)
-        stream.width, stream.height, stream.pix_fmt = image_rgb.shape[1], image_rgb.shape[0], "yuv420p"
-        for packet in [*stream.encode(av.VideoFrame.from_ndarray(image_rgb, "rgb24")), *stream.encode()]:
+        stream.width, stream.height, stream.pix_fmt = (
+            image_rgb.shape[1],
+            image_rgb.shape[0],
+            "yuv420p",
+        )
+        for packet in [
+            *stream.encode(av.VideoFrame.from_ndarray(image_rgb, "rgb24")),
+            *stream.encode(),
+        ]:
             container.mux(packet)
     return path
 
@@ -65,7 +72,11 @@ def test_damaged_avif(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         with pytest.raises(VideoError, match=r"cut\.avif is an image that cannot be decoded"):
             open_video(tmp_path / "cut.avif")
     monkeypatch.setitem(sys.modules, "av", None)
-    with pytest.raises(VideoError, match=r"a\.avif is a video, HEIC or AVIF, which needs the package 'av'.*JPEG"):
+    with pytest.raises(
+        VideoError,
+        match=r"a\.avif is a video, HEIC or AVIF, which needs the "
+        r"package 'av'.*JPEG",
+    ):
         open_video(tmp_path / "a.avif")
 
 
@@ -77,7 +88,9 @@ def test_other_formats_are_refused_with_advice(tmp_path: Path, suffix: str) -> N
         path.write_bytes(b"v/1\x01" + bytes(99))
     else:
         cv2.imwrite(str(path), GREY.astype(np.float32 if suffix in (".hdr", ".pfm") else np.uint8))
-    with pytest.raises(VideoError, match=rf"render\{suffix} is an image in a format that is not supported; .*PNG"):
+    with pytest.raises(
+        VideoError, match=rf"render\{suffix} is an image in a format that is not supported; .*PNG"
+    ):
         open_video(path)
     for k in (1, 2):  # whatever the name
         (tmp_path / f"a_{k}.png").write_bytes(path.read_bytes())
@@ -85,12 +98,19 @@ def test_other_formats_are_refused_with_advice(tmp_path: Path, suffix: str) -> N
         open_video(tmp_path / "a_#.png")
 
 
-@pytest.mark.parametrize("asked", [("5", None, None), ("00:00:01:00", None, None), (None, None, "9")])
-def test_a_range_of_a_single_picture_gives_a_warning(tmp_path: Path, asked: tuple[str | None, ...]) -> None:
+@pytest.mark.parametrize(
+    "asked", [("5", None, None), ("00:00:01:00", None, None), (None, None, "9")]
+)
+def test_a_range_of_a_single_picture_gives_a_warning(
+    tmp_path: Path, asked: tuple[str | None, ...]
+) -> None:
     (tmp_path / "a.png").write_bytes(png(GREY))
     with open_video(tmp_path / "a.png", parse_range(*asked)) as video:
         assert len(list(video)) == 1
-        assert "a.png is a single image: a start, an end or a frame rate has no effect" in video.warnings
+        assert (
+            "a.png is a single image: a start, an end or a frame rate has no effect"
+            in video.warnings
+        )
     with open_video(tmp_path / "a.png") as video:
         assert not video.warnings
 

@@ -14,8 +14,13 @@ LONGEST = np.array(2**62, np.int64)
 
 
 def looping(path: Path, *, while_bright: bool = False) -> Path:
-    """Write a network that loops for ever, for every image, or for those of which a pixel exceeds 1000."""
-    inside = [helper.make_node("Identity", ["go"], ["go_on"]), helper.make_node("Sin", ["x"], ["y"])]
+    """Write a network that loops for ever, for every image, or for those of which a pixel exceeds
+    1000.
+    """
+    inside = [
+        helper.make_node("Identity", ["go"], ["go_on"]),
+        helper.make_node("Sin", ["x"], ["y"]),
+    ]
     body = helper.make_graph(
         inside,
         "body",
@@ -36,11 +41,15 @@ def looping(path: Path, *, while_bright: bool = False) -> Path:
     ]
     out = helper.make_tensor_value_info("out", TensorProto.FLOAT, [1, 3, 32, 32])
     threshold = np.array(1000.0 if while_bright else -1.0, np.float32)
-    return save(path, nodes, [picture_input(32, 32)], [out], {"longest": LONGEST, "threshold": threshold})
+    return save(
+        path, nodes, [picture_input(32, 32)], [out], {"longest": LONGEST, "threshold": threshold}
+    )
 
 
 def huge(path: Path, elements: int) -> Path:
-    """Write a network with a constant of so many floats, which depends on the image, so that it is made in a run."""
+    """Write a network with a constant of so many floats, which depends on the image, so that it is
+    made in a run.
+    """
     nodes = [
         helper.make_node("ReduceMin", ["images"], ["least"], keepdims=0),
         helper.make_node("Cast", ["least"], ["zero"], to=TensorProto.INT64),

@@ -10,10 +10,12 @@ import pytest
 from scope.scope_addon.capture.perception.adapters.box_detector import BoxDetector, cells
 
 WIDTH, HEIGHT = 160, 96  # of the networks
-IMAGE = np.zeros((251, 333, 3), np.uint8)  # 251 / 96 is more than 333 / 160: as high as the network's picture
+# 251 / 96 is more than 333 / 160: as high as the network's picture
+IMAGE = np.zeros((251, 333, 3), np.uint8)
 SCALE = HEIGHT / 251
 COLUMNS = round(333 * SCALE)  # 127 of the 160
-# The person in the image, left, top, right, bottom from its top left edge; one of a pixel is half of it left.
+# The person in the image, left, top, right, bottom from its top left edge; one of a pixel is half
+# of it left.
 PERSON = np.array([50.0, 20.0, 130.0, 230.0])
 CELLS = len(cells(WIDTH, HEIGHT))
 
@@ -25,7 +27,9 @@ def in_picture(box: np.ndarray, left: float = 0.0) -> np.ndarray:
 
 
 def center_size(box: np.ndarray) -> np.ndarray:
-    return np.array([(box[0] + box[2]) / 2, (box[1] + box[3]) / 2, box[2] - box[0], box[3] - box[1]])
+    return np.array(
+        [(box[0] + box[2]) / 2, (box[1] + box[3]) / 2, box[2] - box[0], box[3] - box[1]]
+    )
 
 
 def assert_finds_the_person(path: Path, kind: str, score: float = 0.9) -> None:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An image with three coloured spots at known pixels, regions of it, and what networks must find there."""
+"""An image with three coloured spots at known pixels, regions of it, and what networks must find
+there.
+"""
 
 from __future__ import annotations
 

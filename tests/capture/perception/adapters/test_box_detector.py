@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What all types of detectors share: the JSON beside the network, unknown graphs, and values that are not finite."""
+"""What all types of detectors share: the JSON beside the network, unknown graphs, and values that
+are not finite.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +41,9 @@ def test_a_graph_of_unknown_type_is_refused(tmp_path: Path) -> None:
 def test_nan_and_infinity_are_ignored(tmp_path: Path, value: float) -> None:
     rows, person = yolox_rows(80)
     rows[50:60] = value
-    detector = BoxDetector(fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, {"output": rows[None]}), threads=1)
+    detector = BoxDetector(
+        fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, {"output": rows[None]}), threads=1
+    )
     scores = [found.score for found in detector.detect(IMAGE)]
     assert len(scores) > 0  # the person, whom they do not hide
     assert np.isfinite(scores).all()

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Outputs of each kind of detector.
 
-YOLOX: boxes in pixels or relative to their cells. YOLOv8: a column per box. YOLOv4: boxes as fractions of the stretched
-image, and scores, in either order. A graph that has already suppressed all but the best boxes. MMDeploy's detectors,
-whose normalization only their JSON says.
+YOLOX: boxes in pixels or relative to their cells. YOLOv8: a column per box. YOLOv4: boxes as
+fractions of the stretched image, and scores, in either order. A graph that has already suppressed
+all but the best boxes. MMDeploy's detectors, whose normalization only their JSON says.
 """
 
 from __future__ import annotations
@@ -33,7 +33,9 @@ from .person_in_picture import (
 @pytest.mark.parametrize("classes", [1, 80])
 def test_yolox_decoded(tmp_path: Path, classes: int) -> None:
     rows, _ = yolox_rows(classes)
-    assert_finds_the_person(fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, {"output": rows[None]}), "yolox")
+    assert_finds_the_person(
+        fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, {"output": rows[None]}), "yolox"
+    )
 
 
 def test_yolox_raw(tmp_path: Path) -> None:
@@ -48,7 +50,9 @@ def test_yolox_raw(tmp_path: Path) -> None:
                 raw[k, 2:4] = np.log(rows[k, 2:4] / side)
                 k += 1
     assert k == len(raw)
-    assert_finds_the_person(fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, {"output": raw[None]}), "yolox")
+    assert_finds_the_person(
+        fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, {"output": raw[None]}), "yolox"
+    )
 
 
 def test_yolov8(tmp_path: Path) -> None:
@@ -57,7 +61,9 @@ def test_yolov8(tmp_path: Path) -> None:
     columns[:5, 12] = [*center_size(in_picture(PERSON, left)), 0.9]
     columns[:5, 13] = [*(center_size(in_picture(PERSON, left)) + 1), 0.7]
     columns[[0, 1, 2, 3, 7], 100] = [50, 50, 40, 40, 0.99]  # a car
-    assert_finds_the_person(fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, {"output0": columns[None]}), "yolov8")
+    assert_finds_the_person(
+        fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, {"output0": columns[None]}), "yolov8"
+    )
 
 
 @pytest.mark.parametrize("order", [("boxes", "confs"), ("confs", "boxes")])
@@ -72,7 +78,10 @@ def test_yolov4(tmp_path: Path, order: tuple[str, str]) -> None:
 
 
 def test_different_numbers_of_boxes_and_scores_are_refused(tmp_path: Path) -> None:
-    outputs = {"boxes": np.zeros((1, 40, 1, 4), np.float32), "confs": np.zeros((1, 39, 80), np.float32)}
+    outputs = {
+        "boxes": np.zeros((1, 40, 1, 4), np.float32),
+        "confs": np.zeros((1, 39, 80), np.float32),
+    }
     path = fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, outputs)
     (tmp_path / "m.json").write_text('{"type": "yolov4"}')
     with pytest.raises(ModelFileError, match=r"do not match a yolov4 detector.*m\.json"):
@@ -83,7 +92,9 @@ def test_end_to_end(tmp_path: Path) -> None:
     rows = np.zeros((1, 300, 6), np.float32)
     rows[0, 0] = [10, 10, 50, 50, 0.99, 2]
     rows[0, 1] = [*in_picture(PERSON, (WIDTH - COLUMNS) // 2), 0.9, 0]
-    assert_finds_the_person(fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, {"output0": rows}), "end_to_end")
+    assert_finds_the_person(
+        fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, {"output0": rows}), "end_to_end"
+    )
 
 
 def test_detections_need_their_normalization(tmp_path: Path) -> None:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The JSON beside a network: every entry with values it may have, and those that are refused by their names."""
+"""The JSON beside a network: every entry with values it may have, and those that are refused by
+their names.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +9,11 @@ import json
 from pathlib import Path
 
 import pytest
-from scope.scope_addon.capture.perception.adapters.description import Description, description_path, read_description
+from scope.scope_addon.capture.perception.adapters.description import (
+    Description,
+    description_path,
+    read_description,
+)
 from scope.solver.errors import ModelFileError
 
 TYPES = ("yolox", "simcc")
@@ -64,14 +70,18 @@ def test_an_entry_is_read(tmp_path: Path, key: str, given: object, expected: obj
         ("colour", "rgb", "unknown entry 'colour'"),
     ],
 )
-def test_a_value_that_means_nothing_is_refused(tmp_path: Path, key: str, given: object, expected: str) -> None:
+def test_a_value_that_means_nothing_is_refused(
+    tmp_path: Path, key: str, given: object, expected: str
+) -> None:
     with pytest.raises(ModelFileError, match=r"m\.json") as caught:
         read(tmp_path, json.dumps({key: given}))
     assert key in str(caught.value)
     assert expected in str(caught.value)
 
 
-@pytest.mark.parametrize("text", ['{"std": NaN}', '{"mean": 1e400}', '{"mean": 1e31}', "[]", "{", "", "[" * 100_000])
+@pytest.mark.parametrize(
+    "text", ['{"std": NaN}', '{"mean": 1e400}', '{"mean": 1e31}', "[]", "{", "", "[" * 100_000]
+)
 def test_what_is_no_object_of_finite_numbers_is_refused(tmp_path: Path, text: str) -> None:
     with pytest.raises(ModelFileError, match=r"m\.json"):
         read(tmp_path, text)

@@ -33,7 +33,9 @@ def refused(opens: Open, path: Path, says: str | None = None) -> None:
 
 
 @OPENERS
-@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 torch", b"\x80\x04 pickle", b"text\n" * 99, b"\xff" * 99])
+@pytest.mark.parametrize(
+    "content", [b"", b"PK\x03\x04 torch", b"\x80\x04 pickle", b"text\n" * 99, b"\xff" * 99]
+)
 def test_files_that_are_not_onnx(tmp_path: Path, opens: Open, content: bytes) -> None:
     (tmp_path / "m.onnx").write_bytes(content)
     refused(opens, tmp_path / "m.onnx", "not an ONNX model")
@@ -69,15 +71,20 @@ def test_a_file_larger_than_a_protocol_buffer_is_refused(tmp_path: Path, opens: 
 
 def boxes_and_scores(path: Path) -> Path:
     """Write a detector with MMDeploy's outputs, with one person."""
-    path.with_suffix(".json").write_text('{"type": "detections", "mean": 0, "std": 1, "channel_order": "bgr"}')
+    path.with_suffix(".json").write_text(
+        '{"type": "detections", "mean": 0, "std": 1, "channel_order": "bgr"}'
+    )
     boxes, label = np.array([[[4, 4, 28, 28, 0.9]]], np.float32), np.zeros((1, 1), np.int64)
     return fixed(path, 32, 32, {"dets": boxes, "labels": label})
 
 
 @pytest.mark.parametrize(
-    ("opens", "make"), [(BoxDetector, boxes_and_scores), (KeypointNetwork, lambda path: simcc(path, 17, 32, 32))]
+    ("opens", "make"),
+    [(BoxDetector, boxes_and_scores), (KeypointNetwork, lambda path: simcc(path, 17, 32, 32))],
 )
-def test_every_truncation_and_some_flipped_bytes(tmp_path: Path, opens: Open, make: Callable[[Path], Path]) -> None:
+def test_every_truncation_and_some_flipped_bytes(
+    tmp_path: Path, opens: Open, make: Callable[[Path], Path]
+) -> None:
     path = make(tmp_path / "m.onnx")
     opens(path, threads=1)
     whole, harmed = path.read_bytes(), 0
@@ -109,14 +116,20 @@ def with_external_data(path: Path, location: str, inside: str = "initializer") -
         node, weights = helper.make_node("Constant", [], ["simcc_x"], value=weight), []
     info = helper.make_tensor_value_info("simcc_x", TensorProto.FLOAT, [1, 17, 64])
     graph = helper.make_graph([node], "ours", [picture_input(32, 32)], [info], weights)
-    path.write_bytes(helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)]).SerializeToString())
+    path.write_bytes(
+        helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)]).SerializeToString()
+    )
     return path
 
 
 @OPENERS
 @pytest.mark.parametrize("inside", ["initializer", "constant"])
-@pytest.mark.parametrize("location", ["../secret.bin", "{tmp}/secret.bin", "a/../../secret.bin", "link"])
-def test_weights_outside_of_the_folder(tmp_path: Path, opens: Open, location: str, inside: str) -> None:
+@pytest.mark.parametrize(
+    "location", ["../secret.bin", "{tmp}/secret.bin", "a/../../secret.bin", "link"]
+)
+def test_weights_outside_of_the_folder(
+    tmp_path: Path, opens: Open, location: str, inside: str
+) -> None:
     (tmp_path / "secret.bin").write_bytes(bytes(4352))
     folder = tmp_path / "models"
     folder.mkdir()
@@ -139,7 +152,9 @@ def test_unknown_operators_are_refused(tmp_path: Path, opens: Open) -> None:
     graph = helper.make_graph([node], "ours", [picture_input(32, 32)], [info])
     opsets = [helper.make_opsetid("", 17), helper.make_opsetid("com.example", 1)]
     path = tmp_path / "m.onnx"
-    path.write_bytes(helper.make_model(graph, opset_imports=opsets, ir_version=8).SerializeToString())
+    path.write_bytes(
+        helper.make_model(graph, opset_imports=opsets, ir_version=8).SerializeToString()
+    )
     refused(opens, path, "onnxruntime cannot load.*standard operators")
 
 
@@ -169,7 +184,9 @@ def test_inputs_that_are_not_an_image_are_refused(
 ) -> None:
     info = helper.make_tensor_value_info("images", kind, shape)
     out = helper.make_tensor_value_info("out", kind, shape)
-    path = save(tmp_path / "m.onnx", [helper.make_node("Identity", ["images"], ["out"])], [info], [out])
+    path = save(
+        tmp_path / "m.onnx", [helper.make_node("Identity", ["images"], ["out"])], [info], [out]
+    )
     refused(opens, path, says)
 
 
@@ -210,7 +227,9 @@ def test_an_invalid_json_is_refused(tmp_path: Path, text: str, says: str) -> Non
 
 
 @pytest.mark.parametrize("option", ["--detector", "--keypoints"])
-def test_the_command_line_prints_one_line(tmp_path: Path, capsys: pytest.CaptureFixture, option: str) -> None:
+def test_the_command_line_prints_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture, option: str
+) -> None:
     path = fixed(tmp_path / "m.onnx", 32, 32, {"what": np.zeros((1, 7), np.float32)})
     assert main(["capture", str(SAMPLE), option, str(path), "-o", str(tmp_path / "out.npz")]) == 1
     said = capsys.readouterr().err

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What all keypoint networks share: channels, normalization, the set of keypoints, and the next region."""
+"""What all keypoint networks share: channels, normalization, the set of keypoints, and the next
+region.
+"""
 
 from __future__ import annotations
 
@@ -53,13 +55,26 @@ def test_an_unknown_count_asks_for_the_json(tmp_path: Path) -> None:
 
 def test_a_detector_is_refused_as_a_keypoint_network(tmp_path: Path) -> None:
     path = fixed(tmp_path / "m.onnx", 640, 640, {"output0": np.zeros((1, 84, 8400), np.float32)})
-    with pytest.raises(ModelFileError, match=r"as a keypoint network.*output0 \[1, 84, 8400\].*simcc, heatmap"):
+    with pytest.raises(
+        ModelFileError,
+        match=r"as a keypoint network.*output0 \[1, 84, "
+        r"8400\].*simcc, heatmap",
+    ):
         KeypointNetwork(path, threads=1)
 
 
 def upright(count: int = 17) -> np.ndarray:
     """Create a standing person (33, 2), 200 pixels from nose to ankles."""
-    height = {"nose": 0, "eye": -5, "ear": 0, "shoulder": 35, "elbow": 70, "wrist": 100, "hip": 100, "knee": 150}
+    height = {
+        "nose": 0,
+        "eye": -5,
+        "ear": 0,
+        "shoulder": 35,
+        "elbow": 70,
+        "wrist": 100,
+        "hip": 100,
+        "knee": 150,
+    }
     height |= {"ankle": 200}
     points = np.zeros((33, 2))
     for name in COCO_17:
@@ -88,15 +103,22 @@ def test_the_next_region_contains_the_keypoints(tmp_path: Path) -> None:
     wide = upright()
     for side, x in (("left", 700), ("right", 100)):
         wide[KEYPOINT_NAMES.index(f"{side}_wrist")] = x, 340
-    assert network._next_region(wide, confidence, region).side_px == pytest.approx(1.4 * 600 * 256 / 192)
+    assert network._next_region(wide, confidence, region).side_px == pytest.approx(
+        1.4 * 600 * 256 / 192
+    )
     # hardly anything seen: stay
     assert network._next_region(upright(), confidence * 0.05, region) is region
     # legs hidden: shrink slowly
     legs = np.array(["knee" in n or "ankle" in n or "hip" in n for n in KEYPOINT_NAMES])
     hidden = np.where(legs, 0.0, confidence)
-    assert network._next_region(upright(), hidden, region).side_px == pytest.approx(0.97 * region.side_px)
+    assert network._next_region(upright(), hidden, region).side_px == pytest.approx(
+        0.97 * region.side_px
+    )
     # crouching: the box stays as large as the person will be
     low = upright()
     ankles = [KEYPOINT_NAMES.index(f"{side}_ankle") for side in ("left", "right")]
     low[ankles] += [0, -90]
-    assert network._next_region(low, confidence, Region((400, 400), 100.0, 0.0)).side_px > 1.6 * (65 + 50 + 40) - 1
+    assert (
+        network._next_region(low, confidence, Region((400, 400), 100.0, 0.0)).side_px
+        > 1.6 * (65 + 50 + 40) - 1
+    )

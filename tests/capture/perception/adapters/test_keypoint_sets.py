@@ -10,7 +10,9 @@ from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 
 
 def numbered(count: int) -> tuple[np.ndarray, np.ndarray]:
-    return np.stack([np.arange(count), 1000 - np.arange(count)], axis=1).astype(float), np.linspace(0.5, 1, count)
+    return np.stack([np.arange(count), 1000 - np.arange(count)], axis=1).astype(float), np.linspace(
+        0.5, 1, count
+    )
 
 
 @pytest.mark.parametrize("name", KEYPOINT_SETS)

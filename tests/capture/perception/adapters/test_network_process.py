@@ -25,7 +25,9 @@ def grey(network: NetworkProcess) -> list[np.ndarray]:
     return network.run(None, {"images": np.zeros((1, 3, 32, 32), np.float32)})
 
 
-def test_a_loop_that_only_some_images_start_ends_as_well(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_loop_that_only_some_images_start_ends_as_well(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(network_process, "RUN_S", 0.5)
     network = NetworkProcess("cpu", looping(tmp_path / "m.onnx", while_bright=True), 1)
     grey(network)
@@ -37,28 +39,40 @@ def test_a_loop_that_only_some_images_start_ends_as_well(tmp_path: Path, monkeyp
 
 def test_watched_memory_ends_the_process() -> None:
     code = (
-        f"import sys, threading; sys.path.insert(0, {str(SERVER.parent)!r}); import network_server as n\n"
+        f"import sys, threading; sys.path.insert(0, {str(SERVER.parent)!r}); import network_server "
+        "as n\n"
         "now = n.used_bytes(); assert 5e6 < now < 1e9, now\n"
         "threading.Thread(target=n.watch_memory, args=(100_000_000,), daemon=True).start()\n"
         "threading.Event().wait(0.2); print('small', flush=True)\n"
         "block = bytearray(b'1') * 200_000_000; threading.Event().wait(300)\n"
     )
-    ended = subprocess.run([sys.executable, "-I", "-c", code], capture_output=True, text=True, timeout=600)
+    ended = subprocess.run(
+        [sys.executable, "-I", "-c", code], capture_output=True, text=True, timeout=600
+    )
     assert (ended.returncode, ended.stdout) == (OUT_OF_MEMORY, "small\n"), ended.stderr
 
 
-LISTEN = "; sys.stdin.buffer.read()"  # until the answer has been read: who ends sooner may break the question's pipe
+# until the answer has been read: who ends sooner may break the question's pipe
+LISTEN = "; sys.stdin.buffer.read()"
 
 
 def _answering(text: str) -> str:
-    return f"import os, sys; os.write(1, {len(text).to_bytes(4, 'little') + text.encode()!r})" + LISTEN
+    return (
+        f"import os, sys; os.write(1, {len(text).to_bytes(4, 'little') + text.encode()!r})" + LISTEN
+    )
 
 
 @pytest.mark.parametrize(
     ("code", "says"),
     [
-        ("import os, sys; os._exit(77)", r"m\.onnx was stopped because it took more than 4\.\d GB of memory"),
-        ("import os; os.kill(os.getpid(), 9)", r"cannot load this network \(onnxruntime crashed in its process"),
+        (
+            "import os, sys; os._exit(77)",
+            r"m\.onnx was stopped because it took more than 4\.\d GB of memory",
+        ),
+        (
+            "import os; os.kill(os.getpid(), 9)",
+            r"cannot load this network \(onnxruntime crashed in its process",
+        ),
         (
             "import os, sys; os.write(1, b'ORT_ERROR: no answer')" + LISTEN,
             "sent no valid answer: a message is too long",
@@ -67,8 +81,14 @@ def _answering(text: str) -> str:
             "import os, sys; os.write(1, b'\\2\\0\\0\\0[]')" + LISTEN,
             "sent no valid answer: a message is no object",
         ),
-        ("import os, sys; os.write(1, b'\\2\\0\\0\\0{}')" + LISTEN, "sent no valid answer: 'arrays'"),
-        (_answering('{"arrays": [{"dtype": "f4", "shape": [1e999]}]}'), "sent no valid answer: cannot convert float"),
+        (
+            "import os, sys; os.write(1, b'\\2\\0\\0\\0{}')" + LISTEN,
+            "sent no valid answer: 'arrays'",
+        ),
+        (
+            _answering('{"arrays": [{"dtype": "f4", "shape": [1e999]}]}'),
+            "sent no valid answer: cannot convert float",
+        ),
         (_answering('{"arrays": [{"dtype": "f4,(", "shape": [1]}]}'), "sent no valid answer: "),
         (_answering("[" * 50_000), "sent no valid answer: maximum recursion"),
     ],
@@ -84,13 +104,17 @@ def test_a_process_that_ends_or_answers_nonsense(
     assert "\n" not in str(caught.value)
 
 
-def test_results_are_those_of_this_process_and_the_process_ends_with_the_network(tmp_path: Path) -> None:
+def test_results_are_those_of_this_process_and_the_process_ends_with_the_network(
+    tmp_path: Path,
+) -> None:
     import onnxruntime
 
     path = simcc(tmp_path / "m.onnx", 17, 32, 32)
     network = NetworkProcess("cpu", path, 1)
     image = np.random.default_rng(0).normal(size=(1, 3, 32, 32)).astype(np.float32)
-    here = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"]).run(None, {"images": image})
+    here = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"]).run(
+        None, {"images": image}
+    )
     for ours, truth in zip(network.run(None, {"images": image}), here, strict=True):
         np.testing.assert_array_equal(ours, truth)
     process = network._process
@@ -108,7 +132,9 @@ def test_the_process_ends_when_the_capture_is_killed(tmp_path: Path) -> None:
         "print(network._process.pid, flush=True)\n"
         "os._exit(9)\n"
     )
-    killed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=600)
+    killed = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=600
+    )
     assert killed.returncode == 9, killed.stderr
     pid = int(killed.stdout)
     wait_for(lambda: not runs(pid))

@@ -28,7 +28,9 @@ def face(shared: Path, network: FaceNetwork) -> tuple[np.ndarray, FaceEstimate]:
 
 
 def _head(image: np.ndarray) -> tuple[float, float]:
-    """The middle of the skin-coloured pixels of the upper part of the picture, which are the face's."""
+    """The middle of the skin-coloured pixels of the upper part of the picture, which are the
+    face's.
+    """
     hue, saturation, value = cv2.split(cv2.cvtColor(image, cv2.COLOR_RGB2HSV))
     skin = ((hue < 20) | (hue > 170)) & (saturation > 30) & (saturation < 160) & (value > 120)
     rows, columns = np.nonzero(skin[: image.shape[0] // 4])

@@ -11,7 +11,8 @@ def test_a_real_face_is_present_and_in_order(face):
     points = estimate.landmarks[:, :2]
     assert estimate.presence > 0.9
     assert points[263, 0] > points[33, 0]  # the person's left eye is on the right of the picture
-    assert points[10, 1] < points[1, 1] < points[13, 1] < points[152, 1]  # forehead, nose, lips, chin
+    # forehead, nose, lips, chin
+    assert points[10, 1] < points[1, 1] < points[13, 1] < points[152, 1]
 
 
 def test_a_wall_is_no_face(face, network):

@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The expression network on a real face: which side is which, and that one eye can be closed alone."""
+"""The expression network on a real face: which side is which, and that one eye can be closed
+alone.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception.face.face_landmarks import EXPRESSION_POINTS, ExpressionNetwork
+from scope.scope_addon.capture.perception.face.face_landmarks import (
+    EXPRESSION_POINTS,
+    ExpressionNetwork,
+)
 from scope.solver.names import EXPRESSIONS
 
 # Upper lid, lower lid and corners of the person's left and right eye, in the mesh of 478 points.

@@ -27,7 +27,13 @@ def painted(skin: int, around_eyes: tuple[int, int]) -> tuple[np.ndarray, np.nda
 
 @pytest.mark.parametrize(
     ("skin", "around_eyes", "light"),
-    [(200, (200, 200), 1.0), (200, (30, 30), 0.15), (60, (15, 15), 0.25), (200, (30, 180), 0.9), (4, (0, 0), 1.0)],
+    [
+        (200, (200, 200), 1.0),
+        (200, (30, 30), 0.15),
+        (60, (15, 15), 0.25),
+        (200, (30, 180), 0.9),
+        (4, (0, 0), 1.0),
+    ],
 )
 def test_light_is_that_of_the_brighter_eye_over_the_skin(skin, around_eyes, light):
     assert eye_light(*painted(skin, around_eyes)) == pytest.approx(light)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Regions of the face: the same face, however the body's head and the landmarks are turned and scaled."""
+"""Regions of the face: the same face, however the body's head and the landmarks are turned and
+scaled.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,8 @@ from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 
 # A frontal head, metres from the middle of the eyes, y down; the person's left is to the right.
 HEAD = {
-    "nose": (0, 0.035), "left_eye": (0.0315, 0), "right_eye": (-0.0315, 0), "left_ear": (0.075, 0.02),
+    "nose": (0, 0.035), "left_eye": (0.0315, 0), "right_eye": (-0.0315, 0),
+    "left_ear": (0.075, 0.02),
     "right_ear": (-0.075, 0.02), "mouth_left": (0.025, 0.068), "mouth_right": (-0.025, 0.068),
 }  # fmt: skip
 
@@ -40,7 +43,9 @@ def test_the_body_predicts_a_face_whichever_way_up_it_is(angle):
 def test_a_head_in_profile_keeps_its_size():
     frontal, profile = keypoints(500.0, 0.0), keypoints(500.0, 0.0)
     profile[:11, 0] = 300  # turned by 90°, eyes and ears fall together
-    assert region_from_body(profile).side_px == pytest.approx(region_from_body(frontal).side_px, rel=0.02)
+    assert region_from_body(profile).side_px == pytest.approx(
+        region_from_body(frontal).side_px, rel=0.02
+    )
 
 
 def test_the_landmarks_box_fills_two_thirds_along_the_line_of_the_eyes():

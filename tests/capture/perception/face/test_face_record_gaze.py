@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The direction of eyes whose irises were placed on an eyeball of 12 mm, however the head is turned."""
+"""The direction of eyes whose irises were placed on an eyeball of 12 mm, however the head is
+turned.
+"""
 
 from __future__ import annotations
 
@@ -24,9 +26,13 @@ def landmarks(direction: np.ndarray, turn: tuple[float, float, float]) -> np.nda
 
 
 @pytest.mark.parametrize("turn", [(0, 0, 0), (0, 0.6, 0), (0.3, -0.4, 0.5)])
-@pytest.mark.parametrize("direction", [(0, 0, 1), (0.4, 0, 0.92), (0.3, 0.2, 0.93), (-0.2, -0.3, 0.93)])
+@pytest.mark.parametrize(
+    "direction", [(0, 0, 1), (0.4, 0, 0.92), (0.3, 0.2, 0.93), (-0.2, -0.3, 0.93)]
+)
 def test_the_gaze_is_where_the_irises_were_turned(direction, turn):
     direction = np.array(direction) / np.linalg.norm(direction)
     points = landmarks(direction, turn)
-    np.testing.assert_allclose(head_axes(points), R_CAMERA_FRONTAL @ exp(np.array(turn, float)), atol=1e-9)
+    np.testing.assert_allclose(
+        head_axes(points), R_CAMERA_FRONTAL @ exp(np.array(turn, float)), atol=1e-9
+    )
     np.testing.assert_allclose(gaze(points), [direction, direction], atol=0.01)

@@ -35,7 +35,8 @@ from ...fake_people import FakeDetector, FakeLandmarks, Person, pictures
 RED, BLUE = (220, 30, 30), (30, 30, 220)
 FPS, FRAMES, WINDOW_S = 30, 210, 2.0  # three windows: frames 0 to 59, 60 to 119, and the rest
 SMALL = Person(lambda t: (150 + 0.5 * t, 130), RED, size_px=45)
-# Present when the second window's trackers begin, and so large that they would not care about the other one.
+# Present when the second window's trackers begin, and so large that they would not care about the
+# other one.
 LARGE = Person(lambda t: (430, 130) if 20 <= t < 75 else None, BLUE, size_px=115)
 
 
@@ -43,7 +44,8 @@ LARGE = Person(lambda t: (430, 130) if 20 <= t < 75 else None, BLUE, size_px=115
 def frames_from(change: Callable[[int, Frame], Frame]) -> Iterator[None]:
     """Let a decoder that begins within a clip give other frames.
 
-    :param change: from a frame's number, counted from where it begins, and the frame to the one that it gives.
+    :param change: from a frame's number, counted from where it begins, and the frame to the one
+        that it gives.
     """
     sought = Video.frames_from
 
@@ -64,29 +66,50 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def windows_of(monkeypatch: pytest.MonkeyPatch, folder: Path, fitted: list[Observation]) -> Callable[..., list[Track]]:
+def windows_of(
+    monkeypatch: pytest.MonkeyPatch, folder: Path, fitted: list[Observation]
+) -> Callable[..., list[Track]]:
     """``windows_of(options, parts=None, unfinished=None, stop_at=inf)``: the tracks of the clip.
 
-    They are joined from a folder of windows, or what is found is kept in a folder; cancelled at a frame.
+    They are joined from a folder of windows, or what is found is kept in a folder; cancelled at a
+    frame.
     """
     people = [SMALL, LARGE]
-    monkeypatch.setattr(landmark_estimator, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people, "heavy" in name))
+    monkeypatch.setattr(
+        landmark_estimator,
+        "LandmarkNetwork",
+        lambda name, *_: FakeLandmarks(people, "heavy" in name),
+    )
     monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: FakeDetector(people))
 
     def observed(
-        options: CaptureOptions, parts: Path | None = None, unfinished: Path | None = None, stop_at: float = np.inf
+        options: CaptureOptions,
+        parts: Path | None = None,
+        unfinished: Path | None = None,
+        stop_at: float = np.inf,
     ) -> list[Track]:
         def progress(stage: str, done: int, total: int) -> None:
             if done >= stop_at:
                 raise CancelledError("cancelled")
 
         with open_video(folder) as video, ThreadPoolExecutor(2) as pool:
-            clip = WindowedClip(video, plan_windows(video, options.window_s), options, StageClock(), pool, unfinished)
+            clip = WindowedClip(
+                video,
+                plan_windows(video, options.window_s),
+                options,
+                StageClock(),
+                pool,
+                unfinished,
+            )
             camera = assumed_camera(video.width, video.height, video.width)
             live: Any = SimpleNamespace(load=lambda: None)
             fitted.clear()
-            with BackgroundEstimators(camera, video.width, video.height, live, RecordedFits(fitted)) as background:
-                return clip.observe(background, live, Listeners(progress, lambda *_: None), parts)[1]
+            with BackgroundEstimators(
+                camera, video.width, video.height, live, RecordedFits(fitted)
+            ) as background:
+                return clip.observe(background, live, Listeners(progress, lambda *_: None), parts)[
+                    1
+                ]
 
     return observed
 
@@ -149,7 +172,15 @@ def options(people: int | str = "largest") -> CaptureOptions:
 def assert_same(a: list[Track], b: list[Track]) -> None:
     assert len(a) == len(b)
     for one, other in zip(a, b, strict=True):
-        for name in ("frames", "times", "seen", "keypoints_px", "confidence", "world_landmarks", "acquired"):
+        for name in (
+            "frames",
+            "times",
+            "seen",
+            "keypoints_px",
+            "confidence",
+            "world_landmarks",
+            "acquired",
+        ):
             assert np.array_equal(getattr(one, name), getattr(other, name)), name
         assert np.array_equal(one.reference_rows, other.reference_rows)
         assert np.array_equal(one.reference_landmarks, other.reference_landmarks)

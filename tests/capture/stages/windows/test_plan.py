@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The windows of a clip cover all of its frames once, and begin to warm up within the window before."""
+"""The windows of a clip cover all of its frames once, and begin to warm up within the window
+before.
+"""
 
 from __future__ import annotations
 

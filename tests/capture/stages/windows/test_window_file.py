@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The file of a window holds everything, and one that is damaged or of another window counts for nothing."""
+"""The file of a window holds everything, and one that is damaged or of another window counts for
+nothing.
+"""
 
 from __future__ import annotations
 
@@ -28,10 +30,18 @@ WINDOW = Window(3, 7.5, 8.0, 12.0)
 
 def record(seed: int = 0) -> WindowRecord:
     rng = np.random.default_rng(seed)
-    edges = [FrameEdges(0, Segments(rng.random((4, 2, 2)), rng.random(4))), FrameEdges(5, Segments.none())]
+    edges = [
+        FrameEdges(0, Segments(rng.random((4, 2, 2)), rng.random(4))),
+        FrameEdges(5, Segments.none()),
+    ]
     times = 7.5 + np.arange(FRAMES) / 4
     background = BackgroundRecord(
-        times, rng.random((FRAMES, 3, 3)), rng.random(FRAMES) > 0.5, [0.9, 0.8], edges, [rng.random(4)]
+        times,
+        rng.random((FRAMES, 3, 3)),
+        rng.random(FRAMES) > 0.5,
+        [0.9, 0.8],
+        edges,
+        [rng.random(4)],
     )
     region = Region((100.0, 90.0), 80.0, 0.1)
     people = {}
@@ -50,7 +60,9 @@ def record(seed: int = 0) -> WindowRecord:
         )
     sums = rng.integers(0, 2**32, FRAMES, np.uint32)
     cuts, indices = [4], np.arange(FRAMES) + 30
-    return WindowRecord(WINDOW, indices, times, sums, 2, 9, people, {0: region}, cuts, background, "CPU", ("dark",))
+    return WindowRecord(
+        WINDOW, indices, times, sums, 2, 9, people, {0: region}, cuts, background, "CPU", ("dark",)
+    )
 
 
 def plain(value: Any) -> Any:
@@ -108,7 +120,9 @@ def test_the_file_of_another_window_or_video_counts_for_nothing(tmp_path: Path) 
         ("text", 0, 255),
     ],
 )
-def test_numbers_that_do_not_fit_make_a_file_worthless(tmp_path: Path, name: str, index: Any, value: Any) -> None:
+def test_numbers_that_do_not_fit_make_a_file_worthless(
+    tmp_path: Path, name: str, index: Any, value: Any
+) -> None:
     path = save_window(tmp_path, record(), SIZE)
     arrays = dict(np.load(path))
     arrays[name][index] = value
@@ -117,7 +131,9 @@ def test_numbers_that_do_not_fit_make_a_file_worthless(tmp_path: Path, name: str
 
 
 @pytest.mark.parametrize("name", ["values", "faces", "known", "text"])
-def test_an_array_that_is_missing_or_holds_objects_makes_a_file_worthless(tmp_path: Path, name: str) -> None:
+def test_an_array_that_is_missing_or_holds_objects_makes_a_file_worthless(
+    tmp_path: Path, name: str
+) -> None:
     path = save_window(tmp_path, record(), SIZE)
     arrays = dict(np.load(path))
     for other in (None, np.array([{}], object), arrays[name][:-1], arrays[name].astype(complex)):
@@ -137,7 +153,9 @@ def test_damaged_bytes_never_raise(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no limit on the size of a file")
-def test_a_full_disk_is_an_error_and_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_is_an_error_and_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A half-written zip file printed a traceback when it was destroyed."""
     resource, unraisable = pytest.importorskip("resource"), list[object]()
     monkeypatch.setattr(sys, "unraisablehook", unraisable.append)

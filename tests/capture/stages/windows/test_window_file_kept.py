@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A long clip whose capture was stopped goes on after its finished windows, to the same result, bit for bit."""
+"""A long clip whose capture was stopped goes on after its finished windows, to the same result, bit
+for bit.
+"""
 
 from __future__ import annotations
 
@@ -20,20 +22,27 @@ from scope.scope_addon.errors import CancelledError
 from .conftest import FPS, FRAMES, assert_same, frames_from, options
 
 
-def stop(windows_of: Callable[..., list[Track]], given: CaptureOptions, unfinished: Path, frame: int) -> None:
+def stop(
+    windows_of: Callable[..., list[Track]], given: CaptureOptions, unfinished: Path, frame: int
+) -> None:
     with pytest.raises(CancelledError):
         windows_of(given, None, unfinished, frame)
 
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder for the windows of the whole clip, which the first test that asks for `all_kept` fills."""
+    """A folder for the windows of the whole clip, which the first test that asks for `all_kept`
+    fills.
+    """
     return tmp_path_factory.mktemp("finished")
 
 
 @pytest.fixture
 def all_kept(
-    windows_of: Callable[..., list[Track]], undisturbed: Callable[..., list[Track]], finished: Path, tmp_path: Path
+    windows_of: Callable[..., list[Track]],
+    undisturbed: Callable[..., list[Track]],
+    finished: Path,
+    tmp_path: Path,
 ) -> Path:
     """A copy of a folder in which all windows of the clip are kept; computed once."""
     if not any(finished.iterdir()):
@@ -43,7 +52,13 @@ def all_kept(
 
 @pytest.mark.parametrize(
     ("people", "frame", "goes_on_at_s"),
-    [("largest", 40, 0.0), ("largest", 75, 1.0), (2, 75, 1.0), (2, 130, 3.0), ("largest", 210, 3.0)],
+    [
+        ("largest", 40, 0.0),
+        ("largest", 75, 1.0),
+        (2, 75, 1.0),
+        (2, 130, 3.0),
+        ("largest", 210, 3.0),
+    ],
 )
 def test_a_clip_that_was_stopped_goes_on_after_its_last_finished_window(
     windows_of: Callable[..., list[Track]],
@@ -102,10 +117,16 @@ def test_windows_found_with_other_options_or_networks_are_not_taken(
     windows_of: Callable[..., list[Track]], observed_times: list[float], tmp_path: Path
 ) -> None:
     calibration = tmp_path / "camera.json"
-    calibration.write_text('{"image_size": [600, 260], "K": [[500, 0, 300], [0, 500, 130], [0, 0, 1]]}')
+    calibration.write_text(
+        '{"image_size": [600, 260], "K": [[500, 0, 300], [0, 500, 130], [0, 0, 1]]}'
+    )
     given = replace(options(2), calibration=calibration)
     stop(windows_of, given, tmp_path, 130)
-    for other, begins_at_s in ((replace(given, threads=2), 3.0), (options(2), 0.0), (replace(given, people=1), 0.0)):
+    for other, begins_at_s in (
+        (replace(given, threads=2), 3.0),
+        (options(2), 0.0),
+        (replace(given, people=1), 0.0),
+    ):
         observed_times.clear()
         stop(windows_of, other, tmp_path, 125 if begins_at_s else 5)
         assert observed_times[0] == pytest.approx(begins_at_s)
@@ -124,7 +145,11 @@ def test_a_stopped_clip_whose_middle_is_decoded_to_other_images_goes_on_from_its
     """The frames before are decoded, but not observed."""
 
     def damaged(k: int, frame: Frame) -> Frame:
-        return Frame(frame.index + 5, frame.timestamp_s, np.full_like(frame.image_rgb, 90)) if k < 40 else frame
+        return (
+            Frame(frame.index + 5, frame.timestamp_s, np.full_like(frame.image_rgb, 90))
+            if k < 40
+            else frame
+        )
 
     stop(windows_of, options(), tmp_path, 75)
     whole = undisturbed()
@@ -160,7 +185,9 @@ def test_a_window_that_ended_early_with_the_footage_is_not_kept(
     """As where a disk fails for a moment."""
     frames = Video.__iter__
     with monkeypatch.context() as patch:
-        patch.setattr(Video, "__iter__", lambda video: (f for f in frames(video) if f.timestamp_s < 3))
+        patch.setattr(
+            Video, "__iter__", lambda video: (f for f in frames(video) if f.timestamp_s < 3)
+        )
         windows_of(options(), None, tmp_path)
     assert [file.name for file in tmp_path.glob("windows-*/*")] == ["window00000.npz"]
     assert_same(windows_of(options(), None, tmp_path), undisturbed())

@@ -32,7 +32,9 @@ def test_windows_of_several_processes_are_the_clip_in_one_piece(
 ) -> None:
     given = options(people)
     assert count_windows(folder, given) == 3
-    frames = [observe_windows(folder, given, numbers, tmp_path)[1] for numbers in (range(2, 3), range(2))]
+    frames = [
+        observe_windows(folder, given, numbers, tmp_path)[1] for numbers in (range(2, 3), range(2))
+    ]
     assert frames == [90, 120]
     assert_same(windows_of(given, tmp_path), undisturbed(people))
 
@@ -55,19 +57,27 @@ def test_the_same_person_is_followed_across_a_seam_where_somebody_larger_stands(
 def test_the_focal_length_is_estimated_from_the_same_people_in_one_window_and_in_several(
     windows_of: Callable[..., list[Track]], fitted: list[Observation]
 ) -> None:
-    """The first one, and others after at least 0.2, 0.4, 0.8, 1.6 and 3.2 seconds; of two people, the larger one."""
+    """The first one, and others after at least 0.2, 0.4, 0.8, 1.6 and 3.2 seconds; of two people,
+    the larger one.
+    """
     found = []
     for window_s in (WINDOW_S, 60.0):
         windows_of(replace(options(2), window_s=window_s))
         found.append([person.keypoints_px[[23, 24]].mean(axis=0) for person in fitted])
     people = {0: SMALL, 6: SMALL, 18: SMALL, 42: LARGE, 90: SMALL, 186: SMALL}
-    truth = [who.place(t) + who.size_px * who.body(t)[[23, 24], :2].mean(axis=0) for t, who in people.items()]
+    truth = [
+        who.place(t) + who.size_px * who.body(t)[[23, 24], :2].mean(axis=0)
+        for t, who in people.items()
+    ]
     np.testing.assert_allclose(found[0], truth, atol=2.0)  # the trackers smooth
     np.testing.assert_allclose(found[1], found[0], atol=0.01)
 
 
 def test_windows_that_are_missing_or_damaged_are_observed_by_the_process_that_joins(
-    windows_of: Callable[..., list[Track]], undisturbed: Callable[..., list[Track]], folder: Path, tmp_path: Path
+    windows_of: Callable[..., list[Track]],
+    undisturbed: Callable[..., list[Track]],
+    folder: Path,
+    tmp_path: Path,
 ) -> None:
     given = options()
     files, _ = observe_windows(folder, given, range(3), tmp_path)
@@ -82,7 +92,9 @@ def test_a_window_that_was_decoded_to_other_images_is_observed_again(
     folder: Path,
     tmp_path: Path,
 ) -> None:
-    """As of a file that does not mark its keyframes well: a decoder that begins in its middle gives a grey image."""
+    """As of a file that does not mark its keyframes well: a decoder that begins in its middle gives
+    a grey image.
+    """
 
     def damaged(k: int, frame: Frame) -> Frame:
         lost = np.full_like(frame.image_rgb, 90)
@@ -101,7 +113,9 @@ def test_indices_that_a_decoder_counts_from_elsewhere_are_those_of_the_clip(
     folder: Path,
     tmp_path: Path,
 ) -> None:
-    """As where the frame rate varies, and the index of a frame can only be estimated from its time."""
+    """As where the frame rate varies, and the index of a frame can only be estimated from its
+    time.
+    """
     whole = undisturbed()
     with frames_from(lambda _, frame: Frame(frame.index + 5, frame.timestamp_s, frame.image_rgb)):
         observe_windows(folder, options(), range(1, 3), tmp_path)

@@ -1,12 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Expressions fitted to landmarks: of the model's own faces, and of rendered ones as the networks see them."""
+"""Expressions fitted to landmarks: of the model's own faces, and of rendered ones as the networks
+see them.
+"""
 
 from __future__ import annotations
 
 import cv2
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception.face.face_landmarks import FACE_POINTS, FaceEstimate, FaceNetwork
+from scope.scope_addon.capture.perception.face.face_landmarks import (
+    FACE_POINTS,
+    FaceEstimate,
+    FaceNetwork,
+)
 from scope.scope_addon.capture.perception.face.face_record import parts, record
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.face import expression_fit
@@ -32,24 +38,38 @@ def talk(count: int = T) -> np.ndarray:
     t = np.arange(count)
     weights[:, JAW] = 0.7 * np.maximum(0, np.sin(2 * np.pi * t / 30)) * (t > 10)
     for start in (18, 50):
-        weights[start : start + 5, BLINKS] = np.array([0.4, 0.9, 1.0, 0.8, 0.3])[: count - start, None]
+        weights[start : start + 5, BLINKS] = np.array([0.4, 0.9, 1.0, 0.8, 0.3])[
+            : count - start, None
+        ]
     return weights
 
 
 def modelled(weights: np.ndarray, noise: float, size: float = 120.0) -> np.ndarray:
-    """Rows of a person whose landmarks are as the model says, with another face at rest, who turns his head."""
+    """Rows of a person whose landmarks are as the model says, with another face at rest, who turns
+    his head.
+    """
     response, rng = load_response(), np.random.default_rng(3)
     share = response.units / response.units.sum(axis=1, keepdims=True)
     turns = np.stack([0.05 * np.sin(TIMES), 0.2 * np.sin(2 * TIMES), 0 * TIMES], axis=1)
     own = 0.03 * rng.standard_normal(response.mean.shape)
-    x = response.mean + own + view_terms(turns) @ response.view + weights @ share.T @ response.response
+    x = (
+        response.mean
+        + own
+        + view_terms(turns) @ response.view
+        + weights @ share.T @ response.response
+    )
     x = (x + noise * rng.standard_normal(x.shape)).reshape(T, -1, 3)
     pixels = size / 3 * np.einsum("tij,tnj->tni", exp(turns), x) * [1, -1, -1] + [300, 200, 0]
     landmarks = np.zeros((T, FACE_POINTS, 3))
     landmarks[:] = pixels[:, :1]  # elsewhere, all of them in one place
     landmarks[:, response.landmarks] = pixels
     # The network reports nonsense.
-    return np.array([record(FaceEstimate(p, 0.99, REGION), rng.uniform(0, 1, len(EXPRESSIONS))) for p in landmarks])
+    return np.array(
+        [
+            record(FaceEstimate(p, 0.99, REGION), rng.uniform(0, 1, len(EXPRESSIONS)))
+            for p in landmarks
+        ]
+    )
 
 
 def test_expressions_are_found_whatever_the_face_at_rest():
@@ -58,7 +78,10 @@ def test_expressions_are_found_whatever_the_face_at_rest():
     _, _, weights, gaze, _ = parts(fitted(modelled(truth, 0.002), TIMES))
     np.testing.assert_allclose(weights[:, [JAW, *BLINKS]], truth[:, [JAW, *BLINKS]], atol=0.12)
     assert np.abs(weights - truth).mean() < 0.01
-    assert weights[62:, INDEX["browDownLeft"]].mean() > weights[:58, INDEX["browDownLeft"]].mean() + 0.2
+    assert (
+        weights[62:, INDEX["browDownLeft"]].mean()
+        > weights[:58, INDEX["browDownLeft"]].mean() + 0.2
+    )
     np.testing.assert_allclose(gaze, np.tile([0, 0, 1.0], (T, 2, 1)), atol=0.05)
 
 
@@ -66,8 +89,12 @@ def test_both_eyes_turn_together_and_the_gaze_with_them():
     truth = np.zeros((T, len(EXPRESSIONS)))
     truth[30:60, [INDEX["eyeLookOutLeft"], INDEX["eyeLookInRight"]]] = 0.8
     _, _, weights, gaze, _ = parts(fitted(modelled(truth, 0.002), TIMES))
-    np.testing.assert_allclose(weights[:, INDEX["eyeLookOutLeft"]], truth[:, INDEX["eyeLookOutLeft"]], atol=0.35)
-    np.testing.assert_allclose(weights[:, INDEX["eyeLookInRight"]], weights[:, INDEX["eyeLookOutLeft"]])
+    np.testing.assert_allclose(
+        weights[:, INDEX["eyeLookOutLeft"]], truth[:, INDEX["eyeLookOutLeft"]], atol=0.35
+    )
+    np.testing.assert_allclose(
+        weights[:, INDEX["eyeLookInRight"]], weights[:, INDEX["eyeLookOutLeft"]]
+    )
     assert gaze[45, 0, 0] > 0.1  # to the person's left
     np.testing.assert_allclose(np.linalg.norm(gaze, axis=-1), 1)
 
@@ -94,17 +121,23 @@ def test_a_damaged_file_says_what_to_do(tmp_path, monkeypatch):
 
 
 def test_a_rendered_face_that_the_network_sees(tmp_path):
-    """The default body, which nothing was calibrated on, turned by 20°, through the real landmark network."""
+    """The default body, which nothing was calibrated on, turned by 20°, through the real landmark
+    network.
+    """
     body, rng, truth = load_body("scope"), np.random.default_rng(8), talk(66)
     R = np.diag([1.0, -1.0, -1.0]) @ exp(np.radians([0, 20.0, 0]))
     times = np.arange(66) / FPS
-    clip = FaceClip(truth, np.tile(R, (66, 1, 1)), np.full(66, 0.8), np.zeros(66, int), times, np.zeros((66, 3)))
+    clip = FaceClip(
+        truth, np.tile(R, (66, 1, 1)), np.full(66, 0.8), np.zeros(66, int), times, np.zeros((66, 3))
+    )
     stage, network, rows = ShadedStage(body), FaceNetwork(1), []
     stage.dress(draw_look(body, rng), rng)
     region = Region((SIZE / 2, SIZE / 2), 0.8 * SIZE, 0.0)
     for t in range(66):
         stage.render(
-            camera_vertices(body, clip, np.zeros((1, *body.v_template.shape)), t), focal_px(0.8), tmp_path / "face.png"
+            camera_vertices(body, clip, np.zeros((1, *body.v_template.shape)), t),
+            focal_px(0.8),
+            tmp_path / "face.png",
         )
         image = np.ascontiguousarray(cv2.imread(str(tmp_path / "face.png"))[..., ::-1])
         estimate = network.estimate(image, region)

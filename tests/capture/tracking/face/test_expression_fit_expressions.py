@@ -1,11 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Expressions and gaze of a face that is seen briefly: what the networks make of it; of others, the fit's."""
+"""Expressions and gaze of a face that is seen briefly: what the networks make of it; of others, the
+fit's.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception.face.face_landmarks import EXPRESSION_POINTS, ExpressionNetwork, FaceNetwork
+from scope.scope_addon.capture.perception.face.face_landmarks import (
+    EXPRESSION_POINTS,
+    ExpressionNetwork,
+    FaceNetwork,
+)
 from scope.scope_addon.capture.perception.face.face_record import RECORD, gaze, parts, record
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.face import expression_fit
@@ -17,7 +23,9 @@ BEFORE = np.zeros(RECORD)  # a frame without a face
 
 @pytest.fixture(scope="module")
 def clip(frames):
-    """Two and a half seconds of a real face: the network's estimates, and a track's rows of them."""
+    """Two and a half seconds of a real face: the network's estimates, and a track's rows of
+    them.
+    """
     network, region, estimates = FaceNetwork(1), Region((256.0, 118.0), 200.0, 0.0), []
     for image in frames("clips/squats_5fps", stop=13):
         estimates.append(network.estimate(image, region))
@@ -26,7 +34,9 @@ def clip(frames):
 
 
 @pytest.mark.parametrize("seen", [1, 9])
-def test_a_face_that_was_seen_briefly_gets_the_networks_weights_and_the_gaze_of_its_irises(clip, seen):
+def test_a_face_that_was_seen_briefly_gets_the_networks_weights_and_the_gaze_of_its_irises(
+    clip, seen
+):
     estimates, rows = clip[0][:seen], clip[1][: seen + 1]
     out = with_expressions(rows, np.arange(seen + 1) / FPS)
     _, _, weights, directions, _ = parts(out)
@@ -41,7 +51,9 @@ def test_a_face_that_was_seen_briefly_gets_the_networks_weights_and_the_gaze_of_
     np.testing.assert_array_equal(out[:, others], rows[:, others])
 
 
-def test_the_expression_network_is_not_opened_for_a_face_that_is_seen_for_longer_or_not_at_all(clip, monkeypatch):
+def test_the_expression_network_is_not_opened_for_a_face_that_is_seen_for_longer_or_not_at_all(
+    clip, monkeypatch
+):
     monkeypatch.setattr(expression_fit, "ExpressionNetwork", None)
     rows = clip[1]
     times = np.arange(len(rows)) / FPS

@@ -78,7 +78,9 @@ def test_a_small_face_moves_more_slowly_than_a_large_one():
     for size in (100.0, 24.0):
         rows = seen_face(size)
         rows[:, 2 + JAW] = 0.5 + 0.15 * noise
-        deviations.append(expression_motion(rows, TIMES, smoothing=True)["expressions"][:, JAW].std())
+        deviations.append(
+            expression_motion(rows, TIMES, smoothing=True)["expressions"][:, JAW].std()
+        )
     assert deviations[1] < 0.6 * deviations[0]
 
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Faces in real footage, and with a fake network: found by the body, followed, lost, and somebody else's."""
+"""Faces in real footage, and with a fake network: found by the body, followed, lost, and somebody
+else's.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,9 @@ SHAPE[[10, 152]] = [[0, -0.5, 0], [0, 0.5, 0]]
 
 
 def person(x: float, y: float, scale: float = 500.0, yaw: float | None = None) -> Observation:
-    """A head with its eyes around (x, y), frontal in the image; its depth says that it is turned by ``yaw`` degrees."""
+    """A head with its eyes around (x, y), frontal in the image; its depth says that it is turned by
+    ``yaw`` degrees.
+    """
     points = np.zeros((33, 2))
     places = {
         "left_eye": (0.03, 0),
@@ -86,7 +90,8 @@ def test_a_face_is_found_and_then_followed_with_one_run_of_the_network(tracker):
     assert not weights.any()
     assert not gaze.any()  # both are found later, see `with_expressions`
     assert tracker._network.calls == 2
-    tracker._network.faces = [(*middle(360, 200), 92.0)]  # farther than it would be seen from where it was
+    # farther than it would be seen from where it was
+    tracker._network.faces = [(*middle(360, 200), 92.0)]
     assert face_of(tracker, {7: person(360, 200)}, 1 / 30)[7][0][0] > 0
     assert tracker._network.calls == 3
 
@@ -124,7 +129,9 @@ def test_where_surely_no_face_is_the_landmarks_say_nothing_of_another_place(trac
     assert tracker._network.calls == 1
 
 
-@pytest.mark.parametrize(("yaw", "is_looked_for"), [(None, True), (0, True), (75, True), (-90, False), (180, False)])
+@pytest.mark.parametrize(
+    ("yaw", "is_looked_for"), [(None, True), (0, True), (75, True), (-90, False), (180, False)]
+)
 def test_a_face_is_looked_for_on_heads_that_the_body_does_not_see_from_the_side_or_the_back(
     tracker, yaw, is_looked_for
 ):
@@ -148,7 +155,9 @@ def test_a_head_too_small_is_not_looked_at(tracker):
 def test_a_real_face_is_captured_and_moves_little_but_the_head(shared):
     clip, body = shared / "data" / "clips" / "squats_5fps.mp4", load_body("scope")
     without, found = (
-        capture(clip, body, CaptureOptions(quality="fast", wanted=VideoRange(end_s=2.0), face=face)).motions[0]
+        capture(
+            clip, body, CaptureOptions(quality="fast", wanted=VideoRange(end_s=2.0), face=face)
+        ).motions[0]
         for face in (False, True)
     )
     assert without.face == {}
@@ -158,9 +167,21 @@ def test_a_real_face_is_captured_and_moves_little_but_the_head(shared):
     nose = found.keypoints2d[:, KEYPOINT_NAMES.index("nose"), :2]
     assert (face.min(axis=1) < nose).all()
     assert (nose < face.max(axis=1)).all()
-    for name in ("keypoints2d", "frames", "timestamps", "valid", "betas", "joint_confidence", "height_sigma_m"):
+    for name in (
+        "keypoints2d",
+        "frames",
+        "timestamps",
+        "valid",
+        "betas",
+        "joint_confidence",
+        "height_sigma_m",
+    ):
         np.testing.assert_array_equal(getattr(found, name), getattr(without, name))
     moved_m = np.linalg.norm(found.joints_cam - without.joints_cam, axis=-1).mean(axis=0)
-    limbs = [k for k, name in enumerate(body.joint_names) if name.endswith(("hip", "knee", "ankle", "elbow", "wrist"))]
+    limbs = [
+        k
+        for k, name in enumerate(body.joint_names)
+        if name.endswith(("hip", "knee", "ankle", "elbow", "wrist"))
+    ]
     assert moved_m[limbs].max() < 0.015
     assert moved_m[body.joint_names.index("head")] > moved_m[limbs].max()

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The direction across rendered heads that turn, nod and lean, as the network sees their faces, and its certainty."""
+"""The direction across rendered heads that turn, nod and lean, as the network sees their faces, and
+its certainty.
+"""
 
 from __future__ import annotations
 
@@ -23,12 +25,16 @@ FRONTAL, DISTANCE_M = np.diag([1.0, -1.0, -1.0]), 0.8
 
 
 def camera_of(focal: float) -> Camera:
-    return Camera(np.array([[focal, 0, SIZE / 2], [0, focal, SIZE / 2], [0, 0, 1.0]]), np.zeros(5), "given")
+    return Camera(
+        np.array([[focal, 0, SIZE / 2], [0, focal, SIZE / 2], [0, 0, 1.0]]), np.zeros(5), "given"
+    )
 
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory):
-    """What the network sees of the default body's face, turned by degrees about the head's axes, in the middle."""
+    """What the network sees of the default body's face, turned by degrees about the head's axes, in
+    the middle.
+    """
     body, path = load_body("scope"), tmp_path_factory.mktemp("faces") / "face.png"
     stage, network, rng, kept = ShadedStage(body), FaceNetwork(1), np.random.default_rng(8), {}
     stage.dress(draw_look(body, rng), rng)
@@ -36,7 +42,9 @@ def seen(tmp_path_factory):
     def estimate(turn_deg) -> FaceEstimate:
         if turn_deg not in kept:
             R = FRONTAL @ exp(np.radians(turn_deg))
-            stage.render((body.v_template - MIDDLE) @ R.T + [0, 0, DISTANCE_M], focal_px(DISTANCE_M), path)
+            stage.render(
+                (body.v_template - MIDDLE) @ R.T + [0, 0, DISTANCE_M], focal_px(DISTANCE_M), path
+            )
             image = np.ascontiguousarray(cv2.imread(str(path))[..., ::-1])
             first = network.estimate(image, Region((SIZE / 2, SIZE / 2), 0.8 * SIZE, 0.0))
             kept[turn_deg] = network.estimate(image, first.next_region)
@@ -45,7 +53,9 @@ def seen(tmp_path_factory):
     return estimate
 
 
-@pytest.mark.parametrize("turn_deg", [(0, 0, 0), (0, 0, 20), (0, 0, -35), (0, 35, 0), (15, -30, 10)])
+@pytest.mark.parametrize(
+    "turn_deg", [(0, 0, 0), (0, 0, 20), (0, 0, -35), (0, 35, 0), (15, -30, 10)]
+)
 def test_the_direction_across_a_rendered_head(seen, turn_deg):
     (found,) = across_head(record(seen(turn_deg), None)[None], camera_of(focal_px(DISTANCE_M)))
     true = (FRONTAL @ exp(np.radians(turn_deg)))[:, 0]
@@ -56,8 +66,12 @@ def test_a_face_that_looks_frontal_at_the_edge_of_the_image_is_turned(seen):
     """It looks along the line of sight, 30° beside the camera's axis."""
     estimate, focal = seen((0, 0, 0)), 300.0
     places = (0.0, focal * np.tan(np.radians(30.0)))
-    rows = [record(replace(estimate, landmarks=estimate.landmarks + [x, 0, 0]), None) for x in places]
-    middle, aside = np.degrees([np.arctan2(d[2], d[0]) for d in across_head(np.array(rows), camera_of(focal))])
+    rows = [
+        record(replace(estimate, landmarks=estimate.landmarks + [x, 0, 0]), None) for x in places
+    ]
+    middle, aside = np.degrees(
+        [np.arctan2(d[2], d[0]) for d in across_head(np.array(rows), camera_of(focal))]
+    )
     assert aside - middle == pytest.approx(-30.0, abs=2)
 
 
@@ -66,7 +80,8 @@ def test_a_face_at_the_back_of_a_head_counts_for_nothing(seen):
     face = record(seen((0, 0, 0)), None)[None]
     across = across_head(face, camera_of(300.0))
     full, half, none = (
-        float(certainty(face, across, 0.15 * across @ exp(np.radians([0, angle, 0])))[0]) for angle in (10, 45, 100)
+        float(certainty(face, across, 0.15 * across @ exp(np.radians([0, angle, 0])))[0])
+        for angle in (10, 45, 100)
     )
     assert full > half > 0
     assert none == 0
@@ -81,7 +96,9 @@ def test_a_face_of_which_the_network_is_unsure_counts_by_the_cube_of_its_presenc
 
 def test_the_presence_of_a_small_face_is_that_of_a_large_one(seen):
     estimate = replace(seen((0, 0, 0)), presence=0.7)
-    rows = np.array([record(replace(estimate, landmarks=s * estimate.landmarks), None) for s in (1.0, 0.3)])
+    rows = np.array(
+        [record(replace(estimate, landmarks=s * estimate.landmarks), None) for s in (1.0, 0.3)]
+    )
     assert rows[1, 0] < 0.9 * rows[0, 0]
     np.testing.assert_allclose(presence_of(rows), 0.7, rtol=1e-6)
 

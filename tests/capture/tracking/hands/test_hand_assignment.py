@@ -28,21 +28,32 @@ SHAPE = np.array([(0.0, 0.0), *FINGERS])  # in hand lengths, fingers up
 
 
 def hand(
-    side: int, *, away: float = 0.0, size: float = 1.0, left: float | None = None, presence: float = 0.9
+    side: int,
+    *,
+    away: float = 0.0,
+    size: float = 1.0,
+    left: float | None = None,
+    presence: float = 0.9,
 ) -> HandEstimate:
-    """Return the hand at a wrist, or some hand lengths beside it, with keypoints that agree with those in space."""
+    """Return the hand at a wrist, or some hand lengths beside it, with keypoints that agree with
+    those in space.
+    """
     at = np.array(WRIST_PX[side]) + [away * LENGTH, 0.0]
     world = np.pad(SHAPE * HAND_LENGTH_M, ((0, 0), (0, 1)))
     world[:, 2] = np.linspace(0.0, 0.02, len(world))
     left = (0.95 if side == 0 else 0.05) if left is None else left
-    return HandEstimate(size * LENGTH * SHAPE + at, world, presence, left, Region((at[0], at[1]), 2 * LENGTH, 0.0))
+    return HandEstimate(
+        size * LENGTH * SHAPE + at, world, presence, left, Region((at[0], at[1]), 2 * LENGTH, 0.0)
+    )
 
 
 def person(sure: float = 1.0, right_wrist_px: tuple[float, float] = WRIST_PX[1]) -> Observation:
     points, confidence = np.zeros((33, 2)), np.ones(33)
     points[WRISTS[0]], points[WRISTS[1]] = WRIST_PX[0], right_wrist_px
     confidence[WRISTS] = sure
-    return Observation(points, confidence, np.zeros((33, 3)), 1.0, Region((500.0, 500.0), 900.0, 0.0), False)
+    return Observation(
+        points, confidence, np.zeros((33, 3)), 1.0, Region((500.0, 500.0), 900.0, 0.0), False
+    )
 
 
 @pytest.mark.parametrize("side", [0, 1])
@@ -60,14 +71,23 @@ def test_a_hand_beside_the_wrist_is_this_one_only_as_far_as_the_wrist_is_unsure(
 
 
 def test_a_hand_has_a_size_that_fits_the_body() -> None:
-    sizes = {size: assigned(hand(0, size=size), person(), SCALE, 0) is not None for size in (0.2, 0.3, 1.9, 2.1)}
+    sizes = {
+        size: assigned(hand(0, size=size), person(), SCALE, 0) is not None
+        for size in (0.2, 0.3, 1.9, 2.1)
+    }
     assert sizes == {0.2: False, 0.3: True, 1.9: True, 2.1: False}
     assert MAX_SIZE == 2.0
-    assert assigned(hand(0, size=0.3), person(), SCALE, 0, SECOND) is None  # a second look finds small ones in skin
+    # a second look finds small ones in skin
+    assert assigned(hand(0, size=0.3), person(), SCALE, 0, SECOND) is None
 
 
 def test_more_presence_is_required_elsewhere_than_at_the_wrist() -> None:
-    for presence, away, is_found in ((0.7, 0.0, True), (0.7, 0.5, False), (0.85, 0.5, True), (0.5, 0.0, False)):
+    for presence, away, is_found in (
+        (0.7, 0.0, True),
+        (0.7, 0.5, False),
+        (0.85, 0.5, True),
+        (0.5, 0.0, False),
+    ):
         found = assigned(hand(0, away=away, presence=presence), person(), SCALE, 0, PREDICTED)
         assert (found is not None) == is_found
     assert assigned(hand(0, presence=np.nan), person(), SCALE, 0) is None
@@ -92,7 +112,8 @@ def test_a_hand_of_the_wrong_side_at_this_wrist_alone_is_mirrored_in_depth() -> 
     assert assigned(hand(0, left=0.05, away=0.4), person(), SCALE, 0) is None
     assert assigned(hand(0, left=0.05, away=0.4), person(), SCALE, 0, same_wrist=0.5) is not None
     near = WRIST_PX[0][0] + 0.8 * LENGTH, WRIST_PX[0][1]
-    assert assigned(found, person(right_wrist_px=near), SCALE, 0) is None  # it may be the other hand
+    # it may be the other hand
+    assert assigned(found, person(right_wrist_px=near), SCALE, 0) is None
     assert assigned(found, person(sure=0.3), SCALE, 0) is None
 
 
@@ -105,6 +126,11 @@ def test_a_hand_that_was_found_twice_goes_to_the_nearest_wrist() -> None:
 
 def test_hands_that_touch_are_two_where_the_network_is_sure_of_their_sides() -> None:
     a = hand(0, left=0.95)
-    for left, away, is_same in ((0.5, 0.2, True), (0.05, 0.2, False), (0.05, 0.1, True), (0.5, 0.5, False)):
+    for left, away, is_same in (
+        (0.5, 0.2, True),
+        (0.05, 0.2, False),
+        (0.05, 0.1, True),
+        (0.5, 0.5, False),
+    ):
         assert is_same_hand(a, hand(0, left=left, away=away)) == is_same
     assert not is_same_hand(a, None)

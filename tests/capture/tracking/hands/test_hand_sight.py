@@ -29,7 +29,9 @@ def test_a_part_of_the_frame_gives_the_places_in_the_frame(place):
     image[place[1], place[0]] = 255
     keypoints = np.zeros((33, 2))
     keypoints[WRIST] = np.add(place, 4.0)
-    person = Observation(keypoints, np.ones(33), np.zeros((33, 3)), 1.0, Region((0.0, 0.0), 1.0, 0.0), False)
+    person = Observation(
+        keypoints, np.ones(33), np.zeros((33, 3)), 1.0, Region((0.0, 0.0), 1.0, 0.0), False
+    )
     sight = Sight(image, person, 0, 200.0, None)  # a hand has 36 pixels
     kept = sight.around_wrist()
     assert kept.image_rgb.size < 0.1 * image.size

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hands in real footage, and with fake networks: lost and found, of another person, of both sides at once."""
+"""Hands in real footage, and with fake networks: lost and found, of another person, of both sides
+at once.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,11 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
-from scope.scope_addon.capture.perception.hand_landmarks import HAND_LENGTH_M, HandEstimate, pixels_per_metre
+from scope.scope_addon.capture.perception.hand_landmarks import (
+    HAND_LENGTH_M,
+    HandEstimate,
+    pixels_per_metre,
+)
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.perception.region import Region
@@ -30,7 +36,12 @@ IMAGE = np.zeros((1000, 1000, 3), np.uint8)
 
 def hand_at(wrist, left=0.95, presence=0.95):
     """An upright hand as the network would report it."""
-    points = np.array([[0.0, 0.0], *([x, y] for x in (-0.25, -0.12, 0, 0.12, 0.24) for y in (-0.5, -0.65, -0.8, -1))])
+    points = np.array(
+        [
+            [0.0, 0.0],
+            *([x, y] for x in (-0.25, -0.12, 0, 0.12, 0.24) for y in (-0.5, -0.65, -0.8, -1)),
+        ]
+    )
     region = Region((wrist[0], wrist[1] - LENGTH / 2), 2 * LENGTH, 0.0)
     world = np.pad(points * HAND_LENGTH_M, ((0, 0), (0, 1)))
     return HandEstimate(points * LENGTH + wrist, world, presence, left, region)
@@ -56,7 +67,11 @@ class FakeHands:
 
     def estimate(self, _image, region):
         self.calls += 1
-        inside = [h for h in self.hands if np.hypot(*(h.keypoints_px[9] - region.center_px)) < region.side_px / 3]
+        inside = [
+            h
+            for h in self.hands
+            if np.hypot(*(h.keypoints_px[9] - region.center_px)) < region.side_px / 3
+        ]
         if not inside:
             return hand_at(region.center_px, presence=0.0)
         return min(inside, key=lambda h: np.hypot(*(h.keypoints_px[9] - region.center_px)))
@@ -68,13 +83,19 @@ class FakePalms:
 
     def detect(self, _image, where, threshold):
         self.calls += 1
-        near = [h for h in self.hands if np.hypot(*(h.keypoints_px[9] - where.center_px)) < where.side_px / 2]
+        near = [
+            h
+            for h in self.hands
+            if np.hypot(*(h.keypoints_px[9] - where.center_px)) < where.side_px / 2
+        ]
         return [h.region for h in near]
 
 
 @pytest.fixture
 def follow(monkeypatch):
-    """``follow(hands)``: a tracker whose networks see these hands, as long as they are in the list."""
+    """``follow(hands)``: a tracker whose networks see these hands, as long as they are in the
+    list.
+    """
 
     def make(hands, **options):
         monkeypatch.setattr(hand_tracker, "HandNetwork", lambda *_: FakeHands(hands))
@@ -116,7 +137,9 @@ def test_a_hand_is_found_again_and_zeros_mark_the_frames_without_it(follow):
 
 @pytest.mark.parametrize("rate", [12, 30, 60])
 def test_a_missing_hand_is_searched_equally_often_at_any_frame_rate(follow, rate):
-    """Each hand for a third of a second in every frame, or 30 times per second, then six to eight times per second."""
+    """Each hand for a third of a second in every frame, or 30 times per second, then six to eight
+    times per second.
+    """
     tracker = follow([])
     calls = []
     for k in range(3 * rate):
@@ -137,7 +160,9 @@ def test_a_hand_whose_wrist_is_hidden_is_not_looked_for_in_every_frame(follow):
     """Six to eight times per second from the start, each hand."""
     tracker = follow([])
     for k in range(31):
-        tracker.step(IMAGE, [(0, replace(person(), keypoints_confidence=np.full(33, 0.05)))], k / 30)
+        tracker.step(
+            IMAGE, [(0, replace(person(), keypoints_confidence=np.full(33, 0.05)))], k / 30
+        )
     assert 12 <= tracker._palms.calls <= 18
 
 
@@ -167,10 +192,17 @@ def test_a_hand_that_the_network_is_unsure_of_is_reported_as_tentative_and_follo
 
 
 def test_a_hand_of_another_colour_than_before_is_imagined_unless_it_is_certain(follow):
-    skin, cloth = (np.full((1000, 1000, 3), color, np.uint8) for color in ((134, 104, 79), (26, 40, 45)))
+    skin, cloth = (
+        np.full((1000, 1000, 3), color, np.uint8) for color in ((134, 104, 79), (26, 40, 45))
+    )
     hands = [hand_at((300, 500), presence=0.9)]
     tracker = follow(hands)
-    for image, presence, is_seen in ((skin, 0.9, True), (cloth, 0.9, False), (skin, 0.9, True), (cloth, 0.97, True)):
+    for image, presence, is_seen in (
+        (skin, 0.9, True),
+        (cloth, 0.9, False),
+        (skin, 0.9, True),
+        (cloth, 0.97, True),
+    ):
         hands[0] = hand_at((300, 500), presence=presence)
         (_, found), *_ = tracker.step(image, [(0, person())])
         assert (found.hands[0, 0, 2] > 0) == is_seen
@@ -178,11 +210,17 @@ def test_a_hand_of_another_colour_than_before_is_imagined_unless_it_is_certain(f
 
 
 @pytest.mark.parametrize(("away", "is_seen"), [(0.2, True), (0.4, False)])
-def test_a_second_look_finds_a_hand_by_an_unsure_palm_but_only_at_the_bodys_wrist(follow, away, is_seen):
+def test_a_second_look_finds_a_hand_by_an_unsure_palm_but_only_at_the_bodys_wrist(
+    follow, away, is_seen
+):
     class InPalms(FakeHands):
         def estimate(self, image, region):
             of_body = min(abs(region.side_px / LENGTH - scale) for scale in (1.5, 0.7 * 1.5)) < 0.01
-            return hand_at(region.center_px, presence=0.0) if of_body else super().estimate(image, region)
+            return (
+                hand_at(region.center_px, presence=0.0)
+                if of_body
+                else super().estimate(image, region)
+            )
 
     class UnsurePalms(FakePalms):
         def detect(self, image, where, threshold):
@@ -210,7 +248,9 @@ def test_a_hand_of_the_other_side_is_rejected(follow, hand, other):
 
 
 @pytest.mark.parametrize(("left", "are_sides_sure"), [(0.97, True), (0.7, False)])
-def test_hands_of_sure_sides_are_not_exchanged_where_the_bodys_wrists_are(follow, left, are_sides_sure):
+def test_hands_of_sure_sides_are_not_exchanged_where_the_bodys_wrists_are(
+    follow, left, are_sides_sure
+):
     """Forearms cross: the body's elbows are right, but each of its wrists is at the other hand."""
     at_right, at_left = (500, 500), (500 + 1.2 * LENGTH, 500)
     tracker = follow([hand_at(at_left, left=left), hand_at(at_right, left=1 - left)])
@@ -250,7 +290,9 @@ def test_a_hand_that_only_looks_like_the_other_one_is_mirrored_in_depth(follow):
 
 
 @pytest.mark.parametrize(("away", "presence"), [(0.1, 0.6), (0.4, 0.8)])
-def test_without_a_palm_a_hand_has_to_be_more_certain_the_farther_it_is_from_the_wrist(follow, away, presence):
+def test_without_a_palm_a_hand_has_to_be_more_certain_the_farther_it_is_from_the_wrist(
+    follow, away, presence
+):
     for offset in (-0.05, 0.05):
         tracker = follow([hand_at((300 + away * LENGTH, 500), presence=presence + offset)])
         tracker._palms.hands = []
@@ -259,13 +301,23 @@ def test_without_a_palm_a_hand_has_to_be_more_certain_the_farther_it_is_from_the
 
 def test_one_hand_is_not_assigned_to_both_sides(follow):
     tracker = follow([hand_at((500, 500), left=0.5)])
-    assert list(seen(tracker, person(left_wrist=(495, 500), right_wrist=(540, 500)))) == [True, False]
+    assert list(seen(tracker, person(left_wrist=(495, 500), right_wrist=(540, 500)))) == [
+        True,
+        False,
+    ]
 
 
 @pytest.mark.parametrize(("certainty", "are_both_seen"), [(0.95, True), (0.8, False)])
-def test_hands_that_touch_are_two_where_the_network_is_sure_of_their_sides(follow, certainty, are_both_seen):
-    """A hand behind the other one, which the network imagines where that one is, has an unsure side."""
-    left, right = hand_at((300, 500), left=certainty), hand_at((300 + 0.25 * LENGTH, 500), left=0.02)
+def test_hands_that_touch_are_two_where_the_network_is_sure_of_their_sides(
+    follow, certainty, are_both_seen
+):
+    """A hand behind the other one, which the network imagines where that one is, has an unsure
+    side.
+    """
+    left, right = (
+        hand_at((300, 500), left=certainty),
+        hand_at((300 + 0.25 * LENGTH, 500), left=0.02),
+    )
     tracker = follow([left, right])
     wrists = person(left_wrist=(300, 500), right_wrist=(300 + 0.5 * LENGTH, 500))
     for _ in range(3):
@@ -299,7 +351,9 @@ def test_a_followed_hand_may_look_like_the_other_one_farther_from_the_wrist(foll
 
 
 @pytest.mark.parametrize(("left", "is_followed"), [(0.97, True), (0.7, False)])
-def test_a_certain_hand_stays_where_the_bodys_wrist_leaves_it_for_the_elbow(follow, left, is_followed):
+def test_a_certain_hand_stays_where_the_bodys_wrist_leaves_it_for_the_elbow(
+    follow, left, is_followed
+):
     tracker = follow([hand_at((300, 500), left=left)])
     assert seen(tracker, person())[0]
     bent = person()
@@ -310,21 +364,29 @@ def test_a_certain_hand_stays_where_the_bodys_wrist_leaves_it_for_the_elbow(foll
 def numbered_pixels(late=True):
     """An image in which each pixel says where it is, and whether the frame is a late one."""
     y, x = np.mgrid[:1000, :1000]
-    return np.stack([x % 256, y % 256, 128 * late + 16 * (x // 256) + y // 256], axis=2).astype(np.uint8)
+    return np.stack([x % 256, y % 256, 128 * late + 16 * (x // 256) + y // 256], axis=2).astype(
+        np.uint8
+    )
 
 
 class InFrame(FakeHands):
-    """Knows from the pixels which part of the frame it is given; only late frames show other hands than the first."""
+    """Knows from the pixels which part of the frame it is given; only late frames show other hands
+    than the first.
+    """
 
     def estimate(self, image, region):
         x, y, both = (int(value) for value in image[0, 0])
         offset = np.array([x + 256 * (both % 128 // 16), y + 256 * (both % 16)])
         in_sight = FakeHands(self.hands if both >= 128 else self.hands[:1])
-        found = in_sight.estimate(image, replace(region, center_px=tuple(region.center_px + offset)))
+        found = in_sight.estimate(
+            image, replace(region, center_px=tuple(region.center_px + offset))
+        )
         return replace(found, keypoints_px=found.keypoints_px - offset)
 
 
-def test_a_hand_that_is_found_again_is_followed_back_through_the_frames_in_which_it_was_missed(follow):
+def test_a_hand_that_is_found_again_is_followed_back_through_the_frames_in_which_it_was_missed(
+    follow,
+):
     """For a third of a second, and in the arrays that were given out for these frames."""
     hands, people, first = [], FollowedPeople(), None
     tracker = follow(hands)
@@ -359,13 +421,17 @@ def test_a_hand_is_not_followed_back_onto_one_that_is_another(follow):
 
 
 def test_hands_are_found_in_most_frames_of_a_gesturing_person(frames):
-    """They measure some 25 pixels. In the first second they hang down edge-on, afterwards they are raised."""
+    """They measure some 25 pixels. In the first second they hang down edge-on, afterwards they are
+    raised.
+    """
     people, hands = PeopleTracker("fast", 1), HandTracker(1)
     found, apart = [], []
     for image in frames("clips/gesture_square", stop=72):
         for _, o in hands.step(image, people.step(image)):
             found.append(o.hands[:, 0, 2] > 0)
-            wrists = o.keypoints_px[[KEYPOINT_NAMES.index(f"{side}_wrist") for side in ("left", "right")]]
+            wrists = o.keypoints_px[
+                [KEYPOINT_NAMES.index(f"{side}_wrist") for side in ("left", "right")]
+            ]
             apart += list(np.linalg.norm(o.hands[:, 0, :2] - wrists, axis=1)[found[-1]])
     share = np.mean(found[35:], axis=0)
     assert (share > 0.8).all()
@@ -398,10 +464,15 @@ def test_a_capture_with_hands_from_file_to_motion(shared):
     assert m.keypoints2d.shape[1] == len(m.keypoints2d_names) == 33 + 42
     assert result.report["per_person"][0]["left_hand_frames"] > 0.8 * len(m)
     index = [body.keypoint_names.index(str(name)) for name in m.keypoints2d_names[33:]]
-    R, t = body.forward_kinematics(exp(m.poses.reshape(len(m), -1, 3).astype(float)), m.trans.astype(float), m.betas)
+    R, t = body.forward_kinematics(
+        exp(m.poses.reshape(len(m), -1, 3).astype(float)), m.trans.astype(float), m.betas
+    )
     points = body.keypoints(R, t, m.betas.astype(float))[:, index]
     camera_from_world = np.linalg.inv(m.world_from_camera)
-    points = np.einsum("tij,tkj->tki", camera_from_world[:, :3, :3], points) + camera_from_world[:, None, :3, 3]
+    points = (
+        np.einsum("tij,tkj->tki", camera_from_world[:, :3, :3], points)
+        + camera_from_world[:, None, :3, 3]
+    )
     pixels = points[..., :2] / points[..., 2:] * m.intrinsics[0, 0] + m.intrinsics[:2, 2]
     off = np.linalg.norm(pixels - m.keypoints2d[:, 33:, :2], axis=-1)[m.keypoints2d[:, 33:, 2] > 0]
     assert np.median(off) < 3.5  # pixels; a palm measures 13 of them
@@ -413,7 +484,10 @@ def test_auto_captures_large_hands_and_leaves_the_fingers_of_small_ones_at_rest(
     """Hands of 37 pixels from wrist to middle knuckle in the first clip, of 13 in the second."""
     body = load_body("scope_h")
     options = CaptureOptions(quality="fast", hands="auto", threads=1, smoothing=False)
-    clips = {"squats_5fps": VideoRange(0.0, 1.0, None), "gesture_square": VideoRange(1.4, 1.6, None)}
+    clips = {
+        "squats_5fps": VideoRange(0.0, 1.0, None),
+        "gesture_square": VideoRange(1.4, 1.6, None),
+    }
     large, small = (
         capture(shared / f"data/clips/{name}.mp4", body, replace(options, wanted=wanted))
         for name, wanted in clips.items()
@@ -421,6 +495,10 @@ def test_auto_captures_large_hands_and_leaves_the_fingers_of_small_ones_at_rest(
     assert large.report["per_person"][0]["right_hand_frames"] == len(large.motions[0])
     assert small.report["per_person"][0]["right_hand_frames"] == 0
     assert not any("hands" in warning for warning in small.report["warnings"])
-    fingers = [body.joint_names.index(f"right_{name}{k}") for name in ("index", "middle") for k in (1, 2, 3)]
+    fingers = [
+        body.joint_names.index(f"right_{name}{k}")
+        for name in ("index", "middle")
+        for k in (1, 2, 3)
+    ]
     rotations = small.motions[0].poses.reshape(len(small.motions[0]), -1, 3)[:, fingers]
     np.testing.assert_allclose(rotations, 0.0, atol=1e-6)

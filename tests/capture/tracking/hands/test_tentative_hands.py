@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which tentative hands are believed: those that continue a sure one, for a short time, in both directions."""
+"""Which tentative hands are believed: those that continue a sure one, for a short time, in both
+directions.
+"""
 
 from __future__ import annotations
 
@@ -12,9 +14,13 @@ LEFT = 0
 
 
 def hand(presence, turned_deg=0.0, size=40.0, wrist=(200.0, 300.0)):
-    """A flat hand of 21 points, as in a row of the track; a negative presence marks it as tentative."""
+    """A flat hand of 21 points, as in a row of the track; a negative presence marks it as
+    tentative.
+    """
     a = np.radians(turned_deg)
-    points = np.array([[0.0, 0.0], *([x, y] for x in (-0.4, -0.2, 0, 0.2, 0.4) for y in (-0.5, -0.65, -0.8, -1))])
+    points = np.array(
+        [[0.0, 0.0], *([x, y] for x in (-0.4, -0.2, 0, 0.2, 0.4) for y in (-0.5, -0.65, -0.8, -1))]
+    )
     out = np.zeros((21, 6))
     out[:, :2] = size * points @ np.array([[np.cos(a), np.sin(a)], [-np.sin(a), np.cos(a)]]) + wrist
     out[:, 2], out[:, 3:5] = presence, points

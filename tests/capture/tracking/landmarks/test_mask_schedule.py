@@ -10,7 +10,11 @@ import pytest
 from scope.scope_addon.capture.perception.landmark_network import LandmarkNetwork
 from scope.scope_addon.capture.perception.observation import Observation, PersonMask
 from scope.scope_addon.capture.perception.region import Region
-from scope.scope_addon.capture.tracking.landmarks.mask_schedule import MASKS, MIN_STRIDE, MaskSchedule
+from scope.scope_addon.capture.tracking.landmarks.mask_schedule import (
+    MASKS,
+    MIN_STRIDE,
+    MaskSchedule,
+)
 from scope.scope_addon.capture.tracking.track import Tracklet, make_track, single_frame_track
 
 IMAGE = np.zeros((48, 64, 3), np.uint8)
@@ -33,7 +37,13 @@ def schedule(frames: int) -> MaskSchedule:
 def seen(presence: float = 1.0, **more: Any) -> Observation:
     points = np.random.default_rng(0).uniform(10, 40, (33, 2))
     return Observation(
-        points, np.ones(33), np.zeros((33, 3)), presence, Region((30.0, 20.0), 40.0, 0.0), acquired=False, **more
+        points,
+        np.ones(33),
+        np.zeros((33, 3)),
+        presence,
+        Region((30.0, 20.0), 40.0, 0.0),
+        acquired=False,
+        **more,
     )
 
 
@@ -65,7 +75,9 @@ def test_the_frame_before_knows_which_one_is_due(expected: int) -> None:
 def test_a_mask_that_the_tracker_gives_is_not_computed_again() -> None:
     network = Network()
     masks = MaskSchedule(cast(LandmarkNetwork, network), 40)
-    given = PersonMask(Region((30.0, 20.0), 40.0, 0.0), np.full((256, 256), 0.7, np.float16), (64, 48))
+    given = PersonMask(
+        Region((30.0, 20.0), 40.0, 0.0), np.full((256, 256), 0.7, np.float16), (64, 48)
+    )
     ((_, kept),) = masks.add(IMAGE, [(0, seen(mask=given))])
     assert kept.mask is given
     assert network.calls == 0

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What counts as a body, as the same body, and as one in the image: each limit from both of its sides."""
+"""What counts as a body, as the same body, and as one in the image: each limit from both of its
+sides.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +18,12 @@ IMAGE = np.zeros((480, 640, 3), np.uint8)
 REGION = Region((320.0, 240.0), 250.0, 0.0)
 
 
-def body(spread: float = 0.6, presence: float = 0.9, confident: int = 33, twist: float = 0.0) -> PoseEstimate:
-    """Return an estimate whose keypoints have this spread; `twist` spoils the landmarks in space by that share."""
+def body(
+    spread: float = 0.6, presence: float = 0.9, confident: int = 33, twist: float = 0.0
+) -> PoseEstimate:
+    """Return an estimate whose keypoints have this spread; `twist` spoils the landmarks in space by
+    that share.
+    """
     rng = np.random.default_rng(3)
     shape = rng.normal(size=(33, 3))
     shape -= shape.mean(axis=0)
@@ -36,7 +42,8 @@ def body(spread: float = 0.6, presence: float = 0.9, confident: int = 33, twist:
         (body(confident=3), False, False),
         (body(confident=4), True, True),
         (body(spread=0.37), False, False),
-        (body(spread=0.42), True, False),  # a hand may look so: something else has to say that there is a body
+        # a hand may look so: something else has to say that there is a body
+        (body(spread=0.42), True, False),
         (body(twist=2.0), False, False),
     ],
 )
@@ -53,13 +60,16 @@ def test_two_estimates_within_a_tenth_of_a_region_are_one_body(shift_px: float, 
 
 
 def test_shares_count_keypoints() -> None:
-    estimate = replace(body(), keypoints_px=np.stack([np.linspace(-160, 639, 33), np.full(33, 100.0)], axis=1))
+    estimate = replace(
+        body(), keypoints_px=np.stack([np.linspace(-160, 639, 33), np.full(33, 100.0)], axis=1)
+    )
     inside = (estimate.keypoints_px[:, 0] >= 0).mean()
     assert plausibility.share_in_image(estimate, IMAGE) == pytest.approx(inside)
     assert plausibility.is_center_in_image(estimate, IMAGE)
     left = replace(estimate, keypoints_px=estimate.keypoints_px - [400.0, 0.0])
     assert not plausibility.is_center_in_image(left, IMAGE)
-    assert plausibility.share_within(body(), body()) == pytest.approx(1.0, abs=0.13)  # the outermost are its border
+    # the outermost are its border
+    assert plausibility.share_within(body(), body()) == pytest.approx(1.0, abs=0.13)
     assert plausibility.share_within(body(), left) == 0.0
 
 

@@ -16,12 +16,27 @@ from scope.scope_addon.capture.world.placement import place_track
 from scope.scope_addon.kinematics.body_surface import BodySurface, with_arm_points
 from scope.solver.rotations import exp
 
-from .waving_person import ARM, BODY, FPS, FRAMES, HIPS, JOINTS, LEG, fit, joints, keypoints, person, prepare
+from .waving_person import (
+    ARM,
+    BODY,
+    FPS,
+    FRAMES,
+    HIPS,
+    JOINTS,
+    LEG,
+    fit,
+    joints,
+    keypoints,
+    person,
+    prepare,
+)
 
 
 @pytest.mark.parametrize("flipped", [1, 4, 8])
 def test_a_limb_that_is_lifted_to_its_mirror_image_for_some_frames_stays_where_it_was(flipped):
-    """The image shows a leg bent towards the camera as one bent away; the lifter is half as sure where it is wrong."""
+    """The image shows a leg bent towards the camera as one bent away; the lifter is half as sure
+    where it is wrong.
+    """
     track, true = person()
     wrong, sigma = track.world_landmarks.copy(), np.full((FRAMES, JOINTS), 0.1)
     span = slice(6, 6 + flipped)
@@ -33,7 +48,10 @@ def test_a_limb_that_is_lifted_to_its_mirror_image_for_some_frames_stays_where_i
     start.rotations[span, hip] = exp(np.array([-0.3, 0.0, 0.0]))
     start.rotations[span, knee] = exp(np.array([-0.9, 0.0, 0.0]))
     ankle = BODY.joint_names.index("right_ankle")
-    depth = [joints(each)[:, ankle, 2] for each in (true, start, fit(prepare(track, wrong, sigma), start))]
+    depth = [
+        joints(each)[:, ankle, 2]
+        for each in (true, start, fit(prepare(track, wrong, sigma), start))
+    ]
     assert np.abs(depth[1] - depth[0])[span].min() > 0.5
     np.testing.assert_allclose(depth[2], depth[0], atol=0.06)
 
@@ -41,7 +59,9 @@ def test_a_limb_that_is_lifted_to_its_mirror_image_for_some_frames_stays_where_i
 def test_noise_of_single_frames_is_averaged_and_a_motion_keeps_its_amplitude():
     track, true = person(48)
     rng = np.random.default_rng(0)
-    noisy = replace(track, keypoints_px=track.keypoints_px + rng.normal(0.0, 4.0, track.keypoints_px.shape))
+    noisy = replace(
+        track, keypoints_px=track.keypoints_px + rng.normal(0.0, 4.0, track.keypoints_px.shape)
+    )
     lifted = track.world_landmarks + rng.normal(0.0, 0.03, track.world_landmarks.shape)
     prepared = prepare(noisy, lifted)
     together = fit(prepared, true)
@@ -79,7 +99,9 @@ def test_windows_agree_on_the_deviations(monkeypatch):
 def test_soles_that_rest_stay_in_place():
     track, true = person()
     rng = np.random.default_rng(1)
-    shaken = replace(track, keypoints_px=track.keypoints_px + rng.normal(0.0, 6.0, track.keypoints_px.shape))
+    shaken = replace(
+        track, keypoints_px=track.keypoints_px + rng.normal(0.0, 6.0, track.keypoints_px.shape)
+    )
     stance = Stance(
         true.t_camera_root,
         np.tile(np.eye(3), (FRAMES, 1, 1)),
@@ -100,7 +122,9 @@ def test_soles_that_rest_stay_in_place():
 @pytest.mark.parametrize("moves", [False, True])
 def test_soles_that_rest_do_not_drift(moves):
     angle = 0.1 * np.sin(np.arange(60) / 5.0) * moves
-    path = CameraPath(exp(angle[:, None] * [0.0, 1.0, 0.0]), np.outer(np.arange(60), [0.02, 0.0, 0.01]) * moves)
+    path = CameraPath(
+        exp(angle[:, None] * [0.0, 1.0, 0.0]), np.outer(np.arange(60), [0.02, 0.0, 0.01]) * moves
+    )
     track, first = person(60, path)
     true = path.to_frames(first)
     track.keypoints_px[..., 0] += np.linspace(-4.0, 4.0, 60)[:, None]  # 2 cm at 4 m
@@ -119,7 +143,9 @@ def test_soles_that_rest_do_not_drift(moves):
 
 def test_a_moving_camera_gives_the_same_motion_as_a_static_one():
     angle = 0.1 * np.sin(np.arange(FRAMES) / 5.0)
-    path = CameraPath(exp(angle[:, None] * [0.0, 1.0, 0.0]), np.outer(np.arange(FRAMES), [0.02, 0.0, 0.01]))
+    path = CameraPath(
+        exp(angle[:, None] * [0.0, 1.0, 0.0]), np.outer(np.arange(FRAMES), [0.02, 0.0, 0.01])
+    )
     (still, true), (moved, _) = person(), person(path=path)
     static = fit(prepare(still), true)
     start = path.to_frames(true)
@@ -135,7 +161,9 @@ def test_a_moving_camera_gives_the_same_motion_as_a_static_one():
 def test_windows_agree_with_the_whole_and_join_smoothly(monkeypatch):
     track, true = person(90)
     rng = np.random.default_rng(2)
-    prepared = prepare(replace(track, keypoints_px=track.keypoints_px + rng.normal(0.0, 3.0, (90, JOINTS, 2))))
+    prepared = prepare(
+        replace(track, keypoints_px=track.keypoints_px + rng.normal(0.0, 3.0, (90, JOINTS, 2)))
+    )
     whole = joints(fit(prepared, true))
     monkeypatch.setattr(clip_fit, "WINDOW_UNKNOWNS", 40 * 3 * (BODY.K + 2))
     monkeypatch.setattr(clip_fit, "OVERLAP", 8 * 3 * (BODY.K + 2))
@@ -153,7 +181,8 @@ def test_windows_cover_all_frames_and_overlap():
         found = clip_fit.windows(count, most, overlap)
         assert found[0].start == 0
         assert found[-1].stop == count
-        assert sum(w.stop - w.start for w in found) < count + len(found) * (overlap + 1)  # no more than is needed
+        # no more than is needed
+        assert sum(w.stop - w.start for w in found) < count + len(found) * (overlap + 1)
         for a, b in zip(found[:-1], found[1:], strict=True):
             assert b.stop - b.start == a.stop - a.start <= most
             assert a.stop - b.start >= overlap
@@ -197,7 +226,8 @@ def test_the_second_fit_lets_go_of_what_is_three_times_as_fast_as_usual():
         assert np.asarray(prior.joints)[spine] > 5 * np.asarray(prior.joints)[knee]
     sigmas = np.asarray(second.robust_joints)
     legs = np.array([name.endswith(("hip", "knee", "ankle")) for name in BODY.joint_names[1:]])
-    lifted = np.asarray(second.joints) * np.where(legs, 2.0, 1.0)  # legs may accelerate more for the same weight
+    # legs may accelerate more for the same weight
+    lifted = np.asarray(second.joints) * np.where(legs, 2.0, 1.0)
     np.testing.assert_allclose(lifted * sigmas, lifted[0] * sigmas[0])
 
 
@@ -211,7 +241,9 @@ def test_the_states_to_start_from_stay_as_they_are():
 
 @pytest.mark.parametrize("left_out", [False, True])
 def test_a_hand_that_is_lifted_into_the_trunk_lies_on_it(left_out):
-    """The image does not show the left arm, and the lifting network has it hanging through the hips."""
+    """The image does not show the left arm, and the lifting network has it hanging through the
+    hips.
+    """
     track, true = person()
     shoulder = BODY.joint_names.index("left_shoulder")
     start = replace(true, rotations=true.rotations.copy())
@@ -220,11 +252,20 @@ def test_a_hand_that_is_lifted_into_the_trunk_lies_on_it(left_out):
     points = keypoints(start.rotations, start.t_camera_root)
     inside = points - points[:, HIPS].mean(axis=1, keepdims=True)
     up, nothing = np.tile([0.0, -1.0, 0.0], (FRAMES, 1)), np.zeros((FRAMES, 6))
-    stance = Stance(true.t_camera_root, np.tile(np.eye(3), (FRAMES, 1, 1)), up, np.full(FRAMES, -5.0), nothing, nothing)
+    stance = Stance(
+        true.t_camera_root,
+        np.tile(np.eye(3), (FRAMES, 1, 1)),
+        up,
+        np.full(FRAMES, -5.0),
+        nothing,
+        nothing,
+    )
     prepared = prepare(track, inside).with_stance(stance, true.betas)
     found = fit(prepared, start, ablation=Ablation(body_surface=not left_out))
     surface = BodySurface(with_arm_points(BODY), np.zeros(BODY.P))
-    R, t = BODY.forward_kinematics(found.rotations, found.t_camera_root - BODY.rest_joints()[0], np.zeros(BODY.P))
+    R, t = BODY.forward_kinematics(
+        found.rotations, found.t_camera_root - BODY.rest_joints()[0], np.zeros(BODY.P)
+    )
     lowest = surface.planes(R, t).height.min(axis=1)
     if left_out:
         assert lowest.max() < -0.03

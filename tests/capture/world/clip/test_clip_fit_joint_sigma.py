@@ -9,7 +9,9 @@ from scope.scope_addon.capture.world.clip.clip_fit import ACROSS, ALONG, joint_s
 
 
 def _covariances(sights, along_m, across_m):
-    """Covariances (T, K+1, 3, 3) with these deviations along unit vectors (T, K+1, 3) and at right angles to them."""
+    """Covariances (T, K+1, 3, 3) with these deviations along unit vectors (T, K+1, 3) and at right
+    angles to them.
+    """
     outer = sights[..., :, None] * sights[..., None, :]
     return along_m**2 * outer + across_m**2 * (np.eye(3) - outer)
 
@@ -28,11 +30,19 @@ def test_deviations_are_those_along_each_joints_own_line_of_sight():
 def test_the_same_covariance_says_less_of_more_frames(first, second, ratio):
     joints = np.tile([0.0, 0.0, 3.0], (3, 2, 1))
     covariance = np.tile(1e-5 * np.eye(3), (3, 2, 1, 1))
-    slow, fast = (joint_sigma(covariance[:, 0], covariance, joints, np.arange(3) / rate) for rate in (first, second))
+    slow, fast = (
+        joint_sigma(covariance[:, 0], covariance, joints, np.arange(3) / rate)
+        for rate in (first, second)
+    )
     np.testing.assert_allclose(fast, ratio * slow)
 
 
 def test_a_single_frame_is_as_one_of_few():
-    joints, covariance = np.tile([0.0, 0.0, 3.0], (2, 2, 1)), np.tile(1e-5 * np.eye(3), (2, 2, 1, 1))
+    joints, covariance = (
+        np.tile([0.0, 0.0, 3.0], (2, 2, 1)),
+        np.tile(1e-5 * np.eye(3), (2, 2, 1, 1)),
+    )
     one = joint_sigma(covariance[:1, 0], covariance[:1], joints[:1], np.zeros(1))
-    np.testing.assert_allclose(one, joint_sigma(covariance[:, 0], covariance, joints, np.array([0.0, 0.1]))[:1])
+    np.testing.assert_allclose(
+        one, joint_sigma(covariance[:, 0], covariance, joints, np.array([0.0, 0.1]))[:1]
+    )

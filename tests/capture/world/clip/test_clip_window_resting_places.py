@@ -7,7 +7,8 @@ import numpy as np
 from scope.scope_addon.capture.world.clip.clip_window import resting_places
 
 T = 30
-STEP = np.where(np.arange(T) < 15, 0.0, 0.4)  # metres; the point rests in frames 0 to 11 and 18 to 29
+# metres; the point rests in frames 0 to 11 and 18 to 29
+STEP = np.where(np.arange(T) < 15, 0.0, 0.4)
 RESTING = np.where((np.arange(T) < 12) | (np.arange(T) >= 18), 0.9, 0.1)[:, None]
 
 
@@ -22,7 +23,9 @@ def test_each_rest_has_one_place_where_the_point_is_on_average():
     places, p = resting_places(_points(0.01), RESTING)
     np.testing.assert_allclose(p, np.where(RESTING > 0.5, RESTING, 0.0))
     for rest in (slice(0, 12), slice(18, T)):
-        np.testing.assert_allclose(places[rest, 0], np.tile(_points(0.01)[rest, 0].mean(axis=0), (12, 1)))
+        np.testing.assert_allclose(
+            places[rest, 0], np.tile(_points(0.01)[rest, 0].mean(axis=0), (12, 1))
+        )
 
 
 def test_a_point_that_strays_has_no_place():

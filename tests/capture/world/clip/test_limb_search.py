@@ -17,7 +17,9 @@ FRAMES, SPAN = 64, slice(12, 52)
 
 @pytest.mark.parametrize("moving", [False, True])
 def test_a_limb_that_starts_mirrored_for_long_ends_where_it_was(moving: bool) -> None:
-    """For forty frames, the lifter cannot tell the thigh before the hip from one behind it, and the start is wrong."""
+    """For forty frames, the lifter cannot tell the thigh before the hip from one behind it, and the
+    start is wrong.
+    """
     angles = np.linspace(0.0, 0.3, FRAMES)
     turns = exp(np.array([[0.0, angle, 0.0] for angle in (angles if moving else 0.0 * angles)]))
     path = CameraPath(turns, np.linspace([0.0, 0.0, 0.0], [0.4, 0.0, 0.0], FRAMES) * moving)
@@ -31,7 +33,11 @@ def test_a_limb_that_starts_mirrored_for_long_ends_where_it_was(moving: bool) ->
     ankle = BODY.joint_names.index("right_ankle")
     truth, before, after = (
         joints(each)[:, ankle]
-        for each in (true, start, path.to_first(fit(prepare(track, unsure, sigma), path.to_frames(start), path)))
+        for each in (
+            true,
+            start,
+            path.to_first(fit(prepare(track, unsure, sigma), path.to_frames(start), path)),
+        )
     )
     assert np.linalg.norm(before - truth, axis=1)[SPAN].min() > 0.5
     assert np.linalg.norm(after - truth, axis=1).max() < 0.1

@@ -23,7 +23,9 @@ FPS, FRAMES = 30.0, 24
 BODY, CAMERA = load_body("scope"), choose_camera(1080, 1920)
 JOINTS = len(KEYPOINT_NAMES)
 HIPS = [KEYPOINT_NAMES.index(f"{side}_hip") for side in ("left", "right")]
-ARM = [KEYPOINT_NAMES.index(f"left_{name}") for name in ("elbow", "wrist", "pinky", "index", "thumb")]
+ARM = [
+    KEYPOINT_NAMES.index(f"left_{name}") for name in ("elbow", "wrist", "pinky", "index", "thumb")
+]
 LEG = [KEYPOINT_NAMES.index(f"right_{name}") for name in ("knee", "ankle", "heel", "foot_index")]
 
 
@@ -62,20 +64,31 @@ def keypoints(rotations: np.ndarray, root: np.ndarray) -> np.ndarray:
     """The network's keypoints (T, J, 3) of states, in their axes."""
     R, t = BODY.forward_kinematics(rotations, root - BODY.rest_joints()[0], np.zeros(BODY.P))
     at = BODY.keypoint_set("blazepose")
-    return with_keypoint_offsets(BODY).keypoints(R, t, np.zeros(BODY.P), [at[name] for name in KEYPOINT_NAMES])
+    return with_keypoint_offsets(BODY).keypoints(
+        R, t, np.zeros(BODY.P), [at[name] for name in KEYPOINT_NAMES]
+    )
 
 
-def prepare(track: Track, lifted_m: np.ndarray | None = None, sigma_m: np.ndarray | float = 0.1) -> PreparedTrack:
-    """The track with lifted points and their deviation; by default those of the track, which are exact."""
+def prepare(
+    track: Track, lifted_m: np.ndarray | None = None, sigma_m: np.ndarray | float = 0.1
+) -> PreparedTrack:
+    """The track with lifted points and their deviation; by default those of the track, which are
+    exact.
+    """
     sigma = np.broadcast_to(sigma_m, (len(track), JOINTS)).copy()
     points = track.world_landmarks if lifted_m is None else lifted_m
     return replace(prepare_track(BODY, track, CAMERA), lifted=Lifted(points, sigma, sigma))
 
 
 def fit(
-    prepared: PreparedTrack, start: FittedTrack, path: CameraPath | None = None, ablation: Ablation = NO_ABLATION
+    prepared: PreparedTrack,
+    start: FittedTrack,
+    path: CameraPath | None = None,
+    ablation: Ablation = NO_ABLATION,
 ) -> FittedTrack:
-    return fit_clip(prepared, start, path or CameraPath.static(len(start.valid)), lambda *_: None, ablation)
+    return fit_clip(
+        prepared, start, path or CameraPath.static(len(start.valid)), lambda *_: None, ablation
+    )
 
 
 def joints(fitted: FittedTrack) -> np.ndarray:

@@ -7,7 +7,11 @@ from scope.scope_addon.edit.clip import Clip
 from scope.scope_addon.edit.pins.corrected_motion import shot_of
 from scope.scope_addon.edit.pins.corrections import FeetOnFloor, Interpolation
 from scope.scope_addon.errors import UsageError
-from scope.scope_addon.scene.character.corrections.edited_keys import KeyEdits, begin_with_edits, floored
+from scope.scope_addon.scene.character.corrections.edited_keys import (
+    KeyEdits,
+    begin_with_edits,
+    floored,
+)
 
 from ....edit.walking import BETAS, BODY, motion_of, walk
 from ...made_rigs import captured
@@ -27,17 +31,22 @@ def raised(by):
 
 def edits(*corrections, new=None, rows=None):
     every = np.ones(len(WALK), bool)
-    return KeyEdits(corrections, BETAS, shot_of(motion_of(WALK)), new, every if rows is None else rows)
+    return KeyEdits(
+        corrections, BETAS, shot_of(motion_of(WALK)), new, every if rows is None else rows
+    )
 
 
 def test_feet_of_displayed_keys_are_put_on_the_floor_wherever_the_motion_has_them(rig):
-    keys, old = begin_with_edits(rig, BODY, (raised(0.3), raised(0.1)), FRAMES, edits(FeetOnFloor()))
+    keys, old = begin_with_edits(
+        rig, BODY, (raised(0.3), raised(0.1)), FRAMES, edits(FeetOnFloor())
+    )
     np.testing.assert_allclose(keys.root, old.root, atol=1e-9)
     assert np.abs(keys.soles(BODY, BETAS)[..., 2].min(axis=1)).max() < 0.06
     same = floored(rig, BODY, BETAS, (raised(0.3), FRAMES), FeetOnFloor())
     np.testing.assert_allclose(keys.root, same.root, atol=1e-12)
     np.testing.assert_allclose(
-        floored(rig, BODY, BETAS, (WALK, FRAMES), FeetOnFloor(), 0.2).root[:, 2] - 0.2, same.root[:, 2]
+        floored(rig, BODY, BETAS, (WALK, FRAMES), FeetOnFloor(), 0.2).root[:, 2] - 0.2,
+        same.root[:, 2],
     )
 
 
@@ -53,7 +62,9 @@ def test_an_edit_from_before_changes_only_keys_that_begin_without_it(rig):
 
 def test_a_floor_is_not_found_from_a_few_keys(rig):
     rows = np.arange(len(WALK)) < 5
-    keys, old = begin_with_edits(rig, BODY, (raised(0.3), raised(0.1)), FRAMES, edits(FeetOnFloor(), rows=rows))
+    keys, old = begin_with_edits(
+        rig, BODY, (raised(0.3), raised(0.1)), FRAMES, edits(FeetOnFloor(), rows=rows)
+    )
     np.testing.assert_array_equal(keys.root, raised(0.3).root)
     np.testing.assert_array_equal(old.root, raised(0.1).root)
 

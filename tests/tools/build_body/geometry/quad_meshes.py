@@ -12,7 +12,12 @@ def tube(around: int, rings: int) -> tuple[np.ndarray, np.ndarray]:
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     vertices = np.array([[*xy, z] for z in range(rings) for xy in circle])
     quads = [
-        (z * around + k, z * around + (k + 1) % around, (z + 1) * around + (k + 1) % around, (z + 1) * around + k)
+        (
+            z * around + k,
+            z * around + (k + 1) % around,
+            (z + 1) * around + (k + 1) % around,
+            (z + 1) * around + k,
+        )
         for z in range(rings - 1)
         for k in range(around)
     ]

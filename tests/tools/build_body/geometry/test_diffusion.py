@@ -18,7 +18,9 @@ def test_one_round_is_the_mean_of_the_neighbours() -> None:
     strength = np.zeros(81)
     strength[40] = 0.25
     found = diffuse(LINKS, values, strength, 1)
-    np.testing.assert_allclose(found[40], 0.75 * values[40] + 0.25 * values[[31, 39, 41, 49]].mean(axis=0))
+    np.testing.assert_allclose(
+        found[40], 0.75 * values[40] + 0.25 * values[[31, 39, 41, 49]].mean(axis=0)
+    )
     np.testing.assert_array_equal(np.delete(found, 40, axis=0), np.delete(values, 40, axis=0))
 
 

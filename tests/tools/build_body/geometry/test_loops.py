@@ -16,7 +16,9 @@ VERTICES, QUADS = tube(AROUND, RINGS)
 def test_a_loop_goes_once_around_the_tube() -> None:
     loops = QuadLoops(QUADS)
     assert loops.walk(3 * AROUND, 3 * AROUND + 1) == [3 * AROUND + k for k in range(AROUND)]
-    assert loops.walk(3 * AROUND + 1, 3 * AROUND) == [3 * AROUND + (1 - k) % AROUND for k in range(AROUND)]
+    assert loops.walk(3 * AROUND + 1, 3 * AROUND) == [
+        3 * AROUND + (1 - k) % AROUND for k in range(AROUND)
+    ]
 
 
 def test_a_path_that_meets_a_border_or_a_pole_is_no_loop() -> None:

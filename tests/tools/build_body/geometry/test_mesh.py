@@ -37,8 +37,11 @@ def test_a_hole_in_a_plane_is_filled_with_the_plane_and_one_in_a_saddle_smoothly
     slope = vertices.copy()
     slope[:, 2] = 0.3 * vertices[:, 0] - 0.2 * vertices[:, 1] + 1.0
     saddle = vertices.copy()
-    saddle[:, 2] = (vertices[:, 0] - 4) * (vertices[:, 1] - 4)  # every vertex at the mean of its neighbours, as well
+    # every vertex at the mean of its neighbours, as well
+    saddle[:, 2] = (vertices[:, 0] - 4) * (vertices[:, 1] - 4)
     basis = np.stack([slope, saddle])
     damaged = basis.copy()
     damaged[:, inside] += 5.0
-    np.testing.assert_allclose(thin_plate(edges(quads), inside, damaged), basis[:, inside], atol=1e-9)
+    np.testing.assert_allclose(
+        thin_plate(edges(quads), inside, damaged), basis[:, inside], atol=1e-9
+    )

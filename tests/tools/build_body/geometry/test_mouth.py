@@ -33,7 +33,8 @@ def test_teeth_and_tongue_are_rebuilt(mouth):
     for key, value in built.items():
         if value.dtype.kind == "f":
             np.testing.assert_allclose(kept[key], value, atol=5e-5, err_msg=key)
-        elif key == "moves":  # displacements in whole steps: with another numpy, one lies on the other side of a half
+        # displacements in whole steps: with another numpy, one lies on the other side of a half
+        elif key == "moves":
             np.testing.assert_allclose(kept[key], value, atol=1, err_msg=key)
         else:
             np.testing.assert_array_equal(kept[key], value, err_msg=key)
@@ -69,7 +70,9 @@ def mouth_move(arrays, name):
 
 
 def distance_to_surface(points, triangles):
-    """Distance of each point (n, 3) from the triangles (m, 3, 3), by points spread over them, to 0.3 mm."""
+    """Distance of each point (n, 3) from the triangles (m, 3, 3), by points spread over them, to
+    0.3 mm.
+    """
     u, v = np.meshgrid(np.linspace(0, 1, 12), np.linspace(0, 1, 12))
     inside = u + v <= 1 + 1e-9
     a, b, c = np.stack([1 - u - v, u, v])[:, inside]
@@ -79,7 +82,9 @@ def distance_to_surface(points, triangles):
 
 @pytest.mark.parametrize("name", ["", "jawOpen", "jawLeft", "mouthFunnel"])
 def test_teeth_stay_in_the_strips_of_the_source(grown, mouth, name):
-    """At rest and under an expression: at most 2.5 mm from the source's strips, which its target moves."""
+    """At rest and under an expression: at most 2.5 mm from the source's strips, which its target
+    moves.
+    """
     _, kept = mouth
     source = grown.basis[0]
     teeth = part_of_mouth(kept, "teeth", "gums")
@@ -88,13 +93,17 @@ def test_teeth_stay_in_the_strips_of_the_source(grown, mouth, name):
     if name:
         source = source + source_move(name, len(source))
         points = points + mouth_move(kept, name)[teeth]
-    strips = np.concatenate([source_faces(grown, "upper-teeth"), source_faces(grown, "lower-teeth")])
+    strips = np.concatenate(
+        [source_faces(grown, "upper-teeth"), source_faces(grown, "lower-teeth")]
+    )
     triangles = source[np.concatenate([strips[:, [0, 1, 2]], strips[:, [0, 2, 3]]])]
     assert distance_to_surface(points, triangles).max() < 2.5e-3
 
 
 def mouth_offset(grown, kept):
-    """From the source's pose to the T-pose, (3,) metres: that of the nose, which the head alone moves."""
+    """From the source's pose to the T-pose, (3,) metres: that of the nose, which the head alone
+    moves.
+    """
     with np.load(BUILT_IN["scope"]) as file:
         nose = file["v_template"][np.flatnonzero(grown.mesh.kept == NOSE)[0]]
     return nose - grown.basis[0, NOSE]
@@ -107,7 +116,9 @@ def test_the_tongue_is_that_of_the_source(grown, mouth):
     np.testing.assert_allclose(at, grown.basis[0, vertices], atol=1e-5)
     for name in EXPRESSIONS:
         expected = source_move(name, len(grown.basis[0]))[vertices]
-        np.testing.assert_allclose(mouth_move(kept, name)[tongue], expected, atol=1e-8, err_msg=name)
+        np.testing.assert_allclose(
+            mouth_move(kept, name)[tongue], expected, atol=1e-8, err_msg=name
+        )
 
 
 @pytest.mark.parametrize("jaw", ["upper", "lower"])
@@ -125,4 +136,5 @@ def test_teeth_are_symmetric_and_face_outwards(mouth, jaw):
     outer = middle[:, 2] > np.median(middle[:, 2])  # the front teeth
     away = middle[outer] - [0.0, V[used, 1].mean(), V[used, 2].min()]
     lip = normal[outer] * [1, 0, 1]
-    assert ((lip * away * [1, 0, 1]).sum(axis=1) > 0).mean() > 0.6  # the others are edges and inner sides
+    # the others are edges and inner sides
+    assert ((lip * away * [1, 0, 1]).sum(axis=1) > 0).mean() > 0.6

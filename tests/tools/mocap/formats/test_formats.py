@@ -64,7 +64,9 @@ def test_length_unit_is_inches_over_the_unit():
 
 
 def test_zero_pose_follows_the_directions():
-    np.testing.assert_allclose(ends("root 1 2 3 0 0 0\nupper 0 0 0\nlower 0"), [[1, 2, 3], [11, 2, 3], [16, 2, 3]])
+    np.testing.assert_allclose(
+        ends("root 1 2 3 0 0 0\nupper 0 0 0\nlower 0"), [[1, 2, 3], [11, 2, 3], [16, 2, 3]]
+    )
 
 
 def test_a_dof_turns_about_the_axes_of_the_bone():
@@ -86,7 +88,10 @@ def test_euler_angles_turn_about_fixed_axes_x_first():
     ("text", "message"),
     [
         (amc(), "no frames"),
-        (amc("root 0 0 0 0 0 0\nupper 0 0 0\nlower 0", "root 0 0 0 0 0 0\nupper 0 0 0"), "complete"),
+        (
+            amc("root 0 0 0 0 0 0\nupper 0 0 0\nlower 0", "root 0 0 0 0 0 0\nupper 0 0 0"),
+            "complete",
+        ),
         (amc("root 0 0 0 0 0 0\nupper 0 0 0\nlower x"), "lower"),
         (amc("root 0 0 0 0 0 0\nmiddle 0 0 0"), "complete|middle"),
     ],
@@ -104,7 +109,9 @@ def test_a_broken_asf_is_named():
 
 
 def test_expmap_leaves_out_the_reference_frame_and_transposes():
-    skeleton = asf_amc.parse_asf(ASF.replace("upper", "lowerback").replace("lower\n", "upperback\n"))
+    skeleton = asf_amc.parse_asf(
+        ASF.replace("upper", "lowerback").replace("lower\n", "upperback\n")
+    )
     bones = ("root", "lowerback", "upperback")
     rows = np.zeros((2, expmap.COLUMNS))
     rows[1, :3] = 1, 2, 3
@@ -118,7 +125,9 @@ def test_expmap_leaves_out_the_reference_frame_and_transposes():
     assert len(expmap.BONES) == 38
 
 
-@pytest.mark.parametrize("text", ["1,2,3", ",".join(["0"] * 117), "\n".join([",".join(["a"] * 117)] * 2)])
+@pytest.mark.parametrize(
+    "text", ["1,2,3", ",".join(["0"] * 117), "\n".join([",".join(["a"] * 117)] * 2)]
+)
 def test_a_broken_expmap_is_named(text):
     with pytest.raises(MotionFileError, match="walking_1"):
         expmap.parse_expmap(text, "walking_1.txt")
@@ -128,10 +137,25 @@ def character() -> str:
     """An L-shaped leg: hip 0.1 to the right of the root, knee 0.4 below, ankle 0.4 below that."""
 
     def joint(name, kind, parent, x, y, z):
-        return {"Name": name, "Type": kind, "Parent": parent, "AttachX": x, "AttachY": y, "AttachZ": z}
+        return {
+            "Name": name,
+            "Type": kind,
+            "Parent": parent,
+            "AttachX": x,
+            "AttachY": y,
+            "AttachZ": z,
+        }
 
     def shape(name):
-        return {"Name": name, "AttachX": 0, "AttachY": 0, "AttachZ": 0, "Param0": 0.2, "Param1": 0.2, "Param2": 0.1}
+        return {
+            "Name": name,
+            "AttachX": 0,
+            "AttachY": 0,
+            "AttachZ": 0,
+            "Param0": 0.2,
+            "Param1": 0.2,
+            "Param2": 0.1,
+        }
 
     joints = [
         joint("root", "none", -1, 0, 0, 0),
@@ -152,9 +176,12 @@ def test_deepmimic_bends_the_knee_backwards_and_turns_to_the_shared_frame():
     assert take.fps == pytest.approx(30)
     assert take.mirrored
     np.testing.assert_allclose(take.joint("pelvis")[0], [0, 0.8, 0], atol=1e-12)
-    np.testing.assert_allclose(take.joint("right_knee")[0], [-0.1, 0.4, 0], atol=1e-12)  # right is -x
-    np.testing.assert_allclose(take.joint("right_ankle")[0], [-0.1, 0.4, -0.4], atol=1e-12)  # backwards is -z
-    np.testing.assert_allclose(take.joint("left_foot_end")[0], [0.1, 0, 0.1], atol=1e-12)  # the toes point to +z
+    # right is -x
+    np.testing.assert_allclose(take.joint("right_knee")[0], [-0.1, 0.4, 0], atol=1e-12)
+    # backwards is -z
+    np.testing.assert_allclose(take.joint("right_ankle")[0], [-0.1, 0.4, -0.4], atol=1e-12)
+    # the toes point to +z
+    np.testing.assert_allclose(take.joint("left_foot_end")[0], [0.1, 0, 0.1], atol=1e-12)
     np.testing.assert_allclose(take.joint("right_foot_end")[0], [-0.1, 0.3, -0.4], atol=1e-12)
 
 

@@ -14,7 +14,9 @@ MODULES = {module.__name__.rpartition(".")[2]: module for module in (de, es, fr,
 
 @pytest.mark.parametrize("language", MODULES.values(), ids=MODULES)
 def test_the_labels_are_those_of_the_operators(language):
-    assert set(language.OPERATORS) == {text for context, text in interface_texts() if context == OPERATOR}
+    assert set(language.OPERATORS) == {
+        text for context, text in interface_texts() if context == OPERATOR
+    }
 
 
 @pytest.mark.parametrize("language", MODULES.values(), ids=MODULES)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Labels and tooltips of the declared options are there in each language, and nothing else is among them."""
+"""Labels and tooltips of the declared options are there in each language, and nothing else is among
+them.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,10 @@ from scope.scope_addon.ui.translations.options import de, es, fr, ja, zh
 
 MODULES = {module.__name__.rpartition(".")[2]: module for module in (de, es, fr, ja, zh)}
 DECLARED = {
-    text.lower() for each in OPTIONS for text in (each.help, each.blender.label if each.blender else "") if text
+    text.lower()
+    for each in OPTIONS
+    for text in (each.help, each.blender.label if each.blender else "")
+    if text
 }
 
 

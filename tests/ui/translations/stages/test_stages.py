@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the progress of a capture says is there in each language, and filled in with the same values."""
+"""What the progress of a capture says is there in each language, and filled in with the same
+values.
+"""
 
 from __future__ import annotations
 
